@@ -1,0 +1,82 @@
+# Everything a person types here, from a new clone with Python 3.11 or newer and make:
+#
+#   make demo      simulate the example print head and write a report
+#   make test      run the tests
+#
+# The environment is made in .venv on first use. PYTHON=python3.12 chooses the interpreter.
+
+PYTHON   ?= python3
+VENV     := .venv
+BIN      := $(VENV)/bin
+DEMO     := runs/demo
+EXAMPLES := src/detent/examples
+PYTEST   := $(BIN)/python -m pytest
+# An interpreter named by the person replaces the one that an older .venv was made with.
+CHOSEN := $(if $(filter-out file default undefined,$(origin PYTHON)),--chosen)
+
+# tools/environment.py returns at once when the environment is already what pyproject.toml asks for.
+define environment
+@command -v '$(PYTHON)' >/dev/null || { echo "$(PYTHON) is not installed; detent needs Python 3.11 or newer (Debian: apt install python3 python3-venv)" >&2; exit 2; }
+@'$(PYTHON)' tools/environment.py $(CHOSEN) '$(VENV)' $(1)
+endef
+
+.DEFAULT_GOAL := help
+# The commands share one environment: under `make -j` two of them must not install into it at once.
+.NOTPARALLEL:
+.PHONY: help demo test test-long bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
+
+help: ## this list
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1#/' | awk -F'#' '{ printf "%-20s %s\n", $$1, $$2 }'
+
+venv-base:
+	$(call environment)
+
+venv-test:
+	$(call environment,test)
+
+venv-dev:
+	$(call environment,dev)
+
+demo: venv-base ## simulate the example print head printing a letter; say where the report is
+	@mkdir -p $(DEMO)
+	$(BIN)/detent run $(EXAMPLES)/print_head.toml --job $(EXAMPLES)/letter.txt --report $(DEMO)/report.html
+	@echo "Open $(CURDIR)/$(DEMO)/report.html in a browser."
+
+test: venv-test ## the tests, without those that take long
+	$(PYTEST) $(PYTEST_ARGS)
+
+test-long: venv-test ## the tests that take long
+	$(PYTEST) -m long $(PYTEST_ARGS)
+
+bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, milliseconds to start
+	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)
+
+bench-smoke: venv-test ## run every benchmark once, without measuring
+	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
+
+# Compiled code is invisible to coverage, so the steps run as plain Python here.
+coverage: venv-test ## which lines and branches the unit and property tests reach
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest tests/unit tests/property $(PYTEST_ARGS)
+	$(BIN)/python -m coverage report
+
+lint: venv-dev ## ruff: rules and layout
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: venv-dev ## let ruff lay out the code
+	$(BIN)/ruff format .
+
+types: venv-dev ## pyright, strict on src
+	$(BIN)/pyright
+
+imports: venv-dev ## do the rooms import downwards only?
+	$(BIN)/lint-imports
+
+docs: venv-dev ## build the documentation; a warning is an error
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
+
+check: lint types imports test docs bench-smoke ## all that a change must pass, but for the long tests
+
+clean: ## remove the environment and everything made
+	rm -rf $(VENV) $(VENV).lock docs/_build runs .pytest_cache .hypothesis .benchmarks .ruff_cache .import_linter_cache .coverage htmlcov

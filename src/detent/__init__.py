@@ -1,0 +1,3 @@
+"""detent: positioning control as software."""
+
+__version__ = "0.1.0"

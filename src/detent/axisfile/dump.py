@@ -1,0 +1,54 @@
+"""From a specification back to the text of an axis file that gives the same specification."""
+
+import json
+from decimal import Decimal
+
+from pydantic.fields import FieldInfo
+
+from detent.axisfile.fields import Table, file_key, table_of, unit_of
+from detent.axisfile.schema import PrintHeadSpec
+
+
+def dump_spec(spec: PrintHeadSpec) -> str:
+    """Write a specification as an axis file, with every value stated in SI units.
+
+    Parameters
+    ----------
+    spec : PrintHeadSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    str
+        TOML; loading it gives an equal specification, to the last bit.
+    """
+    return "\n".join(_table_lines(spec, ())).lstrip("\n") + "\n"
+
+
+def _table_lines(table: Table, path: tuple[str, ...]) -> list[str]:
+    """Lines of a table: its header, its values, then the tables below it."""
+    values: list[str] = []
+    below: list[str] = []
+    for name, field in type(table).model_fields.items():
+        value: object = getattr(table, name)
+        key = file_key(name, field)
+        if isinstance(value, Table):
+            below += _table_lines(value, (*path, key))
+        elif value is not None and table_of(field) is None:
+            values.append(f"{key} = {_value_text(field, value)}")
+    header = ["", f"[{'.'.join(path)}]"] if path and values else []
+    return header + values + below
+
+
+def _value_text(field: FieldInfo, value: object) -> str:
+    """Write a value as TOML: ``repr`` of a float is the shortest text that reads back as the same float."""
+    unit = unit_of(field)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and unit:
+        number = str(Decimal(repr(value)) * 100) if unit == "%" else repr(value)
+        return f'"{number} {unit}"'
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, as long as characters outside ASCII stay as they are.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

@@ -1,0 +1,180 @@
+"""How a key of the axis file is declared: its unit, bounds, default and meaning, once, on the field itself.
+
+Everything else that knows about keys (validation, messages, the printed axis, the reference) reads these declarations.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, cast, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from detent.units import QuantityError, describe_kind, format_quantity, parse_quantity
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Annotation of a dimensional field: text with a unit in the file, a float of this unit inside."""
+
+    symbol: str
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Put the reading of the text before the check of the number."""
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def read(self, value: object) -> object:
+        """Read the text of a quantity; anything else is refused with an example."""
+        kind, example = describe_kind(self.symbol)
+        allowed = f'{kind} with its unit, such as "{example}"'
+        if not isinstance(value, str):
+            remedy = f'write it as text with a unit, as in "{example}"'
+            raise PydanticCustomError("quantity", "not a quantity", {"allowed": allowed, "remedy": remedy})
+        try:
+            return parse_quantity(value, self.symbol)
+        except QuantityError as error:
+            context = {"allowed": error.allowed, "remedy": error.remedy}
+            raise PydanticCustomError("quantity", "not a quantity", context) from None
+
+
+class Table(BaseModel):
+    """A table of the axis file: unknown keys are errors, nothing is converted silently, nothing changes later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+def required(doc: str, example: str, *, allowed: str = "", **bounds: float) -> Any:
+    """Declare a key that must be stated.
+
+    Parameters
+    ----------
+    doc : str
+        Meaning of the key, one sentence without a full stop.
+    example : str
+        A value as TOML text, used in messages and in the reference.
+    allowed : str
+        Range in words, where the bounds in SI would be hard to recognise.
+    **bounds : float
+        ``gt``, ``ge``, ``lt``, ``le`` in the SI unit of the field, or ``min_length``, ``max_length``.
+    """
+    constraints: dict[str, Any] = dict(bounds)
+    return Field(description=doc, examples=[example], json_schema_extra={"allowed": allowed}, **constraints)
+
+
+def optional(doc: str, default: object, *, derived: str = "", allowed: str = "", **bounds: float) -> Any:
+    """Declare a key that may be left out.
+
+    Parameters
+    ----------
+    doc : str
+        Meaning of the key, one sentence without a full stop.
+    default : object
+        Value in the SI unit of the field; a callable makes it from the table's other values.
+    derived : str
+        Where the default comes from, in words, when it depends on other keys.
+    allowed, **bounds
+        As in `required`.
+    """
+    constraints: dict[str, Any] = dict(bounds)
+    constraints["default_factory" if callable(default) else "default"] = default
+    return Field(description=doc, json_schema_extra={"allowed": allowed, "derived": derived}, **constraints)
+
+
+def file_key(name: str, field: FieldInfo) -> str:
+    """Key of a field as written in the file."""
+    return field.alias or name
+
+
+def unit_of(field: FieldInfo) -> str:
+    """SI unit of a dimensional field; empty for pure numbers, words and switches."""
+    units = [entry.symbol for entry in _annotations_of(field) if isinstance(entry, Unit)]
+    return units[0] if units else ""
+
+
+def table_of(field: FieldInfo) -> type[Table] | None:
+    """Model of the table below a field, or None for a value."""
+    for candidate in (field.annotation, *get_args(field.annotation)):
+        if isinstance(candidate, type) and issubclass(candidate, Table):
+            return candidate
+    return None
+
+
+def extra_of(field: FieldInfo, name: str) -> str:
+    """Word kept beside a field by `required` or `optional` (``allowed``, ``derived``)."""
+    extra = field.json_schema_extra
+    return str(cast("dict[str, object]", extra).get(name, "")) if isinstance(extra, dict) else ""
+
+
+def example_of(field: FieldInfo) -> str:
+    """Give an example of a value that must be stated, as TOML text."""
+    return str(field.examples[0]) if field.examples else ""
+
+
+def leaf_fields(table: type[Table], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
+    """Walk all values a table can hold, tables below it included, in the order of declaration."""
+    for name, field in table.model_fields.items():
+        path = (*prefix, file_key(name, field))
+        below = table_of(field)
+        if below is None:
+            yield path, field
+        else:
+            yield from leaf_fields(below, path)
+
+
+def describe_allowed(field: FieldInfo) -> str:
+    """Say what a value may be: its kind, its range, an example."""
+    stated = extra_of(field, "allowed")
+    if stated:
+        return stated
+    options = options_of(field)
+    if options:
+        return " or ".join(f'"{option}"' for option in options)
+    if field.annotation is bool:
+        return "true or false"
+    unit = unit_of(field)
+    if unit:
+        kind, example = describe_kind(unit)
+        bounds = _describe_bounds(field, unit)
+        return f"{kind} {bounds}".rstrip() if bounds else f'{kind} such as "{example}"'
+    if field.annotation is str:
+        return "text in quotes"
+    kind = "a whole number" if field.annotation is int else "a number"
+    return f"{kind} {_describe_bounds(field, '')}".rstrip()
+
+
+def options_of(field: FieldInfo) -> tuple[str, ...]:
+    """Words a field may hold, when it is a choice."""
+    if get_origin(field.annotation) is Literal:
+        return tuple(str(option) for option in get_args(field.annotation))
+    return ()
+
+
+def _describe_bounds(field: FieldInfo, unit: str) -> str:
+    """Bounds of a number in words, with units; empty when there are none."""
+    texts: list[str] = []
+    for entry in _annotations_of(field):
+        if isinstance(entry, Gt):
+            texts.append(f"above {_bound_text(entry.gt, unit)}")
+        elif isinstance(entry, Ge):
+            texts.append(f"from {_bound_text(entry.ge, unit)}")
+        elif isinstance(entry, Lt):
+            texts.append(f"below {_bound_text(entry.lt, unit)}")
+        elif isinstance(entry, Le):
+            texts.append(f"up to {_bound_text(entry.le, unit)}")
+    return " and ".join(texts).replace(" and up to", " up to")
+
+
+def _bound_text(bound: object, unit: str) -> str:
+    """Write a bound with its unit; whole numbers in full."""
+    if isinstance(bound, int) and not unit:
+        return str(bound)
+    return format_quantity(float(str(bound)), unit)
+
+
+def _annotations_of(field: FieldInfo) -> Iterator[object]:
+    """Annotations of a field, those inside ``... | None`` included."""
+    yield from field.metadata
+    for candidate in get_args(field.annotation):
+        yield from getattr(candidate, "__metadata__", ())

@@ -1,0 +1,1 @@
+"""The laws: what the axis computer and its supervisor decide."""

@@ -1,0 +1,157 @@
+"""Print timing: fires the columns of a line from the emitter signal.
+
+Between two emitters the position is extrapolated with the last emitter interval. A wire needs its flight time to reach
+the paper, so it is fired early by commanded speed x flight time; what is left when the true speed differs is the column
+error. Positions in 1/256 emitter, times in microseconds.
+"""
+
+from detent.kernel.registers import Registers, f8, i4, i4_array, i8, register, u1, u1_array
+from detent.kernel.step import step
+
+COLUMNS = 2048
+"""Columns of the line buffer: 17 in at 120 per inch."""
+
+BINS = 128
+NEVER = 1 << 62
+
+
+class ColumnTimerParams(Registers):
+    """Geometry of the paper and flight of the wires."""
+
+    column_zero: i4 = register("carriage position of column 0, 1/256 emitter", unit="emitter/256")
+    column_pitch: i4 = register("distance of two columns, 1/256 emitter", unit="emitter/256")
+    lead_per_speed: i4 = register("flight lead per speed value, 1/65536 emitter", unit="emitter/65536")
+    flight_time: f8 = register("time from firing to the paper", unit="s")
+    metres_per_unit: f8 = register("length of 1/256 emitter", unit="m")
+    bin_width: f8 = register("width of a bin of the error histogram", unit="m")
+
+
+class LineBuffer(Registers):
+    """Two banks of columns: the supervisor fills one while the other prints."""
+
+    ink: u1_array = register("1 where a column is printed; bank 0, then bank 1", length=2 * COLUMNS)
+    landed: i4_array = register(
+        "where each fired column landed, right of its place; bank 0, then bank 1", unit="nm", length=2 * COLUMNS
+    )
+    speed: i4_array = register("speed value the line of each bank was begun with", unit="1/6 in/s", length=2)
+    direction: i4_array = register("direction of the line of each bank", length=2)
+    turned: i4_array = register("1 if the line of each bank was begun by a turn-around", length=2)
+
+
+class ErrorHistogram(Registers):
+    """Column errors counted per bin; errors beyond the ends count in the end bins."""
+
+    right: i4_array = register("columns printed moving right", unit="count", length=BINS)
+    left: i4_array = register("columns printed moving left", unit="count", length=BINS)
+
+
+class ColumnTimer(Registers):
+    """State of the print timing of the running line and the errors of its columns."""
+
+    bank: u1 = register("bank of the line buffer that prints")
+    active: u1 = register("1 while columns of the running line are still to be fired")
+    column: i4 = register("next column to fire")
+    end_column: i4 = register("last column of the line in the direction of motion")
+    lead: i4 = register("flight lead at the commanded speed, 1/256 emitter", unit="emitter/256")
+    fire_us: i8 = register("time at which the next column fires; far future when none is due", unit="us")
+    fired: i8 = register("columns printed so far", unit="count")
+    missed: i8 = register("inked columns passed without being fired", unit="count")
+    sum_squares: f8 = register("sum of squared column errors", unit="m^2")
+    worst: f8 = register("largest column error magnitude so far", unit="m")
+    line_fired: i4 = register("columns printed of this line", unit="count")
+    line_sum: f8 = register("sum of column errors of this line", unit="m")
+    line_squares: f8 = register("sum of squared column errors of this line", unit="m^2")
+    line_worst: f8 = register("largest column error magnitude of this line", unit="m")
+
+
+@step
+def skip_white(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
+    """Advance to the next inked column; the line is done when there is none."""
+    base = r.bank * COLUMNS
+    while r.active and b.ink[base + r.column] == 0:
+        if r.column == r.end_column:
+            r.active = 0
+        else:
+            r.column += direction
+
+
+@step
+def start_line(r: ColumnTimer, b: LineBuffer, first: int, last: int, direction: int) -> None:
+    """Begin a line whose printable interval runs from column `first` to `last` in the direction of motion."""
+    r.column = min(max(first, 0), COLUMNS - 1)
+    r.end_column = min(max(last, 0), COLUMNS - 1)
+    r.active = 1 if (last - first) * direction >= 0 else 0
+    r.fire_us = NEVER
+    r.line_fired = 0
+    r.line_sum = 0.0
+    r.line_squares = 0.0
+    r.line_worst = 0.0
+    skip_white(r, b, direction)
+
+
+@step
+def set_lead(p: ColumnTimerParams, r: ColumnTimer, s: int) -> None:
+    """Flight lead for a commanded speed."""
+    r.lead = (p.lead_per_speed * s + 128) >> 8
+
+
+@step
+def next_column(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
+    """The present column is done."""
+    r.fire_us = NEVER
+    if r.column == r.end_column:
+        r.active = 0
+    else:
+        r.column += direction
+        skip_white(r, b, direction)
+
+
+@step
+def schedule(p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int) -> None:
+    """On an emitter: set the firing time of the next column if it lies before the next emitter.
+
+    A column found behind the head (its time passed while the interval was still unknown) is counted as missed.
+    """
+    while r.active and r.fire_us == NEVER:
+        ahead = (p.column_zero + r.column * p.column_pitch - emitter * 256) * direction - r.lead
+        if ahead >= 256:
+            break
+        if ahead < 0 or interval <= 0:
+            r.missed += 1
+            next_column(r, b, direction)
+        else:
+            r.fire_us = now + ((ahead * interval + 128) >> 8)
+
+
+@step
+def book_error(p: ColumnTimerParams, r: ColumnTimer, h: ErrorHistogram, error: float, direction: int) -> None:
+    """Account the landing error of one column."""
+    size = abs(error)
+    r.fired += 1
+    r.sum_squares += error * error
+    r.worst = max(r.worst, size)
+    r.line_fired += 1
+    r.line_sum += error
+    r.line_squares += error * error
+    r.line_worst = max(r.line_worst, size)
+    place = error / p.bin_width + BINS // 2
+    k = 0 if place < 0.0 else (BINS - 1 if place >= BINS else int(place))
+    if direction > 0:
+        h.right[k] += 1
+    else:
+        h.left[k] += 1
+
+
+@step
+def fire(
+    p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, h: ErrorHistogram, x: float, v: float, direction: int
+) -> None:
+    """Print the due column: `x`, `v` are the true carriage position [m] and velocity [m/s] at the moment of firing.
+
+    The error is positive when the dot lands beyond its column in the direction of motion.
+    """
+    wanted = (p.column_zero + r.column * p.column_pitch) * p.metres_per_unit
+    offset = x + v * p.flight_time - wanted
+    b.landed[r.bank * COLUMNS + r.column] = int(offset * 1e9)
+    book_error(p, r, h, offset * direction, direction)
+    next_column(r, b, direction)

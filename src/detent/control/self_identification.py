@@ -1,0 +1,46 @@
+"""Slope and friction of one direction from two drive values and the two speeds they gave (specification 3.3)."""
+
+from detent.kernel.registers import Registers, i4, register, u1
+from detent.kernel.step import step
+
+
+class IdentifiedLine(Registers):
+    """The voltage/speed line of one direction."""
+
+    slope: i4 = register("slope K, 1/256 count per speed value", unit="count/256")
+    friction: i4 = register("friction-equivalent drive Vf", unit="count")
+    speed_fast: i4 = register("measured speed value of the fast pass", unit="1/6 in/s")
+    speed_slow: i4 = register("measured speed value of the slow pass", unit="1/6 in/s")
+    valid: u1 = register("1 after a plausible identification")
+
+
+class PlausibleLimits(Registers):
+    """What an identified line may be."""
+
+    slope_min: i4 = register("smallest plausible slope", unit="count/256")
+    slope_max: i4 = register("largest plausible slope", unit="count/256")
+    friction_max: i4 = register("largest plausible friction", unit="count")
+    literal_intercept: u1 = register("1: friction from the nominal slow speed, as the patent prints it")
+
+
+@step
+def identify(r: IdentifiedLine, p: PlausibleLimits, drive_fast: int, drive_slow: int) -> bool:
+    """Line through the two measured points; False leaves slope and friction as they were.
+
+    K = 256 (V1 - V2) / (s1 - s2), rounded; Vf = V2 - K s2 / 256 with the measured s2 (60 when literal).
+    """
+    rise = r.speed_fast - r.speed_slow
+    r.valid = 0
+    if rise <= 60:
+        return False
+    slope = (512 * (drive_fast - drive_slow) + rise) // (2 * rise)
+    if p.literal_intercept:
+        friction = drive_slow - ((slope * 60) >> 8)
+    else:
+        friction = drive_slow - ((slope * r.speed_slow + 128) >> 8)
+    if slope < p.slope_min or slope > p.slope_max or friction < 0 or friction > p.friction_max:
+        return False
+    r.slope = slope
+    r.friction = friction
+    r.valid = 1
+    return True

@@ -1,0 +1,155 @@
+"""The supervisor computer (B1): sends commands byte by byte and takes the answers in their order.
+
+Print-head specification 3.1. It knows the axis computer only through the two latches; how time passes between two
+bytes is the caller's business, so the same supervisor serves a simulation and a live axis.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from detent.control.head_commands import ACKNOWLEDGE
+from detent.control.head_computer import HeadComputer
+from detent.control.latch import read_latch, write_latch
+from detent.errors import AxisError, describe_sb1
+
+MOST_OUTSTANDING = 3
+"""Unanswered commands: the running one, and a speed or a motion behind it."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command as its bytes.
+
+    Attributes
+    ----------
+    data : bytes
+        First byte and data bytes.
+    motion : bool
+        True if it moves the head to a position; only one such command may wait.
+    text : str
+        For messages.
+    tag : int
+        The caller's own number, returned with the answer.
+    returns_data : bool
+        True if the answer is a data byte instead of SB1.
+    """
+
+    data: bytes
+    motion: bool
+    text: str
+    tag: int = -1
+    returns_data: bool = False
+
+
+@dataclass(frozen=True)
+class Answer:
+    """SB1 (or the data byte) of a command."""
+
+    command: Command
+    byte: int
+
+
+def calculate_parameters() -> Command:
+    """CALCULATE PARAMETERS: home and identify."""
+    return Command(bytes([0x01]), motion=False, text="CALCULATE PARAMETERS")
+
+
+def set_speed(s: int) -> Command:
+    """SET SPEED to the speed value `s` [1/6 in/s]."""
+    return Command(bytes([0x99, s]), motion=False, text=f"SET SPEED {s}")
+
+
+def run_to(emitter: int, tag: int = -1) -> Command:
+    """RUN TILL a position [emitter]."""
+    return Command(bytes([0x92, emitter >> 8, emitter & 0xFF]), motion=True, text=f"RUN TILL {emitter}", tag=tag)
+
+
+def print_from(start: int, end: int, tag: int = -1) -> Command:
+    """PRINT FROM `start` [1/256 emitter] TO `end` [emitter]."""
+    data = bytes([0x8D, start >> 16, (start >> 8) & 0xFF, start & 0xFF, end >> 8, end & 0xFF])
+    return Command(data, motion=True, text=f"PRINT FROM {start / 256:.2f} TO {end}", tag=tag)
+
+
+def position_high() -> Command:
+    """Upper half of the position; latches both halves."""
+    return Command(bytes([0x40]), motion=False, text="POSITION HIGH BYTE", returns_data=True)
+
+
+def position_low() -> Command:
+    """Lower half of the latched position."""
+    return Command(bytes([0x41]), motion=False, text="POSITION LOW BYTE", returns_data=True)
+
+
+@dataclass
+class Supervisor:
+    """Sends commands and collects answers.
+
+    Attributes
+    ----------
+    head : HeadComputer
+        Registers of the axis computer; only its two latches are touched.
+    pass_time : callable
+        ``pass_time(seconds) -> None`` lets at most that much time pass and returns earlier when a status byte waits.
+    on_answer : callable
+        Called with every `Answer` the moment it is read.
+    ack_last : bool
+        The axis acknowledges the last byte of a command too.
+    patience : float
+        Longest time a byte may take [s]; an axis that is silent for longer has failed.
+    """
+
+    head: HeadComputer
+    pass_time: Callable[[float], None]
+    on_answer: Callable[[Answer], None]
+    ack_last: bool = False
+    patience: float = 60.0
+    outstanding: deque[Command] = field(default_factory=deque[Command])
+
+    def send(self, command: Command) -> None:
+        """Send a command as soon as the axis may take it; answers that come meanwhile go to `on_answer`."""
+        while len(self.outstanding) >= MOST_OUTSTANDING or (command.motion and self.waiting_motions() > 1):
+            self.await_answer()
+        for k, byte in enumerate(command.data):
+            while self.head.command_latch.flag:
+                self.pass_time(0.0)
+            write_latch(self.head.command_latch, byte)
+            last = k == len(command.data) - 1
+            if not last or (self.ack_last and len(command.data) > 1):
+                self._await_acknowledge(command)
+        self.outstanding.append(command)
+
+    def waiting_motions(self) -> int:
+        """Unanswered motion commands."""
+        return sum(command.motion for command in self.outstanding)
+
+    def await_answer(self) -> None:
+        """Wait for the answer of the oldest outstanding command."""
+        self._book(self._next_byte(self.outstanding[0]))
+
+    def finish(self) -> None:
+        """Wait until every command is answered."""
+        while self.outstanding:
+            self.await_answer()
+
+    def _await_acknowledge(self, command: Command) -> None:
+        while True:
+            byte = self._next_byte(command)
+            if byte == ACKNOWLEDGE and not (self.outstanding and self.outstanding[0].returns_data):
+                return
+            if not self.outstanding:
+                raise AxisError(f"{command.text}: a byte was answered {describe_sb1(byte)}, expected FF (byte taken)")
+            self._book(byte)
+
+    def _book(self, byte: int) -> None:
+        self.on_answer(Answer(self.outstanding.popleft(), byte))
+
+    def _next_byte(self, command: Command) -> int:
+        latch = self.head.status.latch
+        if not latch.flag:
+            self.pass_time(self.patience)
+        if not latch.flag:
+            raise AxisError(
+                f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state {self.head.state}"
+            )
+        return int(read_latch(latch))

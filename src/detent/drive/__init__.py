@@ -1,0 +1,1 @@
+"""From a drive value to motor terminals: PWM timer, decoder, bridge."""

@@ -1,0 +1,130 @@
+"""The errors a person meets, and the texts of the axis computer's status codes.
+
+Everything detent raises on purpose is a `DetentError`. Its subclasses follow what the caller does next: correct the
+input (`InputError`), or look at the axis (`AxisError`). Inside the compiled loop nothing is raised: a code stands in a
+register, and its text stands here.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class DetentError(Exception):
+    """Root of every error detent raises on purpose.
+
+    Attributes
+    ----------
+    exit_status : int
+        What a command returns to the shell: 1 for an axis that did not do it, 2 for input that is wrong.
+    """
+
+    exit_status: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class FileProblem:
+    """One thing wrong in one input: where, what came, what is allowed, what to do.
+
+    Attributes
+    ----------
+    file : str
+        The file as the user named it, or ``--set`` for a value given on the command line.
+    line, column : int
+        Counted from 1; 0 when the problem has no place in the text (a missing file, an override).
+    key : str
+        Dotted key such as ``mechanics.travel``; empty for a problem of the text as a whole.
+    came : str
+        What was found, as written.
+    allowed : str
+        What would be accepted.
+    remedy : str
+        What the user does about it.
+    """
+
+    file: str
+    line: int
+    column: int
+    key: str
+    came: str
+    allowed: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """Give the problem as one line that editors and terminals can jump from."""
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        what = f"{place} {self.key}".rstrip()
+        return f"{what}: came {self.came}; allowed: {self.allowed}; do: {self.remedy}"
+
+
+class InputError(DetentError):
+    """An input (axis file, override, job) is wrong; holds all that is wrong with it.
+
+    Parameters
+    ----------
+    problems : iterable of FileProblem
+        At least one; kept in order of their place in the text.
+    """
+
+    exit_status = 2
+
+    def __init__(self, problems: Iterable[FileProblem]) -> None:
+        self.problems: tuple[FileProblem, ...] = tuple(
+            sorted(problems, key=lambda problem: (problem.file == "--set", problem.line, problem.column))
+        )
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    @classmethod
+    def of_file(cls, file: str, came: str, allowed: str, remedy: str) -> "InputError":
+        """Error about a file as a whole: it is absent, empty or of another kind."""
+        return cls([FileProblem(file, 0, 0, "", came, allowed, remedy)])
+
+    def __reduce__(self) -> tuple[type["InputError"], tuple[tuple[FileProblem, ...]]]:
+        """Pickle by the problems, so that the error crosses a process boundary whole."""
+        return type(self), (self.problems,)
+
+
+class AxisError(DetentError):
+    """The axis did not do what it was asked: it stalled, met an obstruction, or could not be identified."""
+
+    exit_status = 1
+
+
+SB1_TEXT: dict[int, str] = {
+    0x01: "the command is unknown or illegal; send one of the commands of the protocol, with its count of data bytes",
+    0x02: "a position or a speed is out of range; keep positions between the frames and speeds between 3 and 40 in/s",
+    0x04: "the axis is not calibrated; send CALCULATE PARAMETERS before the first motion",
+    0x08: "the head is obstructed or stalled and the drive is off; clear the way, then send CALCULATE PARAMETERS",
+    0x10: "the measured slope or friction is implausible and the default values were kept; look for a jam, "
+    "a wrong supply voltage or a wrong motor, then send CALCULATE PARAMETERS",
+    0x20: "a motion command came while one was already queued and was dropped; wait for an answer before the next",
+}
+"""Meaning of each bit of the axis computer's status byte SB1 (specification of the print head, 3.1)."""
+
+
+def describe_sb1(code: int) -> str:
+    """Say what a status byte means and what to do.
+
+    Parameters
+    ----------
+    code : int
+        SB1 as the axis computer sent it, 0..255; several bits may be set.
+
+    Returns
+    -------
+    str
+        One sentence per set bit, joined by "; also: ".
+
+    Examples
+    --------
+    >>> describe_sb1(0)
+    'done'
+    >>> describe_sb1(0x04)
+    'the axis is not calibrated; send CALCULATE PARAMETERS before the first motion'
+    """
+    if code == 0:
+        return "done"
+    texts = [text for bit, text in SB1_TEXT.items() if code & bit]
+    unnamed = code & ~sum(SB1_TEXT)
+    if unnamed:
+        texts.append(f"status bits 0x{unnamed:02X} have no meaning in this protocol; the status byte was not SB1")
+    return "; also: ".join(texts)

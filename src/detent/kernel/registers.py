@@ -1,0 +1,273 @@
+"""Register files: typed fields of exact width, declared once.
+
+A class of registers is a `ctypes.Structure`, so an instance is one flat piece of memory in the layout of the C compiler.
+Plain Python reads full integers from it and every store wraps to the width of the field; compiled steps work on the same
+memory with the same rule (`kernel.compiled`). The numpy dtype, the C struct, the trace columns and the reference tables
+all derive from the one declaration.
+"""
+
+import ctypes
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+type_of_structure: type = type(ctypes.Structure)
+
+
+@dataclass(frozen=True)
+class Width:
+    """Storage of one field: its short name, its ctypes type and its C name."""
+
+    code: str
+    ctype: Any
+    c_name: str
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return int(self.code[1:])
+
+    @property
+    def is_float(self) -> bool:
+        """True for a float, False for an integer."""
+        return self.code[0] == "f"
+
+    @property
+    def is_signed(self) -> bool:
+        """True unless the field is an unsigned integer."""
+        return self.code[0] != "u"
+
+
+u1 = Annotated[int, Width("u1", ctypes.c_uint8, "uint8_t")]
+u2 = Annotated[int, Width("u2", ctypes.c_uint16, "uint16_t")]
+u4 = Annotated[int, Width("u4", ctypes.c_uint32, "uint32_t")]
+i1 = Annotated[int, Width("i1", ctypes.c_int8, "int8_t")]
+i2 = Annotated[int, Width("i2", ctypes.c_int16, "int16_t")]
+i4 = Annotated[int, Width("i4", ctypes.c_int32, "int32_t")]
+i8 = Annotated[int, Width("i8", ctypes.c_int64, "int64_t")]
+f8 = Annotated[float, Width("f8", ctypes.c_double, "double")]
+u1_array = Annotated[list[int], Width("u1", ctypes.c_uint8, "uint8_t")]
+i4_array = Annotated[list[int], Width("i4", ctypes.c_int32, "int32_t")]
+i8_array = Annotated[list[int], Width("i8", ctypes.c_int64, "int64_t")]
+f8_array = Annotated[list[float], Width("f8", ctypes.c_double, "double")]
+
+
+@dataclass(frozen=True)
+class _Declaration:
+    """What `register` and `block` leave in the class body until the structure is laid out."""
+
+    doc: str
+    unit: str
+    length: int
+
+
+@dataclass(frozen=True)
+class Field:
+    """One declared field of a register file.
+
+    `width` is None for a nested block, whose class is then `block`; `length` is 0 for a single value, else the number of
+    elements of an array. `offset` counts bytes from the start of the structure.
+    """
+
+    name: str
+    doc: str
+    unit: str
+    offset: int
+    width: Width | None
+    block: "type[Registers] | None"
+    length: int
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One stored quantity reached through nested blocks, such as ``motor.current``."""
+
+    path: str
+    doc: str
+    unit: str
+    offset: int
+    width: Width
+    length: int
+
+
+def register(doc: str, *, unit: str = "", length: int = 0) -> Any:
+    """Declare a register.
+
+    Parameters
+    ----------
+    doc : str
+        What the value means, in the field's words.
+    unit : str
+        SI unit or "count", "tick", "code"; empty for a pure number or flag.
+    length : int
+        0 for one value, else the number of elements of an array field.
+    """
+    return _Declaration(doc, unit, length)
+
+
+def block(doc: str) -> Any:
+    """Declare a nested register file."""
+    return _Declaration(doc, "", 0)
+
+
+def _ctypes_field(name: str, hint: Any, declared: _Declaration) -> tuple[str, Any, Width | None]:
+    if isinstance(hint, type) and issubclass(hint, Registers):
+        return name, hint, None
+    widths = [part for part in get_args(hint)[1:] if isinstance(part, Width)]
+    if len(widths) != 1:
+        raise TypeError(
+            f"register {name!r}: came {hint!r}; allowed: a width such as i8 or f8, or a Registers class; declare one"
+        )
+    ctype = widths[0].ctype
+    return name, ctype * declared.length if declared.length else ctype, widths[0]
+
+
+class _RegistersMeta(type_of_structure):
+    """Lays the structure out from the annotations of the class body."""
+
+    def __init__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any) -> None:
+        super().__init__(name, bases, namespace, **kwargs)
+        declared = {key: value for key, value in namespace.items() if isinstance(value, _Declaration)}
+        if not declared:
+            return
+        hints = inspect.get_annotations(cls, eval_str=True)
+        rows = [_ctypes_field(key, hints[key], value) for key, value in declared.items()]
+        structure: Any = cls
+        structure._fields_ = [(key, ctype) for key, ctype, _ in rows]
+        structure.__fields__ = {
+            key: Field(
+                name=key,
+                doc=declared[key].doc,
+                unit=declared[key].unit,
+                offset=int(getattr(cls, key).offset),
+                width=width,
+                block=None if width else ctype,
+                length=declared[key].length,
+            )
+            for key, ctype, width in rows
+        }
+
+
+class Registers(ctypes.Structure, metaclass=_RegistersMeta):
+    """Base of every register file; an instance starts with all bits zero.
+
+    Examples
+    --------
+    >>> class Counter(Registers):
+    ...     count: u1 = register("pulses", unit="count")
+    >>> counter = Counter()
+    >>> counter.count = 257
+    >>> counter.count
+    1
+    """
+
+    __fields__: "dict[str, Field]" = {}  # noqa: RUF012 - replaced per class by the metaclass
+
+    @classmethod
+    def leaves(cls, prefix: str = "", offset: int = 0) -> Iterator[Leaf]:
+        """Every stored quantity with its dotted path, in order of memory."""
+        for field in cls.__fields__.values():
+            path, place = prefix + field.name, offset + field.offset
+            if field.block is not None:
+                yield from field.block.leaves(path + ".", place)
+            elif field.width is not None:
+                yield Leaf(path, field.doc, field.unit, place, field.width, field.length)
+
+    @classmethod
+    def dtype(cls) -> "np.dtype[Any]":
+        """Numpy structured dtype of the same memory, aligned as in C."""
+        import numpy as np
+
+        return np.dtype(cls)
+
+    @classmethod
+    def c_struct(cls) -> str:
+        """C99 declarations of this structure and of the blocks in it, inner ones first."""
+        inner: dict[str, str] = {}
+        body = "".join(_c_member(field, inner) for field in cls.__fields__.values())
+        return "".join(inner.values()) + f"typedef struct {{\n{body}}} {cls.__name__};\n"
+
+    def view(self) -> "NDArray[Any]":
+        """The same memory as a numpy array of shape (1,); writes go both ways."""
+        import numpy as np
+
+        return np.frombuffer(self, dtype=type(self).dtype())
+
+    def snapshot(self) -> bytes:
+        """Copy of the whole state."""
+        return bytes(self)
+
+    def restore(self, state: bytes) -> None:
+        """Put a snapshot back.
+
+        Raises
+        ------
+        ValueError
+            The snapshot is of another size, so of another declaration.
+        """
+        size = ctypes.sizeof(self)
+        if len(state) != size:
+            raise ValueError(
+                f"snapshot of {type(self).__name__}: came {len(state)} bytes; allowed: {size}; "
+                "take the snapshot with this version of the declaration"
+            )
+        ctypes.memmove(ctypes.addressof(self), state, size)
+
+    def copy(self) -> Self:
+        """Independent copy."""
+        return type(self).from_buffer_copy(self)
+
+    def values(self) -> dict[str, Any]:
+        """Value per dotted path; arrays as lists."""
+        state, found = bytes(self), {}
+        for leaf in type(self).leaves():
+            count = max(leaf.length, 1)
+            raw = (leaf.width.ctype * count).from_buffer_copy(state, leaf.offset)
+            found[leaf.path] = list(raw) if leaf.length else raw[0]
+        return found
+
+    def diff(self, other: "Registers | bytes") -> dict[str, tuple[Any, Any]]:
+        """Paths whose value differs, with (own, other's) value; `other` may be a snapshot."""
+        if isinstance(other, bytes):
+            theirs = type(self)()
+            theirs.restore(other)
+        else:
+            theirs = other
+        mine, them = self.values(), theirs.values()
+        return {path: (value, them[path]) for path, value in mine.items() if value != them[path]}
+
+    def __str__(self) -> str:
+        """One line per leaf: path, value, unit and meaning."""
+        rows = [(leaf, self.values()[leaf.path]) for leaf in type(self).leaves()]
+        width = max((len(leaf.path) for leaf, _ in rows), default=0)
+        return "\n".join(f"{leaf.path:<{width}}  {_shown(value)} {leaf.unit}".rstrip() for leaf, value in rows)
+
+    @classmethod
+    def markdown_table(cls) -> str:
+        """Reference table (Markdown) of every leaf: path, width, unit, meaning."""
+        rows = ["| register | width | unit | meaning |", "|---|---|---|---|"]
+        for leaf in cls.leaves():
+            width = leaf.width.code + (f" x {leaf.length}" if leaf.length else "")
+            rows.append(f"| `{leaf.path}` | {width} | {leaf.unit} | {leaf.doc} |")
+        return "\n".join(rows) + "\n"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list):
+        shown: list[Any] = value[:8]  # pyright: ignore[reportUnknownVariableType] - element type is the field's
+        return "[" + ", ".join(str(v) for v in shown) + (", ...]" if len(value) > len(shown) else "]")  # pyright: ignore[reportUnknownArgumentType]
+    return repr(value)
+
+
+def _c_member(field: Field, inner: dict[str, str]) -> str:
+    if field.block is not None:
+        inner.setdefault(field.block.__name__, field.block.c_struct())
+        return f"    {field.block.__name__} {field.name};\n"
+    assert field.width is not None, field.name
+    array = f"[{field.length}]" if field.length else ""
+    return f"    {field.width.c_name} {field.name}{array};\n"

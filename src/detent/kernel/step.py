@@ -1,0 +1,75 @@
+"""`@step`: the one place where a step's compilation is decided.
+
+A step reads its Params, writes its own Registers, allocates nothing and never raises. With ``NUMBA_DISABLE_JIT=1`` the
+same functions run as plain Python on the same memory and give the same bits.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import config
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+
+from detent.kernel import compiled  # noqa: F401 - registers the numba types of register files
+from detent.kernel.cache import compiled_folder, is_step_source, source_hash
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class _PackageLocator(UserProvidedCacheLocator):
+    """Puts a function's machine code into the folder of the package's source hash."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        self._py_file = py_file
+        self._lineno: int = py_func.__code__.co_firstlineno
+        self._cache_path = str(compiled_folder())
+
+    def get_source_stamp(self) -> str:
+        """The hash that also names the folder: an index that was moved here from elsewhere does not count."""
+        return source_hash()
+
+    def get_disambiguator(self) -> str:
+        """The module, so that equal names in two modules do not meet."""
+        return Path(self._py_file).parent.name
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> "_PackageLocator | None":
+        """None where the user's cache folder cannot be written."""
+        try:
+            found = cls(py_func, py_file)
+            found.ensure_cache_path()
+        except OSError:
+            return None
+        return found
+
+
+class _PackageCacheImpl(CompileResultCacheImpl):
+    _locator_classes = [_PackageLocator]  # noqa: RUF012 - numba's own attribute
+
+
+class _PackageCache(FunctionCache):
+    _impl_class = _PackageCacheImpl
+
+
+def step(function: F) -> F:  # noqa: UP047 - the type variable reads better here
+    """Compile a step.
+
+    ``error_model="numpy"`` keeps divisions from raising and lets loops vectorise; ``nogil`` lets a live loop run beside
+    the panel; floating-point rules stay strict, so that every machine gives the same bits. Only the package's own steps
+    are cached: the hash that names the cache folder covers no other source.
+    """
+    return _compiled(function, forceinline=False)
+
+
+def hot_step(function: F) -> F:  # noqa: UP047
+    """`step` for what runs in every tick: always inlined, so that a caller's registers stay in machine registers."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: F, *, forceinline: bool) -> F:  # noqa: UP047
+    made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline)(function)
+    if not config.DISABLE_JIT and is_step_source(Path(function.__code__.co_filename).resolve()):
+        made._cache = _PackageCache(function)
+    return cast("F", made)

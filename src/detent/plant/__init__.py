@@ -1,0 +1,1 @@
+"""What moves: motors, friction, transmissions, frames and other loads."""

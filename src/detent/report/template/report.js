@@ -1,0 +1,288 @@
+/* Draws what the page's data describes. Knows charts and paper, nothing about motors: the report's Python says what to draw. */
+(() => {
+  "use strict";
+  const data = JSON.parse(document.getElementById("report-data").textContent);
+  const root = document.documentElement;
+  const colour = (name) => getComputedStyle(root).getPropertyValue("--" + name).trim();
+  const font = '12px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
+  const plots = new Map();
+
+  /* ---- charts ---- */
+
+  const eachSpan = (u, spans, draw) => {
+    for (const [from, to] of spans) {
+      const left = Math.max(u.valToPos(from, "x", true), u.bbox.left);
+      const right = Math.min(u.valToPos(to, "x", true), u.bbox.left + u.bbox.width);
+      if (right > left) draw(left, right - left);
+    }
+  };
+
+  /* Bands lie under grid and curves. */
+  const drawBands = (chart) => (u) => {
+    for (const band of chart.bands || []) {
+      u.ctx.fillStyle = colour("band-" + band.colour);
+      eachSpan(u, band.spans, (left, width) => u.ctx.fillRect(left, u.bbox.top, width, u.bbox.height));
+    }
+  };
+
+  /* Their names stand at the foot, where curves seldom are, and only where they fit. */
+  const drawBandNames = (u, chart) => {
+    const { ctx, bbox } = u;
+    const scale = devicePixelRatio;
+    ctx.font = font.replace("12px", 11 * scale + "px");
+    ctx.fillStyle = colour("soft");
+    ctx.textAlign = "center";
+    ctx.textBaseline = "alphabetic";
+    for (const { spans, label } of chart.bands || [])
+      eachSpan(u, spans, (left, width) => {
+        const foot = bbox.top + bbox.height - 5 * scale;
+        if (ctx.measureText(label).width < width - 6 * scale) ctx.fillText(label, left + width / 2, foot);
+      });
+  };
+
+  const verticalLine = (u, x, dash, strokeStyle) => {
+    const { ctx, bbox } = u;
+    const at = Math.round(u.valToPos(x, "x", true));
+    if (at < bbox.left - 1 || at > bbox.left + bbox.width + 1) return null;
+    ctx.strokeStyle = strokeStyle;
+    ctx.lineWidth = devicePixelRatio;
+    ctx.setLineDash(dash.map((d) => d * devicePixelRatio));
+    ctx.beginPath();
+    ctx.moveTo(at, bbox.top);
+    ctx.lineTo(at, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.setLineDash([]);
+    return at;
+  };
+
+  /* Numbered events: the same numbers stand in the table below the figure. */
+  const drawEvents = (u, chart) => {
+    const { ctx, bbox } = u;
+    const scale = devicePixelRatio;
+    const radius = 8 * scale;
+    let last = -Infinity, level = 0;
+    (chart.events || []).forEach((x, index) => {
+      const at = verticalLine(u, x, [2, 3], colour("soft"));
+      if (at === null || !chart.numbered) return;
+      level = at - last < 2.2 * radius ? level + 1 : 0;
+      last = at;
+      const inside = Math.min(Math.max(at, bbox.left + radius), bbox.left + bbox.width - radius);
+      const y = bbox.top + radius + 2 * scale + level * 2.2 * radius;
+      ctx.fillStyle = colour("ink");
+      ctx.beginPath();
+      ctx.arc(inside, y, radius, 0, 2 * Math.PI);
+      ctx.fill();
+      ctx.fillStyle = colour("card");
+      ctx.textAlign = "center";
+      ctx.textBaseline = "middle";
+      ctx.font = "bold " + font.replace("12px", 11 * scale + "px");
+      ctx.fillText(String(index + 1), inside, y + scale / 2);
+    });
+  };
+
+  const drawLevels = (u, chart) => {
+    const { ctx, bbox } = u;
+    const scale = devicePixelRatio;
+    ctx.font = font.replace("12px", 11 * scale + "px");
+    ctx.textBaseline = "alphabetic";
+    for (const { y, label } of chart.levels || []) {
+      const at = Math.round(u.valToPos(y, "y", true));
+      ctx.strokeStyle = colour("soft");
+      ctx.lineWidth = scale;
+      ctx.setLineDash([2 * scale, 3 * scale]);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, at);
+      ctx.lineTo(bbox.left + bbox.width, at);
+      ctx.stroke();
+      ctx.setLineDash([]);
+      const right = bbox.left + bbox.width - 4 * scale;
+      const width = ctx.measureText(label).width;
+      ctx.fillStyle = colour("card");
+      ctx.fillRect(right - width - 3 * scale, at - 16 * scale, width + 6 * scale, 14 * scale);
+      ctx.fillStyle = colour("ink");
+      ctx.textAlign = "right";
+      ctx.fillText(label, right, at - 5 * scale);
+    }
+    for (const { x, label } of chart.marks || []) {
+      const at = verticalLine(u, x, [6, 4], colour("bad"));
+      if (at === null) continue;
+      ctx.fillStyle = colour("bad");
+      ctx.textAlign = x > 0 ? "left" : "right";
+      ctx.fillText(label, at + (x > 0 ? 4 : -4) * scale, bbox.top + 12 * scale);
+    }
+  };
+
+  const drawOver = (chart) => (u) => {
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(u.bbox.left - 1, u.bbox.top, u.bbox.width + 2, u.bbox.height);
+    u.ctx.clip();
+    if (chart.zero && u.scales.y.min < 0 && u.scales.y.max > 0) {
+      const at = Math.round(u.valToPos(0, "y", true));
+      u.ctx.strokeStyle = colour("muted");
+      u.ctx.lineWidth = devicePixelRatio;
+      u.ctx.beginPath();
+      u.ctx.moveTo(u.bbox.left, at);
+      u.ctx.lineTo(u.bbox.left + u.bbox.width, at);
+      u.ctx.stroke();
+    }
+    drawBandNames(u, chart);
+    drawLevels(u, chart);
+    drawEvents(u, chart);
+    u.ctx.restore();
+  };
+
+  const seriesOf = (one) => {
+    const stroke = colour(one.colour);
+    const series = { label: one.label, stroke, width: one.width || 1.5, dash: one.dash, points: { show: false }, spanGaps: false };
+    if (one.step) series.paths = uPlot.paths.stepped({ align: 1 });
+    if (one.bars) {
+      series.paths = uPlot.paths.bars({ size: [0.46, 60], align: one.bars, gap: 0 });
+      series.fill = stroke;
+      series.width = 0;
+    }
+    if (one.points) {
+      series.paths = () => null;
+      series.points = { show: true, size: one.points, fill: colour("card"), stroke, width: 2 };
+    }
+    return series;
+  };
+
+  const plain = new Intl.NumberFormat("en", { maximumFractionDigits: 6 });
+  const written = (value) => plain.format(value).replaceAll(",", "\u202f").replace("-", "\u2212");
+
+  const axisOf = (label, size, space) => ({
+    label: label || undefined, labelSize: 20, size, space, values: (u, ticks) => ticks.map(written), labelFont: font, font, stroke: colour("soft"),
+    grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1, size: 4 },
+  });
+
+  const optionsOf = (chart, holder) => ({
+    width: holder.clientWidth, height: chart.height, padding: [10, 12, 0, 0],
+    scales: { x: { time: false }, y: chart.yRange ? { range: () => chart.yRange } : {} },
+    axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), axisOf(chart.yLabel, 54, 26)],
+    series: [{ label: chart.xLabel.replace(/.*\[/, "").replace("]", "") }].concat(chart.series.map(seriesOf)),
+    legend: { live: true, markers: { width: 0 } },
+    cursor: {
+      sync: chart.sync ? { key: chart.sync } : undefined, y: false, drag: { x: true, y: false },
+      points: { size: 6 },
+    },
+    hooks: {
+      drawClear: [drawBands(chart)], draw: [drawOver(chart)],
+      setCursor: [(u) => holder.classList.toggle("live", u.cursor.left >= 0)],
+    },
+  });
+
+  /* The legend shows what the curve looks like: a line, dashes, a ring or a bar. */
+  const styleMarker = (marker, one) => {
+    if (!one) return;
+    const kind = one.points ? "ring" : one.bars ? "bar" : one.dash ? "dashes" : "line";
+    marker.className = "u-marker " + kind;
+    marker.style.color = colour(one.colour);
+  };
+
+  const drawChart = (chart) => {
+    const holder = document.getElementById(chart.id);
+    if (!holder) return;
+    const old = plots.get(chart.id);
+    if (old) old.destroy();
+    const columns = [chart.x].concat(chart.series.map((one) => one.y));
+    plots.set(chart.id, new uPlot(optionsOf(chart, holder), columns, holder));
+    holder.querySelectorAll(".u-legend .u-marker").forEach((marker, index) => styleMarker(marker, chart.series[index - 1]));
+  };
+  const drawCharts = () => data.charts.forEach(drawChart);
+
+  new ResizeObserver((entries) => {
+    for (const { target } of entries) {
+      const plot = plots.get(target.id);
+      if (plot && Math.abs(plot.width - target.clientWidth) > 1) plot.setSize({ width: target.clientWidth, height: plot.height });
+    }
+  }).observe(document.querySelector("main"));
+  addEventListener("resize", () => plots.forEach((plot, id) => {
+    const width = document.getElementById(id).clientWidth;
+    if (Math.abs(plot.width - width) > 1) plot.setSize({ width, height: plot.height });
+  }));
+
+  /* ---- the printed page ---- */
+
+  const svgElement = (name, attributes, text) => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    if (text !== undefined) element.textContent = text;
+    return element;
+  };
+
+  /* One unit is 1/120 in. A space has no ink and is left out, so that leading spaces cannot collapse. */
+  const drawLine = (svg, line, y, factor, limit) => {
+    const bold = new Set(line.bold);
+    const groups = { "": [], bold: [], off: [] };
+    [...line.text].forEach((letter, index) => {
+      if (letter.trim() === "") return;
+      const kind = Math.abs(line.off[index]) > limit ? "off" : bold.has(index) ? "bold" : "";
+      groups[kind].push([letter, (line.x[index] + (line.off[index] / 25400) * 120 * factor).toFixed(2)]);
+    });
+    for (const [kind, letters] of Object.entries(groups)) {
+      if (!letters.length) continue;
+      const x = letters.map((pair) => pair[1]).join(" ");
+      const size = Math.min(line.w / 0.6, 19);
+      svg.append(svgElement("text", { x, y, class: kind, "font-size": size }, letters.map((pair) => pair[0]).join("")));
+    }
+    const right = line.d > 0;
+    const label = right ? line.n + " \u2192" : "\u2190 " + line.n;
+    svg.append(svgElement("text", { x: -10, y, class: "gutter " + (right ? "right" : "left"), "text-anchor": "end" }, label));
+  };
+
+  const drawPaper = (state) => {
+    const { pages, limit, columns, magnify } = data.paper;
+    const page = pages[state.page];
+    const factor = state.magnified ? magnify : 1;
+    const ys = page.lines.map((line) => line.y * 2.5);
+    const top = Math.min(...ys) - 30, bottom = Math.max(...ys) + 20;
+    const width = Math.max(columns, 600) + 100;
+    const svg = svgElement("svg", { viewBox: `-75 ${top} ${width} ${bottom - top}`, role: "img", "aria-label": "the printed page" });
+    if (state.magnified)
+      for (let x = 0; x <= columns; x += 12) svg.append(svgElement("line", { x1: x, x2: x, y1: top, y2: bottom, class: "grid" }));
+    page.lines.forEach((line, index) => drawLine(svg, line, ys[index], factor, limit));
+    state.holder.replaceChildren(svg);
+    if (state.label) state.label.textContent = `page ${page.number} of ${pages.length + data.paper.leftOut}`;
+  };
+
+  const setUpPaper = () => {
+    const holder = document.getElementById("paper");
+    if (!holder || !data.paper) return;
+    const find = (id) => document.getElementById(id);
+    const state = { holder, page: 0, magnified: false, label: find("page-label") };
+    const press = (button, magnified) => button && button.addEventListener("click", () => {
+      state.magnified = magnified;
+      find("true-size").setAttribute("aria-pressed", String(!magnified));
+      find("magnified").setAttribute("aria-pressed", String(magnified));
+      drawPaper(state);
+    });
+    press(find("true-size"), false);
+    press(find("magnified"), true);
+    const turn = (step) => () => {
+      state.page = Math.min(Math.max(state.page + step, 0), data.paper.pages.length - 1);
+      find("page-back").disabled = state.page === 0;
+      find("page-next").disabled = state.page === data.paper.pages.length - 1;
+      drawPaper(state);
+    };
+    if (find("page-next")) {
+      find("page-next").addEventListener("click", turn(1));
+      find("page-back").addEventListener("click", turn(-1));
+    }
+    drawPaper(state);
+  };
+
+  /* ---- theme and paper output ---- */
+
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawCharts);
+  const forPrint = (on) => () => {
+    root.toggleAttribute("data-print", on);
+    drawCharts();
+    if (on) plots.forEach((plot) => plot.setSize({ width: Math.min(plot.width, 660), height: plot.height }));
+  };
+  addEventListener("beforeprint", forPrint(true));
+  addEventListener("afterprint", forPrint(false));
+
+  drawCharts();
+  setUpPaper();
+})();

@@ -1,0 +1,1 @@
+"""Advance an axis in simulated time; runs and their traces."""

@@ -1,0 +1,226 @@
+"""A trace: named columns over time, each with its unit, as a run records them.
+
+Columns are called by the dotted path of the register they came from (``motor.current``). The first is always ``t`` [s].
+"""
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+
+Column = NDArray[Any]
+"""One column: a one-dimensional array of integers, floats or booleans."""
+
+Attribute = str | float | int
+"""What is known about a trace as a whole: the axis, the job, the seed."""
+
+TIME = "t"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trace:
+    """What a run recorded: columns of equal length over time, with units.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray
+        Name to values, each of shape (n,). The first is ``t`` [s], which never runs backwards.
+    units : mapping of str to str
+        Unit of each column; "" (or no entry) for a number without unit.
+    docs : mapping of str to str
+        What each column holds, in a few words; may be incomplete.
+    attributes : mapping of str to str, float or int
+        What is true of the whole trace: ``axis``, ``job``, ``seed``.
+
+    Raises
+    ------
+    DetentError
+        The columns do not make a trace: no ``t`` in front, unequal lengths, values that are not numbers.
+    """
+
+    columns: dict[str, Column]
+    units: dict[str, str] = field(default_factory=dict[str, str])
+    docs: dict[str, str] = field(default_factory=dict[str, str])
+    attributes: dict[str, Attribute] = field(default_factory=dict[str, Attribute])
+
+    def __post_init__(self) -> None:
+        check_columns(self.columns)
+        for kind, mapping in (("unit", self.units), ("description", self.docs)):
+            for name in mapping:
+                if name not in self.columns:
+                    raise DetentError(f"trace: a {kind} is given for {name!r}, which is not one of its columns")
+
+    def __len__(self) -> int:
+        return len(self.columns[TIME])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __getitem__(self, name: str) -> Column:
+        """Give one column.
+
+        Parameters
+        ----------
+        name : str
+            Column name, such as ``motor.current``.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,); unit `self.units[name]`.
+
+        Raises
+        ------
+        DetentError
+            There is no such column; the text names the nearest and all that exist.
+        """
+        if name not in self.columns:
+            raise unknown_column(name, list(self.columns))
+        return self.columns[name]
+
+    @property
+    def time(self) -> Column:
+        """The time of each row [s], shape (n,)."""
+        return self.columns[TIME]
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The names of all columns but time, in order."""
+        return tuple(name for name in self.columns if name != TIME)
+
+    def label(self, name: str) -> str:
+        """Give a column's name with its unit, as headers and axes show it.
+
+        Parameters
+        ----------
+        name : str
+            Column name.
+
+        Returns
+        -------
+        str
+            Such as ``motor.current [A]``; the bare name where there is no unit.
+        """
+        unit = self.units.get(name, "")
+        return f"{name} [{unit}]" if unit else name
+
+    def between(self, start: float, stop: float) -> "Trace":
+        """Cut out a stretch of time.
+
+        Parameters
+        ----------
+        start, stop : float
+            First and last moment [s]; both ends belong to the stretch.
+
+        Returns
+        -------
+        Trace
+            Views into the same columns, no copy.
+
+        Raises
+        ------
+        DetentError
+            Nothing was recorded in the stretch.
+        """
+        first = int(np.searchsorted(self.time, start, side="left"))
+        last = int(np.searchsorted(self.time, stop, side="right"))
+        if first >= last:
+            held = f"{self.time[0]:g} s to {self.time[-1]:g} s" if len(self) else "nothing"
+            raise DetentError(f"trace: no rows from {start:g} s to {stop:g} s; it holds {held}; choose a time in there")
+        return Trace(
+            columns={name: values[first:last] for name, values in self.columns.items()},
+            units=self.units,
+            docs=self.docs,
+            attributes=self.attributes,
+        )
+
+    def match(self, patterns: Sequence[str]) -> tuple[str, ...]:
+        """Find the columns that a person means.
+
+        Parameters
+        ----------
+        patterns : sequence of str
+            Names, or patterns with ``*`` such as ``motor.*``.
+
+        Returns
+        -------
+        tuple of str
+            The columns in the order asked, each once; never ``t``.
+
+        Raises
+        ------
+        DetentError
+            A pattern fits no column.
+        """
+        found: dict[str, None] = {}
+        for pattern in patterns:
+            names = [name for name in self.signals if fnmatchcase(name, pattern)]
+            if not names:
+                raise unknown_column(pattern, list(self.signals))
+            found.update(dict.fromkeys(names))
+        return tuple(found)
+
+
+def unknown_column(name: str, known: Sequence[str]) -> DetentError:
+    """Make the error for a column that is not there.
+
+    Parameters
+    ----------
+    name : str
+        What was asked for.
+    known : sequence of str
+        What there is.
+
+    Returns
+    -------
+    DetentError
+        Its text names the nearest column first.
+    """
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return DetentError(f"trace: no signal {name!r}{hint}; it holds: {', '.join(known) or 'none'}")
+
+
+def check_columns(columns: Mapping[str, Column]) -> None:
+    """Refuse columns that do not make a trace.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray
+        As of `Trace`.
+
+    Raises
+    ------
+    DetentError
+        The first thing that is wrong, with the column's name and what came.
+    """
+    if next(iter(columns), None) != TIME:
+        first = next(iter(columns), "nothing")
+        raise DetentError(f"trace: the first column must be 't' (time in s), got {first!r}; put the time first")
+    rows = columns[TIME].shape
+    for name, values in columns.items():
+        if values.ndim != 1 or values.shape != rows:
+            raise DetentError(
+                f"trace: column {name!r} has shape {values.shape}, 't' has {rows}; give one value per row"
+            )
+        if values.dtype.kind not in "biuf":
+            raise DetentError(
+                f"trace: column {name!r} holds {values.dtype}; allowed: integers, floats, booleans; convert it"
+            )
+    time = columns[TIME]
+    backwards = np.flatnonzero(~(np.diff(time) >= 0)) if time.size > 1 else np.empty(0, dtype=np.intp)
+    if backwards.size:
+        row = int(backwards[0])
+        raise DetentError(
+            f"trace: time runs backwards or is not a number after row {row + 1} "
+            f"({time[row]!s} s, then {time[row + 1]!s} s); sort the rows by time"
+        )

@@ -1,0 +1,440 @@
+"""Traces in files: HDF5 is the store, CSV and Parquet are for other people's tools.
+
+| file | keeps | needs |
+|---|---|---|
+| ``.h5`` / ``.hdf5`` | columns in their exact width, units, descriptions, attributes | - |
+| ``.csv`` | columns (every digit) and units; no descriptions or attributes | - |
+| ``.parquet`` | everything | the extra ``parquet`` |
+
+Every writer fills a ``.part`` file beside the target and renames it at the end: a file with the right name is whole.
+"""
+
+import csv
+import importlib
+import json
+import re
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError, InputError
+from detent.simulation.trace import TIME, Attribute, Column, Trace, check_columns
+
+CHUNK_ROWS = 16384
+"""Rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column."""
+
+CSV_ROWS = 65536
+"""Rows of text made at once: bounds the memory of a CSV file of any length."""
+
+GROUP = "trace"
+FORMAT = "detent trace 1"
+
+_HEADER = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
+
+
+def save_hdf5(trace: Trace, path: str | Path) -> None:
+    """Write a trace as HDF5: one dataset per column under ``/trace``, units in attributes.
+
+    Parameters
+    ----------
+    trace : Trace
+        What to write.
+    path : str or Path
+        Target; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    dtype = np.dtype([(name, values.dtype) for name, values in trace.columns.items()])
+    with TraceWriter(path, dtype, units=trace.units, docs=trace.docs, attributes=trace.attributes) as writer:
+        writer.append_columns(trace.columns)
+
+
+class TraceWriter:
+    """Write a trace to HDF5 piece by piece, in constant memory, for runs of any length.
+
+    The file appears under its name when the writer is closed; until then it is beside it as ``.part``. Leaving the
+    ``with`` block by an exception closes it too - what was recorded up to a failure is what one wants to look at - with
+    the attribute ``complete`` = 0.
+
+    Parameters
+    ----------
+    path : str or Path
+        Target, replaced if it exists.
+    dtype : numpy.dtype
+        Structured type of the blocks to come: the column names and their widths; ``t`` first.
+    units, docs : mapping of str to str
+        As of `Trace`.
+    attributes : mapping of str to str, float or int
+        As of `Trace`; stored at the root.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be made, or the columns do not make a trace.
+
+    Examples
+    --------
+    >>> import numpy as np, tempfile, pathlib
+    >>> row = np.dtype([("t", "f8"), ("motor.current", "f8")])
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "run.h5"
+    >>> with TraceWriter(path, row, units={"t": "s", "motor.current": "A"}) as writer:
+    ...     writer.append(np.array([(0.0, 0.0), (0.001, 0.4)], dtype=row))
+    >>> len(load_trace(path))
+    2
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        dtype: np.dtype[Any],
+        *,
+        units: Mapping[str, str] | None = None,
+        docs: Mapping[str, str] | None = None,
+        attributes: Mapping[str, Attribute] | None = None,
+    ) -> None:
+        names = tuple(dtype.names or ())
+        # An empty trace of these columns must be a trace: this checks the names and the kinds of number.
+        Trace(
+            columns={name: np.empty(0, dtype[name]) for name in names}, units=dict(units or {}), docs=dict(docs or {})
+        )
+        self.path = Path(path)
+        self.rows = 0
+        self._names = names
+        self._last_time = -np.inf
+        self._part = _part_of(self.path)
+        with _writing(self.path):
+            self._file: Any = _h5py().File(self._part, "w")
+        self._write_head(dtype, dict(units or {}), dict(docs or {}), dict(attributes or {}))
+
+    def _write_head(
+        self, dtype: np.dtype[Any], units: dict[str, str], docs: dict[str, str], attributes: dict[str, Attribute]
+    ) -> None:
+        from detent import __version__
+
+        root = self._file.attrs
+        for name, value in {"detent_version": __version__, **attributes}.items():
+            root[name] = value
+        root["format"] = FORMAT
+        # A copy of a trace that broke off stays one that broke off.
+        self._whole = bool(attributes.get("complete", 1))
+        root["complete"] = 0
+        group = self._file.create_group(GROUP)
+        group.attrs["columns"] = list(self._names)  # HDF5 itself lists datasets by name, not in order
+        self._sets: dict[str, Any] = {}
+        for name in self._names:
+            dataset = group.create_dataset(
+                name, (0,), dtype[name], maxshape=(None,), chunks=(CHUNK_ROWS,), compression="gzip", compression_opts=1,
+                shuffle=True,
+            )  # fmt: skip
+            dataset.attrs["unit"] = units.get(name, "")
+            dataset.attrs["doc"] = docs.get(name, "")
+            self._sets[name] = dataset
+
+    def append(self, block: NDArray[np.void]) -> None:
+        """Add rows.
+
+        Parameters
+        ----------
+        block : ndarray
+            Structured array, shape (n,), with the fields of the writer's dtype.
+
+        Raises
+        ------
+        DetentError
+            The writer is closed, a field is missing, or the time runs backwards.
+        """
+        self.append_columns({name: block[name] for name in (block.dtype.names or ())})
+
+    def append_columns(self, columns: Mapping[str, Column]) -> None:
+        """Add rows given as columns.
+
+        Parameters
+        ----------
+        columns : mapping of str to ndarray
+            Every column of the writer, each of shape (n,).
+
+        Raises
+        ------
+        DetentError
+            As of `append`.
+        """
+        if self._file is None:
+            raise DetentError(f"{self.path}: the trace is closed; append rows before close()")
+        if tuple(columns) != self._names:
+            raise DetentError(f"{self.path}: got columns {list(columns)}, the file has {list(self._names)}; send these")
+        check_columns(columns)
+        time = columns[TIME]
+        if not time.size:
+            return
+        if time[0] < self._last_time:
+            raise DetentError(
+                f"{self.path}: a block starts at {time[0]!s} s, before the last row at {self._last_time!s} s; "
+                "append blocks in order of time"
+            )
+        end = self.rows + time.size
+        with _writing(self.path):
+            for name, values in columns.items():
+                self._sets[name].resize((end,))
+                self._sets[name][self.rows : end] = values
+        self.rows, self._last_time = end, time[-1]
+
+    def close(self, *, complete: bool = True) -> None:
+        """Finish the file and give it its name; a second call does nothing.
+
+        Parameters
+        ----------
+        complete : bool
+            Whether the run came to its end; stored as attribute ``complete`` (1 or 0).
+        """
+        if self._file is None:
+            return
+        with _writing(self.path):
+            self._file.attrs["complete"] = int(complete and self._whole)
+            self._file.close()
+            self._file = None
+            self._part.replace(self.path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close(complete=kind is None)
+
+
+def save_csv(trace: Trace, path: str | Path) -> None:
+    """Write a trace as CSV: one header row such as ``t [s],motor.current [A]``, then one row per moment.
+
+    Floats carry every digit needed to read the same bits back (17 at most), integers stay integers, booleans
+    become 0 and 1. Descriptions and attributes are not in the file.
+
+    Parameters
+    ----------
+    trace : Trace
+        What to write.
+    path : str or Path
+        Target; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    part = _part_of(Path(path))
+    with _writing(Path(path)):
+        with part.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerow([trace.label(name) for name in trace])
+            for first in range(0, len(trace), CSV_ROWS):
+                texts = [_texts(values[first : first + CSV_ROWS]) for values in trace.columns.values()]
+                # No cell needs quotes, so joining strings does what csv.writer does in half the time.
+                stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
+        part.replace(path)
+
+
+def _texts(values: Column) -> list[str]:
+    """Give the shortest text of each value that reads back as the same bits."""
+    if values.dtype.kind == "b":
+        values = values.view(np.uint8)
+    return list(map(repr, values.tolist()))
+
+
+def save_parquet(trace: Trace, path: str | Path) -> None:
+    """Write a trace as Parquet; units and descriptions are in the fields' metadata, attributes in the schema's.
+
+    Parameters
+    ----------
+    trace : Trace
+        What to write.
+    path : str or Path
+        Target; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        pyarrow is not installed (the text names the extra), or the file cannot be written.
+    """
+    arrow, parquet = _pyarrow()
+    fields = [
+        arrow.field(
+            name,
+            arrow.from_numpy_dtype(values.dtype),
+            metadata={"unit": trace.units.get(name, ""), "doc": trace.docs.get(name, "")},
+        )
+        for name, values in trace.columns.items()
+    ]
+    schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **trace.attributes})})
+    table = arrow.table([arrow.array(values) for values in trace.columns.values()], schema=schema)
+    part = _part_of(Path(path))
+    with _writing(Path(path)):
+        parquet.write_table(table, part)
+        part.replace(path)
+
+
+def save_trace(trace: Trace, path: str | Path) -> None:
+    """Write a trace in the format its suffix names.
+
+    Parameters
+    ----------
+    trace : Trace
+        What to write.
+    path : str or Path
+        Target ending in ``.h5``, ``.hdf5``, ``.csv`` or ``.parquet``.
+
+    Raises
+    ------
+    DetentError
+        The suffix is none of these, or the file cannot be written.
+    """
+    writers: dict[str, Callable[[Trace, str | Path], None]] = {
+        ".h5": save_hdf5, ".hdf5": save_hdf5, ".csv": save_csv, ".parquet": save_parquet,
+    }  # fmt: skip
+    suffix = Path(path).suffix.lower()
+    if suffix not in writers:
+        raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {', '.join(writers)}")
+    writers[suffix](trace, path)
+
+
+def load_trace(path: str | Path) -> Trace:
+    """Read a trace written by detent, or a CSV file of the same form.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file ending in ``.h5``, ``.hdf5``, ``.csv`` or ``.parquet``.
+
+    Returns
+    -------
+    Trace
+        From HDF5 and Parquet the same columns, bit for bit; from CSV integers come back as int64, floats as float64.
+
+    Raises
+    ------
+    InputError
+        The file is absent, is not a trace, or has a suffix detent does not read.
+    """
+    path = Path(path)
+    readers: dict[str, Callable[[Path], Trace]] = {
+        ".h5": _load_hdf5, ".hdf5": _load_hdf5, ".csv": _load_csv, ".parquet": _load_parquet,
+    }  # fmt: skip
+    suffix = path.suffix.lower()
+    if suffix not in readers:
+        raise InputError.of_file(str(path), f"suffix {suffix!r}", ", ".join(readers), "give a trace in one of these")
+    if not path.is_file():
+        raise InputError.of_file(str(path), "no such file", "a trace file", "check the name and the folder")
+    try:
+        return readers[suffix](path)
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, DetentError) as error:
+        if isinstance(error, DetentError) and not str(error).startswith("trace:"):
+            raise
+        came = " ".join(str(error).split()) or type(error).__name__
+        remedy = "save it again with detent, or give another file"
+        raise InputError.of_file(str(path), came, "a trace", remedy) from error
+
+
+def _load_hdf5(path: Path) -> Trace:
+    with _h5py().File(path, "r") as file:
+        if GROUP not in file:
+            raise InputError.of_file(
+                str(path), f"HDF5 with {', '.join(file) or 'nothing'}", f"a group /{GROUP}", "give a trace of detent"
+            )
+        group = file[GROUP]
+        names = [str(name) for name in group.attrs["columns"]]
+        # Version, format and completeness are the store's own; the rest is what the run said about itself.
+        attributes = {name: _plain(value) for name, value in file.attrs.items() if name != "format"}
+        return Trace(
+            columns={name: group[name][()] for name in names},
+            units={name: str(group[name].attrs["unit"]) for name in names},
+            docs={name: str(group[name].attrs["doc"]) for name in names},
+            attributes=attributes,
+        )
+
+
+def _plain(value: Any) -> Attribute:  # noqa: ANN401 - whatever HDF5 holds
+    """Turn an HDF5 attribute (NumPy scalar or text) into Python's own type."""
+    return cast("Attribute", value.item() if isinstance(value, np.generic) else value)
+
+
+def _load_parquet(path: Path) -> Trace:
+    _, parquet = _pyarrow()
+    table = parquet.read_table(path)
+    head: dict[bytes, bytes] = table.schema.metadata or {}
+    attributes: dict[str, Attribute] = json.loads(head.get(b"detent", b"{}"))
+    attributes.pop("format", None)
+    columns: dict[str, Column] = {}
+    units: dict[str, str] = {}
+    docs: dict[str, str] = {}
+    for field in table.schema:
+        metadata: dict[bytes, bytes] = field.metadata or {}
+        columns[field.name] = table.column(field.name).to_numpy()
+        units[field.name] = metadata.get(b"unit", b"").decode()
+        docs[field.name] = metadata.get(b"doc", b"").decode()
+    return Trace(columns=columns, units=units, docs=docs, attributes=attributes)
+
+
+def _load_csv(path: Path) -> Trace:
+    with path.open(encoding="utf-8-sig", newline="") as stream:
+        rows = csv.reader(stream)
+        empty: list[str] = []
+        header, first = next(rows, empty), next(rows, empty)
+    names: list[str] = []
+    units: dict[str, str] = {}
+    for cell in header:
+        match = _HEADER.fullmatch(cell.strip())
+        name, unit = (match["name"], match["unit"] or "") if match else (cell, "")
+        if name in units:
+            raise InputError.of_file(str(path), f"two columns {name!r}", "one of each", "rename one of them")
+        names.append(name)
+        units[name] = unit
+    if not first:
+        return Trace(columns={name: np.empty(0) for name in names}, units=units)
+    return Trace(columns=dict(zip(names, _read_columns(path, first), strict=True)), units=units)
+
+
+def _read_columns(path: Path, first: list[str]) -> list[Column]:
+    """Read all rows; a column whose first cell has no point, exponent or word is one of integers."""
+    kinds = ["i8" if re.fullmatch(r"\s*[+-]?\d+\s*", cell) else "f8" for cell in first]
+    options: dict[str, Any] = {"delimiter": ",", "skiprows": 1, "ndmin": 1, "encoding": "utf-8-sig", "comments": None}
+    try:
+        table = np.loadtxt(path, dtype=[(f"c{index}", kind) for index, kind in enumerate(kinds)], **options)
+    except ValueError:
+        # Other people's tools write 0 for 0.0: then the first row misleads and every number is read as a float.
+        table = np.loadtxt(path, dtype=[(f"c{index}", "f8") for index in range(len(kinds))], **options)
+    return [np.ascontiguousarray(table[f"c{index}"]) for index in range(len(kinds))]
+
+
+def _part_of(path: Path) -> Path:
+    return path.with_name(path.name + ".part")
+
+
+@contextmanager
+def _writing(path: Path) -> Generator[None]:
+    """Turn the system's refusal to write into an error that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+
+
+def _h5py() -> Any:  # noqa: ANN401 - h5py publishes no types
+    return importlib.import_module("h5py")
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise DetentError(
+            'Parquet needs pyarrow, which is not installed; do: pip install "detent[parquet]", or save as .h5 or .csv'
+        ) from error

@@ -1,0 +1,1 @@
+"""One module per method: the whole axis wired as its block diagram."""

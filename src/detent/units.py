@@ -1,0 +1,226 @@
+"""Quantities with units, at the border: text in, SI number out, and back to text for messages.
+
+The axis file is the only place where units other than SI are met, so `axisfile` is the only user of `parse_quantity`.
+Conversion is exact: factors are ratios of whole numbers, and the result is the double nearest to the true value, so
+that ``"3 in"`` and ``"76.2 mm"`` are the same number. Pint is imported at the first conversion.
+"""
+
+import math
+import re
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+MAX_TEXT = 80
+"""Longest quantity read, in characters: anything longer is not a quantity, and is refused before pint sees it."""
+
+KINDS: dict[str, tuple[str, str]] = {
+    "m": ("a length", "12 mm"),
+    "m/s": ("a velocity", "600 mm/s"),
+    "s": ("a time", "5 ms"),
+    "kg": ("a mass", "1.1 kg"),
+    "kg*m^2": ("a moment of inertia", "260 g*cm^2"),
+    "N": ("a force", "7.5 N"),
+    "N*s/m": ("a viscous friction coefficient", "0.4 N*s/m"),
+    "N*m/A": ("a torque constant", "0.241 N*m/A"),
+    "V": ("a voltage", "38 V"),
+    "V*s/rad": ("a back-EMF constant", "25.2 V/krpm"),
+    "ohm": ("a resistance", "12 ohm"),
+    "H": ("an inductance", "12 mH"),
+    "A": ("a current", "1.5 A"),
+    "rad": ("an angle", "5 deg"),
+    "rpm": ("a rotary speed", "3000 rpm"),
+    "%": ("a percentage", "+10 %"),
+}
+"""Name and example of each unit a file may ask for, as they appear in messages."""
+
+COMMON_UNITS: dict[str, dict[str, Fraction]] = {
+    "m": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
+    "m/s": {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
+    "s": {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
+    "kg": {"kg": Fraction(1), "g": Fraction(1, 1000)},
+    "kg*m^2": {"kg*m^2": Fraction(1), "g*cm^2": Fraction(1, 10**7)},
+    "N": {"N": Fraction(1)},
+    "N*s/m": {"N*s/m": Fraction(1)},
+    "N*m/A": {"N*m/A": Fraction(1), "mN*m/A": Fraction(1, 1000)},
+    "V": {"V": Fraction(1)},
+    "V*s/rad": {"V*s/rad": Fraction(1)},
+    "ohm": {"ohm": Fraction(1)},
+    "H": {"H": Fraction(1), "mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
+    "A": {"A": Fraction(1), "mA": Fraction(1, 1000)},
+    "rad": {"rad": Fraction(1)},
+}
+"""Factors met in nearly every file, by target unit: with these alone a file is read without waiting for pint's import
+(0.2 s). A test holds each of them to pint's."""
+
+_NUMBER_THEN_UNIT = re.compile(
+    r"\s*([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(\S.*)?", re.DOTALL
+)
+_UNIT_TEXT = re.compile(r"(?:[A-Za-zµμΩ]|[*/() ]|\^-?[0-9](?![0-9]))+")
+_OUNCE_OR_POUND = re.compile(r"\b(oz|lb)\b")
+
+
+class QuantityError(ValueError):
+    """A text is not a quantity of the wanted kind.
+
+    Attributes
+    ----------
+    allowed : str
+        What would be accepted, with an example.
+    remedy : str
+        What to do about it.
+    """
+
+    def __init__(self, reason: str, allowed: str, remedy: str) -> None:
+        super().__init__(f"{reason}; allowed: {allowed}; do: {remedy}")
+        self.reason = reason
+        self.allowed = allowed
+        self.remedy = remedy
+
+
+def describe_kind(unit: str) -> tuple[str, str]:
+    """Name and example of what `unit` measures: ``"m"`` gives ``("a length", "12 mm")``."""
+    return KINDS.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
+
+
+def parse_quantity(text: str, unit: str) -> float:
+    """Read a quantity such as ``"12 mm"`` as a number of `unit`.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit. ``"in"`` is the inch, ``"count"`` a pure number, ``ozf`` and ``lbf`` the forces.
+    unit : str
+        Unit of the result, a coherent SI unit of `KINDS`; ``"%"`` gives the fraction (``"+10 %"`` is 0.1).
+
+    Returns
+    -------
+    float
+        The value in `unit`, correctly rounded, always finite.
+
+    Raises
+    ------
+    QuantityError
+        The text has no unit, an unknown one or one of another dimension; the message holds an example.
+
+    Examples
+    --------
+    >>> parse_quantity("3 in", "m")
+    0.0762
+    >>> parse_quantity("-2.5 %", "%")
+    -0.025
+    """
+    kind, example = describe_kind(unit)
+    allowed = f'{kind} such as "{example}"'
+    match = _NUMBER_THEN_UNIT.fullmatch(text) if len(text) <= MAX_TEXT else None
+    if match is None:
+        raise QuantityError(f'"{text[:MAX_TEXT]}" is not a number with a unit', allowed, f'write {kind} as "{example}"')
+    number, unit_text = match.group(1), match.group(2)
+    if unit_text is None:
+        remedy = f'write the unit after the number, as in "{example}"'
+        raise QuantityError(f"the bare number {number}", allowed, remedy)
+    value = Fraction(number) * _conversion_factor(unit_text.strip(), unit)
+    try:
+        return float(value)
+    except OverflowError:
+        reason = f'"{text.strip()}" is beyond any number'
+        raise QuantityError(reason, allowed, f'write {kind} as "{example}"') from None
+
+
+def format_quantity(value: float, unit: str, digits: int = 4) -> str:
+    """Write an SI value for people, with a prefix that keeps the number short.
+
+    Parameters
+    ----------
+    value : float
+        Value in `unit`; for ``"%"`` the fraction.
+    unit : str
+        A unit of `KINDS`, or empty for a pure number.
+    digits : int
+        Significant digits, at least 1.
+
+    Examples
+    --------
+    >>> format_quantity(0.0762, "m")
+    '76.2 mm'
+    >>> format_quantity(0.1, "%")
+    '10 %'
+    """
+    if unit == "%":
+        return f"{value * 100:.{digits}g} %"
+    if unit == "rad":
+        return f"{math.degrees(value):.{digits}g} deg"
+    if unit == "":
+        return f"{value:.{digits}g}"
+    scale, prefixed = _prefixed(abs(float(f"{value:.{digits}g}")), unit)
+    return f"{value / scale:.{digits}g} {prefixed}"
+
+
+def _prefixed(size: float, unit: str) -> tuple[float, str]:
+    """Choose the prefix of a unit for a value of this size; returns (scale, prefixed unit)."""
+    if unit == "kg":
+        return (1.0, "kg") if size >= 1 or size == 0 else (1e-3, "g")
+    if unit == "kg*m^2":
+        # Rotor inertias are printed in g*cm^2 in every catalogue.
+        return (1e-7, "g*cm^2") if size else (1.0, unit)
+    if size == 0 or not math.isfinite(size):
+        return 1.0, unit
+    largest = 0 if unit in {"m", "m/s", "s"} else 6
+    exponent = max(-9, min(largest, 3 * math.floor(math.log10(size) / 3)))
+    prefix = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}[exponent]
+    return 10.0**exponent, prefix + unit
+
+
+@cache
+def _registry() -> Any:
+    """Load pint's units once, with factors as exact fractions; parsed definitions are kept in the user's cache."""
+    import pint
+
+    # Pint's annotations do not know registries of exact fractions.
+    make_registry: Any = pint.UnitRegistry
+    try:
+        return make_registry(cache_folder=":auto:", non_int_type=Fraction)
+    except OSError:
+        # A read-only home: slower by a few tenths of a second, otherwise the same.
+        return make_registry(non_int_type=Fraction)
+
+
+@cache
+def _conversion_factor(unit_text: str, unit: str) -> Fraction:
+    """How many `unit` one `unit_text` is, exactly."""
+    kind, example = describe_kind(unit)
+    allowed = f'{kind} such as "{example}"'
+    if unit == "%" or unit_text == "%":
+        if unit == unit_text:
+            return Fraction(1, 100)
+        raise QuantityError(f'the unit "{unit_text}"', allowed, f'write {kind} as "{example}"')
+    common = COMMON_UNITS.get(unit, {}).get(unit_text)
+    if common is not None:
+        return common
+    if "rad" in unit and re.search(r"[hH]z\b|[hH]ertz", unit_text):
+        # Pint takes 1 Hz for 1 rad/s: silently wrong by 2 pi.
+        raise QuantityError(f'the ambiguous unit "{unit_text}"', allowed, "write rad/s, rpm or turn/s instead of Hz")
+    return _pint_factor(unit_text, unit, allowed)
+
+
+def _pint_factor(unit_text: str, unit: str, allowed: str) -> Fraction:
+    """Ask pint for the factor; every way it can fail becomes a `QuantityError`."""
+    import pint
+
+    registry = _registry()
+    spelled = re.sub(r"[·.]", "*", unit_text).replace("**", "^").replace("²", "^2")
+    try:
+        if not _UNIT_TEXT.fullmatch(spelled):
+            raise ValueError(unit_text)  # noqa: TRY301 - joins the failures of pint below
+        factor = registry.Quantity(Fraction(1), registry.parse_units(spelled)).to(unit).magnitude
+    except pint.DimensionalityError:
+        _, example = describe_kind(unit)
+        remedy = f'use a unit of the same dimension as in "{example}"'
+        if "N" in unit and _OUNCE_OR_POUND.search(spelled):
+            remedy = "oz and lb are masses; write the forces as ozf and lbf"
+        raise QuantityError(f'the unit "{unit_text}", which measures something else', allowed, remedy) from None
+    except Exception as error:
+        # Pint reports a malformed unit by half a dozen kinds of exception; to the user all mean the same.
+        reason = f'the unknown unit "{unit_text}"'
+        raise QuantityError(reason, allowed, f"use a unit as in {allowed.rpartition(' as ')[2]}") from error
+    return Fraction(factor)

@@ -1,0 +1,11 @@
+"""Settings that every test shares."""
+
+import os
+
+from hypothesis import settings
+
+# A compiled step costs seconds the first time it is called, which says nothing about the example that met it: no
+# deadline. In CI the examples are the same each time, so that a red run can be repeated.
+settings.register_profile("detent", deadline=None, print_blob=True)
+settings.register_profile("ci", settings.get_profile("detent"), derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "detent")

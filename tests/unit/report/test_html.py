@@ -1,0 +1,201 @@
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import detent
+from detent.errors import DetentError
+from detent.report.data import Marks, Note, ReportData
+from detent.report.html import render_report, write_report
+from detent.report.words import GAP
+
+VOID = {"meta", "br", "link", "img", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """Collects text, ids and outside references, and checks that every element is closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.fetched: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value or "")
+            if name in {"src", "href", "srcset", "data"}:
+                self.fetched.append(value or "")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not {"script", "style"} & set(self.open):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", "".join(self.words).replace(GAP, " "))
+
+
+def embedded(text: str) -> dict:
+    found = re.search(r'<script type="application/json" id="report-data">(.*?)</script>', text, flags=re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def test_the_first_lines_say_what_happened(report: ReportData) -> None:
+    text = Page(render_report(report)).text
+    assert "✔ Printed LETTER.TXT" in text
+    assert "2 lines and 4 characters on 2 pages in 0.800 s." in text
+    assert "Every character landed within 60 µm of its column." in text
+    assert "Simulated run of the axis daisy & wheel" in text
+
+
+def test_the_cards_carry_the_figures(report: ReportData) -> None:
+    text = Page(render_report(report)).text
+    assert "Lines printed2 of 24 characters" in text
+    assert "Throughput5 characters/sin 0.800 s" in text
+    assert "Worst column error60 µmrms 30 µm, allowed 100 µm" in text
+    assert "Top print speed40 in/s1.02 m/s, in 1 of 2 lines" in text
+    assert "Turn-arounds1 of 1" in text
+
+
+def test_a_run_that_stopped_says_where_why_and_what_to_do(report: ReportData) -> None:
+    stopped = dataclasses.replace(
+        report, printed=False, failure="Obstruction <7 in>; clear the way.", lines=report.lines[:1]
+    )
+    text = Page(render_report(stopped)).text
+    assert "✘ Not printed LETTER.TXT" in text
+    assert "Stopped after 1 of 2 lines, 0.800 s into the job. Obstruction <7 in>; clear the way." in text
+    assert "✔" not in text
+
+
+def test_characters_off_their_column_spoil_the_headline(report: ReportData) -> None:
+    html = render_report(dataclasses.replace(report, column_limit=50e-6))
+    text = Page(html).text
+    assert "! Printed, but off its columns" in text
+    assert "1 character landed more than 50 µm from its column." in text
+    assert html.count('<td class="n over">') == 1
+
+
+def test_errors_come_before_warnings_and_notes(report: ReportData) -> None:
+    noted = dataclasses.replace(report, notes=[*report.notes, Note("error", "stalled")])
+    text = Page(render_report(noted)).text
+    assert text.index("Errorstalled") < text.index("Warningheadroom <3 %") < text.index("NoteESC A accepted")
+
+
+def test_a_long_job_says_that_its_path_is_cut(report: ReportData) -> None:
+    assert "The whole job" in Page(render_report(report)).text
+    assert report.path
+    long = dataclasses.replace(report, path=dataclasses.replace(report.path, t=report.path.t * 40), duration=80.0)
+    text = Page(render_report(long)).text
+    assert "The first 30 seconds of 80 s" in text
+    assert "The whole job" not in text
+
+
+def test_tables_compare_lines_and_constants(report: ReportData) -> None:
+    html = render_report(report)
+    rows = re.findall(r"<tr>(.*?)</tr>", html, flags=re.DOTALL)
+    cells = [[Page(cell).text for cell in re.findall(r"<td.*?</td>", row, flags=re.DOTALL)] for row in rows]
+    assert ["1", "→ right", "40", "standing start", "0.000", "0.300", "2", "2", "1.6"] in cells
+    assert ["2", "← left", "20", "turn-around", "0.300", "0.500", "2", "60", "42"] in cells
+    assert ["slope K, rightback-EMF", "171", "170", "+1 (+0.6 %)", "1/256 count per speed value"] in cells
+    assert ["tau", "–", "40.16", "–", "ms"] in cells
+    assert ["1", "0.0", "start", "132"] in cells
+    assert ["2", "66.8", "zero speed", ""] in cells
+
+
+def test_the_page_is_well_formed_and_every_chart_has_its_place(report: ReportData) -> None:
+    html = render_report(report)
+    page = Page(html)
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    charts = {chart["id"] for chart in embedded(html)["charts"]}
+    assert charts == {
+        "histogram", "path", "profile-speed", "profile-drive", "turn-current", "turn-speed", "identified-right",
+        "identified-left",
+    }  # fmt: skip
+    assert charts <= set(page.ids)
+    assert html.count('class="chart"') == len(charts)
+
+
+def test_the_page_fetches_nothing_and_forbids_it(report: ReportData) -> None:
+    html = render_report(report)
+    assert Page(html).fetched == []
+    assert "Content-Security-Policy\" content=\"default-src 'none'" in html
+    assert not re.search(r"@import|url\(|\bfetch\(|XMLHttpRequest", html)
+
+
+def test_what_the_job_printed_cannot_break_the_page(report: ReportData, marks: Marks) -> None:
+    text = list("</script><script>alert(1)//\u2028$body${x}")
+    n = len(text)
+    evil = Marks(
+        characters=text, page=np.ones(n), line=np.ones(n), baseline=np.ones(n), column=np.arange(n) * 1e-3,
+        landed=np.arange(n) * 1e-3, width=np.full(n, 2e-3), direction=np.ones(n), strikes=np.ones(n),
+    )  # fmt: skip
+    html = render_report(dataclasses.replace(report, marks=evil, job_name="<b>$data</b>", axis_name="</title>"))
+    assert "<script>alert" not in html
+    assert embedded(html)["paper"]["pages"][0]["lines"][0]["text"] == "".join(text)
+    page = Page(html)
+    assert page.open == []
+    assert "<b>$data</b>" in page.text
+    assert len(marks) == 4
+
+
+def test_parts_that_are_absent_leave_no_trace() -> None:
+    bare = ReportData(
+        axis_name="a", job_name="j", printed=False, duration=0.0, line_count=3, page_count=1, character_count=9,
+        failure="Not calibrated.",
+    )  # fmt: skip
+    html = render_report(bare)
+    page = Page(html)
+    assert embedded(html) == {"charts": [], "paper": None}
+    assert 'class="chart"' not in html
+    assert "<h2>" not in html
+    assert "Stopped after 0 of 3 lines, 0 s into the job. Not calibrated." in page.text
+    assert "nan" not in page.text.lower()
+
+
+def test_a_report_does_not_change_from_one_writing_to_the_next(report: ReportData, tmp_path: Path) -> None:
+    write_report(report, tmp_path / "a.html")
+    write_report(report, tmp_path / "b.html")
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.html", "b.html"]
+
+
+def test_a_folder_that_is_not_there_is_said(report: ReportData, tmp_path: Path) -> None:
+    with pytest.raises(DetentError, match=r"nowhere.*cannot be written \(No such file or directory\); choose another"):
+        write_report(report, tmp_path / "nowhere" / "a.html")
+
+
+def test_the_vendored_library_carries_its_licence(report: ReportData) -> None:
+    vendor = resources.files("detent.report").joinpath("vendor")
+    assert "MIT License" in vendor.joinpath("uPlot-LICENSE").read_text(encoding="utf-8")
+    assert "uPlot (v1.6.32)" in render_report(report)
+
+
+def test_writing_a_report_loads_no_plotting_library() -> None:
+    code = (
+        "import sys, detent.report.html, detent.report.figures; "
+        "print([name for name in ('matplotlib', 'h5py', 'numba', 'pint', 'pydantic') if name in sys.modules])"
+    )
+    source = Path(detent.__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={"PYTHONPATH": str(source)}, capture_output=True, check=True
+    )
+    assert done.stdout.strip() == b"[]"
