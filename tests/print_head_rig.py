@@ -107,6 +107,11 @@ class Rig:
         self.send(0x92, target >> 8, target & 0xFF)
         return self.next_status() if wait else None
 
+    def controlled_run_to(self, target: int, *, wait: bool = True) -> int | None:
+        """RUN TILL target, capped by the preselected speed; returns SB1 when `wait`."""
+        self.send(0xA2, target >> 8, target & 0xFF)
+        return self.next_status() if wait else None
+
     def set_speed(self, s: int) -> int | None:
         """SET SPEED."""
         self.send(0x99, s)

@@ -1,3 +1,48 @@
-"""detent: positioning control as software."""
+"""detent: positioning control as software.
+
+>>> import detent
+>>> axis = detent.load(detent.example("print_head.toml"))
+>>> axis.name
+'print head'
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from detent.axis import Axis, Run, load, load_trace
 
 __version__ = "0.1.0"
+
+__all__ = ["Axis", "Run", "__version__", "example", "examples", "load", "load_trace"]
+
+
+def __getattr__(name: str) -> Any:
+    """The API loads when it is first used, so that `import detent` and `detent --help` stay quick."""
+    if name in ("Axis", "Run", "load", "load_trace"):
+        from detent import axis
+
+        return getattr(axis, name)
+    raise AttributeError(f"module 'detent' has no attribute {name!r}; it has {', '.join(__all__)}")
+
+
+def examples() -> list[Path]:
+    """The packaged example files: axis files and jobs."""
+    folder = Path(__file__).resolve().parent / "examples"
+    return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("__"))
+
+
+def example(name: str) -> Path:
+    """Path of a packaged example.
+
+    Raises
+    ------
+    DetentError
+        There is none of that name; the message lists those there are.
+    """
+    from detent.errors import DetentError
+
+    found = {path.name: path for path in examples()}
+    if name not in found:
+        raise DetentError(f"example {name!r}: there is none of that name; choose one of {', '.join(found)}")
+    return found[name]

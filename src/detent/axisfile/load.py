@@ -169,7 +169,11 @@ def _apply_catalogue(layers: _Layers, reporter: Reporter) -> None:
     """Put a catalogue motor's constants under the stated ones."""
     motor = _as_table(layers.tables.get("motor"))
     name: object = motor.get("catalogue")
-    if not isinstance(name, str) or not name:
+    if not name:
+        return
+    if not isinstance(name, str):
+        # Validation refuses it; without the motor it names, missing constants are no news.
+        layers.doubtful.add(("motor",))
         return
     constants = motor_constants(name)
     if constants is None:

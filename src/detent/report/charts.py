@@ -27,6 +27,9 @@ Chart = dict[str, Any]
 PATH_SECONDS = 30.0
 """Time that the figure of the head's path shows: more than this is a grey block on any screen."""
 
+MARKS = 100_000
+"""Characters that a report draws: a megabyte of it. Beyond them whole pages are left out, and the report says so."""
+
 POINTS = 3000
 """Points of one curve: three per pixel of a wide screen."""
 
@@ -202,7 +205,7 @@ def histogram_chart(marks: Marks, limit: float) -> Chart:
     return {
         "id": "histogram",
         "x": _list((edges[:-1] + edges[1:]) / 2, 4),
-        "xLabel": "landed left of its column  \u2190  0  \u2192  right of its column  [µm]",
+        "xLabel": "\u2190 left of its column   [µm]   right of it \u2192",
         "yLabel": "characters",
         "height": 260,
         "zero": True,
@@ -255,8 +258,8 @@ def identified_chart(line: IdentifiedLine) -> Chart:
     }
 
 
-def page_data(marks: Marks, limit: float, most: int = 100_000) -> dict[str, Any]:
-    """Give the printed pages, line by line, for drawing characters where they landed.
+def page_data(marks: Marks, limit: float) -> dict[str, Any]:
+    """Give the printed pages, line by line, for drawing characters where they landed; at most `MARKS` of them.
 
     Parameters
     ----------
@@ -264,8 +267,6 @@ def page_data(marks: Marks, limit: float, most: int = 100_000) -> dict[str, Any]
         Everything struck.
     limit : float
         Largest good column error [m].
-    most : int
-        Marks to draw at most; whole pages are left out beyond it.
 
     Returns
     -------
@@ -274,7 +275,7 @@ def page_data(marks: Marks, limit: float, most: int = 100_000) -> dict[str, Any]
         that makes the errors visible; how many pages were left out.
     """
     numbers, sizes = np.unique(marks.page, return_counts=True)
-    kept = numbers[: max(1, int(np.searchsorted(np.cumsum(sizes), most, side="right")))]
+    kept = numbers[: max(1, int(np.searchsorted(np.cumsum(sizes), MARKS, side="right")))]
     worst = float(np.abs(marks.offset).max()) if len(marks) else 0.0
     column = np.round(marks.column / INCH * 120, 2)
     extent = float((column + marks.width / INCH * 120).max()) if len(marks) else 0.0

@@ -229,7 +229,7 @@ def _paper_figure(paper: dict[str, Any]) -> str:
         "so that the errors can be seen."
     )
     if left_out:
-        caption += f" {count(left_out, 'further page')} are not drawn."
+        caption += f" {count(left_out, 'further page')} {'is' if left_out == 1 else 'are'} not drawn."
     content = f'<div class="controls">{controls}</div><div class="paper" id="paper" tabindex="0"></div>'
     return _figure("The printed page", caption, content)
 

@@ -360,7 +360,7 @@ def _load_hdf5(path: Path) -> Trace:
         )
 
 
-def _plain(value: Any) -> Attribute:  # noqa: ANN401 - whatever HDF5 holds
+def _plain(value: Any) -> Attribute:
     """Turn an HDF5 attribute (NumPy scalar or text) into Python's own type."""
     return cast("Attribute", value.item() if isinstance(value, np.generic) else value)
 
@@ -427,7 +427,7 @@ def _writing(path: Path) -> Generator[None]:
         raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
 
 
-def _h5py() -> Any:  # noqa: ANN401 - h5py publishes no types
+def _h5py() -> Any:
     return importlib.import_module("h5py")
 
 

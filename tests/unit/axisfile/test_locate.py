@@ -18,7 +18,7 @@ inline = { a = 1, b = { c = 2 } }
 ]
 [[list]]
 [ spaced . "out" ]
-umlaut = "ä" 
+umlaut = "ä"
 x = "ä"
 """
 

@@ -126,8 +126,9 @@ def test_the_page_keeps_text_place_and_offset(marks: Marks) -> None:
     assert second["lines"][0]["off"] == [0.0, 60.0]
 
 
-def test_too_many_marks_leave_whole_pages_out(marks: Marks) -> None:
-    data = charts.page_data(marks, 50e-6, most=3)
+def test_too_many_marks_leave_whole_pages_out(marks: Marks, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(charts, "MARKS", 3)
+    data = charts.page_data(marks, 50e-6)
     assert [page["number"] for page in data["pages"]] == [1]
     assert data["leftOut"] == 1
 

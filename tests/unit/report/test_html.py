@@ -171,6 +171,23 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
     assert "nan" not in page.text.lower()
 
 
+def test_lines_without_marks_are_counted_and_have_no_error(report: ReportData) -> None:
+    lines = [dataclasses.replace(line, worst_error=float("nan"), rms_error=float("nan")) for line in report.lines]
+    html = render_report(dataclasses.replace(report, marks=Marks(), lines=lines))
+    page = Page(html)
+    assert "Throughput5 characters/s" in page.text
+    assert "column error" not in page.text
+    assert "What came out" not in page.text
+    assert html.count('<td class="n">–</td>') >= 4
+    assert "nan" not in page.text.lower()
+
+
+def test_pages_that_are_not_drawn_are_counted(report: ReportData, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "not drawn" not in Page(render_report(report)).text
+    monkeypatch.setattr("detent.report.charts.MARKS", 3)
+    assert "1 further page is not drawn." in Page(render_report(report)).text
+
+
 def test_a_report_does_not_change_from_one_writing_to_the_next(report: ReportData, tmp_path: Path) -> None:
     write_report(report, tmp_path / "a.html")
     write_report(report, tmp_path / "b.html")

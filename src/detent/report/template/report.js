@@ -1,4 +1,4 @@
-/* Draws what the page's data describes. Knows charts and paper, nothing about motors: the report's Python says what to draw. */
+/* Draws what the page's data describes. Knows charts and paper, nothing about motors: charts.py says what to draw. */
 (() => {
   "use strict";
   const data = JSON.parse(document.getElementById("report-data").textContent);
@@ -134,7 +134,7 @@
 
   const seriesOf = (one) => {
     const stroke = colour(one.colour);
-    const series = { label: one.label, stroke, width: one.width || 1.5, dash: one.dash, points: { show: false }, spanGaps: false };
+    const series = { label: one.label, stroke, width: one.width || 1.5, dash: one.dash, points: { show: false } };
     if (one.step) series.paths = uPlot.paths.stepped({ align: 1 });
     if (one.bars) {
       series.paths = uPlot.paths.bars({ size: [0.46, 60], align: one.bars, gap: 0 });
@@ -152,7 +152,8 @@
   const written = (value) => plain.format(value).replaceAll(",", "\u202f").replace("-", "\u2212");
 
   const axisOf = (label, size, space) => ({
-    label: label || undefined, labelSize: 20, size, space, values: (u, ticks) => ticks.map(written), labelFont: font, font, stroke: colour("soft"),
+    label: label || undefined, labelSize: 20, labelFont: font, size, space, font, stroke: colour("soft"),
+    values: (u, ticks) => ticks.map(written),
     grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1, size: 4 },
   });
 
@@ -160,7 +161,7 @@
     width: holder.clientWidth, height: chart.height, padding: [10, 12, 0, 0],
     scales: { x: { time: false }, y: chart.yRange ? { range: () => chart.yRange } : {} },
     axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), axisOf(chart.yLabel, 54, 26)],
-    series: [{ label: chart.xLabel.replace(/.*\[/, "").replace("]", "") }].concat(chart.series.map(seriesOf)),
+    series: [{ label: (/\[(.*)\]/.exec(chart.xLabel) || ["", ""])[1] }].concat(chart.series.map(seriesOf)),
     legend: { live: true, markers: { width: 0 } },
     cursor: {
       sync: chart.sync ? { key: chart.sync } : undefined, y: false, drag: { x: true, y: false },
@@ -191,16 +192,13 @@
   };
   const drawCharts = () => data.charts.forEach(drawChart);
 
-  new ResizeObserver((entries) => {
-    for (const { target } of entries) {
-      const plot = plots.get(target.id);
-      if (plot && Math.abs(plot.width - target.clientWidth) > 1) plot.setSize({ width: target.clientWidth, height: plot.height });
-    }
-  }).observe(document.querySelector("main"));
-  addEventListener("resize", () => plots.forEach((plot, id) => {
-    const width = document.getElementById(id).clientWidth;
-    if (Math.abs(plot.width - width) > 1) plot.setSize({ width, height: plot.height });
-  }));
+  const fit = (holder) => {
+    const plot = plots.get(holder.id);
+    const width = holder.clientWidth;
+    if (plot && Math.abs(plot.width - width) > 1) plot.setSize({ width, height: plot.height });
+  };
+  const watcher = new ResizeObserver((entries) => entries.forEach((entry) => fit(entry.target)));
+  document.querySelectorAll(".chart").forEach((holder) => watcher.observe(holder));
 
   /* ---- the printed page ---- */
 
