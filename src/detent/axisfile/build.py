@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.schema import EMITTER, FULL_DRIVE_COUNTS, INCH, SPEED_STEP, PrintHeadSpec, speed_value
+from detent.axisfile.schema import COLUMN, EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.plant.switched_motor import fill_pulse_table
 from detent.systems.print_head import AVERAGED, PERIOD_US, SWITCH_LEVEL, PrintHeadParams
@@ -61,7 +61,8 @@ def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
     for side, change in (("right", spec.disturbance.friction_right), ("left", spec.disturbance.friction_left)):
         friction = getattr(spec.mechanics.friction, side)
         for kind in ("coulomb", "static", "viscous"):
-            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind) * (1 + change))
+            # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
+            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind) * (1 + change) * drift)
     t.left_end, t.right_end = 0.0, spec.limits.travel
     obstacle = spec.disturbance.obstacle
     if obstacle is not None and spec.mechanics.start_position < obstacle.position:
@@ -110,7 +111,7 @@ def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
 def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     c = p.head.columns
     c.column_zero = round(spec.printing.left_margin / EMITTER * 256)
-    c.column_pitch = round(INCH / spec.printing.columns_per_inch / EMITTER * 256)
+    c.column_pitch = round(COLUMN / EMITTER * 256)
     c.flight_time = spec.printing.flight_time
     c.lead_per_speed = round(SPEED_STEP * c.flight_time / EMITTER * 65536)
     c.metres_per_unit = EMITTER / 256

@@ -72,7 +72,11 @@ class Machine:
         # The bridge cannot give more than the supply, the axis must not give more than the stated effort.
         self.max_counts = FULL_DRIVE_COUNTS * min(1.0, spec.limits.effort / spec.drive.supply)
         self.top_speed = speed_value(spec.limits.speed)
-        tables = {"right": (friction.right, drift.friction_right), "left": (friction.left, drift.friction_left)}
+        # Friction drifts as the drive that overcomes it, so its force drifts with the motor constant as well.
+        tables = {
+            "right": (friction.right, (1 + drift.friction_right) * gain - 1),
+            "left": (friction.left, (1 + drift.friction_left) * gain - 1),
+        }
         volts_per_newton = self.resistance / self.force_per_ampere
         counts_per_newton = volts_per_newton * self.counts_per_volt
         self.coulomb_counts = {d: (1 + change) * t.coulomb * counts_per_newton for d, (t, change) in tables.items()}

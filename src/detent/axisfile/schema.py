@@ -17,6 +17,9 @@ INCH = 0.0254
 EMITTER = INCH / 300
 """Head travel per encoder cycle the method assumes [m] (2.1)."""
 
+COLUMN = INCH / 120
+"""Distance of two print columns [m]: the finest step of a daisy-wheel stream."""
+
 SPEED_STEP = INCH / 6
 """Velocity of one speed value [m/s] (2.1)."""
 
@@ -235,7 +238,6 @@ class PrintTable(Table):
     """The printed line."""
 
     left_margin: Length = optional("head position of column 0, from the left frame", 0.0381, ge=0.0)
-    columns_per_inch: int = optional("finest column step of jobs, per inch", 120, ge=1, le=1200)
     flight_time: Time = optional("from the trigger to the print on the paper", 350e-6, ge=0.0, le=0.01)
 
 
@@ -257,8 +259,8 @@ class DisturbanceTable(Table):
     """How the true machine differs from the tables above; the axis computer does not know."""
 
     motor_constant: Percentage = optional("drift of torque and back-EMF constant", 0.0, ge=-0.9, le=2.0)
-    friction_right: Percentage = optional("drift of the friction to the right", 0.0, ge=-1.0, le=5.0)
-    friction_left: Percentage = optional("drift of the friction to the left", 0.0, ge=-1.0, le=5.0)
+    friction_right: Percentage = optional("drift of the friction-equivalent drive Vf to the right", 0.0, ge=-1.0, le=5.0)
+    friction_left: Percentage = optional("drift of the friction-equivalent drive Vf to the left", 0.0, ge=-1.0, le=5.0)
     supply: Voltage = optional("true supply voltage", math.nan, derived="drive.supply", gt=0.0, le=1000.0)
     obstacle: ObstacleTable | None = None
     push: PushTable | None = None

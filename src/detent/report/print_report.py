@@ -14,6 +14,7 @@ from detent.control.head_computer import (
     LOW_STOP,
 )
 from detent.report.data import (
+    Comparison,
     Constant,
     Event,
     HeadPath,
@@ -24,8 +25,10 @@ from detent.report.data import (
     Numbers,
     ReportData,
     SpeedProfile,
+    StartCurve,
     TurnAround,
 )
+from detent.simulation.comparison import DriveComparison
 from detent.simulation.print_run import LineRecord, PrintRun
 from detent.simulation.trace import Trace
 
@@ -252,3 +255,28 @@ def _notes(run: PrintRun) -> list[Note]:
     if len(run.job.notes) > 20:
         notes.append(Note("note", f"{len(run.job.notes) - 20} more notes about the job are in the JSON summary"))
     return notes
+
+
+def comparison_figure(found: DriveComparison, spec: PrintHeadSpec) -> Comparison:
+    """What the comparison figure shows: steady errors and starts of the three drives."""
+    return Comparison(
+        methods=found.methods,
+        speeds=found.speeds,
+        errors=found.errors,
+        starts=[StartCurve(name=start.method, t=start.t, velocity=start.velocity) for start in found.starts],
+        target=found.target,
+        machine=drift_text(spec),
+    )
+
+
+def drift_text(spec: PrintHeadSpec) -> str:
+    """How the true machine differs from its file, in a few words."""
+    d = spec.disturbance
+    parts = [
+        f"{name} {100 * value:+.3g} %"
+        for name, value in (("K", d.motor_constant), ("friction right", d.friction_right), ("friction left", d.friction_left))
+        if value
+    ]
+    if d.supply != spec.drive.supply:
+        parts.append(f"supply {d.supply:.4g} V instead of {spec.drive.supply:.4g} V")
+    return ", ".join(parts) or "machine as in its file"

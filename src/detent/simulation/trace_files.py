@@ -31,6 +31,9 @@ CHUNK_ROWS = 16384
 CSV_ROWS = 65536
 """Rows of text made at once: bounds the memory of a CSV file of any length."""
 
+PARQUET_ROWS = 1 << 20
+"""Rows of one Parquet row group."""
+
 GROUP = "trace"
 FORMAT = "detent trace 1"
 
@@ -229,12 +232,17 @@ def save_csv(trace: Trace, path: str | Path) -> None:
     DetentError
         The file cannot be written.
     """
-    part = _part_of(Path(path))
-    with _writing(Path(path)):
+    _write_csv(trace.columns, [trace.label(name) for name in trace], Path(path))
+
+
+def _write_csv(columns: Mapping[str, Column], labels: list[str], path: Path) -> None:
+    """Write columns, in memory or in an open HDF5 file, piece by piece."""
+    part = _part_of(path)
+    with _writing(path):
         with part.open("w", encoding="utf-8", newline="") as stream:
-            csv.writer(stream, lineterminator="\n").writerow([trace.label(name) for name in trace])
-            for first in range(0, len(trace), CSV_ROWS):
-                texts = [_texts(values[first : first + CSV_ROWS]) for values in trace.columns.values()]
+            csv.writer(stream, lineterminator="\n").writerow(labels)
+            for first in range(0, len(columns[TIME]), CSV_ROWS):
+                texts = [_texts(values[first : first + CSV_ROWS]) for values in columns.values()]
                 # No cell needs quotes, so joining strings does what csv.writer does in half the time.
                 stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
         part.replace(path)
@@ -262,21 +270,66 @@ def save_parquet(trace: Trace, path: str | Path) -> None:
     DetentError
         pyarrow is not installed (the text names the extra), or the file cannot be written.
     """
+    _write_parquet(trace.columns, trace.units, trace.docs, trace.attributes, Path(path))
+
+
+def _write_parquet(
+    columns: Mapping[str, Column],
+    units: Mapping[str, str],
+    docs: Mapping[str, str],
+    attributes: Mapping[str, Attribute],
+    path: Path,
+) -> None:
+    """Write columns, in memory or in an open HDF5 file, one row group at a time."""
     arrow, parquet = _pyarrow()
     fields = [
         arrow.field(
             name,
             arrow.from_numpy_dtype(values.dtype),
-            metadata={"unit": trace.units.get(name, ""), "doc": trace.docs.get(name, "")},
+            metadata={"unit": units.get(name, ""), "doc": docs.get(name, "")},
         )
-        for name, values in trace.columns.items()
+        for name, values in columns.items()
     ]
-    schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **trace.attributes})})
-    table = arrow.table([arrow.array(values) for values in trace.columns.values()], schema=schema)
-    part = _part_of(Path(path))
-    with _writing(Path(path)):
-        parquet.write_table(table, part)
+    schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **attributes})})
+    part = _part_of(path)
+    with _writing(path):
+        with parquet.ParquetWriter(part, schema) as writer:
+            for first in range(0, len(columns[TIME]), PARQUET_ROWS):
+                block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in columns.values()]
+                writer.write_table(arrow.table(block, schema=schema))
         part.replace(path)
+
+
+def convert_trace(store: str | Path, path: str | Path) -> None:
+    """Write an HDF5 trace again as CSV or Parquet, in constant memory however long it is.
+
+    Parameters
+    ----------
+    store : str or Path
+        HDF5 file.
+    path : str or Path
+        Target ending in ``.csv`` or ``.parquet``.
+
+    Raises
+    ------
+    DetentError
+        The suffix is none of these, the store cannot be read, or the target cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".csv", ".parquet"):
+        raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use .csv or .parquet")
+    with _writing(Path(store)):
+        file: Any = _h5py().File(store, "r")
+    with file:
+        group = file[GROUP]
+        columns = {str(name): group[name] for name in group.attrs["columns"]}
+        units = {name: str(values.attrs["unit"]) for name, values in columns.items()}
+        if suffix == ".csv":
+            labels = [f"{name} [{units[name]}]" if units[name] else name for name in columns]
+            _write_csv(columns, labels, Path(path))
+        else:
+            docs = {name: str(values.attrs["doc"]) for name, values in columns.items()}
+            _write_parquet(columns, units, docs, {k: _plain(v) for k, v in file.attrs.items() if k != "format"}, Path(path))
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
