@@ -106,9 +106,9 @@ class Axis:
                 result = print_job(self.spec, loaded, recorder=recorder, progress=progress)
         return Run(self, result, memory.trace(recorder, about))
 
-    def compare(self, *, progress: Progress | None = None) -> DriveComparison:
+    def compare(self) -> DriveComparison:
         """Power-on default, nominal table and identified drive on this (drifted) axis."""
-        return compare_drives(self.spec, progress=progress)
+        return compare_drives(self.spec)
 
 
 class _Memory:

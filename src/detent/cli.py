@@ -305,10 +305,12 @@ def compare(
     axis = load(file, overrides or [])
     _say_if_cold()
     with _progress(quiet=as_json) as progress:
-        found = axis.compare(progress=progress)
+        progress(0.1, "driving the axis three ways")
+        found = axis.compare()
+        progress(0.8, "drawing")
         plot_comparison(comparison_figure(found, axis.spec), figure)
     if as_json:
-        _print_json(found.to_dict() | {"files": [str(figure)]})
+        _print_json(found.to_dict() | {"machine": drift_text(axis.spec), "files": [str(figure)]})
         return
     _print_comparison(found, drift_text(axis.spec), figure)
 

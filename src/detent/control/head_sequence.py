@@ -50,11 +50,15 @@ from detent.control.speed_selection import HIGH_SPEED
 from detent.kernel.step import hot_step, step
 
 BREAK_LOOSE_US = 1000
-"""Homing without a speed trim: the drive rises one count per millisecond without an emitter, up to the homing limit."""
+"""Homing without a speed trim: while the head stands, the drive rises one count per millisecond up to the homing limit.
+It stands once no emitter has come for the zero-speed time; a drive that rose while it creeps would double its speed."""
 
 FAST_WINDOW_US, SLOW_WINDOW_US = 20_000, 80_000
 PASS_FAST_LEFT, PASS_FAST_RIGHT, PASS_SLOW_LEFT, PASS_SLOW_RIGHT = 1, 2, 3, 4
 RUNAWAY_EMITTERS = 2
+REVERSAL_US = 800
+"""Emitter interval from which a reversed encoder sequence is believed: the last one before standstill takes over 1 ms, and
+at speed a missing pulse looks like a reversal."""
 
 
 @step
@@ -92,7 +96,7 @@ def begin_homing(p: HeadParams, c: HeadComputer, state: int) -> None:
     c.interval_us = 0
     c.too_fast = 0
     c.drive = min(steady_drive(p.slope_default, p.friction_default, p.homing_speed), p.homing_limit)
-    c.next_ramp_us = c.now_us + BREAK_LOOSE_US
+    c.next_ramp_us = c.now_us + p.zero_speed_us
     put_drive(p, c, c.direction * c.drive)
 
 
@@ -273,7 +277,7 @@ def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change:
     if c.too_fast >= RUNAWAY_EMITTERS:
         fault(p, c, OBSTRUCTION)
     elif c.state in (HOME_LEFT, HOME_RIGHT):
-        c.next_ramp_us = c.now_us + BREAK_LOOSE_US
+        c.next_ramp_us = c.now_us + p.zero_speed_us
     elif c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE):
         if change != c.direction:
             at_zero_speed(p, c, b)
@@ -282,6 +286,14 @@ def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change:
         move_emitter(p, c)
         if was_accelerating and c.state == HIGH_STEADY and c.calibration_pass:
             begin_windows(c)
+
+
+@step
+def on_reverse_edge(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+    """A quadrature edge against the motion: during a stop the head has passed zero speed (3.9)."""
+    at_speed = 0 < c.interval_us < REVERSAL_US
+    if c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE) and not at_speed:
+        at_zero_speed(p, c, b)
 
 
 @step
@@ -360,4 +372,4 @@ def power_on(p: HeadParams, c: HeadComputer) -> None:
         line.slope, line.friction = p.slope_default, p.friction_default
 
 
-__all__ = ["LOW_STEADY", "decide", "next_wake", "on_emitter", "power_on"]
+__all__ = ["LOW_STEADY", "decide", "next_wake", "on_emitter", "on_reverse_edge", "power_on"]

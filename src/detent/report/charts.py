@@ -12,6 +12,7 @@ import numpy as np
 from detent.report.data import (
     INCH,
     SPEED_STEP,
+    ColumnErrors,
     Event,
     HeadPath,
     IdentifiedLine,
@@ -176,37 +177,38 @@ def _nice_step(wanted: float) -> float:
     return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= wanted * 0.999))
 
 
-def histogram_chart(marks: Marks, limit: float) -> Chart:
-    """Count how far from their column the characters landed, per direction of printing.
+def histogram_chart(errors: ColumnErrors, limit: float) -> Chart:
+    """Count how far from their place the columns landed, per direction of printing.
 
     Parameters
     ----------
-    marks : Marks
-        At least one.
+    errors : ColumnErrors
+        At least one column.
     limit : float
         Largest good column error [m].
 
     Returns
     -------
     dict
-        One chart: characters per bin over micrometres to the right of the column.
+        One chart: columns per bin over micrometres to the right of the place.
     """
-    offset = marks.offset * 1e6
-    largest = max(float(np.abs(offset).max()), 0.05)
-    step = _nice_step(largest / 15)
+    offset = errors.offsets * 1e6
+    seen = np.abs(offset[(errors.right + errors.left) > 0])
+    largest = max(float(seen.max(initial=0.0)), 0.05)
+    step = max(_nice_step(largest / 15), errors.bin_width * 1e6)
     half = int(np.ceil(largest / step + 0.5))
     edges = (np.arange(-half, half + 2) - 0.5) * step
     series = [
         {"label": f"printed to the {name}", "colour": name, "bars": side,
-         "y": np.histogram(offset[np.asarray(marks.direction) == direction], edges)[0].tolist()}
-        for name, direction, side in (("right", 1, 1), ("left", -1, -1))
+         "y": np.histogram(offset, edges, weights=counts)[0].astype(int).tolist()}
+        for name, counts, side in (("right", errors.right, 1), ("left", errors.left, -1))
     ]  # fmt: skip
     limits = [sign * limit * 1e6 for sign in (-1, 1) if limit * 1e6 <= edges[-1]]
     return {
         "id": "histogram",
         "x": _list((edges[:-1] + edges[1:]) / 2, 4),
-        "xLabel": "\u2190 left of its column   [µm]   right of it \u2192",
-        "yLabel": "characters",
+        "xLabel": "\u2190 left of its place   [µm]   right of it \u2192",
+        "yLabel": "columns",
         "height": 260,
         "zero": True,
         "marks": [{"x": round(value, 3), "label": "limit"} for value in limits],

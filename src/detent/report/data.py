@@ -175,6 +175,42 @@ class Marks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ColumnErrors:
+    """How far from its place every printed column landed, counted in bins.
+
+    Attributes
+    ----------
+    bin_width : float
+        Width of a bin [m]; the middle bin is centred on zero, the end bins hold everything beyond.
+    right, left : ndarray of int
+        Columns per bin, printed to the right and to the left, from left of the place to right of it; odd length.
+    worst, rms : float
+        Largest magnitude and root mean square of all columns [m].
+    """
+
+    bin_width: float
+    right: Numbers
+    left: Numbers
+    worst: float
+    rms: float
+
+    @property
+    def total(self) -> int:
+        """Columns printed."""
+        return int(self.right.sum() + self.left.sum())
+
+    @property
+    def offsets(self) -> Numbers:
+        """Middle of each bin [m], right of the place positive."""
+        return (np.arange(len(self.right)) - len(self.right) // 2) * self.bin_width
+
+    def beyond(self, limit: float) -> int:
+        """Columns that landed farther than `limit` [m] from their place."""
+        far = np.abs(self.offsets) > limit
+        return int(self.right[far].sum() + self.left[far].sum())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class HeadPath:
     """Where the head was during the whole job.
 
@@ -313,6 +349,8 @@ class ReportData:
         Lines that were printed, in order.
     marks : Marks
         Characters that were struck.
+    errors : ColumnErrors, optional
+        Column errors of the whole job.
     column_limit : float
         Largest column error to be called good [m]; marks beyond it are shown in the colour of warnings.
     path, profile, turn_around : optional
@@ -339,6 +377,7 @@ class ReportData:
     failure: str = ""
     lines: Sequence[LineResult] = ()
     marks: Marks = field(default_factory=Marks)
+    errors: ColumnErrors | None = None
     column_limit: float = COLUMN / 2
     path: HeadPath | None = None
     profile: SpeedProfile | None = None

@@ -13,12 +13,10 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-import numpy as np
-
 from detent import __version__
 from detent.errors import DetentError
 from detent.report import charts
-from detent.report.data import COLUMN, INCH, Event, ReportData
+from detent.report.data import COLUMN, INCH, ColumnErrors, Event, ReportData
 from detent.report.words import GAP, arrow, count, duration, inches_per_second, micrometres, number, table
 
 LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}
@@ -91,8 +89,8 @@ def _embedded(payload: dict[str, Any]) -> str:
 
 def _all_charts(data: ReportData) -> list[charts.Chart]:
     drawn: list[charts.Chart] = []
-    if len(data.marks):
-        drawn.append(charts.histogram_chart(data.marks, data.column_limit))
+    if data.errors and data.errors.total:
+        drawn.append(charts.histogram_chart(data.errors, data.column_limit))
     if data.path:
         drawn.append(charts.path_chart(data.path))
     if data.profile:
@@ -105,14 +103,9 @@ def _all_charts(data: ReportData) -> list[charts.Chart]:
 # ---- what came out, in one glance
 
 
-def _worst(data: ReportData) -> float:
-    """Give the largest column error of all marks [m]; NaN without marks."""
-    return float(np.abs(data.marks.offset).max()) if len(data.marks) else float("nan")
-
-
 def _off_column(data: ReportData) -> int:
-    """Count the marks beyond the limit."""
-    return int((np.abs(data.marks.offset) > data.column_limit).sum()) if len(data.marks) else 0
+    """Count the columns beyond the limit."""
+    return data.errors.beyond(data.column_limit) if data.errors else 0
 
 
 def _headline(data: ReportData) -> str:
@@ -135,12 +128,12 @@ def _headline(data: ReportData) -> str:
 
 
 def _accuracy(data: ReportData, off: int) -> str:
-    if not len(data.marks):
+    if not data.errors or not data.errors.total:
         return ""
     if off:
         whose = "its" if off == 1 else "their"
-        return f"{count(off, 'character')} landed more than {micrometres(data.column_limit)} from {whose} column."
-    return f"Every character landed within {micrometres(_worst(data))} of its column."
+        return f"{count(off, 'column')} landed more than {micrometres(data.column_limit)} from {whose} place."
+    return f"Every column of dots landed within {micrometres(data.errors.worst)} of its place."
 
 
 def _card(title: str, value: str, unit: str, below: str, *, bad: bool = False) -> str:
@@ -151,7 +144,7 @@ def _card(title: str, value: str, unit: str, below: str, *, bad: bool = False) -
 
 
 def _cards(data: ReportData) -> str:
-    struck = len(data.marks) or sum(line.characters for line in data.lines)
+    struck = sum(line.characters for line in data.lines)
     rate = struck / data.duration if data.duration > 0 else None
     done = len(data.lines)
     cards = [
@@ -159,12 +152,11 @@ def _cards(data: ReportData) -> str:
               bad=done < data.line_count),
         _card("Throughput", number(rate), "characters/s", f"in {duration(data.duration)}"),
     ]  # fmt: skip
-    if len(data.marks):
-        rms = float(np.sqrt(np.mean(data.marks.offset**2)))
-        worst = micrometres(_worst(data)).partition(GAP)
+    if data.errors and data.errors.total:
+        worst = micrometres(data.errors.worst).partition(GAP)
         cards.append(
             _card("Worst column error", worst[0], worst[2],
-                  f"rms {micrometres(rms)}, allowed {micrometres(data.column_limit)}", bad=_off_column(data) > 0)
+                  f"rms {micrometres(data.errors.rms)}, allowed {micrometres(data.column_limit)}", bad=_off_column(data) > 0)
         )  # fmt: skip
     if data.lines:
         fastest = max(line.speed for line in data.lines)
@@ -207,7 +199,7 @@ _ZOOM = '<p class="hint">Drag across to zoom in, double-click to zoom out.</p>'
 def _result(data: ReportData, paper: dict[str, Any] | None) -> str:
     if paper is None:
         return ""
-    return "\n".join(["<h2>What came out</h2>", _paper_figure(paper), _histogram_figure(data)])
+    return "\n".join(["<h2>What came out</h2>", _paper_figure(paper), _histogram_figure(data, data.errors)])
 
 
 def _paper_figure(paper: dict[str, Any]) -> str:
@@ -234,11 +226,13 @@ def _paper_figure(paper: dict[str, Any]) -> str:
     return _figure("The printed page", caption, content)
 
 
-def _histogram_figure(data: ReportData) -> str:
+def _histogram_figure(data: ReportData, errors: ColumnErrors | None) -> str:
+    if errors is None or not errors.total:
+        return ""
     limit = micrometres(data.column_limit)
-    outside = " (outside the figure)" if _worst(data) < data.column_limit / 1.5 else ""
+    outside = " (outside the figure)" if errors.worst < data.column_limit / 1.5 else ""
     caption = (
-        "How far from its column each character landed. Look for: two narrow heaps in the same place. Heaps that stand "
+        "How far from its place each column of dots landed. Look for: two narrow heaps in the same place. Heaps that stand "
         "apart mean that lines printed to the right and to the left do not line up. "
         f"Allowed: ±{limit}{outside}; the finest column grid is {micrometres(COLUMN)} (1/120{GAP}in)."
     )

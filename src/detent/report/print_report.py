@@ -14,6 +14,7 @@ from detent.control.head_computer import (
     LOW_STOP,
 )
 from detent.report.data import (
+    ColumnErrors,
     Comparison,
     Constant,
     Event,
@@ -29,7 +30,7 @@ from detent.report.data import (
     TurnAround,
 )
 from detent.simulation.comparison import DriveComparison
-from detent.simulation.print_run import LineRecord, PrintRun
+from detent.simulation.print_run import ERROR_BIN, LineRecord, PrintRun
 from detent.simulation.trace import Trace
 
 PAGE = 528
@@ -83,6 +84,13 @@ def print_report(
         character_count=sum(c.strike for line in run.job.lines for c in line.characters),
         lines=[_line_result(line) for line in run.lines],
         marks=_marks(run),
+        errors=ColumnErrors(
+            bin_width=ERROR_BIN,
+            right=run.errors_right,
+            left=run.errors_left,
+            worst=run.worst_error,
+            rms=run.rms_error,
+        ),
         path=_head_path(spec, run, trace) if trace is not None and drawable else None,
         profile=_profile(run, trace) if trace is not None and drawable else None,
         turn_around=_turn_around(run, trace) if trace is not None and drawable else None,
@@ -263,7 +271,10 @@ def comparison_figure(found: DriveComparison, spec: PrintHeadSpec) -> Comparison
         methods=found.methods,
         speeds=found.speeds,
         errors=found.errors,
-        starts=[StartCurve(name=start.method, t=start.t, velocity=start.velocity) for start in found.starts],
+        starts=[
+            StartCurve(name=method, t=start.t, velocity=start.velocity)
+            for method, start in zip(found.methods, found.starts, strict=True)
+        ],
         target=found.target,
         machine=drift_text(spec),
     )

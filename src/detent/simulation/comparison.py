@@ -4,7 +4,8 @@ The power-on default, a table computed from the nameplate, and the constants the
 Every way drives the same machine open loop at several speeds, and starts it with the slow trim running.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,26 @@ class DriveComparison:
     errors: Numbers
     starts: tuple[DriveStart, ...]
     target: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: everything but the curves."""
+        return {
+            "target": self.target,
+            "speeds": list(self.speeds),
+            "methods": [
+                {
+                    "method": method,
+                    "constants": asdict(constants),
+                    "errors_right": errors[:, 0].tolist(),
+                    "errors_left": errors[:, 1].tolist(),
+                    "mean_error": start.mean_error,
+                    "time_to_band": start.time_to_band if isfinite(start.time_to_band) else None,
+                }
+                for method, constants, errors, start in zip(
+                    self.methods, self.constants, self.errors, self.starts, strict=True
+                )
+            ],
+        }
 
 
 def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> DriveComparison:

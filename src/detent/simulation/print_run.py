@@ -93,6 +93,10 @@ class PrintRun:
         Lines that were printed.
     strikes : list of Strike
         Characters printed, in the order of the lines; bounded by `MOST_STRIKES`.
+    worst_error, rms_error : float
+        Of where the columns landed, as far as they were printed.
+    errors_right, errors_left : ndarray of int, shape (ERROR_BINS,)
+        Columns per bin of `ERROR_BIN`, right of their place positive, by direction of printing.
     identified : dict
         By "right" and "left".
     """
@@ -110,6 +114,8 @@ class PrintRun:
     missed: int = 0
     worst_error: float = 0.0
     rms_error: float = 0.0
+    errors_right: NDArray[np.int64] = field(default_factory=lambda: np.zeros(ERROR_BINS, np.int64))
+    errors_left: NDArray[np.int64] = field(default_factory=lambda: np.zeros(ERROR_BINS, np.int64))
     turn_arounds: int = 0
     repositions: int = 0
     peak_current: float = 0.0
@@ -150,6 +156,12 @@ class PrintRun:
         found["notes"] = [asdict(note) for note in self.job.notes]
         return found
 
+
+ERROR_BIN = 1e-7
+"""Width of a bin of the column errors [m]."""
+
+ERROR_BINS = 6001
+"""Bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins."""
 
 MOST_STRIKES = 50_000
 """Characters kept one by one for the picture of the pages; the figures count all."""
@@ -277,6 +289,9 @@ class _Runner:
         squares = float(errors @ errors)
         worst = float(np.max(np.abs(errors), initial=0.0))
         number = bank.start // COLUMNS
+        bins = np.clip(np.round(errors / ERROR_BIN).astype(np.int64) + ERROR_BINS // 2, 0, ERROR_BINS - 1)
+        counted = result.errors_right if self.state.buffer.direction[number] > 0 else result.errors_left
+        counted += np.bincount(bins, minlength=ERROR_BINS)
         count, missed = int(fired.sum()), int(inked.sum() - fired.sum())
         result.lines.append(
             LineRecord(

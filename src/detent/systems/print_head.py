@@ -10,7 +10,7 @@ last period, decide, actuate, move.
 
 from detent.control.column_timer import NEVER, ErrorHistogram, LineBuffer, fire, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
-from detent.control.head_sequence import decide, next_wake, on_emitter, power_on
+from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
 from detent.drive.h_bridge import Bridge, BridgeLines, steer
 from detent.drive.pwm_timer import PwmTimer, trigger
 from detent.kernel.compiled import byte_at, copy_back, local_copy
@@ -84,6 +84,13 @@ def take_emitter(p: PrintHeadParams, r: PrintHead, cycle: int, when: int) -> Non
 
 
 @step
+def take_reverse_edge(p: PrintHeadParams, r: PrintHead) -> None:
+    """A quadrature edge against the motion: it may end a stop."""
+    on_reverse_edge(p.head, r.head, r.buffer)
+    r.head.wake_us = next_wake(p.head, r.head)
+
+
+@step
 def fire_column(p: PrintHeadParams, r: PrintHead, start: float, end: float, velocity: float) -> None:
     """Fire the due column with the carriage where it truly was at that moment."""
     c = r.head.columns
@@ -112,10 +119,12 @@ def sample(p: PrintHeadParams, r: PrintHead, e: Encoder, x: float, velocity: flo
                 pass_right(p.encoder, e)
             else:
                 pass_left(p.encoder, e)
-            count_edge(r.quadrature, e.channel_a, e.channel_b)
+            change = count_edge(r.quadrature, e.channel_a, e.channel_b)
             cycle = r.quadrature.count >> 2
             if cycle != r.cycle:
                 take_emitter(p, r, cycle, when)
+            if change == -r.head.direction:
+                take_reverse_edge(p, r)
     r.sampled = x
 
 
