@@ -148,7 +148,7 @@ def begin_pass(p: HeadParams, c: HeadComputer, b: LineBuffer, number: int) -> No
     fast = number in (PASS_FAST_LEFT, PASS_FAST_RIGHT)
     plan_run(c, p.calibration_margin if leftward else c.width - p.calibration_margin, c.emitter, p.run_speed)
     c.plan.speed = p.run_speed if fast else HIGH_SPEED
-    begin_move(p, c, b, False)  # noqa: FBT003
+    begin_move(p, c, b, False)
 
 
 @step
@@ -192,7 +192,7 @@ def end_pass(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
     slow = steady_drive(p.slope_default, p.friction_default, HIGH_SPEED)
     right = identify(c.right, p.plausible, fast, slow)
     left = identify(c.left, p.plausible, fast, slow)
-    finish(p, c, b, OK if right and left else IMPLAUSIBLE, False)  # noqa: FBT003
+    finish(p, c, b, OK if right and left else IMPLAUSIBLE, False)
 
 
 @step
@@ -258,7 +258,7 @@ def at_zero_speed(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
         c.repositioned = 1
         if not begin_motion(p, c, b, turn):
             c.operation = NO_OPERATION
-            begin_next(p, c, b, False)  # noqa: FBT003
+            begin_next(p, c, b, False)
     else:
         finish(p, c, b, OK, turn)
 
@@ -324,7 +324,7 @@ def on_command(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
     receive_byte(p, c)
     if c.operation == NO_OPERATION:
         if c.queue.waiting > 0:
-            begin_next(p, c, b, False)  # noqa: FBT003
+            begin_next(p, c, b, False)
     else:
         plan_waiting(p, c)
 

@@ -1,8 +1,8 @@
 """Where compiled steps are kept between processes.
 
 Numba stamps a cached function with the contents of its own file only, so an edit of a callee in another file would be
-served stale. Here the folder itself is named by a hash over every source of the package that a step can be made of and the versions that
-shape the machine code: any such edit means another folder, and nothing in it can be stale.
+served stale. Here the folder itself is named by a hash over every source that a step can be made of and over the versions
+that shape the machine code: any such edit means another folder, and nothing in it can be stale.
 """
 
 import hashlib

@@ -10,23 +10,18 @@ import ctypes
 import operator
 from typing import Any
 
+import numba.extending
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.extending import (
-    NativeValue,
-    intrinsic,
-    lower_builtin,
-    lower_getattr_generic,
-    lower_setattr_generic,
-    models,
-    overload,
-    register_model,
-    typeof_impl,
-    unbox,
-)
+from numba.core import cgutils as untyped_cgutils
+from numba.core import types
+from numba.core.typing import templates as untyped_templates
 
 from detent.kernel.registers import Registers, Width
+
+# Numba's extension interface publishes no types.
+extending: Any = numba.extending
+templates: Any = untyped_templates
+cgutils: Any = untyped_cgutils
 
 BYTE = ir.IntType(8)
 INT32 = ir.IntType(32)
@@ -49,24 +44,24 @@ class RegisterArrayType(types.Type):
         super().__init__(name=f"RegisterArray({width.code} x {length})")
 
 
-register_model(RegistersType)(models.OpaqueModel)
-register_model(RegisterArrayType)(models.OpaqueModel)
+extending.register_model(RegistersType)(extending.models.OpaqueModel)
+extending.register_model(RegisterArrayType)(extending.models.OpaqueModel)
 
 
-@typeof_impl.register(Registers)
+@extending.typeof_impl.register(Registers)
 def _typeof_registers(value: Registers, _context: Any) -> RegistersType:
     return RegistersType(type(value))
 
 
-@unbox(RegistersType)
-def _unbox_registers(_typ: RegistersType, obj: Any, c: Any) -> NativeValue:
+@extending.unbox(RegistersType)
+def _unbox_registers(_typ: RegistersType, obj: Any, c: Any) -> Any:
     """The address of the structure; the caller's reference keeps the memory alive during the call."""
     address_of = c.pyapi.unserialize(c.pyapi.serialize_object(ctypes.addressof))
     number = c.pyapi.call_function_objargs(address_of, (obj,))
     address = c.pyapi.long_as_voidptr(number)
     c.pyapi.decref(number)
     c.pyapi.decref(address_of)
-    return NativeValue(address, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+    return extending.NativeValue(address, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
 
 
 def _scalar_type(width: Width) -> types.Type:
@@ -95,8 +90,8 @@ def _field_address(builder: Any, base: Any, offset: int) -> Any:
     return builder.gep(base, [ir.Constant(INT32, offset)], source_etype=BYTE)
 
 
-@infer_getattr
-class _RegistersAttributes(AttributeTemplate):
+@templates.infer_getattr
+class _RegistersAttributes(templates.AttributeTemplate):
     key = RegistersType
 
     def generic_resolve(self, value: RegistersType, attr: str) -> types.Type | None:
@@ -105,11 +100,12 @@ class _RegistersAttributes(AttributeTemplate):
             return None
         if field.block is not None:
             return RegistersType(field.block)
-        assert field.width is not None, attr
-        return RegisterArrayType(field.width, field.length) if field.length else _scalar_type(field.width)
+        if field.width is not None and field.length:
+            return RegisterArrayType(field.width, field.length)
+        return _scalar_type(field.width) if field.width is not None else None
 
 
-@lower_getattr_generic(RegistersType)
+@extending.lower_getattr_generic(RegistersType)
 def _read_field(_context: Any, builder: Any, typ: RegistersType, value: Any, attr: str) -> Any:
     field = typ.registers.__fields__[attr]
     address = _field_address(builder, value, field.offset)
@@ -118,7 +114,7 @@ def _read_field(_context: Any, builder: Any, typ: RegistersType, value: Any, att
     return _load(builder, address, field.width)
 
 
-@lower_setattr_generic(RegistersType)
+@extending.lower_setattr_generic(RegistersType)
 def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> None:
     target, value = args
     field = sig.args[0].registers.__fields__[attr]
@@ -126,21 +122,21 @@ def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> 
     _store(builder, _field_address(builder, target, field.offset), field.width, wide)
 
 
-@infer_global(operator.getitem)
-class _ArrayRead(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
+@templates.infer_global(operator.getitem)
+class _ArrayRead(templates.AbstractTemplate):
+    def generic(self, args: Any, _kws: Any) -> Any:
         array, index = args
         if isinstance(array, RegisterArrayType) and isinstance(index, types.Integer):
-            return signature(_scalar_type(array.width), array, types.int64)
+            return templates.signature(_scalar_type(array.width), array, types.int64)
         return None
 
 
-@infer_global(operator.setitem)
-class _ArrayWrite(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
+@templates.infer_global(operator.setitem)
+class _ArrayWrite(templates.AbstractTemplate):
+    def generic(self, args: Any, _kws: Any) -> Any:
         array, index, _value = args
         if isinstance(array, RegisterArrayType) and isinstance(index, types.Integer):
-            return signature(types.none, array, types.int64, _scalar_type(array.width))
+            return templates.signature(types.none, array, types.int64, _scalar_type(array.width))
         return None
 
 
@@ -149,13 +145,13 @@ def _element_address(builder: Any, array: Any, width: Width, index: Any) -> Any:
     return builder.gep(array, [offset], source_etype=BYTE)
 
 
-@lower_builtin(operator.getitem, RegisterArrayType, types.Integer)
+@extending.lower_builtin(operator.getitem, RegisterArrayType, types.Integer)
 def _read_element(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
     width = sig.args[0].width
     return _load(builder, _element_address(builder, args[0], width, args[1]), width)
 
 
-@lower_builtin(operator.setitem, RegisterArrayType, types.Integer, types.Any)
+@extending.lower_builtin(operator.setitem, RegisterArrayType, types.Integer, types.Any)
 def _write_element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     array, index, value = args
     width = sig.args[0].width
@@ -168,8 +164,9 @@ def _copy_memory(builder: Any, target: Any, source: Any, size: int) -> None:
     cgutils.raw_memcpy(builder, target, source, ir.Constant(ir.IntType(64), size), 1)
 
 
-@intrinsic
-def _stack_copy(_typingctx: Any, registers: Any) -> Any:
+@extending.intrinsic
+def stack_copy(_typingctx: Any, registers: Any) -> Any:
+    """Copy a register file into a stack slot."""
     def codegen(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
         size = ctypes.sizeof(sig.args[0].registers)
         slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), (size + 7) // 8))
@@ -180,8 +177,9 @@ def _stack_copy(_typingctx: Any, registers: Any) -> Any:
     return registers(registers), codegen
 
 
-@intrinsic
-def _copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
+@extending.intrinsic
+def copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
+    """Copy one register file over another."""
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         _copy_memory(builder, args[0], args[1], ctypes.sizeof(sig.args[0].registers))
         return context.get_dummy_value()
@@ -189,8 +187,9 @@ def _copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
     return types.none(target, source), codegen
 
 
-@intrinsic
-def _byte_at(_typingctx: Any, registers: Any, offset: Any) -> Any:
+@extending.intrinsic
+def read_byte(_typingctx: Any, registers: Any, _offset: Any) -> Any:
+    """Load one byte."""
     def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
         return builder.zext(builder.load(builder.gep(args[0], [args[1]], source_etype=BYTE)), ir.IntType(64))
 
@@ -212,25 +211,25 @@ def byte_at(registers: Any, offset: int) -> int:
     return ctypes.c_uint8.from_buffer(registers, offset).value
 
 
-@overload(local_copy, inline="always")
+@extending.overload(local_copy, inline="always")
 def _local_copy(registers: Any) -> Any:
     def compiled(registers: Any) -> Any:
-        return _stack_copy(registers)
+        return stack_copy(registers)
 
     return compiled
 
 
-@overload(copy_back, inline="always")
+@extending.overload(copy_back, inline="always")
 def _copy_back(target: Any, source: Any) -> Any:
     def compiled(target: Any, source: Any) -> Any:
-        return _copy_over(target, source)
+        return copy_over(target, source)
 
     return compiled
 
 
-@overload(byte_at, inline="always")
+@extending.overload(byte_at, inline="always")
 def _byte_at_overload(registers: Any, offset: Any) -> Any:
     def compiled(registers: Any, offset: Any) -> Any:
-        return _byte_at(registers, offset)
+        return read_byte(registers, offset)
 
     return compiled

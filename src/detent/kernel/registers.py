@@ -1,9 +1,9 @@
 """Register files: typed fields of exact width, declared once.
 
-A class of registers is a `ctypes.Structure`, so an instance is one flat piece of memory in the layout of the C compiler.
-Plain Python reads full integers from it and every store wraps to the width of the field; compiled steps work on the same
-memory with the same rule (`kernel.compiled`). The numpy dtype, the C struct, the trace columns and the reference tables
-all derive from the one declaration.
+A class of registers is a `ctypes.Structure`, so an instance is one flat piece of memory in the layout of the C
+compiler. Plain Python reads full integers from it and every store wraps to the width of the field; compiled steps work
+on the same memory with the same rule (`kernel.compiled`). The numpy dtype, the C struct, the trace columns and the
+reference tables all derive from the one declaration.
 """
 
 import ctypes
@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-type_of_structure: type = type(ctypes.Structure)
+if TYPE_CHECKING:
+    # The metaclass of ctypes.Structure has no public name.
+    from _ctypes import _PyCStructType as type_of_structure  # pyright: ignore[reportPrivateUsage, reportAttributeAccessIssue, reportUnknownVariableType]
+else:
+    type_of_structure = type(ctypes.Structure)
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,8 @@ class _Declaration:
 class Field:
     """One declared field of a register file.
 
-    `width` is None for a nested block, whose class is then `block`; `length` is 0 for a single value, else the number of
-    elements of an array. `offset` counts bytes from the start of the structure.
+    `width` is None for a nested block, whose class is then `block`; `length` is 0 for a single value, else the number
+    of elements of an array. `offset` counts bytes from the start of the structure.
     """
 
     name: str
@@ -127,24 +131,24 @@ def _ctypes_field(name: str, hint: Any, declared: _Declaration) -> tuple[str, An
     return name, ctype * declared.length if declared.length else ctype, widths[0]
 
 
-class _RegistersMeta(type_of_structure):
+class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIssues] - see above
     """Lays the structure out from the annotations of the class body."""
 
-    def __init__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any) -> None:
+    def __init__(self, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any) -> None:
         super().__init__(name, bases, namespace, **kwargs)
         declared = {key: value for key, value in namespace.items() if isinstance(value, _Declaration)}
         if not declared:
             return
-        hints = inspect.get_annotations(cls, eval_str=True)
+        hints = inspect.get_annotations(self, eval_str=True)
         rows = [_ctypes_field(key, hints[key], value) for key, value in declared.items()]
-        structure: Any = cls
+        structure: Any = self
         structure._fields_ = [(key, ctype) for key, ctype, _ in rows]
         structure.__fields__ = {
             key: Field(
                 name=key,
                 doc=declared[key].doc,
                 unit=declared[key].unit,
-                offset=int(getattr(cls, key).offset),
+                offset=int(getattr(structure, key).offset),
                 width=width,
                 block=None if width else ctype,
                 length=declared[key].length,
@@ -188,15 +192,14 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     @classmethod
     def c_struct(cls) -> str:
         """C99 declarations of this structure and of the blocks in it, inner ones first."""
-        inner: dict[str, str] = {}
-        body = "".join(_c_member(field, inner) for field in cls.__fields__.values())
-        return "".join(inner.values()) + f"typedef struct {{\n{body}}} {cls.__name__};\n"
+        return "".join(_c_types(cls).values())
 
     def view(self) -> "NDArray[Any]":
         """The same memory as a numpy array of shape (1,); writes go both ways."""
         import numpy as np
 
-        return np.frombuffer(self, dtype=type(self).dtype())
+        memory: Any = self
+        return np.frombuffer(memory, dtype=type(self).dtype())
 
     def snapshot(self) -> bytes:
         """Copy of the whole state."""
@@ -224,7 +227,8 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
 
     def values(self) -> dict[str, Any]:
         """Value per dotted path; arrays as lists."""
-        state, found = bytes(self), {}
+        state = bytes(self)
+        found: dict[str, Any] = {}
         for leaf in type(self).leaves():
             count = max(leaf.length, 1)
             raw = (leaf.width.ctype * count).from_buffer_copy(state, leaf.offset)
@@ -265,9 +269,18 @@ def _shown(value: Any) -> str:
 
 
 def _c_member(field: Field, inner: dict[str, str]) -> str:
+    if field.width is not None:
+        array = f"[{field.length}]" if field.length else ""
+        return f"    {field.width.c_name} {field.name}{array};\n"
     if field.block is not None:
-        inner.setdefault(field.block.__name__, field.block.c_struct())
+        # An inner block brings the blocks inside it; each type is declared once, before its first use.
+        inner.update((name, text) for name, text in _c_types(field.block).items() if name not in inner)
         return f"    {field.block.__name__} {field.name};\n"
-    assert field.width is not None, field.name
-    array = f"[{field.length}]" if field.length else ""
-    return f"    {field.width.c_name} {field.name}{array};\n"
+    return ""
+
+
+def _c_types(block: type[Registers]) -> dict[str, str]:
+    """C declaration per structure name, inner ones first."""
+    inner: dict[str, str] = {}
+    body = "".join(_c_member(field, inner) for field in block.__fields__.values())
+    return inner | {block.__name__: f"typedef struct {{\n{body}}} {block.__name__};\n"}

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import config
+from numba.core import config as untyped_config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 
-from detent.kernel import compiled  # noqa: F401 - registers the numba types of register files
+import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
 from detent.kernel.cache import compiled_folder, is_step_source, source_hash
+
+config: Any = untyped_config  # numba sets its attributes at run time
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -26,9 +28,9 @@ class _PackageLocator(UserProvidedCacheLocator):
         self._lineno: int = py_func.__code__.co_firstlineno
         self._cache_path = str(compiled_folder())
 
-    def get_source_stamp(self) -> str:
+    def get_source_stamp(self) -> bytes:
         """The hash that also names the folder: an index that was moved here from elsewhere does not count."""
-        return source_hash()
+        return source_hash().encode()
 
     def get_disambiguator(self) -> str:
         """The module, so that equal names in two modules do not meet."""
@@ -53,7 +55,7 @@ class _PackageCache(FunctionCache):
     _impl_class = _PackageCacheImpl
 
 
-def step(function: F) -> F:  # noqa: UP047 - the type variable reads better here
+def step(function: F) -> F:
     """Compile a step.
 
     ``error_model="numpy"`` keeps divisions from raising and lets loops vectorise; ``nogil`` lets a live loop run beside
@@ -63,13 +65,13 @@ def step(function: F) -> F:  # noqa: UP047 - the type variable reads better here
     return _compiled(function, forceinline=False)
 
 
-def hot_step(function: F) -> F:  # noqa: UP047
+def hot_step(function: F) -> F:
     """`step` for what runs in every tick: always inlined, so that a caller's registers stay in machine registers."""
     return _compiled(function, forceinline=True)
 
 
-def _compiled(function: F, *, forceinline: bool) -> F:  # noqa: UP047
+def _compiled(function: F, *, forceinline: bool) -> F:
     made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline)(function)
     if not config.DISABLE_JIT and is_step_source(Path(function.__code__.co_filename).resolve()):
-        made._cache = _PackageCache(function)
+        made._cache = _PackageCache(function)  # noqa: SLF001 - numba offers no public way to choose the folder
     return cast("F", made)

@@ -209,5 +209,5 @@ def fill_period(p: DriveTrainParams) -> None:
     fill_transition(p, p.coast_left, -1, conducting=False)
     for name, current, voltage in (("held_i", 1.0, 0.0), ("held_u", 0.0, 1.0)):
         r = DriveTrain(current=current)
-        flow(p, r, voltage, True, p.period)  # noqa: FBT003 - a step takes plain arguments
+        flow(p, r, voltage, True, p.period)
         setattr(p, name, r.current)

@@ -63,7 +63,7 @@ def time_of_zero(p: DriveTrainParams, r: DriveTrain, w: Scratch, u: float, durat
     for _ in range(CROSSING_STEPS):
         t = late - at_late * (late - early) / (at_late - at_early)
         copy_state(r, w.trial)
-        flow(p, w.trial, u, True, t)  # noqa: FBT003
+        flow(p, w.trial, u, True, t)
         found = w.trial.current
         if found * at_late < 0.0:
             early, at_early = late, at_late
@@ -87,12 +87,12 @@ def part_of_period(p: DriveTrainParams, r: DriveTrain, w: Scratch, u_positive: f
         negative = r.current < 0.0 or (r.current == 0.0 and u_negative < emf)
         if not (positive or negative):
             start = r.position
-            flow(p, r, 0.0, False, left)  # noqa: FBT003
+            flow(p, r, 0.0, False, left)
             w.volt_seconds += p.emf_constant * (r.position - start)
             break
         u = u_positive if positive else u_negative
         copy_state(r, w.trial)
-        flow(p, w.trial, u, True, left)  # noqa: FBT003
+        flow(p, w.trial, u, True, left)
         lasted = left
         crossed = (positive and w.trial.current < 0.0) or (negative and w.trial.current > 0.0)
         if crossed and r.current != 0.0:
@@ -177,11 +177,11 @@ def fill_pulse_table(p: DriveTrainParams, q: SwitchedParams) -> None:
 
 def _fill_row(p: DriveTrainParams, table: list[float], k: int, sense: int, on_time: float) -> None:
     pulsed = DriveTrain(sense=sense)
-    flow(p, pulsed, 1.0, True, on_time)  # noqa: FBT003
+    flow(p, pulsed, 1.0, True, on_time)
     table[k + 5] = pulsed.current
-    flow(p, pulsed, 0.0, True, p.period - on_time)  # noqa: FBT003
+    flow(p, pulsed, 0.0, True, p.period - on_time)
     table[k], table[k + 1], table[k + 2] = pulsed.current, pulsed.velocity, pulsed.position
     for place, state in ((3, DriveTrain(current=1.0)), (4, DriveTrain(velocity=1.0)), (6, DriveTrain(force=1.0))):
         state.sense = sense
-        flow(p, state, 0.0, True, on_time)  # noqa: FBT003
+        flow(p, state, 0.0, True, on_time)
         table[k + place] = state.current

@@ -8,6 +8,9 @@ One tick is one PWM period of 40 us, begun by the 25 kHz trigger. Its order is: 
 last period, decide, actuate, move.
 """
 
+import numpy as np
+from numpy.typing import NDArray
+
 from detent.control.column_timer import NEVER, ErrorHistogram, LineBuffer, fire, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
 from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
@@ -20,6 +23,9 @@ from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.plant.switched_motor import Scratch, SwitchedParams, move_switched
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right, stand_at
 from detent.sensing.quadrature import Quadrature, count_edge, cycle_position
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
 
 PERIOD_US = 40
 AVERAGED, SWITCH_LEVEL = 0, 1
@@ -176,7 +182,7 @@ def advance_plain(p: PrintHeadParams, r: PrintHead, ticks: int) -> int:
 
 
 @step
-def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace, picks, every: int) -> int:  # type: ignore[no-untyped-def]
+def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
     """Run up to `ticks` periods; stops early when a status byte waits for the supervisor.
 
     What every tick touches, the drive train and the encoder, is worked on in local copies, so that it stays in machine
