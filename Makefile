@@ -39,7 +39,7 @@ venv-dev:
 
 demo: venv-base ## simulate the example print head printing a letter; say where the report is
 	@mkdir -p $(DEMO)
-	$(BIN)/detent run $(EXAMPLES)/print_head.toml --job $(EXAMPLES)/letter.txt --report $(DEMO)/report.html
+	$(BIN)/detent run $(EXAMPLES)/print_head.toml --job $(EXAMPLES)/letter.txt --output $(DEMO)
 	@echo "Open $(CURDIR)/$(DEMO)/report.html in a browser."
 
 test: venv-test ## the tests, without those that take long

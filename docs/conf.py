@@ -1,9 +1,14 @@
-"""How Sphinx builds the documentation: Markdown through MyST, the furo theme, API pages from the docstrings."""
+"""How Sphinx builds the documentation: Markdown through MyST, the furo theme, API pages from the docstrings.
 
+The reference tables (generate.py) and the figures of the explanation (figures.py) are made anew from the code.
+"""
+
+import sys
 import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "src"), str(ROOT / "docs")]
 
 project = "detent"
 author = "The detent authors"
@@ -13,7 +18,10 @@ version = release
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
 exclude_patterns = ["_build"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False  # types of other packages are named in signatures, and their inventories need a network
+
+smartquotes = False  # a quotation mark in a value of the axis file is a straight one
 
 # Headings down to the third level can be linked to, as on a code host.
 myst_heading_anchors = 3
@@ -27,4 +35,14 @@ napoleon_use_rtype = False
 html_theme = "furo"
 html_title = f"detent {release}"
 html_static_path = ["_static"]
+html_css_files = ["captions.css"]
 html_show_sourcelink = False
+
+
+def setup(_app: object) -> None:
+    """Make the generated parts before any page is read."""
+    import figures
+    import generate
+
+    generate.write_all()
+    figures.draw_all()

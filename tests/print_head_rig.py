@@ -51,17 +51,19 @@ class Rig:
         self.responses: list[int] = []
         """Every status byte read so far."""
 
-    def pretend_identified(self, *, slope: int = 170, right: int = 36, left: int = 28, emitter: int = 1000) -> "Rig":
-        """As after homing and identification, at rest at `emitter`, without running them."""
-        self.place(emitter)
+    def pretend_identified(
+        self, *, slope: int = 170, right: int = 36, left: int = 28, emitter: int = 1000, fraction: float = 0.5
+    ) -> "Rig":
+        """As after homing and identification, at rest at `emitter` (see `place`), without running them."""
+        self.place(emitter, fraction)
         self.head.homed, self.head.width, self.head.state = 1, 4350, IDLE
         for line, friction in ((self.head.right, right), (self.head.left, left)):
             line.slope, line.friction, line.valid = slope, friction, 1
         return self
 
-    def place(self, emitter: int) -> None:
-        """Put the head at rest somewhere."""
-        switch_on(self.p, self.r, (emitter + 0.5) * EMITTER, self.spec.encoder.seed)
+    def place(self, emitter: int, fraction: float = 0.5) -> None:
+        """Put the head at rest at an emitter and a fraction of the way to the next; state as after power-on."""
+        switch_on(self.p, self.r, (emitter + fraction) * EMITTER, self.spec.encoder.seed)
         self.head.emitter = emitter
 
     def run(self, ticks: int) -> int:

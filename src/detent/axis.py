@@ -8,14 +8,13 @@ from typing import Any
 from detent.axisfile.check import CheckReport, check_spec
 from detent.axisfile.load import AxisFile, read_axis
 from detent.axisfile.schema import PrintHeadSpec
-from detent.kernel.cache import is_warm
 from detent.planning.print_job import PrintJob, load_job
 from detent.report.data import ReportData
 from detent.report.print_report import print_report
 from detent.simulation.comparison import DriveComparison, compare_drives
 from detent.simulation.machine import TICK
 from detent.simulation.print_run import PrintRun, Progress, default_signals, print_job
-from detent.simulation.recorder import Recorder
+from detent.simulation.recorder import Recorder, choose_leaves, make_trace
 from detent.simulation.trace import Trace
 from detent.simulation.trace_files import TraceWriter, load_trace, save_trace
 from detent.systems.print_head import PrintHead
@@ -23,8 +22,8 @@ from detent.systems.print_head import PrintHead
 EVERY = 10
 """Ticks between two rows of a trace unless told otherwise: 0.4 ms, the time of a count of the ramp."""
 
-KEPT_ROWS = 1_000_000
-"""Rows kept in memory beside a trace that goes to a file: the report draws from the first 400 s."""
+KEPT_ROWS = 100_000
+"""Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,16 @@ class Axis:
     def check(self) -> CheckReport:
         """Effective values, derived figures and warnings."""
         return check_spec(self.file)
+
+    def check_signals(self, names: Sequence[str]) -> None:
+        """Refuse names and patterns that are no register of the axis, before any work is done.
+
+        Raises
+        ------
+        DetentError
+            A name is unknown; the message names the nearest.
+        """
+        choose_leaves(PrintHead, names)
 
     def run(
         self,
@@ -86,11 +95,13 @@ class Axis:
         ------
         InputError
             The job cannot be read or does not fit the axis.
+        DetentError
+            A signal is unknown, or the trace cannot be written.
         """
         loaded = job if isinstance(job, PrintJob) else load_job(job)
-        if every <= 0:
+        if every == 0:
             return Run(self, print_job(self.spec, loaded, progress=progress), None)
-        names = list(signals or default_signals())
+        names = list(default_signals() if signals is None else signals)
         about: dict[str, str | float | int] = {
             "axis": self.name, "job": loaded.name, "seed": self.spec.encoder.seed, "fidelity": self.spec.axis.fidelity,
         }  # fmt: skip
@@ -129,11 +140,7 @@ class _Memory:
             self.rows += room
 
     def trace(self, recorder: Recorder, about: dict[str, str | float | int]) -> Trace:
-        import numpy as np
-
-        whole = np.concatenate(self.blocks) if self.blocks else np.empty(0, recorder.dtype)
-        columns = {name: np.ascontiguousarray(whole[name]) for name in whole.dtype.names or ()}
-        return Trace(columns=columns, units=recorder.units, docs=recorder.docs, attributes=about)
+        return make_trace(recorder, self.blocks, about)
 
 
 @dataclass
@@ -148,6 +155,8 @@ class Run:
         Figures, lines, identified constants.
     trace : Trace or None
         Recorded registers over time.
+    settings : dict
+        Small print for the report, beside file, fidelity and seed.
     """
 
     axis: Axis
@@ -227,4 +236,4 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-__all__ = ["Axis", "Run", "is_warm", "load", "load_trace"]
+__all__ = ["Axis", "Run", "load", "load_trace"]

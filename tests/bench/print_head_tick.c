@@ -1,8 +1,8 @@
 /* The averaged print-head tick by hand: what `detent.systems.print_head.advance` is measured against.
  *
  * The same arithmetic in the same order, so that both end on the same bits (compile with -ffp-contract=off). It covers
- * what print lines and their turn-arounds reach; anything else - command bytes, homing, identification, faults, the
- * switch-level bridge - ends the run with NOT_COVERED. The declarations of the structures are generated from the
+ * what print lines at high speed and their turn-arounds reach; anything else - command bytes, homing, identification,
+ * low speed, faults, the switch-level bridge - ends the run with NOT_COVERED. The declarations of the structures are generated from the
  * register files into print_head_registers.h.
  */
 #include <math.h>
@@ -14,7 +14,7 @@
 #define NOT_COVERED INT64_C(-1)
 #define NEVER (INT64_C(1) << 62)
 
-enum { PERIOD_US = 40, STALL_US = 50000, TRIM_US = 16000, RUNAWAY_US = 62, TURN_AROUND_US = 133000 };
+enum { PERIOD_US = 40, STALL_US = 50000, TRIM_US = 16000, RUNAWAY_US = 62, REVERSAL_US = 800, TURN_AROUND_US = 133000 };
 enum { COLUMNS = 2048, BINS = 128, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
 enum { FLOOR = 30, HIGH_SPEED = 60, STALL_MARGIN = 20, RUN_UP_RESERVE = 12 };
 enum {
@@ -80,13 +80,15 @@ static inline void pass_edge(const EncoderParams *p, Encoder *e, bool rightward)
     e->channel_b = quarter == 1u || quarter == 2u;
 }
 
-static inline void count_edge(Quadrature *q, unsigned a, unsigned b)
+static inline int count_edge(Quadrature *q, unsigned a, unsigned b)
 {
     unsigned now = a ? (b ? 1u : 0u) : (b ? 2u : 3u);
     unsigned change = (now - q->previous) & 3u;
     q->previous = (uint8_t)now;
-    q->count += (change == 1u) - (change == 3u);
     q->illegal += change == 2u;
+    int step = (change == 1u) - (change == 3u);
+    q->count += step;
+    return step;
 }
 
 /* ---- columns ------------------------------------------------------------------------------------------------ */
@@ -183,16 +185,9 @@ static void put_braking(const HeadParams *p, HeadComputer *c)
     }
 }
 
-static void put_low(const HeadParams *p, HeadComputer *c)
+static void begin_steady(HeadComputer *c)
 {
-    int64_t pace = 17 * c->interval_us * c->speed;
-    int64_t value = 0 < pace && pace < 320000 && p->overspeed_test ? c->drive >> 1 : c->drive;
-    put_drive(p, c, c->direction * value);
-}
-
-static void begin_steady(HeadComputer *c, int state)
-{
-    c->state = (uint8_t)state;
+    c->state = HIGH_STEADY;
     c->drive = c->steady;
     c->next_trim_us = c->now_us + TRIM_US;
     c->phase_start = c->emitter;
@@ -200,11 +195,6 @@ static void begin_steady(HeadComputer *c, int state)
 
 static void begin_stop(const HeadParams *p, HeadComputer *c)
 {
-    if (c->speed < HIGH_SPEED) {
-        c->state = LOW_STOP;
-        put_drive(p, c, -(int64_t)c->direction * c->drive);
-        return;
-    }
     if (c->state != HIGH_STEADY) {
         c->drive = (int16_t)(c->drive - p->ir);
     } else if (c->direction > 0) {
@@ -224,28 +214,18 @@ static inline int64_t stop_distance_up(int64_t s) { return (s * s + 143) / 144; 
 
 static inline void move_emitter(const HeadParams *p, HeadComputer *c)
 {
-    if (c->state == LOW_START && (c->emitter - c->phase_start) * c->direction >= c->start_emitters) {
-        begin_steady(c, LOW_STEADY);
-    } else if (c->state == HIGH_ACCEL) {
-        int64_t pace = c->interval_us * c->speed;
-        if (0 < pace && pace <= 20000) {
-            begin_steady(c, HIGH_STEADY);
-            put_drive(p, c, (int64_t)c->direction * c->drive);
-        }
+    int64_t pace = c->interval_us * c->speed;
+    if (c->state == HIGH_ACCEL && 0 < pace && pace <= 20000) {
+        begin_steady(c);
+        put_drive(p, c, (int64_t)c->direction * c->drive);
     }
-    if (c->state == LOW_STEADY)
-        put_low(p, c);
-    if (c->state != LOW_START && (c->target - c->emitter) * c->direction <= stop_distance_up(c->speed))
+    if ((c->target - c->emitter) * c->direction <= stop_distance_up(c->speed))
         begin_stop(p, c);
 }
 
 static void trim(const HeadParams *p, HeadComputer *c)
 {
-    if (p->trim && c->state == LOW_STEADY) {
-        int64_t pace = c->interval_us * c->speed;
-        if (c->interval_us > 0)
-            c->drive = (int16_t)(c->drive + (pace > 20000) - (pace < 20000));
-    } else if (p->trim) {
+    if (p->trim) {
         int64_t passed = (c->emitter - c->phase_start) * c->direction, reference = (204 * c->speed + 128) >> 8;
         c->drive = (int16_t)(c->drive + (passed < reference) - (passed > reference));
         c->phase_start = c->emitter;
@@ -263,7 +243,7 @@ static void move_timer(const HeadParams *p, HeadComputer *c)
             c->next_ramp_us += c->ramp_us;
         }
         if (c->drive >= c->ramp_top && c->next_ramp_us <= c->now_us)
-            begin_steady(c, HIGH_STEADY);
+            begin_steady(c);
         put_drive(p, c, (int64_t)c->direction * c->drive);
         break;
     case HIGH_TRANSITION:
@@ -274,16 +254,12 @@ static void move_timer(const HeadParams *p, HeadComputer *c)
         }
         put_braking(p, c);
         break;
-    case LOW_STEADY:
     case HIGH_STEADY:
         if (c->next_trim_us <= c->now_us) {
             c->next_trim_us += TRIM_US;
             trim(p, c);
         }
-        if (c->state == LOW_STEADY)
-            put_low(p, c);
-        else
-            put_drive(p, c, (int64_t)c->direction * c->drive);
+        put_drive(p, c, (int64_t)c->direction * c->drive);
         break;
     default:
         break;
@@ -367,7 +343,7 @@ static void plan_print(const HeadParams *p, HeadComputer *c, int64_t start, int6
     q->reposition = 1;
 }
 
-static void begin_line(const HeadParams *p, HeadComputer *c, const LineBuffer *b)
+static void begin_line(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool turn)
 {
     int64_t zero = p->columns.column_zero, pitch = p->columns.column_pitch, first, last;
     ColumnTimer *t = &c->columns;
@@ -379,6 +355,9 @@ static void begin_line(const HeadParams *p, HeadComputer *c, const LineBuffer *b
         last = -floor_div(zero - (int64_t)c->end * 256, pitch);
     }
     t->bank = 1 - t->bank;
+    b->speed[t->bank] = c->speed;
+    b->direction[t->bank] = c->direction;
+    b->turned[t->bank] = turn;
     t->lead = (int32_t)(((int64_t)p->columns.lead_per_speed * c->speed + 128) >> 8);
     t->column = (int32_t)least(most(first, 0), COLUMNS - 1);
     t->end_column = (int32_t)least(most(last, 0), COLUMNS - 1);
@@ -409,7 +388,7 @@ static int64_t ramp_interval_us(const HeadParams *p, const HeadComputer *c, int6
     return total <= 0 ? TURN_AROUND_US : (2 * TURN_AROUND_US * s + total) / (2 * total);
 }
 
-static void begin_move(const HeadParams *p, HeadComputer *c, const LineBuffer *b, bool turn)
+static void begin_move(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool turn)
 {
     int16_t old_drive = c->drive;
     const IdentifiedLine *line = c->plan.direction > 0 ? &c->right : &c->left;
@@ -424,34 +403,24 @@ static void begin_move(const HeadParams *p, HeadComputer *c, const LineBuffer *b
     c->phase_start = c->emitter;
     c->steady = (int16_t)steady_value(p, c, c->direction, c->speed);
     if (c->operation == PRINT && !c->repositioning)
-        begin_line(p, c, b);
-    if (c->speed < HIGH_SPEED) {
-        c->state = LOW_START;
-        c->start_emitters = (3 * c->speed * c->speed + 575) / 576;
-        c->drive = (int16_t)(line->friction + p->ir);
+        begin_line(p, c, b, turn);
+    c->state = HIGH_ACCEL;
+    c->ramp_us = (int32_t)ramp_interval_us(p, c, c->speed);
+    c->ramp_top = (int16_t)least(c->steady + p->ir, p->drive_limit);
+    if (turn) {
+        c->turn_arounds++;
+        c->drive = (int16_t)((p->friction_jump ? c->right.friction + c->left.friction : 0) - old_drive);
     } else {
-        c->state = HIGH_ACCEL;
-        c->ramp_us = (int32_t)ramp_interval_us(p, c, c->speed);
-        c->ramp_top = (int16_t)least(c->steady + p->ir, p->drive_limit);
-        if (turn) {
-            c->turn_arounds++;
-            c->drive = (int16_t)((p->friction_jump ? c->right.friction + c->left.friction : 0) - old_drive);
-        } else {
-            c->drive = (int16_t)(line->friction + p->ir);
-            c->next_ramp_us = c->now_us + c->ramp_us;
-        }
+        c->drive = (int16_t)(line->friction + p->ir);
+        c->next_ramp_us = c->now_us + c->ramp_us;
     }
     put_drive(p, c, (int64_t)c->direction * c->drive);
 }
 
 static void stand(const HeadParams *p, HeadComputer *c, int state)
 {
-    c->state = (uint8_t)state;
     c->drive = 0;
-    c->speed = 0;
-    c->expected_stop = (int32_t)c->emitter;
-    c->columns.active = 0;
-    c->columns.fire_us = NEVER;
+    c->state = (uint8_t)state;
     put_drive(p, c, 0);
 }
 
@@ -476,6 +445,10 @@ static bool begin_motion(Axis *a, bool turn)
     bool continues = turn && c->plan.speed == c->speed && c->plan.direction == -c->direction;
     if (!continues)
         stand(p, c, IDLE);
+    if (c->plan.speed < HIGH_SPEED) {
+        a->lost = true;
+        return true;
+    }
     begin_move(p, c, &a->r->buffer, continues);
     return true;
 }
@@ -529,9 +502,6 @@ static inline int64_t next_wake(const HeadParams *p, const HeadComputer *c)
 {
     int64_t stall = c->last_emitter_us + STALL_US, zero = c->last_emitter_us + p->zero_speed_us;
     switch (c->state) {
-    case LOW_START: return stall;
-    case LOW_STEADY: return least(c->next_trim_us, stall);
-    case LOW_STOP: return zero;
     case HIGH_ACCEL: return least(c->next_ramp_us, stall);
     case HIGH_STEADY: return least(c->next_trim_us, stall);
     case HIGH_TRANSITION:
@@ -554,28 +524,32 @@ static inline void on_emitter(Axis *a, int64_t when, int change)
     case IDLE:
     case FAULT:
         break;
-    case HOME_LEFT:
-    case HOME_RIGHT:
-        a->lost = true;
+    case HIGH_ACCEL:
+    case HIGH_STEADY:
+        move_emitter(&a->p->head, c);
         break;
-    case LOW_STOP:
     case HIGH_TRANSITION:
     case HIGH_REVERSE:
-        if (c->too_fast >= 2)
-            a->lost = true;
-        else if (change != c->direction)
+        if (change != c->direction)
             at_zero_speed(a);
         break;
     default:
-        if (c->too_fast >= 2)
-            a->lost = true;
-        else
-            move_emitter(&a->p->head, c);
+        a->lost = true;
     }
+    a->lost |= c->state != IDLE && c->too_fast >= 2;
     c->wake_us = next_wake(&a->p->head, c);
     if (c->columns.active && change == c->direction)
         schedule(&a->p->head.columns, &c->columns, &a->r->buffer, change > 0 ? c->emitter : c->emitter + 1, change,
                  when, c->interval_us);
+}
+
+static void on_reverse_edge(Axis *a)
+{
+    HeadComputer *c = &a->r->head;
+    bool at_speed = 0 < c->interval_us && c->interval_us < REVERSAL_US;
+    if ((c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE) && !at_speed)
+        at_zero_speed(a);
+    c->wake_us = next_wake(&a->p->head, c);
 }
 
 static void on_timer(Axis *a)
@@ -583,15 +557,15 @@ static void on_timer(Axis *a)
     const HeadParams *p = &a->p->head;
     HeadComputer *c = &a->r->head;
     int64_t quiet = c->now_us - c->last_emitter_us;
-    if (c->state == LOW_STOP || c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE) {
+    if (c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE) {
         if (quiet >= p->zero_speed_us)
             at_zero_speed(a);
         else
             move_timer(p, c);
-    } else if (c->state < LOW_START || c->state == FAULT || quiet >= STALL_US) {
-        a->lost = true;
-    } else {
+    } else if ((c->state == HIGH_ACCEL || c->state == HIGH_STEADY) && quiet < STALL_US) {
         move_timer(p, c);
+    } else {
+        a->lost = true;
     }
     c->wake_us = next_wake(p, c);
 }
@@ -718,13 +692,15 @@ static inline void sample(Axis *a, Encoder *e, double start, double x, double ve
         if (!passed)
             return;
         pass_edge(&a->p->encoder, e, rightward);
-        count_edge(&r->quadrature, e->channel_a, e->channel_b);
+        int change = count_edge(&r->quadrature, e->channel_a, e->channel_b);
         int64_t cycle = r->quadrature.count >> 2;
         if (cycle != r->cycle) {
-            int change = cycle > r->cycle ? 1 : -1;
+            int emitter = cycle > r->cycle ? 1 : -1;
             r->cycle = cycle;
-            on_emitter(a, edge_time(now, start, x, place), change);
+            on_emitter(a, edge_time(now, start, x, place), emitter);
         }
+        if (change == -r->head.direction)
+            on_reverse_edge(a);
     }
 }
 
@@ -732,15 +708,15 @@ int64_t advance(const PrintHeadParams *p, PrintHead *r, int64_t ticks)
 {
     Axis axis = {p, r, false};
     DriveTrain train = r->train; /* no other function sees these two: the compiler may keep them in registers */
-    Encoder encoder = r->encoder;
+    Encoder *const encoder = &r->encoder;
     double sampled = r->sampled;
     int64_t tick = r->tick, n = 0;
-    if (p->fidelity != 0)
+    if (p->fidelity != 0 || r->head.calibration_pass != 0)
         return NOT_COVERED;
     for (; n < ticks && !r->head.status.latch.flag && !axis.lost; n++, tick++) {
         int64_t now = tick * PERIOD_US;
         r->head.now_us = now;
-        sample(&axis, &encoder, sampled, train.position, train.velocity, now);
+        sample(&axis, encoder, sampled, train.position, train.velocity, now);
         sampled = train.position;
         if (r->head.command_latch.flag)
             axis.lost = true;
@@ -753,7 +729,6 @@ int64_t advance(const PrintHeadParams *p, PrintHead *r, int64_t ticks)
         move(&p->train, &train, r->bridge.mean_positive, r->bridge.mean_negative);
     }
     r->train = train;
-    r->encoder = encoder;
     r->sampled = sampled;
     r->tick = tick;
     return axis.lost ? NOT_COVERED : n;

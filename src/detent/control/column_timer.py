@@ -107,7 +107,9 @@ def next_column(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
 
 
 @step
-def schedule(p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int) -> None:
+def schedule(
+    p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int
+) -> None:
     """On an emitter: set the firing time of the next column if it lies before the next emitter.
 
     A column found behind the head (its time passed while the interval was still unknown) is counted as missed.

@@ -1,4 +1,4 @@
-"""Byte protocol and command queue of the axis computer (print-head specification 3.1), and the planning of a move (3.4)."""
+"""Byte protocol, command queue and the planning of a move (print-head specification 3.1, 3.4)."""
 
 from detent.control.feed_forward import run_up, stop_distance_up
 from detent.control.head_computer import (
@@ -56,11 +56,14 @@ def operation_of(first: int) -> int:
 
 @step
 def enqueue(c: HeadComputer, operation: int, start: int, end: int) -> None:
-    """Append a command; a second waiting motion command, or a full queue, is refused as overrun."""
+    """Append a command; a second waiting motion command, or one that finds the queue full, is refused as overrun.
+
+    A refusal waits too, so that answers keep the order of the commands: the last place counts those of a full queue.
+    """
     if c.queue.waiting >= QUEUE:
-        send(c.status, OVERRUN)
+        c.queue.end[(c.queue.first + QUEUE - 1) & (QUEUE - 1)] += 1
         return
-    if is_motion(operation) and c.queue.motions > 0:
+    if c.queue.waiting == QUEUE - 1 or (is_motion(operation) and c.queue.motions > 0):
         operation, start, end = REFUSED, OVERRUN, 0
     k = (c.queue.first + c.queue.waiting) & (QUEUE - 1)
     c.queue.operation[k] = operation
@@ -84,6 +87,14 @@ def take_next(c: HeadComputer) -> None:
     c.queue.waiting -= 1
     if is_motion(c.operation):
         c.queue.motions -= 1
+
+
+@step
+def answer(c: HeadComputer, code: int) -> None:
+    """Answer the running command, which may be several refused ones."""
+    times = 1 + c.end if c.operation == REFUSED else 1
+    for _ in range(times):
+        send(c.status, code)
 
 
 @step

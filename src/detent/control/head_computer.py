@@ -28,11 +28,14 @@ STALL_MARGIN = 20
 """Counts above friction from which the head must move: below them standing still is no fault (3.2, 7.3)."""
 
 STALL_US = 50_000
+DEAD_US = 1_000_000
+"""A head that stands this long in a move is stalled at any drive: one that creeps along gives an emitter in 5 ms."""
+
 RUNAWAY_US = 62
 """Emitter interval of 53 in/s: beyond every speed a plausible machine reaches with a drive of 300 counts or less."""
 
 QUEUE = 4
-"""Commands that wait; only one of them may be a motion command."""
+"""Commands that wait, the last place for refused ones; only one of them may be a motion command."""
 
 
 class HeadOutputs(Registers):

@@ -108,7 +108,7 @@ def begin_move(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
         begin_line(p, c, b, turn)
     if s < HIGH_SPEED:
         c.state = LOW_START
-        c.start_emitters = low_speed_start_emitters(s)
+        c.start_emitters = min(low_speed_start_emitters(s), c.plan.distance)
         c.drive = line_of(c, direction).friction + p.ir
         put_drive(p, c, direction * c.drive)
         return
@@ -143,10 +143,10 @@ def begin_line(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
 
 @step
 def begin_steady(c: HeadComputer, state: int) -> None:
-    """Enter a steady phase: the first trim is one period away."""
+    """Enter a steady phase. The first trim by count needs a whole window; the one by interval comes half a period on."""
     c.state = state
     c.drive = c.steady
-    c.next_trim_us = c.now_us + TRIM_US
+    c.next_trim_us = c.now_us + (TRIM_US if state == HIGH_STEADY else TRIM_US // 2)
     c.phase_start = c.emitter
 
 
@@ -188,13 +188,18 @@ def put_braking(p: HeadParams, c: HeadComputer) -> None:
 
 
 @step
+def growing_interval(c: HeadComputer) -> int:
+    """Latest emitter interval, or the time since that emitter once it is longer: a head that stands is not fast."""
+    return max(c.interval_us, c.now_us - c.last_emitter_us)
+
+
+@step
 def trim_low(c: HeadComputer) -> None:
     """One count per 16 ms by the latest emitter interval against 20000/s us (3.7)."""
-    if c.interval_us <= 0:
-        return
-    if c.interval_us * c.speed > 20_000:
+    interval = growing_interval(c)
+    if interval * c.speed > 20_000:
         c.drive += 1
-    elif c.interval_us * c.speed < 20_000:
+    elif 0 < interval * c.speed < 20_000 and c.interval_us > 0:
         c.drive -= 1
 
 
@@ -213,7 +218,7 @@ def trim_high(c: HeadComputer) -> None:
 @step
 def put_low(p: HeadParams, c: HeadComputer) -> None:
     """Steady low-speed output: half the drive while the interval is below 16/17 of the target (3.8)."""
-    fast = 0 < 17 * c.interval_us * c.speed < 320_000
+    fast = c.interval_us > 0 and 17 * growing_interval(c) * c.speed < 320_000
     value = c.drive >> 1 if fast and p.overspeed_test else c.drive
     put_drive(p, c, c.direction * value)
 

@@ -6,6 +6,7 @@ Print-head specification 3.2, 3.3, 3.13 and 4.1.
 from detent.control.column_timer import NEVER, LineBuffer
 from detent.control.feed_forward import steady_drive
 from detent.control.head_commands import (
+    answer,
     plan_command,
     plan_run,
     plan_waiting,
@@ -16,6 +17,7 @@ from detent.control.head_commands import (
 )
 from detent.control.head_computer import (
     CALCULATE,
+    DEAD_US,
     FAULT,
     HIGH_ACCEL,
     HIGH_REVERSE,
@@ -57,17 +59,21 @@ FAST_WINDOW_US, SLOW_WINDOW_US = 20_000, 80_000
 PASS_FAST_LEFT, PASS_FAST_RIGHT, PASS_SLOW_LEFT, PASS_SLOW_RIGHT = 1, 2, 3, 4
 RUNAWAY_EMITTERS = 2
 REVERSAL_US = 800
-"""Emitter interval from which a reversed encoder sequence is believed: the last one before standstill takes over 1 ms, and
-at speed a missing pulse looks like a reversal."""
+"""Emitter interval from which a reversed encoder sequence is believed: the last one before standstill takes over 1 ms,
+and at speed a missing pulse looks like a reversal."""
 
 
 @step
 def stand(p: HeadParams, c: HeadComputer, state: int) -> None:
-    """Drive off."""
+    """Drive off, the line back in the direction of the move: what a reversed drive left of current returns to the supply.
+
+    With the line of the reversed drive it would circulate for milliseconds and push the head back.
+    """
     c.drive = 0
     c.state = state
-    c.out.transition = 0
     put_drive(p, c, 0)
+    if c.direction != 0:
+        c.out.right_left = 1 if c.direction > 0 else 0
 
 
 @step
@@ -82,7 +88,7 @@ def fault(p: HeadParams, c: HeadComputer, code: int) -> None:
         send(c.status, code)
     while c.queue.waiting > 0:
         take_next(c)
-        send(c.status, code)
+        answer(c, code)
     c.operation = NO_OPERATION
 
 
@@ -153,7 +159,7 @@ def begin_pass(p: HeadParams, c: HeadComputer, b: LineBuffer, number: int) -> No
 
 @step
 def begin_windows(c: HeadComputer) -> None:
-    """Measuring windows begin with the steady phase, for the slow passes one window later, when the speed has settled."""
+    """Measuring windows begin with the steady phase, for the slow passes one window later, at settled speed."""
     fast = c.calibration_pass <= PASS_FAST_RIGHT
     c.window_us = c.now_us + (FAST_WINDOW_US if fast else SLOW_WINDOW_US)
     c.windows = 0 if fast else -1
@@ -217,7 +223,7 @@ def begin_next(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
         elif c.operation == SET_SPEED:
             send(c.status, set_speed(c))
         elif c.operation == REFUSED:
-            send(c.status, c.start)
+            answer(c, c.start)
         else:
             send_position(c)
         c.operation = NO_OPERATION
@@ -297,6 +303,13 @@ def on_reverse_edge(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
 
 
 @step
+def stalled(c: HeadComputer, quiet: int) -> bool:
+    """No emitter for 50 ms with drive to spare (7.3), or for a second with any drive."""
+    to_spare = abs(c.drive_cmd) > line_of(c, c.direction).friction + STALL_MARGIN
+    return quiet >= DEAD_US or (quiet >= STALL_US and to_spare)
+
+
+@step
 def on_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
     """Timers that are due in the present state."""
     if c.state in (HOME_LEFT, HOME_RIGHT):
@@ -307,7 +320,7 @@ def on_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
         if quiet >= p.zero_speed_us:
             at_zero_speed(p, c, b)
             return
-    elif quiet >= STALL_US and abs(c.drive_cmd) > line_of(c, c.direction).friction + STALL_MARGIN:
+    elif stalled(c, quiet):
         fault(p, c, OBSTRUCTION)
         return
     was_accelerating = c.state == HIGH_ACCEL

@@ -9,12 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from detent.control.head_commands import ACKNOWLEDGE
-from detent.control.head_computer import HeadComputer
+from detent.control.head_computer import STATE_NAMES, HeadComputer
 from detent.control.latch import read_latch, write_latch
 from detent.errors import AxisError, describe_sb1
 
 MOST_OUTSTANDING = 3
 """Unanswered commands: the running one, and a speed or a motion behind it."""
+
+MOST_TRIES = 1000
+"""Stretches of time in which the axis must take a byte; a computer that works takes it in the first."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +114,7 @@ class Supervisor:
         while len(self.outstanding) >= MOST_OUTSTANDING or (command.motion and self.waiting_motions() > 1):
             self.await_answer()
         for k, byte in enumerate(command.data):
-            while self.head.command_latch.flag:
-                self.pass_time(0.0)
+            self._await_free_latch(command)
             write_latch(self.head.command_latch, byte)
             last = k == len(command.data) - 1
             if not last or (self.ack_last and len(command.data) > 1):
@@ -132,6 +134,20 @@ class Supervisor:
         while self.outstanding:
             self.await_answer()
 
+    def _await_free_latch(self, command: Command) -> None:
+        """Wait until the axis has taken the last byte. Time stands still while an answer waits: it is read first."""
+        for _ in range(MOST_TRIES):
+            if not self.head.command_latch.flag:
+                return
+            if self.head.status.latch.flag and self.outstanding:
+                self.await_answer()
+            else:
+                self.pass_time(0.0)
+        raise AxisError(
+            f"{command.text}: the axis computer does not take the byte before it; it hangs in state "
+            f"{STATE_NAMES[self.head.state]!r}"
+        )
+
     def _await_acknowledge(self, command: Command) -> None:
         while True:
             byte = self._next_byte(command)
@@ -150,6 +166,7 @@ class Supervisor:
             self.pass_time(self.patience)
         if not latch.flag:
             raise AxisError(
-                f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state {self.head.state}"
+                f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state "
+                f"{STATE_NAMES[self.head.state]!r}"
             )
         return int(read_latch(latch))

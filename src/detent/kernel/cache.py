@@ -1,8 +1,8 @@
 """Where compiled steps are kept between processes.
 
 Numba stamps a cached function with the contents of its own file only, so an edit of a callee in another file would be
-served stale. Here the folder itself is named by a hash over every source that a step can be made of and over the versions
-that shape the machine code: any such edit means another folder, and nothing in it can be stale.
+served stale. Here the folder itself is named by a hash over every source that a step can be made of and over the
+versions that shape the machine code: any such edit means another folder, and nothing in it can be stale.
 """
 
 import hashlib
@@ -70,7 +70,10 @@ def compiled_folder() -> Path:
 
 def is_warm() -> bool:
     """True when a process with the same sources has compiled before."""
-    return any(compiled_folder().glob("*.nbi"))
+    try:
+        return any(compiled_folder().glob("*.nbi"))
+    except OSError:  # no folder can be made: nothing is ever kept
+        return False
 
 
 def _forget_old(root: Path, keep: Path) -> None:

@@ -167,6 +167,7 @@ def _copy_memory(builder: Any, target: Any, source: Any, size: int) -> None:
 @extending.intrinsic
 def stack_copy(_typingctx: Any, registers: Any) -> Any:
     """Copy a register file into a stack slot."""
+
     def codegen(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
         size = ctypes.sizeof(sig.args[0].registers)
         slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), (size + 7) // 8))
@@ -180,6 +181,7 @@ def stack_copy(_typingctx: Any, registers: Any) -> Any:
 @extending.intrinsic
 def copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
     """Copy one register file over another."""
+
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         _copy_memory(builder, args[0], args[1], ctypes.sizeof(sig.args[0].registers))
         return context.get_dummy_value()
@@ -190,6 +192,7 @@ def copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
 @extending.intrinsic
 def read_byte(_typingctx: Any, registers: Any, _offset: Any) -> Any:
     """Load one byte."""
+
     def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
         return builder.zext(builder.load(builder.gep(args[0], [args[1]], source_etype=BYTE)), ir.IntType(64))
 

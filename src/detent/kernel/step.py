@@ -5,16 +5,20 @@ same functions run as plain Python on the same memory and give the same bits.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
+import numba as untyped_numba
 from numba.core import config as untyped_config
+from numba.core import types as untyped_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 
 import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
 from detent.kernel.cache import compiled_folder, is_step_source, source_hash
 
+numba: Any = untyped_numba  # its annotations leave out an option that we use
+types: Any = untyped_types
 config: Any = untyped_config  # numba sets its attributes at run time
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -71,7 +75,26 @@ def hot_step(function: F) -> F:
 
 
 def _compiled(function: F, *, forceinline: bool) -> F:
-    made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline)(function)
-    if not config.DISABLE_JIT and is_step_source(Path(function.__code__.co_filename).resolve()):
-        made._cache = _PackageCache(function)  # noqa: SLF001 - numba offers no public way to choose the folder
+    # No step is called by address, so none needs the wrapper for it: a sixth less to compile.
+    made: Any = numba.njit(error_model="numpy", nogil=True, forceinline=forceinline, no_cfunc_wrapper=True)(function)
+    if config.DISABLE_JIT:
+        return cast("F", made)
+    _compile_once(made)
+    if is_step_source(Path(function.__code__.co_filename).resolve()):
+        with suppress(RuntimeError):  # numba finds no locator where the cache cannot be written: each process compiles
+            made._cache = _PackageCache(function)  # noqa: SLF001 - numba offers no public way to choose the folder
     return cast("F", made)
+
+
+def _compile_once(made: Any) -> None:
+    """Make a call with constants, ``stand(p, c, IDLE)``, use the same machine code as one with variables.
+
+    Numba would compile a step, and all that takes the constant from it, again for every constant it is called with.
+    """
+    template_of_types = made.get_call_template
+
+    def template(args: Any, kws: Any) -> Any:
+        plain = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return template_of_types([types.unliteral(kind) for kind in args], plain)
+
+    made.get_call_template = template

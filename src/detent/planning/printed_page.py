@@ -207,36 +207,64 @@ class _Glyph:
     underline: bool = False
 
 
+OPEN_LINES = 200
+"""Lines that can be struck again without being taken apart first: more than reverse feeds reach on a page."""
+
+
 @dataclass(slots=True)
 class Sheet:
     """Collects strikes in any order and hands them back as lines.
 
-    Overstrikes of the same glyph at the same place become one character with a higher `strike`.
+    Overstrikes of the same glyph at the same place become one character with a higher `strike`. Lines left behind are
+    settled into characters at once, and equal characters are one object, so that a job of any length stays small.
     """
 
-    _glyphs: dict[tuple[int, int], dict[tuple[int, str, bool], _Glyph]] = field(
+    _open: dict[tuple[int, int], dict[tuple[int, str, bool], _Glyph]] = field(
         default_factory=dict[tuple[int, int], dict[tuple[int, str, bool], _Glyph]]
     )
+    _settled: dict[tuple[int, int], tuple[PrintedCharacter, ...]] = field(
+        default_factory=dict[tuple[int, int], tuple[PrintedCharacter, ...]]
+    )
+    _known: dict[PrintedCharacter, PrintedCharacter] = field(default_factory=dict[PrintedCharacter, PrintedCharacter])
 
     def strike(self, page: int, baseline: int, hit: PrintedCharacter) -> None:
         """Put one hit on paper: `baseline` [1/48 in] from the top of the first page, on page `page`."""
-        line = self._glyphs.setdefault((page, baseline), {})
-        glyph = line.setdefault((hit.column, hit.char, hit.red), _Glyph())
-        glyph.strike += hit.strike
-        glyph.width_columns = max(glyph.width_columns, hit.width_columns)
-        glyph.underline |= hit.underline
+        line = self._open.get((page, baseline))
+        if line is None:
+            line = self._begin((page, baseline))
+        _strike(line, hit)
 
     def lines(self) -> tuple[PrintLine, ...]:
         """Give all lines with ink, from the top down, numbered from 1."""
+        for place in list(self._open):
+            self._settle(place)
         return tuple(
-            PrintLine(number, baseline, _characters(self._glyphs[page, baseline]), page)
-            for number, (page, baseline) in enumerate(sorted(self._glyphs), start=1)
+            PrintLine(number, baseline, self._settled[page, baseline], page)
+            for number, (page, baseline) in enumerate(sorted(self._settled), start=1)
         )
 
+    def _begin(self, place: tuple[int, int]) -> dict[tuple[int, str, bool], _Glyph]:
+        """Open a line, with what was struck on it before; the one opened longest ago makes room."""
+        if len(self._open) >= OPEN_LINES:
+            self._settle(next(iter(self._open)))
+        line: dict[tuple[int, str, bool], _Glyph] = {}
+        for character in self._settled.pop(place, ()):
+            _strike(line, character)
+        self._open[place] = line
+        return line
 
-def _characters(line: dict[tuple[int, str, bool], _Glyph]) -> tuple[PrintedCharacter, ...]:
-    """Turn the strikes of one line into characters, sorted by column."""
-    return tuple(
-        PrintedCharacter(char, column, glyph.width_columns, glyph.strike, red, glyph.underline)
-        for (column, char, red), glyph in sorted(line.items(), key=lambda item: item[0])
-    )
+    def _settle(self, place: tuple[int, int]) -> None:
+        """Turn the strikes of one line into characters, sorted by column."""
+        line = self._open.pop(place)
+        found = [
+            PrintedCharacter(char, column, glyph.width_columns, glyph.strike, red, glyph.underline)
+            for (column, char, red), glyph in sorted(line.items(), key=lambda item: item[0])
+        ]
+        self._settled[place] = tuple(self._known.setdefault(character, character) for character in found)
+
+
+def _strike(line: dict[tuple[int, str, bool], _Glyph], hit: PrintedCharacter) -> None:
+    glyph = line.setdefault((hit.column, hit.char, hit.red), _Glyph())
+    glyph.strike += hit.strike
+    glyph.width_columns = max(glyph.width_columns, hit.width_columns)
+    glyph.underline |= hit.underline

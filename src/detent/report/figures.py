@@ -67,7 +67,7 @@ def plot_signals(
     DetentError
         A signal is not there, the stretch holds nothing, or the file cannot be written.
     """
-    path = _checked(path)
+    path = check_figure_path(path)
     names = trace.match(signals)
     if not names:
         raise DetentError(f"{path}: no signal was asked for; name one of: {', '.join(trace.signals)}")
@@ -138,7 +138,7 @@ def plot_comparison(comparison: Comparison, path: str | Path) -> None:
     DetentError
         The figures do not fit together, or the file cannot be written.
     """
-    path = _checked(path)
+    path = check_figure_path(path)
     shape = (len(comparison.methods), len(comparison.speeds), 2)
     if comparison.errors.shape != shape:
         raise DetentError(
@@ -234,11 +234,29 @@ def _method_colour(index: int, methods: int) -> str:
     return COLOURS[0] if index == methods - 1 else others[index % len(others)]
 
 
-def _checked(path: str | Path) -> Path:
-    """Refuse a suffix that is no figure before any work is done."""
+def check_figure_path(path: str | Path) -> Path:
+    """Refuse a target that cannot take a figure, before any work is done.
+
+    Parameters
+    ----------
+    path : str or Path
+        Target.
+
+    Returns
+    -------
+    Path
+        The same.
+
+    Raises
+    ------
+    DetentError
+        The suffix names no kind of figure, or the folder is not there.
+    """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
+    if not path.parent.is_dir():
+        raise DetentError(f"{path}: cannot be written (no folder {path.parent}); make it, or choose another place")
     return path
 
 

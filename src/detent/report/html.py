@@ -19,6 +19,9 @@ from detent.report import charts
 from detent.report.data import COLUMN, INCH, ColumnErrors, Event, ReportData
 from detent.report.words import GAP, arrow, count, duration, inches_per_second, micrometres, number, table
 
+MOST_LINES = 500
+"""Lines in the table: more than anybody reads."""
+
 LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}
 
 
@@ -40,7 +43,8 @@ def write_report(data: ReportData, path: str | Path) -> None:
     path = Path(path)
     part = path.with_name(path.name + ".part")
     try:
-        part.write_text(render_report(data), encoding="utf-8")
+        # A file name need not be valid UTF-8; the page must be.
+        part.write_text(render_report(data), encoding="utf-8", errors="replace")
         part.replace(path)
     except OSError as error:
         reason = error.strerror or str(error)
@@ -156,7 +160,8 @@ def _cards(data: ReportData) -> str:
         worst = micrometres(data.errors.worst).partition(GAP)
         cards.append(
             _card("Worst column error", worst[0], worst[2],
-                  f"rms {micrometres(data.errors.rms)}, allowed {micrometres(data.column_limit)}", bad=_off_column(data) > 0)
+                  f"rms {micrometres(data.errors.rms)}, allowed {micrometres(data.column_limit)}",
+                  bad=_off_column(data) > 0)
         )  # fmt: skip
     if data.lines:
         fastest = max(line.speed for line in data.lines)
@@ -232,8 +237,8 @@ def _histogram_figure(data: ReportData, errors: ColumnErrors | None) -> str:
     limit = micrometres(data.column_limit)
     outside = " (outside the figure)" if errors.worst < data.column_limit / 1.5 else ""
     caption = (
-        "How far from its place each column of dots landed. Look for: two narrow heaps in the same place. Heaps that stand "
-        "apart mean that lines printed to the right and to the left do not line up. "
+        "How far from its place each column of dots landed. Look for: two narrow heaps in the same place. Heaps that "
+        "stand apart mean that lines printed to the right and to the left do not line up. "
         f"Allowed: ±{limit}{outside}; the finest column grid is {micrometres(COLUMN)} (1/120{GAP}in)."
     )
     chart = _chart("histogram", "Histogram of column errors, printed to the right and to the left")
@@ -370,9 +375,12 @@ def _lines(data: ReportData) -> str:
             _error_cell(line.worst_error, scale, data.column_limit),
             number(line.rms_error * 1e6, 2),
         )
-        for line in data.lines
+        for line in data.lines[:MOST_LINES]
     ]
     caption = "Time runs from the command to zero speed. The bar compares the lines with one another."
+    left_out = len(data.lines) - len(rows)
+    if left_out > 0:
+        caption += f" {count(left_out, 'further line')} {'is' if left_out == 1 else 'are'} in the JSON summary only."
     return "<h2>Line by line</h2>\n" + _figure("Every line", caption, table(heads, rows, tall=True))
 
 

@@ -1,5 +1,7 @@
 """From a print run and its trace to what the report shows."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from detent.axisfile.schema import FULL_DRIVE_COUNTS, INCH, SPEED_STEP, PrintHeadSpec
@@ -13,6 +15,7 @@ from detent.control.head_computer import (
     LOW_STEADY,
     LOW_STOP,
 )
+from detent.planning.printed_page import PrintJob
 from detent.report.data import (
     ColumnErrors,
     Comparison,
@@ -34,7 +37,10 @@ from detent.simulation.print_run import ERROR_BIN, LineRecord, PrintRun
 from detent.simulation.trace import Trace
 
 PAGE = 528
-"""Eleven inches in 1/48 in: the top of each page on continuous paper."""
+"""Eleven inches in 1/48 in: the usual page of continuous paper."""
+
+FEWEST_ROWS = 10
+"""Rows of a trace without which a line is not drawn."""
 
 STATE_EVENTS = {
     (HIGH_ACCEL, HIGH_STEADY): "top of the ramp: IR part removed, trim on",
@@ -81,7 +87,7 @@ def print_report(
         duration=run.print_time,
         line_count=len(run.job.lines),
         page_count=run.job.pages,
-        character_count=sum(c.strike for line in run.job.lines for c in line.characters),
+        character_count=run.job.characters,
         lines=[_line_result(line) for line in run.lines],
         marks=_marks(run),
         errors=ColumnErrors(
@@ -117,6 +123,8 @@ def _line_result(line: LineRecord) -> LineResult:
 
 def _marks(run: PrintRun) -> Marks:
     lines = {line.number: line for line in run.job.lines}
+    tops = _page_tops(run.job)
+    from_top = {line.number: line.baseline - tops[line.page] for line in run.job.lines}
     directions = {line.number: line.direction for line in run.lines}
     struck = [s for s in run.strikes if s.offset == s.offset]  # those that were fired
     column = np.array([s.character.column for s in struck], dtype=float) * (INCH / 120)
@@ -124,13 +132,21 @@ def _marks(run: PrintRun) -> Marks:
         characters=[s.character.char for s in struck],
         page=np.array([lines[s.line].page for s in struck], dtype=int),
         line=np.array([s.line for s in struck], dtype=int),
-        baseline=np.array([lines[s.line].baseline % PAGE for s in struck], dtype=float) * (INCH / 48),
+        baseline=np.array([from_top[s.line] for s in struck], dtype=float) * (INCH / 48),
         column=column,
         landed=column + np.array([s.offset for s in struck], dtype=float),
         width=np.array([s.character.ink_columns for s in struck], dtype=float) * (INCH / 120),
         direction=np.array([directions[s.line] for s in struck], dtype=int),
         strikes=np.array([s.character.strike for s in struck], dtype=int),
     )
+
+
+def _page_tops(job: PrintJob) -> dict[int, int]:
+    """Top of each page [1/48 in]: eleven inches each; on shorter forms the first line of a page is its top."""
+    tops: dict[int, int] = {}
+    for line in job.lines:
+        tops.setdefault(line.page, min(PAGE * (line.page - 1), line.baseline))
+    return tops
 
 
 def _head_path(spec: PrintHeadSpec, run: PrintRun, trace: Trace) -> HeadPath:
@@ -169,13 +185,13 @@ def _reference(trace: Trace) -> Numbers:
 
 
 def _profile(run: PrintRun, trace: Trace) -> SpeedProfile | None:
-    """The line with the most columns among the fastest."""
-    if not run.lines:
+    """The line with the most columns among the fastest, of those recorded whole."""
+    lines = _recorded(run, trace)
+    if not lines:
         return None
-    chosen = max(run.lines, key=lambda line: (line.speed_value, line.columns))
-    part = trace.between(chosen.start, chosen.stop)
-    if len(part) < 2:
-        return None
+    chosen = max(lines, key=lambda line: (line.speed_value, line.columns))
+    # One row more: the end of the move shows in the first row after it.
+    part = trace.between(chosen.start, chosen.stop + _row(trace))
     fired = np.flatnonzero(np.diff(part["head.columns.fired"]))
     t = part.time - chosen.start
     return SpeedProfile(
@@ -191,9 +207,22 @@ def _profile(run: PrintRun, trace: Trace) -> SpeedProfile | None:
     )
 
 
+def _row(trace: Trace) -> float:
+    """Time between two rows [s]."""
+    return float(trace.time[1] - trace.time[0])
+
+
+def _recorded(run: PrintRun, trace: Trace) -> list[LineRecord]:
+    """Lines that the trace shows from start to stop: of a very long job only the beginning is kept."""
+    row = _row(trace)
+    ends = float(trace.time[-1]) + row
+    # Fewer rows than these show nothing of a line.
+    return [line for line in run.lines if line.stop <= ends and line.stop - line.start > FEWEST_ROWS * row]
+
+
 def _turn_around(run: PrintRun, trace: Trace) -> TurnAround | None:
     """The turn-around at the highest speed: from the stop of a line to the steady speed of the next."""
-    pairs = [(a, b) for a, b in zip(run.lines, run.lines[1:], strict=False) if b.turn_around]
+    pairs = [(a, b) for a, b in pairwise(_recorded(run, trace)) if b.turn_around]
     if not pairs:
         return None
     before, after = max(pairs, key=lambda pair: pair[1].speed_value)
@@ -285,7 +314,11 @@ def drift_text(spec: PrintHeadSpec) -> str:
     d = spec.disturbance
     parts = [
         f"{name} {100 * value:+.3g} %"
-        for name, value in (("K", d.motor_constant), ("friction right", d.friction_right), ("friction left", d.friction_left))
+        for name, value in (
+            ("K", d.motor_constant),
+            ("friction right", d.friction_right),
+            ("friction left", d.friction_left),
+        )
         if value
     ]
     if d.supply != spec.drive.supply:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from detent.axisfile.build import build_print_head
 from detent.axisfile.derive import Machine as Figures
-from detent.axisfile.schema import EMITTER, INCH, SPEED_STEP, PrintHeadSpec, speed_value
+from detent.axisfile.schema import EMITTER, INCH, PrintHeadSpec, speed_value
 from detent.control.head_computer import HIGH_STEADY, IDLE
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
@@ -158,8 +158,8 @@ def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> D
     if low or not chosen:
         came = ", ".join(f"{v / INCH:.4g} in/s" for v in low or speeds)
         raise DetentError(
-            f"comparison of drives: came {came}; allowed: 10 in/s to {spec.limits.speed / INCH:.4g} in/s (limits.speed); "
-            "choose speeds of the high-speed class, or raise limits.speed"
+            f"comparison of drives: came {came}; allowed: 10 in/s to {spec.limits.speed / INCH:.4g} in/s "
+            "(limits.speed); choose speeds of the high-speed class, or raise limits.speed"
         )
     ways = {
         "power-on default": default_constants(spec),
@@ -258,7 +258,7 @@ class MeasuringBench:
     def start(self, constants: DriveConstants, speed: float) -> DriveStart:
         """A start to the right at `speed` [m/s] with the trim running."""
         rows = self._run(constants, speed, 1, START_TIME, trim=True)
-        t = np.arange(1, len(rows) + 1) * TICK
+        t = np.arange(1, len(rows) + 1, dtype=np.float64) * TICK
         velocity = rows["velocity"].copy()
         steady = np.flatnonzero(rows["state"] == HIGH_STEADY)
         if len(steady) == 0:

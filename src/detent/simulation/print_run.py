@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.axisfile.derive import Machine as TrueMachine
-from detent.axisfile.schema import EMITTER, SPEED_STEP, PrintHeadSpec
+from detent.axisfile.schema import EMITTER, INCH, SPEED_STEP, PrintHeadSpec
 from detent.control.column_timer import COLUMNS
-from detent.control.head_computer import IMPLAUSIBLE
+from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
 from detent.control.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
 from detent.errors import AxisError, describe_sb1
 from detent.planning.line_plan import Geometry, LinePlan, plan_lines
@@ -93,6 +93,8 @@ class PrintRun:
         Lines that were printed.
     strikes : list of Strike
         Characters printed, in the order of the lines; bounded by `MOST_STRIKES`.
+    characters, columns, missed : int
+        Characters printed (one struck twice in place counts once), columns of dots fired, and inked ones passed by.
     worst_error, rms_error : float
         Of where the columns landed, as far as they were printed.
     errors_right, errors_left : ndarray of int, shape (ERROR_BINS,)
@@ -163,7 +165,7 @@ ERROR_BIN = 1e-7
 ERROR_BINS = 6001
 """Bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins."""
 
-MOST_STRIKES = 50_000
+MOST_STRIKES = 20_000
 """Characters kept one by one for the picture of the pages; the figures count all."""
 
 
@@ -276,29 +278,39 @@ class _Runner:
             self.result.warnings.append(f"{answer.command.text}: {describe_sb1(answer.byte)}")
         elif answer.byte and not self.result.failure:
             where = f" (line {self.plans[answer.command.tag].line.number})" if answer.command.tag >= 0 else ""
-            self.result.failure = f"{answer.command.text}{where}: {describe_sb1(answer.byte)}"
+            self.result.failure = f"{answer.command.text}{where}: {describe_sb1(answer.byte)}{self._place(answer.byte)}"
         self.began = self.machine.time
+
+    def _place(self, code: int) -> str:
+        """Where an obstruction is, as far as the axis knows."""
+        head = self.state.head
+        if not code & OBSTRUCTION or head.width <= 0:
+            return ""
+        expected = self.machine.params.head.expected_width
+        if head.width < expected - self.machine.params.head.width_tolerance:
+            return f" (the way found is {_both(head.width)}, limits.travel is {_both(expected)})"
+        return f" (the head stopped {_both(head.emitter)} from the left frame)"
 
     def book_line(self, index: int) -> None:
         """Read what a finished line left in its bank."""
         line, bank, result = self.plans[index].line, self._bank(index), self.result
         inked = self.ink[bank] != 0
         landed = self.landed[bank]
+        buffer: Any = self.state.buffer  # ctypes gives the elements of an array no type
         fired = inked & (landed != NOT_FIRED)
-        errors = landed[fired] * 1e-9
+        errors: NDArray[np.float64] = landed[fired].astype(np.float64) * 1e-9
         squares = float(errors @ errors)
         worst = float(np.max(np.abs(errors), initial=0.0))
         number = bank.start // COLUMNS
-        bins = np.clip(np.round(errors / ERROR_BIN).astype(np.int64) + ERROR_BINS // 2, 0, ERROR_BINS - 1)
-        counted = result.errors_right if self.state.buffer.direction[number] > 0 else result.errors_left
-        counted += np.bincount(bins, minlength=ERROR_BINS)
+        counted = result.errors_right if buffer.direction[number] > 0 else result.errors_left
+        counted += count_errors(errors)
         count, missed = int(fired.sum()), int(inked.sum() - fired.sum())
         result.lines.append(
             LineRecord(
                 number=line.number,
-                direction=int(self.state.buffer.direction[number]),
-                speed_value=int(self.state.buffer.speed[number]),
-                turn_around=bool(self.state.buffer.turned[number]),
+                direction=int(buffer.direction[number]),
+                speed_value=int(buffer.speed[number]),
+                turn_around=bool(buffer.turned[number]),
                 start=self.began,
                 stop=self.machine.time,
                 characters=len(line.characters),
@@ -309,7 +321,7 @@ class _Runner:
             )
         )
         self._book_strikes(line, landed)
-        result.characters += sum(c.strike for c in line.characters)
+        result.characters += len(line.characters)
         result.columns += count
         result.missed += missed
         result.worst_error = max(result.worst_error, worst)
@@ -365,6 +377,17 @@ class _Runner:
             default_slope=p.slope_default,
             default_friction=p.friction_default,
         )
+
+
+def count_errors(errors: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Columns per bin of `ERROR_BIN`, the middle bin centred on zero; errors beyond the ends count in the end bins."""
+    bins = np.clip(np.round(errors / ERROR_BIN).astype(np.int64) + ERROR_BINS // 2, 0, ERROR_BINS - 1)
+    return np.bincount(bins, minlength=ERROR_BINS).astype(np.int64)
+
+
+def _both(emitters: int) -> str:
+    """A length in the two units people use."""
+    return f"{emitters * EMITTER * 1e3:.1f} mm = {emitters * EMITTER / INCH:.2f} in"
 
 
 def _ink_span(character: PrintedCharacter) -> tuple[int, int]:

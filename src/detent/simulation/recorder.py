@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.kernel.registers import Leaf, Registers
-from detent.simulation.trace import Trace
+from detent.simulation.trace import Attribute, Trace
 
 ROWS = 16384
 """Rows between two flushes."""
@@ -18,28 +19,44 @@ Sink = Callable[[NDArray[np.void]], None]
 
 
 def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf]:
-    """Leaves of the named registers; a trailing ``.*`` takes a whole block, ``all`` everything but arrays.
+    """Leaves of the named registers, each once, in the order asked.
+
+    Parameters
+    ----------
+    registers : type of Registers
+        Class of the recorded state.
+    names : iterable of str
+        Dotted paths, or patterns with ``*`` such as ``head.*``; ``all`` is every register but arrays.
 
     Raises
     ------
     DetentError
-        A name is no register; the message names the nearest.
+        A name is no register, or an array; the message names the nearest.
     """
-    leaves = {leaf.path: leaf for leaf in registers.leaves() if not leaf.length}
+    leaves = {leaf.path: leaf for leaf in registers.leaves()}
+    single = [leaf for leaf in leaves.values() if not leaf.length]
     chosen: dict[str, Leaf] = {}
     for name in names:
-        if name == "all":
-            found = list(leaves.values())
-        elif name.endswith(".*"):
-            found = [leaf for path, leaf in leaves.items() if path.startswith(name[:-1])]
-        else:
-            found = [leaves[name]] if name in leaves else []
+        pattern = "*" if name == "all" else name
+        found = [leaf for leaf in single if fnmatchcase(leaf.path, pattern)]
         if not found:
-            near = get_close_matches(name, leaves, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise DetentError(f"signal {name!r}: no such register of {registers.__name__}{hint}; 'all' records every one")
+            raise _no_signal(name, registers, leaves)
         chosen.update((leaf.path, leaf) for leaf in found)
     return list(chosen.values())
+
+
+def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -> DetentError:
+    if name in leaves:
+        return DetentError(
+            f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
+            "leave it out"
+        )
+    near = get_close_matches(name, [path for path, leaf in leaves.items() if not leaf.length], 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return DetentError(
+        f"signal {name!r}: no such register of {registers.__name__}; {hint}`detent registers` lists them all, "
+        "'all' records every one"
+    )
 
 
 class Recorder:
@@ -62,6 +79,8 @@ class Recorder:
     def __init__(
         self, registers: type[Registers], names: Sequence[str], *, every: int, period: float, sink: Sink | None = None
     ) -> None:
+        if every < 1:
+            raise DetentError(f"recording: came every {every} ticks; allowed: 1 or more; choose how often to record")
         self.leaves = [leaf for leaf in choose_leaves(registers, names) if leaf.path != "tick"]
         tick = next(leaf for leaf in registers.leaves() if leaf.path == "tick")
         picked = [tick, *self.leaves]
@@ -99,15 +118,20 @@ class Recorder:
             return
         index = np.arange(self._next_row, last + 1) % ROWS
         raw: Any = self.rows[index].view(self._raw)[:, 0]
-        block = np.empty(len(raw), self.dtype)
+        block: Any = np.empty(len(raw), self.dtype)
         block["t"] = raw["tick"] * self.period
         for leaf in self.leaves:
             block[leaf.path] = raw[leaf.path]
         self._sink(block)
         self._next_row = last + 1
 
-    def trace(self, **attributes: str | float | int) -> Trace:
+    def trace(self, **attributes: str | float) -> Trace:
         """What is in memory, as a trace."""
-        whole = np.concatenate(self._blocks) if self._blocks else np.empty(0, self.dtype)
-        columns = {name: whole[name].copy() for name in whole.dtype.names or ()}
-        return Trace(columns=columns, units=self.units, docs=self.docs, attributes=attributes)
+        return make_trace(self, self._blocks, dict(attributes))
+
+
+def make_trace(recorder: Recorder, blocks: Sequence[NDArray[np.void]], attributes: dict[str, Attribute]) -> Trace:
+    """Blocks that a recorder handed to its sink, as one trace."""
+    whole: Any = np.concatenate(blocks) if blocks else np.empty(0, recorder.dtype)
+    columns = {str(name): np.ascontiguousarray(whole[name]) for name in recorder.dtype.names}
+    return Trace(columns=columns, units=recorder.units, docs=recorder.docs, attributes=attributes)

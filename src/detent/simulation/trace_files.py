@@ -28,7 +28,7 @@ from detent.simulation.trace import TIME, Attribute, Column, Trace, check_column
 CHUNK_ROWS = 16384
 """Rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column."""
 
-CSV_ROWS = 65536
+CSV_ROWS = 8192
 """Rows of text made at once: bounds the memory of a CSV file of any length."""
 
 PARQUET_ROWS = 1 << 20
@@ -124,7 +124,8 @@ class TraceWriter:
 
         root = self._file.attrs
         for name, value in {"detent_version": __version__, **attributes}.items():
-            root[name] = value
+            # A file name need not be valid UTF-8; HDF5 text must be.
+            root[name] = value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
         root["format"] = FORMAT
         # A copy of a trace that broke off stays one that broke off.
         self._whole = bool(attributes.get("complete", 1))
@@ -313,14 +314,12 @@ def convert_trace(store: str | Path, path: str | Path) -> None:
     Raises
     ------
     DetentError
-        The suffix is none of these, the store cannot be read, or the target cannot be written.
+        The suffix is none of these, the store holds no trace, or the target cannot be written.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".parquet"):
         raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use .csv or .parquet")
-    with _writing(Path(store)):
-        file: Any = _h5py().File(store, "r")
-    with file:
+    with _open_store(Path(store)) as file:
         group = file[GROUP]
         columns = {str(name): group[name] for name in group.attrs["columns"]}
         units = {name: str(values.attrs["unit"]) for name, values in columns.items()}
@@ -329,7 +328,28 @@ def convert_trace(store: str | Path, path: str | Path) -> None:
             _write_csv(columns, labels, Path(path))
         else:
             docs = {name: str(values.attrs["doc"]) for name, values in columns.items()}
-            _write_parquet(columns, units, docs, {k: _plain(v) for k, v in file.attrs.items() if k != "format"}, Path(path))
+            _write_parquet(columns, units, docs, _attributes_of(file), Path(path))
+
+
+@contextmanager
+def _open_store(path: Path) -> Generator[Any]:
+    """An HDF5 file that holds a trace."""
+    try:
+        file: Any = _h5py().File(path, "r")
+    except OSError as error:
+        came = " ".join(str(error).split())
+        raise InputError.of_file(str(path), came, "a trace in HDF5", "give a .h5 file that detent wrote") from error
+    with file:
+        if GROUP not in file or "columns" not in file[GROUP].attrs:
+            raise InputError.of_file(
+                str(path), f"HDF5 with {', '.join(file) or 'nothing'}", f"a group /{GROUP}", "give a trace of detent"
+            )
+        yield file
+
+
+def _attributes_of(file: Any) -> dict[str, Attribute]:
+    """What the run said about itself; the format is the store's own."""
+    return {name: _plain(value) for name, value in file.attrs.items() if name != "format"}
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
@@ -396,20 +416,14 @@ def load_trace(path: str | Path) -> Trace:
 
 
 def _load_hdf5(path: Path) -> Trace:
-    with _h5py().File(path, "r") as file:
-        if GROUP not in file:
-            raise InputError.of_file(
-                str(path), f"HDF5 with {', '.join(file) or 'nothing'}", f"a group /{GROUP}", "give a trace of detent"
-            )
+    with _open_store(path) as file:
         group = file[GROUP]
         names = [str(name) for name in group.attrs["columns"]]
-        # Version, format and completeness are the store's own; the rest is what the run said about itself.
-        attributes = {name: _plain(value) for name, value in file.attrs.items() if name != "format"}
         return Trace(
             columns={name: group[name][()] for name in names},
             units={name: str(group[name].attrs["unit"]) for name in names},
             docs={name: str(group[name].attrs["doc"]) for name in names},
-            attributes=attributes,
+            attributes=_attributes_of(file),
         )
 
 
@@ -478,6 +492,17 @@ def _writing(path: Path) -> Generator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+
+
+def need_parquet() -> None:
+    """Refuse before any work what cannot be written at its end.
+
+    Raises
+    ------
+    DetentError
+        pyarrow is not installed; the text names the extra.
+    """
+    _pyarrow()
 
 
 def _h5py() -> Any:

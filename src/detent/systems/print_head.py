@@ -11,7 +11,7 @@ last period, decide, actuate, move.
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.column_timer import NEVER, ErrorHistogram, LineBuffer, fire, schedule
+from detent.control.column_timer import ErrorHistogram, LineBuffer, fire, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
 from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
 from detent.drive.h_bridge import Bridge, BridgeLines, steer
@@ -71,7 +71,7 @@ class PrintHead(Registers):
 
 @hot_step
 def edge_time(now: int, start: float, end: float, x: float) -> int:
-    """Time at which the carriage passed `x` on its way from `start` to `end` in the last period, in whole microseconds."""
+    """Time at which the carriage passed `x` on its way from `start` to `end` in the last period [whole us]."""
     share = (x - start) / (end - start) if end != start else 0.0
     return now - PERIOD_US + min(max(int(share * PERIOD_US), 0), PERIOD_US - 1)
 
@@ -105,20 +105,20 @@ def fire_column(p: PrintHeadParams, r: PrintHead, start: float, end: float, velo
 
 
 @hot_step
-def sample(p: PrintHeadParams, r: PrintHead, e: Encoder, x: float, velocity: float) -> None:
-    """Edges and due columns of the last period, in order of time; the carriage stands at `x` now."""
-    now = r.head.now_us
+def sample(p: PrintHeadParams, r: PrintHead, x: float, velocity: float) -> None:
+    """Edges and due columns of the last period, in order of time; the carriage stands at `x` now.
+
+    The time of an edge costs a division, so it is worked out only where a due column or an emitter asks for it.
+    """
+    now, e = r.head.now_us, r.encoder
     while True:
-        when = NEVER
         rightward = x >= e.next_right
-        if rightward:
-            when = edge_time(now, r.sampled, x, e.next_right)
-        elif x < e.next_left:
-            when = edge_time(now, r.sampled, x, e.next_left)
+        passed = rightward or x < e.next_left
+        edge = e.next_right if rightward else e.next_left
         due = r.head.columns.fire_us
-        if due < now and due <= when:
+        if due < now and (not passed or due <= edge_time(now, r.sampled, x, edge)):
             fire_column(p, r, r.sampled, x, velocity)
-        elif when == NEVER:
+        elif not passed:
             break
         else:
             if rightward:
@@ -128,7 +128,7 @@ def sample(p: PrintHeadParams, r: PrintHead, e: Encoder, x: float, velocity: flo
             change = count_edge(r.quadrature, e.channel_a, e.channel_b)
             cycle = r.quadrature.count >> 2
             if cycle != r.cycle:
-                take_emitter(p, r, cycle, when)
+                take_emitter(p, r, cycle, edge_time(now, r.sampled, x, edge))
             if change == -r.head.direction:
                 take_reverse_edge(p, r)
     r.sampled = x
@@ -161,10 +161,10 @@ def move(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> None:
 
 
 @hot_step
-def tick(p: PrintHeadParams, r: PrintHead, e: Encoder, train: DriveTrain) -> None:
-    """One PWM period; `e` and `train` are the encoder and the drive train of `r`, or local copies of them."""
+def tick(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> None:
+    """One PWM period; `train` is the drive train of `r` or a local copy of it."""
     r.head.now_us = r.tick * PERIOD_US
-    sample(p, r, e, train.position, train.velocity)
+    sample(p, r, train.position, train.velocity)
     decide(p.head, r.head, r.buffer)
     actuate(p, r)
     move(p, r, train)
@@ -173,11 +173,11 @@ def tick(p: PrintHeadParams, r: PrintHead, e: Encoder, train: DriveTrain) -> Non
 
 @step
 def advance_plain(p: PrintHeadParams, r: PrintHead, ticks: int) -> int:
-    """`advance` without trace and without local copies; the benchmark holds it beside `advance`."""
+    """`advance` without trace and without a local copy; the benchmark holds it beside `advance`."""
     for n in range(ticks):
         if r.head.status.latch.flag:
             return n
-        tick(p, r, r.encoder, r.train)
+        tick(p, r, r.train)
     return ticks
 
 
@@ -185,7 +185,7 @@ def advance_plain(p: PrintHeadParams, r: PrintHead, ticks: int) -> int:
 def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
     """Run up to `ticks` periods; stops early when a status byte waits for the supervisor.
 
-    What every tick touches, the drive train and the encoder, is worked on in local copies, so that it stays in machine
+    The drive train, which only its own move writes, is worked on in a local copy, so that it stays in machine
     registers; it is written back before anything else looks at it.
 
     Parameters
@@ -209,13 +209,12 @@ def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: O
     done = 0
     while done < ticks and r.head.status.latch.flag == 0:
         stretch = min(ticks - done, every - r.tick % every) if every > 0 else ticks - done
-        train, encoder = local_copy(r.train), local_copy(r.encoder)
+        train = local_copy(r.train)
         n = 0
         while n < stretch and r.head.status.latch.flag == 0:
-            tick(p, r, encoder, train)
+            tick(p, r, train)
             n += 1
         copy_back(r.train, train)
-        copy_back(r.encoder, encoder)
         done += n
         if every > 0 and r.tick % every == 0:
             row = (r.tick // every) % trace.shape[0]

@@ -107,7 +107,15 @@ def test_leaves_give_paths_and_offsets_of_nested_blocks():
     r.middle.inner.count = 7
     r.queue[4] = 9
     paths = {leaf.path: leaf for leaf in Outer.leaves()}
-    assert list(paths) == ["inner.count", "inner.gain", "middle.inner.count", "middle.inner.gain", "middle.tail", "queue", "table"]
+    assert list(paths) == [
+        "inner.count",
+        "inner.gain",
+        "middle.inner.count",
+        "middle.inner.gain",
+        "middle.tail",
+        "queue",
+        "table",
+    ]
     state = r.snapshot()
     assert state[paths["middle.inner.count"].offset] == 7
     assert state[paths["queue"].offset + 4] == 9
@@ -179,7 +187,13 @@ def test_numpy_view_shares_the_memory():
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) on this machine")
 def test_the_c_compiler_lays_the_structure_out_the_same(registers, tmp_path):
     leaves = list(registers.leaves())
-    lines = ["#include <stdint.h>", "#include <stddef.h>", "#include <stdio.h>", registers.c_struct(), "int main(void) {"]
+    lines = [
+        "#include <stdint.h>",
+        "#include <stddef.h>",
+        "#include <stdio.h>",
+        registers.c_struct(),
+        "int main(void) {",
+    ]
     lines.append(f'printf("%zu\\n", sizeof({registers.__name__}));')
     lines += [f'printf("%zu\\n", offsetof({registers.__name__}, {leaf.path}));' for leaf in leaves]
     source, program = tmp_path / "layout.c", tmp_path / "layout"

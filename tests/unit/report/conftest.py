@@ -3,6 +3,7 @@ import pytest
 
 from detent.report.data import (
     INCH,
+    ColumnErrors,
     Constant,
     Event,
     HeadPath,
@@ -30,6 +31,17 @@ def marks() -> Marks:
         width=np.full(4, 0.1 * INCH),
         direction=np.array([1, 1, -1, -1]),
         strikes=np.array([1, 1, 2, 1]),
+    )
+
+
+@pytest.fixture
+def errors() -> ColumnErrors:
+    """The columns of those characters: eight each, but only one of the bold one is 60 µm off."""
+    right, left = np.zeros(6001, dtype=np.int64), np.zeros(6001, dtype=np.int64)
+    right[3000 + 10], right[3000 - 20] = 8, 8
+    left[3000], left[3000 + 600] = 15, 1
+    return ColumnErrors(
+        bin_width=1e-7, right=right, left=left, worst=60e-6, rms=np.sqrt((8 + 8 * 4 + 3600) / 32) * 1e-6
     )
 
 
@@ -86,7 +98,12 @@ def identified() -> tuple[IdentifiedLine, IdentifiedLine]:
 
 @pytest.fixture
 def report(
-    marks: Marks, profile: SpeedProfile, turn: TurnAround, path: HeadPath, identified: tuple[IdentifiedLine, ...]
+    marks: Marks,
+    errors: ColumnErrors,
+    profile: SpeedProfile,
+    turn: TurnAround,
+    path: HeadPath,
+    identified: tuple[IdentifiedLine, ...],
 ) -> ReportData:
     return ReportData(
         axis_name="daisy & wheel",
@@ -103,6 +120,7 @@ def report(
                        rms_error=42e-6),
         ],
         marks=marks,
+        errors=errors,
         column_limit=100e-6,
         path=path,
         profile=profile,

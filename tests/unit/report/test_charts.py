@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from detent.report import charts
-from detent.report.data import INCH, HeadPath, IdentifiedLine, Marks, ReportData, SpeedProfile, TurnAround
+from detent.report.data import INCH, ColumnErrors, HeadPath, IdentifiedLine, Marks, ReportData, SpeedProfile, TurnAround
 from detent.report.html import _all_charts
 
 
@@ -71,28 +71,48 @@ def test_a_long_path_shows_its_first_stretch_and_keeps_where_lines_begin(path: H
     assert {round(float(t[row]), 4) for row in changes if t[row] < 30} <= set(chart["x"])
 
 
-@given(st.lists(st.floats(-1e-3, 1e-3), min_size=1, max_size=50), st.integers(0, 2**50 - 1))
-def test_every_character_is_in_the_histogram_once(offsets: list[float], sides: int) -> None:
-    n = len(offsets)
-    direction = np.array([1 if sides >> k & 1 else -1 for k in range(n)])
-    ones = np.ones(n)
-    made = Marks(
-        characters="x" * n, page=ones, line=ones, baseline=ones, column=ones * 0, landed=np.array(offsets), width=ones,
-        direction=direction, strikes=ones,
-    )  # fmt: skip
-    right, left = charts.histogram_chart(made, 50e-6)["series"]
-    assert sum(right["y"]) == (direction > 0).sum()
-    assert sum(left["y"]) == (direction < 0).sum()
+counts_per_bin = st.dictionaries(st.integers(0, 6000), st.integers(1, 10_000), max_size=20)
 
 
-def test_the_histogram_is_centred_and_shows_limits_that_are_near(marks: Marks) -> None:
-    near = charts.histogram_chart(marks, 50e-6)
+@given(counts_per_bin, counts_per_bin)
+def test_every_column_is_in_the_histogram_once(to_the_right: dict[int, int], to_the_left: dict[int, int]) -> None:
+    counted = [np.zeros(6001, dtype=np.int64), np.zeros(6001, dtype=np.int64)]
+    for counts, found in zip(counted, (to_the_right, to_the_left), strict=True):
+        counts[list(found)] = list(found.values())
+    made = ColumnErrors(bin_width=1e-7, right=counted[0], left=counted[1], worst=1e-6, rms=1e-6)
+    chart = charts.histogram_chart(made, 50e-6)
+    for series, found in zip(chart["series"], (to_the_right, to_the_left), strict=True):
+        assert sum(series["y"]) == sum(found.values())
+        # No column is drawn farther from its place than the width of a bar says.
+        drawn = sum(abs(x) * y for x, y in zip(chart["x"], series["y"], strict=True))
+        true = sum(abs(place - 3000) * 0.1 * number for place, number in found.items())
+        bar = chart["x"][1] - chart["x"][0]
+        assert abs(drawn - true) <= bar / 2 * sum(found.values()) * (1 + 1e-9)
+
+
+def test_a_bar_stands_where_its_columns_landed(errors: ColumnErrors) -> None:
+    chart = charts.histogram_chart(errors, 50e-6)
+    right, left = (dict(zip(chart["x"], series["y"], strict=True)) for series in chart["series"])
+    assert {x: y for x, y in right.items() if y} == {0.0: 16}
+    assert {x: y for x, y in left.items() if y} == {0.0: 15, 60.0: 1}
+
+
+def test_errors_without_spread_are_one_bar() -> None:
+    right = np.zeros(6001, dtype=np.int64)
+    right[3000] = 7
+    chart = charts.histogram_chart(ColumnErrors(bin_width=1e-7, right=right, left=right * 0, worst=0.0, rms=0.0), 1e-4)
+    assert {x: y for x, y in zip(chart["x"], chart["series"][0]["y"], strict=True) if y} == {0.0: 7}
+    assert len(chart["x"]) >= 3
+
+
+def test_the_histogram_is_centred_and_shows_limits_that_are_near(errors: ColumnErrors) -> None:
+    near = charts.histogram_chart(errors, 50e-6)
     assert [mark["x"] for mark in near["marks"]] == [-50.0, 50.0]
     assert near["x"] == [-value for value in reversed(near["x"])]
     assert 0.0 in near["x"]
     steps = {round(b - a, 6) for a, b in pairwise(near["x"])}
     assert steps == {5.0}
-    assert charts.histogram_chart(marks, 1e-3)["marks"] == []
+    assert charts.histogram_chart(errors, 1e-3)["marks"] == []
 
 
 def test_identified_lines_go_through_friction_and_top_speed(identified: tuple[IdentifiedLine, ...]) -> None:

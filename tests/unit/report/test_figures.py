@@ -9,7 +9,7 @@ import pytest
 from detent.errors import DetentError
 from detent.report import figures
 from detent.report.data import INCH, Comparison, StartCurve
-from detent.report.figures import plot_comparison, plot_signals, settling_time
+from detent.report.figures import check_figure_path, plot_comparison, plot_signals, settling_time
 from detent.simulation.trace import Trace
 
 METHODS = ("power-on default", "nominal table", "identified")
@@ -153,3 +153,12 @@ def test_settling_counts_from_the_last_time_outside() -> None:
     assert settling_time(t, np.array([0.0, 1.0, 0.0, 1.0]), 1.0, 0.01) == 3.0
     assert settling_time(t, np.array([0.0, 1.0, 1.0, 0.0]), 1.0, 0.01) is None
     assert settling_time(t, np.array([0.0, np.nan, 1.0, 1.0]), 1.0, 0.01) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("a.txt", r"cannot be saved as '\.txt'"), ("no/a.png", "no folder .*no.; make it")]
+)
+def test_a_target_can_be_refused_before_any_work(tmp_path: Path, name: str, says: str) -> None:
+    assert check_figure_path(tmp_path / "a.PNG") == tmp_path / "a.PNG"
+    with pytest.raises(DetentError, match=says):
+        check_figure_path(tmp_path / name)

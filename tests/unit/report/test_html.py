@@ -6,13 +6,14 @@ import sys
 from html.parser import HTMLParser
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import detent
 from detent.errors import DetentError
-from detent.report.data import Marks, Note, ReportData
+from detent.report.data import ColumnErrors, Marks, Note, ReportData
 from detent.report.html import render_report, write_report
 from detent.report.words import GAP
 
@@ -52,7 +53,7 @@ class Page(HTMLParser):
         return re.sub(r"\s+", " ", "".join(self.words).replace(GAP, " "))
 
 
-def embedded(text: str) -> dict:
+def embedded(text: str) -> dict[str, Any]:
     found = re.search(r'<script type="application/json" id="report-data">(.*?)</script>', text, flags=re.DOTALL)
     assert found
     return json.loads(found[1])
@@ -62,7 +63,7 @@ def test_the_first_lines_say_what_happened(report: ReportData) -> None:
     text = Page(render_report(report)).text
     assert "✔ Printed LETTER.TXT" in text
     assert "2 lines and 4 characters on 2 pages in 0.800 s." in text
-    assert "Every character landed within 60 µm of its column." in text
+    assert "Every column of dots landed within 60 µm of its place." in text
     assert "Simulated run of the axis daisy & wheel" in text
 
 
@@ -70,7 +71,7 @@ def test_the_cards_carry_the_figures(report: ReportData) -> None:
     text = Page(render_report(report)).text
     assert "Lines printed2 of 24 characters" in text
     assert "Throughput5 characters/sin 0.800 s" in text
-    assert "Worst column error60 µmrms 30 µm, allowed 100 µm" in text
+    assert "Worst column error60 µmrms 11 µm, allowed 100 µm" in text
     assert "Top print speed40 in/s1.02 m/s, in 1 of 2 lines" in text
     assert "Turn-arounds1 of 1" in text
 
@@ -85,12 +86,27 @@ def test_a_run_that_stopped_says_where_why_and_what_to_do(report: ReportData) ->
     assert "✔" not in text
 
 
-def test_characters_off_their_column_spoil_the_headline(report: ReportData) -> None:
+def test_columns_off_their_place_spoil_the_headline(report: ReportData) -> None:
     html = render_report(dataclasses.replace(report, column_limit=50e-6))
     text = Page(html).text
     assert "! Printed, but off its columns" in text
-    assert "1 character landed more than 50 µm from its column." in text
+    assert "✔" not in text
+    assert "1 column landed more than 50 µm from its place." in text
     assert html.count('<td class="n over">') == 1
+    assert html.count('<div class="card bad">') == 1
+
+
+def test_several_columns_off_their_place_are_counted_in_both_directions(report: ReportData) -> None:
+    text = Page(render_report(dataclasses.replace(report, column_limit=1.5e-6))).text
+    assert "9 columns landed more than 1.5 µm from their place." in text
+
+
+def test_a_run_without_columns_shows_no_column_error(report: ReportData, errors: ColumnErrors) -> None:
+    nothing = dataclasses.replace(errors, right=errors.right * 0, left=errors.left * 0, worst=0.0, rms=0.0)
+    html = render_report(dataclasses.replace(report, errors=nothing))
+    assert "olumn error" not in Page(html).text
+    assert "histogram" not in {chart["id"] for chart in embedded(html)["charts"]}
+    assert "landed" not in Page(html).text.partition("What came out")[0]
 
 
 def test_errors_come_before_warnings_and_notes(report: ReportData) -> None:
@@ -173,7 +189,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
 
 def test_lines_without_marks_are_counted_and_have_no_error(report: ReportData) -> None:
     lines = [dataclasses.replace(line, worst_error=float("nan"), rms_error=float("nan")) for line in report.lines]
-    html = render_report(dataclasses.replace(report, marks=Marks(), lines=lines))
+    html = render_report(dataclasses.replace(report, marks=Marks(), errors=None, lines=lines))
     page = Page(html)
     assert "Throughput5 characters/s" in page.text
     assert "column error" not in page.text
@@ -193,6 +209,11 @@ def test_a_report_does_not_change_from_one_writing_to_the_next(report: ReportDat
     write_report(report, tmp_path / "b.html")
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.html", "b.html"]
+
+
+def test_a_file_name_that_is_no_text_still_gives_a_page(report: ReportData, tmp_path: Path) -> None:
+    write_report(dataclasses.replace(report, job_name="letter\udcff.txt"), tmp_path / "a.html")
+    assert "letter?.txt" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
 def test_a_folder_that_is_not_there_is_said(report: ReportData, tmp_path: Path) -> None:

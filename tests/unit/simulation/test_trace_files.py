@@ -1,6 +1,7 @@
 import importlib
 import sys
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -12,7 +13,16 @@ from detent import __version__
 from detent.errors import DetentError, InputError
 from detent.simulation import trace_files
 from detent.simulation.trace import Trace
-from detent.simulation.trace_files import TraceWriter, load_trace, save_csv, save_hdf5, save_parquet, save_trace
+from detent.simulation.trace_files import (
+    TraceWriter,
+    convert_trace,
+    load_trace,
+    need_parquet,
+    save_csv,
+    save_hdf5,
+    save_parquet,
+    save_trace,
+)
 
 ROW = np.dtype([("t", "f8"), ("motor.current", "f8"), ("head.drive_cmd", "i2")])
 
@@ -61,6 +71,7 @@ def test_hdf5_and_parquet_give_back_everything(tmp_path: Path, suffix: str) -> N
 
 def test_hdf5_layout_is_the_documented_one(tmp_path: Path) -> None:
     save_hdf5(make_trace(), tmp_path / "run.h5")
+    file: Any
     with h5py.File(tmp_path / "run.h5") as file:
         assert file.attrs["detent_version"] == __version__
         assert file.attrs["format"] == "detent trace 1"
@@ -248,3 +259,79 @@ def test_importing_the_module_loads_neither_h5py_nor_pyarrow() -> None:
     path = Path(importlib.import_module("detent").__file__ or "").parents[1]
     done = subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": str(path)}, capture_output=True, check=True)
     assert done.stdout.strip() == b"[]"
+
+
+@pytest.mark.parametrize("rows", [None, 2])
+def test_a_converted_csv_is_the_one_saved_directly(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int | None
+) -> None:
+    save_hdf5(make_trace(), tmp_path / "run.h5")
+    save_csv(make_trace(), tmp_path / "direct.csv")
+    if rows:
+        monkeypatch.setattr(trace_files, "CSV_ROWS", rows)
+    convert_trace(tmp_path / "run.h5", tmp_path / "converted.csv")
+    assert (tmp_path / "converted.csv").read_bytes() == (tmp_path / "direct.csv").read_bytes()
+
+
+@pytest.mark.parametrize("rows", [None, 2])
+def test_a_converted_parquet_holds_what_the_one_saved_directly_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int | None
+) -> None:
+    save_hdf5(make_trace(), tmp_path / "run.h5")
+    save_parquet(make_trace(), tmp_path / "direct.parquet")
+    if rows:
+        monkeypatch.setattr(trace_files, "PARQUET_ROWS", rows)
+    convert_trace(tmp_path / "run.h5", tmp_path / "converted.parquet")
+    direct, converted = load_trace(tmp_path / "direct.parquet"), load_trace(tmp_path / "converted.parquet")
+    assert_same_columns(direct, converted, dtypes=True)
+    assert (converted.units, converted.docs) == (direct.units, direct.docs)
+    assert converted.attributes == {**direct.attributes, "detent_version": __version__, "complete": 1}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["converted.parquet", "direct.parquet", "run.h5"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_an_empty_trace_is_converted(tmp_path: Path, suffix: str) -> None:
+    save_hdf5(Trace(columns={"t": np.empty(0), "x": np.empty(0)}, units={"t": "s"}), tmp_path / "run.h5")
+    convert_trace(tmp_path / "run.h5", tmp_path / f"run{suffix}")
+    assert list(load_trace(tmp_path / f"run{suffix}")) == ["t", "x"]
+
+
+@pytest.mark.parametrize("name", ["run.h5", "run.xlsx", "run"])
+def test_a_trace_is_converted_to_csv_and_parquet_only(tmp_path: Path, name: str) -> None:
+    save_hdf5(make_trace(), tmp_path / "store.h5")
+    with pytest.raises(DetentError, match=r"cannot be converted to .*; use \.csv or \.parquet"):
+        convert_trace(tmp_path / "store.h5", tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not HDF5"])
+def test_a_store_that_is_none_is_an_input_error(tmp_path: Path, content: bytes | None) -> None:
+    if content is not None:
+        (tmp_path / "store.h5").write_bytes(content)
+    with pytest.raises(InputError, match=r"store\.h5: came .*; allowed: a trace in HDF5; do: give a \.h5 file"):
+        convert_trace(tmp_path / "store.h5", tmp_path / "run.csv")
+    assert not (tmp_path / "run.csv").exists()
+
+
+def test_a_store_of_something_else_is_an_input_error(tmp_path: Path) -> None:
+    file: Any
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["pictures"] = [1, 2]
+        file.create_group("trace")
+    with pytest.raises(InputError, match="came HDF5 with pictures, trace; allowed: a group /trace"):
+        convert_trace(tmp_path / "other.h5", tmp_path / "run.csv")
+    with pytest.raises(InputError, match="allowed: a group /trace"):
+        load_trace(tmp_path / "other.h5")
+
+
+def test_a_folder_that_is_not_there_is_said_when_converting(tmp_path: Path) -> None:
+    save_hdf5(make_trace(), tmp_path / "run.h5")
+    for suffix in (".csv", ".parquet"):
+        with pytest.raises(DetentError, match=r"nowhere.*cannot be written"):
+            convert_trace(tmp_path / "run.h5", tmp_path / "nowhere" / f"run{suffix}")
+
+
+def test_parquet_can_be_asked_for_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    need_parquet()
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(DetentError, match=r'pip install "detent\[parquet\]"'):
+        need_parquet()

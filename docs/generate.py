@@ -1,0 +1,144 @@
+"""Reference pages from the declarations in the code: called by conf.py at every build, never edited by hand.
+
+Each function returns the Markdown of one page's generated part; the page itself, in docs/reference, includes it from
+docs/_build/generated.
+"""
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+GENERATED = Path(__file__).resolve().parent / "_build" / "generated"
+
+
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Markdown table."""
+    lines = [head, tuple("---" for _ in head), *(tuple(map(plain, row)) for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+
+
+def plain(cell: str) -> str:
+    """Text of a cell as it stands: a bar would end the cell, and a star outside code would begin emphasis."""
+    parts = cell.replace("|", "\\|").split("`")
+    return "`".join(part.replace("*", "\\*") if k % 2 == 0 else part for k, part in enumerate(parts))
+
+
+def code(text: str) -> str:
+    """Text as code; nothing stays nothing."""
+    return f"`{text}`" if text else ""
+
+
+def registers() -> str:
+    """State and parameters of the print-head axis."""
+    from detent.systems.print_head import PrintHead, PrintHeadParams
+
+    parts: list[str] = []
+    for title, declared, what in (
+        ("State", PrintHead, "What changes while the axis runs. `--signals` records any of it but the arrays."),
+        ("Parameters", PrintHeadParams, "What the axis file decides. It does not change while the axis runs."),
+    ):
+        parts.append(f"## {title}\n\n{what} Class `{declared.__name__}`.\n\n{declared.markdown_table()}")
+    return "\n".join(parts)
+
+
+def axis_file() -> str:
+    """Every key of the axis file, one section per table."""
+    from detent.axisfile.reference import reference_rows
+
+    sections: dict[str, list[tuple[str, ...]]] = {}
+    for row in reference_rows():
+        place, _, key = row.key.rpartition(".")
+        default = f"must be stated, such as {code(row.example)}" if row.required else row.default or "none"
+        sections.setdefault(place, []).append((code(key), default, row.allowed, row.unit, row.doc))
+    docs = dict(_tables())
+    head = ("key", "default", "allowed", "SI unit inside", "meaning")
+    return "\n".join(f"## `[{place}]`\n\n{docs[place]}\n\n{table(head, rows)}" for place, rows in sections.items())
+
+
+def _tables(model: Any = None, prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted name and first sentence of every table of the schema."""
+    from detent.axisfile.fields import file_key, table_of
+    from detent.axisfile.schema import PrintHeadSpec
+
+    for name, field in (model or PrintHeadSpec).model_fields.items():
+        below = table_of(field)
+        if below is not None:
+            path = prefix + file_key(name, field)
+            yield path, (below.__doc__ or "").splitlines()[0]
+            yield from _tables(below, path + ".")
+
+
+def commands() -> dict[str, Any]:
+    """The commands as the command line knows them."""
+    import typer
+
+    from detent.cli import app
+
+    group: Any = typer.main.get_command(app)
+    return dict(group.commands)
+
+
+def parameter_row(parameter: Any) -> tuple[str, str, str]:
+    """Name, default and meaning of an argument or an option."""
+    is_argument = parameter.param_type_name == "argument"
+    name = parameter.name.upper() if is_argument else ", ".join(parameter.opts)
+    if not is_argument and not parameter.is_flag:
+        name += f" {parameter.metavar or parameter.name.upper()}"
+    default = "must be given" if parameter.required else ""
+    if not parameter.required and parameter.default not in (None, False):
+        default = code(str(parameter.default))
+    return code(name), default, parameter.help or ""
+
+
+def command_line() -> str:
+    """Every command with its arguments and options."""
+    parts: list[str] = []
+    for name, command in commands().items():
+        needed = [parameter_row(p)[0].strip("`") for p in command.params if p.required]
+        usage = " ".join(["detent", name, *needed, "[OPTIONS]"])
+        rows = table(("", "default", "meaning"), [parameter_row(p) for p in command.params])
+        parts.append(f"## {name}\n\n```text\n{usage}\n```\n\n{command.help}\n\n{rows}")
+    return "\n".join(parts)
+
+
+def status_codes() -> str:
+    """Bits of the status byte SB1."""
+    from detent.errors import SB1_TEXT
+
+    rows = [(code("00"), "done")] + [(code(f"{bit:02X}"), text) for bit, text in SB1_TEXT.items()]
+    return table(("bit", "what happened; what to do"), rows)
+
+
+def motors() -> str:
+    """The motors of the catalogue with the source of their constants."""
+    from detent.axisfile.catalogue import MOTORS_FILE
+
+    entries: list[dict[str, Any]] = tomllib.loads(MOTORS_FILE.read_text(encoding="utf-8"))["motor"]
+    keys = ("nominal_voltage", "torque_constant", "resistance", "inductance", "rotor_inertia", "max_current")
+    constants = [(code(m["name"]), *(str(m.get(key, "")) for key in keys)) for m in entries]
+    head = ("name", "nominal voltage", "torque constant", "resistance", "inductance", "rotor inertia", "max. current")
+    sources = table(("name", "source"), [(code(m["name"]), m["source"]) for m in entries])
+    return f"{table(head, constants)}\n## Where the constants come from\n\n{sources}"
+
+
+PAGES = {
+    "registers": registers,
+    "axis-file": axis_file,
+    "command-line": command_line,
+    "status-codes": status_codes,
+    "motors": motors,
+}
+
+
+def write_all(folder: Path = GENERATED) -> None:
+    """Write every generated part whose text has changed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, make in PAGES.items():
+        target, text = folder / f"{name}.md", make()
+        if not target.exists() or target.read_text(encoding="utf-8") != text:
+            target.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_all()

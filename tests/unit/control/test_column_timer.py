@@ -1,0 +1,214 @@
+"""Print timing: which column, when, and how far off."""
+
+import numpy as np
+import pytest
+from tests.print_head_rig import EMITTER, Rig
+
+from detent.control.column_timer import (
+    BINS,
+    COLUMNS,
+    NEVER,
+    ColumnTimer,
+    ColumnTimerParams,
+    ErrorHistogram,
+    LineBuffer,
+    fire,
+    next_column,
+    schedule,
+    set_lead,
+    skip_white,
+    start_line,
+)
+
+PITCH = 640  # 1/120 in = 2.5 emitters
+UNIT = EMITTER / 256
+
+
+@pytest.fixture
+def p():
+    return ColumnTimerParams(
+        column_zero=100 * 256,
+        column_pitch=PITCH,
+        lead_per_speed=1147,
+        flight_time=350e-6,
+        metres_per_unit=UNIT,
+        bin_width=2e-6,
+    )
+
+
+def inked(*columns, bank=0):
+    b = LineBuffer()
+    for column in columns:
+        b.ink[bank * COLUMNS + column] = 1
+    return b
+
+
+def started(b, first, last, direction, bank=0):
+    r = ColumnTimer(bank=bank)
+    start_line(r, b, first, last, direction)
+    return r
+
+
+def test_a_line_starts_at_its_first_inked_column():
+    b = inked(3, 7, 9)
+    assert started(b, 0, 20, 1).column == 3
+    assert started(b, 20, 0, -1).column == 9
+    assert started(b, 4, 8, 1).column == 7
+
+
+def test_the_banks_are_separate():
+    b = inked(5, bank=1)
+    assert not started(b, 0, 20, 1, bank=0).active
+    assert started(b, 0, 20, 1, bank=1).column == 5
+
+
+@pytest.mark.parametrize(("first", "last", "direction"), [(10, 12, 1), (12, 10, -1), (20, 0, 1), (0, 20, -1)])
+def test_white_or_empty_intervals_are_done_at_once(first, last, direction):
+    r = started(inked(3), first, last, direction)
+    assert not r.active
+    assert r.fire_us == NEVER
+
+
+def test_columns_beyond_the_buffer_are_cut_off():
+    b = inked(0, COLUMNS - 1)
+    r = started(b, -50, 5000, 1)
+    assert (r.column, r.end_column) == (0, COLUMNS - 1)
+    next_column(r, b, 1)
+    assert r.column == COLUMNS - 1
+    next_column(r, b, 1)
+    assert not r.active
+
+
+def test_skip_white_stops_at_the_end_column():
+    b = inked(3, 30)
+    r = started(b, 0, 10, 1)
+    next_column(r, b, 1)
+    assert not r.active
+    skip_white(r, b, 1)
+    assert r.column == 10
+
+
+def test_lead_is_speed_times_flight_time(p):
+    r = ColumnTimer()
+    for s in (18, 240):
+        set_lead(p, r, s)
+        # s/6 in/s for 350 us, in 1/256 emitter; lead_per_speed itself is rounded to 1/65536 emitter
+        assert r.lead == pytest.approx(s / 6 * 350e-6 * 300 * 256, rel=1e-3, abs=0.5)
+
+
+@pytest.mark.parametrize(("direction", "column", "emitter"), [(1, 4, 109), (-1, 4, 111)])
+def test_a_column_is_fired_between_the_emitters(p, direction, column, emitter):
+    r = started(inked(column), *((0, 20) if direction > 0 else (20, 0)), direction)
+    # Column 4 lies at emitter 110; the head passes its neighbour with 200 us per emitter.
+    r.lead = 64
+    schedule(p, r, inked(column), emitter, direction, 1000, 200)
+    assert r.fire_us == 1000 + 200 * (256 - 64) // 256
+
+
+def test_a_column_beyond_the_next_emitter_waits(p):
+    b = inked(4)
+    r = started(b, 0, 20, 1)
+    schedule(p, r, b, 108, 1, 1000, 200)
+    assert (r.fire_us, r.missed) == (NEVER, 0)
+    schedule(p, r, b, 109, 1, 1200, 200)
+    # Exactly one emitter ahead belongs to the next emitter.
+    assert r.fire_us == NEVER
+    schedule(p, r, b, 110, 1, 1400, 200)
+    assert r.fire_us == 1400
+
+
+def test_a_due_column_is_not_scheduled_again(p):
+    b = inked(4)
+    r = started(b, 0, 20, 1)
+    schedule(p, r, b, 110, 1, 1400, 200)
+    schedule(p, r, b, 111, 1, 1600, 200)
+    assert (r.fire_us, r.missed) == (1400, 0)
+
+
+def test_columns_behind_the_head_or_without_an_interval_are_missed(p):
+    b = inked(2, 4, 8)
+    r = started(b, 0, 20, 1)
+    schedule(p, r, b, 112, 1, 1000, 200)  # columns 2 and 4 lie at 105 and 110, column 8 at 120
+    assert (r.missed, r.column, r.fire_us) == (2, 8, NEVER)
+    schedule(p, r, b, 120, 1, 1000, 0)
+    assert (r.missed, r.active) == (3, 0)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_error_is_positive_beyond_the_column_in_the_direction_of_motion(p, direction):
+    b, h = inked(4), ErrorHistogram()
+    r = started(b, *((0, 20) if direction > 0 else (20, 0)), direction)
+    speed = 0.5 * direction
+    beyond = 5e-6 * direction
+    fire(p, r, b, h, 110 * EMITTER - speed * 350e-6 + beyond, speed, direction)
+    assert r.worst == pytest.approx(5e-6)
+    assert r.line_sum == pytest.approx(5e-6)
+    assert b.landed[4] == pytest.approx(5000 * direction, abs=1)
+    assert (r.fired, r.line_fired, r.active) == (1, 1, 0)
+    counts = list(h.right) if direction > 0 else list(h.left)
+    assert counts.index(1) == BINS // 2 + 2
+    assert sum(h.right) + sum(h.left) == 1
+
+
+def test_errors_beyond_the_histogram_count_at_its_ends(p):
+    b, h = inked(3, 4, 5), ErrorHistogram()
+    r = started(b, 0, 20, 1)
+    for error in (-1.0, 1.0, 0.0):
+        fire(p, r, b, h, (100 + 2.5 * r.column) * EMITTER + error, 0.0, 1)
+    assert (h.right[0], h.right[BINS - 1], h.right[BINS // 2]) == (1, 1, 1)
+    assert r.line_worst == pytest.approx(1.0)
+    assert r.line_squares == pytest.approx(2.0)
+
+
+def test_a_new_line_forgets_the_figures_of_the_last_but_not_of_the_job(p):
+    b, h = inked(3), ErrorHistogram()
+    r = started(b, 0, 20, 1)
+    fire(p, r, b, h, 0.0, 0.0, 1)
+    start_line(r, b, 0, 20, 1)
+    assert (r.line_fired, r.line_sum, r.line_squares, r.line_worst) == (0, 0, 0, 0)
+    assert r.fired == 1
+    assert r.worst > 0
+
+
+def printed(rig, start, end):
+    """Run a print, recorded at every tick."""
+    rig.send_print(start, end)
+    rows = rig.record(5, ["head.columns.fired", "head.columns.column", "train.velocity"])
+    assert rig.read_status() == 0
+    return rows
+
+
+@pytest.mark.parametrize("s", [18, 42, 60, 120, 240])
+def test_every_inked_column_of_a_line_is_fired_once_and_in_order(s):
+    rig = Rig().pretend_identified(emitter=1500)
+    rig.set_speed(s)
+    columns = np.sort(np.random.default_rng(s).choice(np.arange(480, 760), 150, replace=False))
+    fired_before = 0
+    for start, end, order in (
+        (450 + 475 * 2.5, 450 + 765 * 2.5, columns),
+        (450 + 765 * 2.5, 450 + 475 * 2.5, columns[::-1]),
+    ):
+        bank = 1 - rig.head.columns.bank
+        rig.r.buffer.ink[:] = [0] * (2 * COLUMNS)
+        for column in columns:
+            rig.r.buffer.ink[bank * COLUMNS + int(column)] = 1
+            rig.r.buffer.landed[bank * COLUMNS + int(column)] = 1 << 30
+        rows = printed(rig, start, round(end))
+        assert rig.head.speed == s
+        c = rig.head.columns
+        assert (c.bank, c.active, c.missed, c.line_fired) == (bank, 0, 0, 150)
+        steps = np.flatnonzero(np.diff(rows["head.columns.fired"], prepend=fired_before))
+        assert len(steps) == 150, "two columns in one period"
+        np.testing.assert_array_equal(rows["head.columns.column"][steps - 1], order)
+        fired_before = c.fired
+        landed = np.array(rig.r.buffer.landed[bank * COLUMNS : (bank + 1) * COLUMNS])
+        assert np.all(landed[columns] != 1 << 30)
+        # What is left is speed error x flight time, the extrapolation, and the microseconds of the times.
+        direction = 1 if order is columns else -1
+        speed_error = rows["train.velocity"][steps - 1] - direction * s / 6 * 0.0254
+        rounding = EMITTER / 50 + 2e-6 * s / 6 * 0.0254
+        np.testing.assert_allclose(landed[order] * 1e-9, speed_error * 350e-6, rtol=0, atol=rounding)
+        assert np.abs(speed_error).max() < 0.1 * s / 6 * 0.0254
+        assert c.line_worst == pytest.approx(np.abs(landed[columns]).max() * 1e-9, abs=1e-9)
+    assert rig.r.errors.right[:].count(0) < BINS
+    assert sum(rig.r.errors.right) == sum(rig.r.errors.left) == 150

@@ -1,0 +1,203 @@
+"""The compiled cache, tried on a copy of the package that may be edited."""
+
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+import detent
+from detent.kernel import cache
+
+PACKAGE = Path(detent.__file__).parent
+
+
+class Copy:
+    """A copy of the package with a compiled cache of its own; every `run` is a new process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.package = folder / "lib" / "detent"
+        shutil.copytree(PACKAGE, self.package, ignore=shutil.ignore_patterns("__pycache__"))
+        self.cache = folder / "cache"
+
+    def run(self, program: str, **extra: str) -> str:
+        environment = os.environ | {
+            "PYTHONPATH": str(self.package.parent),
+            "DETENT_CACHE_DIR": str(self.cache),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+        environment.pop("NUMBA_DISABLE_JIT", None)
+        command = [sys.executable, "-W", "error", "-c", textwrap.dedent(program)]
+        done = subprocess.run(command, env=environment | extra, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    def edit(self, file: str, old: str, new: str) -> None:
+        source = self.package / file
+        text = source.read_text()
+        assert text.count(old) == 1
+        source.write_text(text.replace(old, new))
+
+    def write(self, file: str, text: str) -> Path:
+        source = self.package / file
+        source.write_text(textwrap.dedent(text))
+        return source
+
+    @property
+    def compiled(self) -> list[str]:
+        """Names of the machine code files in every folder."""
+        return sorted(str(f.relative_to(self.cache)) for f in self.cache.rglob("*.nbc"))
+
+    @property
+    def folders(self) -> list[Path]:
+        return sorted((self.cache / "compiled").iterdir())
+
+
+@pytest.fixture
+def package(tmp_path):
+    return Copy(tmp_path)
+
+
+SHORT_PROGRAM = """
+    from detent.control.head_computer import HeadComputer
+    from detent.control.head_motion import must_stop  # calls stop_distance_up of another file
+
+    print(must_stop(HeadComputer(speed=240, direction=1, emitter=0, target=500)))
+"""
+
+
+def test_editing_a_callee_in_another_file_never_yields_a_stale_result(package):
+    assert package.run(SHORT_PROGRAM) == "False"  # 500 emitters left, 400 needed
+    package.edit("control/feed_forward.py", "(s * s + 143) // 144", "(s * s + 71) // 72")
+    assert package.run(SHORT_PROGRAM) == "True"  # now 800 needed
+    package.edit("control/feed_forward.py", "(s * s + 71) // 72", "(s * s + 143) // 144")
+    assert package.run(SHORT_PROGRAM) == "False"
+    assert len(package.folders) == 2  # the third run found the first one's folder again
+
+
+def test_editing_a_declaration_of_registers_is_an_edit_of_the_callers(package):
+    assert package.run(SHORT_PROGRAM) == "False"
+    # The fields behind it move in memory; machine code with the old offsets would read other registers.
+    field = 'emitter: i8 = register("position"'
+    package.edit("control/head_computer.py", field, f'pushed_in: i8 = register("new")\n    {field}')
+    assert package.run(SHORT_PROGRAM) == "False"
+    assert len(package.folders) == 2
+
+
+TIMED_PROGRAM = """
+    import time
+    from detent.plant.drive_train import DriveTrain, DriveTrainParams
+    from detent.plant.switched_motor import Scratch, SwitchedParams, move_switched
+
+    begin = time.perf_counter()
+    p = DriveTrainParams(resistance=1.0, inductance=1.0, mass=1.0, period=4e-5, substep=4e-5)
+    move_switched(p, SwitchedParams(), DriveTrain(velocity=1.0), Scratch(), 100, 1.0, 1.0, 0.0, 0.0)
+    print(time.perf_counter() - begin)
+"""
+
+
+def test_a_second_process_takes_machine_code_from_the_cache(package):
+    first = float(package.run(TIMED_PROGRAM))
+    compiled = package.compiled
+    assert any("move_switched" in name for name in compiled)
+    second = float(package.run(TIMED_PROGRAM))
+    assert package.compiled == compiled
+    assert second < first / 3
+
+
+def test_equal_names_in_two_rooms_do_not_meet(package):
+    for room, factor in (("control", 2), ("drive", 3)):
+        package.write(
+            f"{room}/same_name.py",
+            f"""
+            from detent.kernel.step import step
+
+
+            @step
+            def scaled(x: int) -> int:
+                return {factor} * x
+            """,
+        )
+    program = """
+        from detent.control import same_name as a
+        from detent.drive import same_name as b
+
+        print(a.scaled(1), b.scaled(1))
+    """
+    assert package.run(program) == "2 3"
+    assert package.run(program) == "2 3"
+
+
+def test_steps_outside_the_package_are_compiled_but_not_cached(package, tmp_path):
+    outside = """
+        from detent.kernel.step import step
+
+
+        @step
+        def doubled(x: int) -> int:
+            return 2 * x
+    """
+    (tmp_path / "lib" / "elsewhere.py").write_text(textwrap.dedent(outside))
+    package.write("simulation/elsewhere.py", outside)  # a room whose edits do not change the hash
+    program = """
+        import elsewhere
+        from detent.simulation import elsewhere as above
+
+        print(elsewhere.doubled(21), above.doubled(4), elsewhere.doubled.nopython_signatures != [])
+    """
+    assert package.run(program) == "42 8 True"
+    assert package.compiled == []
+
+
+def test_plain_python_makes_no_cache(package):
+    assert package.run(SHORT_PROGRAM, NUMBA_DISABLE_JIT="1") == "False"
+    assert package.compiled == []
+
+
+def test_a_cache_folder_that_cannot_be_made_does_not_stop_the_program(package, tmp_path):
+    blocked = tmp_path / "a file"
+    blocked.write_text("in the way")
+    assert package.run(SHORT_PROGRAM, DETENT_CACHE_DIR=str(blocked / "cache")) == "False"
+
+
+def test_sources_of_the_hash_are_the_rooms_a_step_can_be_made_of():
+    rooms = {source.relative_to(PACKAGE).parts[0] for source in cache.step_sources()}
+    assert rooms == set(cache.STEP_ROOMS)
+    assert cache.is_step_source(PACKAGE / "plant" / "drive_train.py")
+    assert not cache.is_step_source(PACKAGE / "report" / "html.py")
+    assert not cache.is_step_source(Path(__file__))
+
+
+def test_only_the_youngest_folders_are_kept(tmp_path):
+    names = [f"hash{k}" for k in range(cache.KEPT_FOLDERS + 3)]
+    now = time.time()
+    for age, name in enumerate(names):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (now - age, now - age))
+    (tmp_path / "note.txt").write_text("not a folder")
+    cache._forget_old(tmp_path, keep=tmp_path / names[-1])
+    left = {f.name for f in tmp_path.iterdir()}
+    assert left == {*names[: cache.KEPT_FOLDERS - 1], names[-1], "note.txt"}
+
+
+@pytest.mark.parametrize(
+    ("platform", "variables", "expected"),
+    [
+        ("linux", {"DETENT_CACHE_DIR": "/stated"}, Path("/stated")),
+        ("linux", {"XDG_CACHE_HOME": "/xdg"}, Path("/xdg/detent")),
+        ("linux", {}, Path.home() / ".cache" / "detent"),
+        ("darwin", {}, Path.home() / "Library" / "Caches" / "detent"),
+        ("win32", {"LOCALAPPDATA": "/local"}, Path("/local/detent/Cache")),
+    ],
+)
+def test_cache_root_of_each_system(monkeypatch, platform, variables, expected):
+    for name in ("DETENT_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(cache.sys, "platform", platform)
+    assert cache.user_cache_root() == expected

@@ -1,0 +1,223 @@
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import detent
+from detent import axis as axis_module
+from detent.errors import DetentError, InputError
+from detent.planning.print_job import load_job
+from detent.simulation.print_run import default_signals
+from detent.simulation.recorder import ROWS
+
+AXIS, LETTER = detent.example("print_head.toml"), detent.example("letter.txt")
+
+
+@pytest.fixture(scope="module")
+def run() -> detent.Run:
+    return detent.load(AXIS).run(LETTER)
+
+
+def test_the_words_of_the_package_are_those_it_promises() -> None:
+    for name in detent.__all__:
+        assert getattr(detent, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'Gripper'; it has Axis, Run, "):
+        _ = detent.Gripper
+
+
+def test_the_version_is_the_projects() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert detent.__version__ == project["project"]["version"]
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, detent; detent.examples(); "
+        "print([n for n in ('numba', 'numpy', 'pint', 'pydantic', 'h5py', 'matplotlib', 'typer') if n in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={"PYTHONPATH": str(Path(detent.__file__).parents[1])}, capture_output=True,
+        check=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == b"[]"
+
+
+def test_examples_are_files_that_load() -> None:
+    names = [path.name for path in detent.examples()]
+    assert {"print_head.toml", "letter.txt", "brochure.prn"} <= set(names)
+    assert names == sorted(names)
+    for path in detent.examples():
+        assert detent.example(path.name) == path
+        assert detent.load(path).check().rows if path.suffix == ".toml" else load_job(path).lines
+
+
+def test_an_example_that_is_not_there_is_said_with_those_that_are() -> None:
+    with pytest.raises(
+        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, letter\.txt, print_"
+    ):
+        detent.example("robot.toml")
+
+
+def test_an_axis_has_its_name_its_values_and_their_check() -> None:
+    axis = detent.load(str(AXIS), ["axis.name=left head", "drive.supply=40 V"])
+    assert axis.name == "left head"
+    assert axis.spec.drive.supply == 40.0
+    report = axis.check()
+    origins = {row.key: row.origin for row in report.rows}
+    assert origins["drive.supply"] == "--set"
+    assert origins["limits.travel"] == f"{AXIS} line 15"
+    assert origins["method.trim"] == "default"
+    assert origins["motor.resistance"].startswith("catalogue ")
+
+
+def test_a_file_with_errors_tells_all_of_them(tmp_path: Path) -> None:
+    text = AXIS.read_text(encoding="utf-8").replace('"14.5 in"', '"14.5 V"').replace("carriage_mass", "carriage_mas")
+    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        detent.load(tmp_path / "bad.toml", ["drive.supply=5 m"])
+    assert {problem.key for problem in caught.value.problems} == {
+        "limits.travel", "mechanics.carriage_mas", "drive.supply",
+    }  # fmt: skip
+
+
+def test_a_run_tells_what_happened(run: detent.Run) -> None:
+    assert run.printed
+    assert run.failure == ""
+    found = run.to_dict()
+    assert (found["axis"], found["file"], found["job"]) == ("print head", str(AXIS), "letter.txt")
+    assert len(found["lines"]) == 11
+
+
+def test_a_run_records_what_the_report_needs_every_tenth_tick(run: detent.Run) -> None:
+    assert run.trace is not None
+    assert run.trace.signals == tuple(default_signals())
+    np.testing.assert_allclose(np.diff(run.trace.time), 0.4e-3, rtol=1e-9)
+    assert run.trace.time[-1] == pytest.approx(run.result.time_end, abs=0.4e-3)
+    assert run.trace.units["train.current"] == "A"
+    assert run.trace.docs["head.state"]
+    assert run.trace.attributes == {"axis": "print head", "job": "letter.txt", "seed": 1, "fidelity": "averaged"}
+    assert len(run.trace) > ROWS // 2
+
+
+def test_signals_and_rows_can_be_chosen() -> None:
+    done = detent.load(AXIS).run(load_job(LETTER), signals=["head.right.*", "train.energy"], every=1000)
+    assert done.trace is not None
+    assert done.trace.signals[-1] == "train.energy"
+    assert set(done.trace.signals[:-1]) >= {"head.right.slope", "head.right.friction"}
+    assert done.trace["head.right.slope"][-1] == done.result.identified["right"].slope
+    assert np.diff(done.trace.time).min() == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize(("signals", "every", "says"), [(["no.such"], 10, "no such register"), (None, -1, "1 or more")])
+def test_what_cannot_be_recorded_is_refused(signals: list[str] | None, every: int, says: str) -> None:
+    with pytest.raises(DetentError, match=says):
+        detent.load(AXIS).run(LETTER, signals=signals, every=every)
+
+
+def test_signals_can_be_checked_before_a_run() -> None:
+    axis = detent.load(AXIS)
+    axis.check_signals(["head.*", "all", "train.current"])
+    with pytest.raises(DetentError, match=r"did you mean 'train\.current'"):
+        axis.check_signals(["train.curent"])
+
+
+def test_a_run_without_record_says_so_when_asked_for_it(tmp_path: Path) -> None:
+    done = detent.load(AXIS).run(LETTER, every=0)
+    assert done.printed
+    assert done.trace is None
+    for wanted in (lambda: done.save(tmp_path / "t.csv"), lambda: done.plot(["train.current"], tmp_path / "t.png")):
+        with pytest.raises(DetentError, match="this run recorded nothing; run with every >= 1"):
+            wanted()
+    assert "Printed" in done.report(tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_a_job_that_is_missing_is_an_input_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nothing\.txt"):
+        detent.load(AXIS).run(tmp_path / "nothing.txt")
+
+
+def test_an_axis_that_fails_gives_a_run_all_the_same() -> None:
+    done = detent.load(AXIS, ["disturbance.obstacle.position=7 in"]).run(LETTER)
+    assert not done.printed
+    assert "obstructed" in done.failure
+    assert done.trace is not None
+    assert done.to_dict()["printed"] is False
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".csv", ".parquet"])
+def test_a_saved_trace_is_the_recorded_one(run: detent.Run, tmp_path: Path, suffix: str) -> None:
+    assert run.trace is not None
+    loaded = detent.load_trace(run.save(tmp_path / f"trace{suffix}"))
+    assert list(loaded) == list(run.trace)
+    for name in loaded:
+        np.testing.assert_array_equal(loaded[name], run.trace[name])
+    assert loaded.units == run.trace.units
+
+
+def test_a_streamed_trace_is_the_one_in_memory(run: detent.Run, tmp_path: Path) -> None:
+    done = detent.load(AXIS).run(LETTER, trace_file=tmp_path / "stream.h5")
+    run.save(tmp_path / "memory.h5")
+    stream: Any
+    memory: Any
+    with h5py.File(tmp_path / "stream.h5") as stream, h5py.File(tmp_path / "memory.h5") as memory:
+        assert dict(stream.attrs) == dict(memory.attrs)
+        assert list(stream["trace"].attrs["columns"]) == list(memory["trace"].attrs["columns"])
+        for name in memory["trace"]:
+            np.testing.assert_array_equal(stream["trace"][name][()], memory["trace"][name][()])
+    assert done.trace is not None
+    assert run.trace is not None
+    assert len(done.trace) == len(run.trace)
+
+
+def test_memory_is_bounded_and_the_file_is_not(
+    run: detent.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run.trace is not None
+    monkeypatch.setattr(axis_module, "KEPT_ROWS", 20_000)
+    done = detent.load(AXIS).run(LETTER, trace_file=tmp_path / "long.h5")
+    assert done.trace is not None
+    assert len(done.trace) == 20_000
+    assert len(detent.load_trace(tmp_path / "long.h5")) == len(run.trace)
+    # The report draws from what was kept, and from the first lines when the last ones are beyond it.
+    data = done.report_data()
+    assert data.errors is not None
+    assert data.errors.total == run.result.columns
+    assert data.profile is not None
+    assert data.profile.line < 11
+
+
+def test_the_report_is_one_file_with_its_small_print(run: detent.Run, tmp_path: Path) -> None:
+    run.settings["command"] = "detent run <here>"
+    path = run.report(str(tmp_path / "report.html"))
+    assert path == tmp_path / "report.html"
+    text = path.read_text(encoding="utf-8")
+    assert "✔ Printed" in text
+    for word in ("averaged", str(AXIS), "detent run &lt;here&gt;", "<dt>seed</dt><dd>1</dd>"):
+        assert word in text
+    assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_signals_are_drawn(run: detent.Run, tmp_path: Path) -> None:
+    path = run.plot(["train.velocity", "head.*"], tmp_path / "plot.svg", (7.0, 8.5))
+    text = path.read_text(encoding="utf-8")
+    for word in ("train.velocity", "head.drive_cmd", "[count]", "time [s]", "print head · letter.txt"):
+        assert word in text
+
+
+def test_progress_is_told() -> None:
+    told: list[float] = []
+    detent.load(AXIS).run(LETTER, every=0, progress=lambda share, _text: told.append(share))
+    assert told[0] == 0.0
+    assert told[-1] == 1.0
+
+
+def test_three_drives_are_compared_on_the_drifted_machine() -> None:
+    found = detent.load(AXIS, ["disturbance.motor_constant=10 %"]).compare()
+    worst = np.abs(found.errors).max(axis=(1, 2))
+    assert found.methods == ("power-on default", "nominal table", "identified")
+    assert worst[2] < 0.03 < worst[1] < worst[0]
