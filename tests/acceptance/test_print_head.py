@@ -474,7 +474,7 @@ def test_19_drive_values_of_the_power_on_defaults():
     )
 
 
-LIMITS = {"slope_min": 100, "slope_max": 255, "friction_max": 80}
+LIMITS = {"slope_min": 100, "slope_max": 255, "friction_max": 80, "rise_min": 60}
 
 
 @pytest.mark.parametrize(("fast", "slow", "slope", "friction"), [(208, 47, 170, 36), (220, 59, 170, 28)])

@@ -11,6 +11,10 @@ CALIBRATION_MARGIN = 400
 """Emitters between a frame and the stop target of an identification pass: the stop distance of 40 in/s again, so that a
 machine a third faster than its nameplate still stops before the frame."""
 
+SLOW_PASS = 60
+"""Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
+speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit."""
+
 HISTOGRAM_BIN = 2e-6
 """Width of a bin of the column-error histogram [m]."""
 
@@ -106,6 +110,7 @@ def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     h.expected_width = round(spec.limits.travel / EMITTER)
     h.width_tolerance = round(spec.homing.width_tolerance / EMITTER)
     h.calibration_margin = CALIBRATION_MARGIN
+    h.plausible.rise_min = (h.run_speed - SLOW_PASS) // 3
 
 
 def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:

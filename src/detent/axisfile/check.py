@@ -24,6 +24,9 @@ ASSUMED_ACCELERATION = 600 * INCH
 RAMP_INTERVAL_RANGE = (350e-6, 450e-6)
 """Usual ramp interval [s] (3.10)."""
 
+LOWEST_FAST_PASS = 84
+"""Speed value from which a fast calibration pass lies far enough from the slow one [1/6 in/s], 14 in/s."""
+
 STANDSTILL_SPEED = 4
 """Speed value at which the zero-speed detector calls the head standing (4.1: 0.67 in/s)."""
 
@@ -230,7 +233,16 @@ def _identification(machine: Machine) -> Iterator[Caution]:
 
 def _calibration_passes(machine: Machine) -> Iterator[Caution]:
     method = machine.spec.method
-    drives = {speed: (method.default_slope * speed >> 8) + method.default_friction_counts for speed in (240, 60)}
+    top = machine.top_speed
+    drives = {speed: (method.default_slope * speed >> 8) + method.default_friction_counts for speed in (top, 60)}
+    if top < LOWEST_FAST_PASS:
+        yield Caution(
+            "identification",
+            f"fast pass at {top / 6:.3g} in/s beside the slow one at 10 in/s",
+            f"limits.speed of {LOWEST_FAST_PASS / 6:.3g} in/s or more",
+            "two passes so close cannot tell slope from friction, and the power-on values stay in use",
+            "raise limits.speed",
+        )
     for direction in DIRECTIONS:
         slow = machine.open_loop_speed(drives[60], direction)
         if slow <= STANDSTILL_SPEED:
@@ -241,11 +253,11 @@ def _calibration_passes(machine: Machine) -> Iterator[Caution]:
                 "friction holds the head, and the calibration fails",
                 f"lower mechanics.friction.{direction}, or raise method.default_friction_counts",
             )
-        fast = machine.open_loop_speed(drives[240], direction)
+        fast = machine.open_loop_speed(drives[top], direction)
         if fast > 1.1 * machine.top_speed:
             yield Caution(
                 f"fast calibration pass, {direction}",
-                f"{fast / 6:.3g} in/s at {drives[240]} counts",
+                f"{fast / 6:.3g} in/s at {drives[top]} counts",
                 f"up to limits.speed, {machine.top_speed / 6:.3g} in/s",
                 "the first pass after power-on runs faster than the axis may",
                 "choose a motor with a larger constant or a smaller pulley, or lower method.default_slope",

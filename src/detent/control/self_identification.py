@@ -20,6 +20,7 @@ class PlausibleLimits(Registers):
     slope_min: i4 = register("smallest plausible slope", unit="count/256")
     slope_max: i4 = register("largest plausible slope", unit="count/256")
     friction_max: i4 = register("largest plausible friction", unit="count")
+    rise_min: i4 = register("the measured speeds must differ by more than this", unit="1/6 in/s")
     literal_intercept: u1 = register("1: friction from the nominal slow speed, as the patent prints it")
 
 
@@ -31,7 +32,7 @@ def identify(r: IdentifiedLine, p: PlausibleLimits, drive_fast: int, drive_slow:
     """
     rise = r.speed_fast - r.speed_slow
     r.valid = 0
-    if rise <= 60:
+    if rise <= max(p.rise_min, 0):
         return False
     slope = (512 * (drive_fast - drive_slow) + rise) // (2 * rise)
     if p.literal_intercept:

@@ -194,12 +194,14 @@ def _profile(run: PrintRun, trace: Trace) -> SpeedProfile | None:
     part = trace.between(chosen.start, chosen.stop + _row(trace))
     fired = np.flatnonzero(np.diff(part["head.columns.fired"]))
     t = part.time - chosen.start
+    # After the stop the computer already demands the speed of the next line.
+    reference = np.where(part.time <= chosen.stop, _reference(part), np.nan)
     return SpeedProfile(
         line=chosen.number,
         direction=chosen.direction,
         t=t,
         velocity=part["train.velocity"],
-        velocity_ref=_reference(part),
+        velocity_ref=reference,
         drive=part["head.drive_cmd"],
         transition=part["head.out.transition"] != 0,
         print_span=(float(t[fired[0]]), float(t[fired[-1] + 1])) if fired.size else None,

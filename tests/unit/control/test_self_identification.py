@@ -6,7 +6,7 @@ from detent.control.self_identification import IdentifiedLine, PlausibleLimits, 
 
 
 def limits(**changes):
-    return PlausibleLimits(**({"slope_min": 100, "slope_max": 255, "friction_max": 80} | changes))
+    return PlausibleLimits(**({"slope_min": 100, "slope_max": 255, "friction_max": 80, "rise_min": 60} | changes))
 
 
 def line(fast, slow):
@@ -70,3 +70,10 @@ def test_implausible_data_keep_the_old_line(fast, slow, why):
 )
 def test_the_limits_themselves_are_plausible(changes, plausible):
     assert identify(line(208, 47), limits(**changes), 174, 67) is plausible
+
+
+def test_a_slower_axis_may_measure_closer_speeds():
+    line = IdentifiedLine(slope=152, friction=32, speed_fast=100, speed_slow=47)
+    assert not identify(line, limits(), 103, 67)
+    assert identify(line, limits(rise_min=20), 103, 67)
+    assert (line.slope, line.friction) == (174, 35)

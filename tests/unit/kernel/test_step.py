@@ -61,3 +61,25 @@ def test_only_steps_of_the_package_are_cached():
 def test_the_name_and_the_documentation_stay():
     assert divide.__name__ == "divide"
     assert divide.__doc__ == "Division that must not raise."
+
+
+@step
+def keep(r: Ratio, whole: int, up: bool) -> None:
+    """Take a value."""
+    r.whole = whole + 1 if up else whole
+
+
+@step
+def keep_several(r: Ratio, whole: int) -> None:
+    """Calls with variables and with constants."""
+    keep(r, whole, r.above > 0.0)
+    keep(r, 7, True)
+    keep(r, 9, False)
+
+
+@compiled_only
+def test_calls_with_constants_use_the_same_machine_code():
+    r = Ratio()
+    keep_several(r, 5)
+    assert r.whole == 9
+    assert len(keep.overloads) == 1
