@@ -2,8 +2,8 @@
  *
  * The same arithmetic in the same order, so that both end on the same bits (compile with -ffp-contract=off). It covers
  * what print lines at high speed and their turn-arounds reach; anything else - command bytes, homing, identification,
- * low speed, faults, the switch-level bridge - ends the run with NOT_COVERED. The declarations of the structures are generated from the
- * register files into print_head_registers.h.
+ * low speed, faults, the switch-level bridge - ends the run with NOT_COVERED. print_head_registers.h, the declarations
+ * of the structures, is generated from the register files.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -421,6 +421,8 @@ static void stand(const HeadParams *p, HeadComputer *c, int state)
 {
     c->drive = 0;
     c->state = (uint8_t)state;
+    if (c->direction != 0)
+        c->out.right_left = c->direction > 0;
     put_drive(p, c, 0);
 }
 
@@ -707,7 +709,7 @@ static inline void sample(Axis *a, Encoder *e, double start, double x, double ve
 int64_t advance(const PrintHeadParams *p, PrintHead *r, int64_t ticks)
 {
     Axis axis = {p, r, false};
-    DriveTrain train = r->train; /* no other function sees these two: the compiler may keep them in registers */
+    DriveTrain train = r->train; /* only move() writes it: the compiler may keep it in registers */
     Encoder *const encoder = &r->encoder;
     double sampled = r->sampled;
     int64_t tick = r->tick, n = 0;
