@@ -1,4 +1,4 @@
-"""A print-head axis on the bench: the default plant of specification 7.2, driven byte by byte, recorded tick by tick."""
+"""A print-head axis on the bench: the default plant of specification 7.2, driven by bytes, recorded tick by tick."""
 
 from collections.abc import Sequence
 from importlib.resources import files
@@ -41,7 +41,13 @@ class Rig:
     """The axis with its latches within reach of a test."""
 
     def __init__(
-        self, slope: float = 170, right: float = 36, left: float = 28, *, overrides: Sequence[str] = (), start: float = 0.0889
+        self,
+        slope: float = 170,
+        right: float = 36,
+        left: float = 28,
+        *,
+        overrides: Sequence[str] = (),
+        start: float = 0.0889,
     ) -> None:
         self.spec = make_spec(slope, right, left, overrides)
         self.p: PrintHeadParams = build_print_head(self.spec)
@@ -63,7 +69,7 @@ class Rig:
 
     def place(self, emitter: int, fraction: float = 0.5) -> None:
         """Put the head at rest at an emitter and a fraction of the way to the next; state as after power-on."""
-        switch_on(self.p, self.r, (emitter + fraction) * EMITTER, self.spec.encoder.seed)
+        switch_on(self.p, self.r, (emitter + fraction) * EMITTER + self.p.encoder.origin, self.spec.encoder.seed)
         self.head.emitter = emitter
 
     def run(self, ticks: int) -> int:

@@ -93,7 +93,8 @@ SB1_TEXT: dict[int, str] = {
     0x01: "the command is unknown or illegal; send one of the commands of the protocol, with its count of data bytes",
     0x02: "a position or a speed is out of range; keep positions between the frames and speeds between 3 and 40 in/s",
     0x04: "the axis is not calibrated; send CALCULATE PARAMETERS before the first motion",
-    0x08: "the head is obstructed or stalled and the drive is off; clear the way, then send CALCULATE PARAMETERS",
+    0x08: "the head is obstructed or stalled, or moves against its drive, and the drive is off; clear the way, check "
+    "the leads of motor and encoder, then send CALCULATE PARAMETERS",
     0x10: "the measured slope or friction is implausible and the default values were kept; look for a jam, "
     "a wrong supply voltage or a wrong motor, then send CALCULATE PARAMETERS",
     0x20: "a motion command came while one was already queued and was dropped; wait for an answer before the next",

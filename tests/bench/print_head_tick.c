@@ -15,7 +15,7 @@
 #define NEVER (INT64_C(1) << 62)
 
 enum { PERIOD_US = 40, STALL_US = 50000, TRIM_US = 16000, RUNAWAY_US = 62, REVERSAL_US = 800, TURN_AROUND_US = 133000 };
-enum { COLUMNS = 2048, BINS = 128, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
+enum { COLUMNS = 2048, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
 enum { FLOOR = 30, HIGH_SPEED = 60, STALL_MARGIN = 20, RUN_UP_RESERVE = 12 };
 enum {
     POWER_ON, HOME_LEFT, HOME_RIGHT, IDLE, LOW_START, LOW_STEADY, LOW_STOP,
@@ -68,8 +68,8 @@ static inline void pass_edge(const EncoderParams *p, Encoder *e, bool rightward)
         e->above = e->below;
         e->below = fresh_jitter(p, e);
     }
-    e->next_right = ((double)(e->edge + 1) + e->above) * p->edge_pitch;
-    e->next_left = ((double)e->edge + e->below) * p->edge_pitch;
+    e->next_right = ((double)(e->edge + 1) + e->above) * p->edge_pitch + p->origin;
+    e->next_left = ((double)e->edge + e->below) * p->edge_pitch + p->origin;
     unsigned quarter = (unsigned)e->edge & 3u;
     bool a = quarter < 2u;
     if (!a)
@@ -139,21 +139,11 @@ static inline void fire(Axis *a, double start, double end, double velocity)
     ColumnTimer *c = &h->columns;
     int direction = h->direction;
     double share = (double)(c->fire_us - (h->now_us - PERIOD_US)) * (1.0 / PERIOD_US);
-    double x = start + (end - start) * share;
+    double x = start + (end - start) * share - a->p->encoder.origin;
     double wanted = (double)(p->column_zero + (int64_t)c->column * p->column_pitch) * p->metres_per_unit;
-    double offset = x + velocity * p->flight_time - wanted;
-    double error = offset * direction, size = fabs(error);
-    a->r->buffer.landed[c->bank * COLUMNS + c->column] = (int32_t)(int64_t)(offset * 1e9);
+    c->offset = x + velocity * p->flight_time - wanted;
     c->fired++;
-    c->sum_squares += error * error;
-    c->worst = c->worst < size ? size : c->worst;
-    c->line_fired++;
-    c->line_sum += error;
-    c->line_squares += error * error;
-    c->line_worst = c->line_worst < size ? size : c->line_worst;
-    double place = error / p->bin_width + BINS / 2;
-    int bin = place < 0.0 ? 0 : place >= BINS ? BINS - 1 : (int)place;
-    (direction > 0 ? a->r->errors.right : a->r->errors.left)[bin]++;
+    a->r->buffer.landed[c->bank * COLUMNS + c->column] = (int32_t)(int64_t)(c->offset * 1e9);
     next_column(c, &a->r->buffer, direction);
 }
 
@@ -363,8 +353,6 @@ static void begin_line(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool
     t->end_column = (int32_t)least(most(last, 0), COLUMNS - 1);
     t->active = (last - first) * c->direction >= 0;
     t->fire_us = NEVER;
-    t->line_fired = 0;
-    t->line_sum = t->line_squares = t->line_worst = 0.0;
     skip_white(t, b, c->direction);
 }
 
@@ -400,6 +388,7 @@ static void begin_move(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool
     c->emitter_seen = 0;
     c->interval_us = 0;
     c->too_fast = 0;
+    c->against = 0;
     c->phase_start = c->emitter;
     c->steady = (int16_t)steady_value(p, c, c->direction, c->speed);
     if (c->operation == PRINT && !c->repositioning)
@@ -521,6 +510,7 @@ static inline void on_emitter(Axis *a, int64_t when, int change)
     c->emitter_seen = 1;
     c->last_step = (int8_t)change;
     c->too_fast = 0 < c->interval_us && c->interval_us < RUNAWAY_US ? c->too_fast + 1 : 0;
+    c->against = change != c->direction ? (uint16_t)(c->against + 1) : 0;
     switch (c->state) {
     case POWER_ON:
     case IDLE:

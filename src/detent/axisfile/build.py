@@ -15,9 +15,6 @@ SLOW_PASS = 60
 """Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
 speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit."""
 
-HISTOGRAM_BIN = 2e-6
-"""Width of a bin of the column-error histogram [m]."""
-
 SUBSTEP_SHARE = 0.25
 """Longest substep of the power series, as a share of the fastest time constant."""
 
@@ -41,6 +38,8 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
     _fill_drive_train(p.train, spec)
     fill_pulse_table(p.train, p.switched)
     p.encoder.edge_pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
+    # The left frame lies halfway between two emitters: on one, any error of its edge would move the zero by an emitter.
+    p.encoder.origin = -EMITTER / 2
     p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
     p.encoder.missing = spec.encoder.missing_edges
     _fill_options(p, spec)
@@ -120,4 +119,3 @@ def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     c.flight_time = spec.printing.flight_time
     c.lead_per_speed = round(SPEED_STEP * c.flight_time / EMITTER * 65536)
     c.metres_per_unit = EMITTER / 256
-    c.bin_width = HISTOGRAM_BIN

@@ -259,8 +259,8 @@ class DisturbanceTable(Table):
     """How the true machine differs from the tables above; the axis computer does not know."""
 
     motor_constant: Percentage = optional("drift of torque and back-EMF constant", 0.0, ge=-0.9, le=2.0)
-    friction_right: Percentage = optional("drift of the friction-equivalent drive Vf to the right", 0.0, ge=-1.0, le=5.0)
-    friction_left: Percentage = optional("drift of the friction-equivalent drive Vf to the left", 0.0, ge=-1.0, le=5.0)
+    friction_right: Percentage = optional("drift of the friction drive Vf to the right", 0.0, ge=-1.0, le=5.0)
+    friction_left: Percentage = optional("drift of the friction drive Vf to the left", 0.0, ge=-1.0, le=5.0)
     supply: Voltage = optional("true supply voltage", math.nan, derived="drive.supply", gt=0.0, le=1000.0)
     obstacle: ObstacleTable | None = None
     push: PushTable | None = None

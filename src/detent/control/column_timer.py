@@ -11,7 +11,6 @@ from detent.kernel.step import step
 COLUMNS = 2048
 """Columns of the line buffer: 17 in at 120 per inch."""
 
-BINS = 128
 NEVER = 1 << 62
 
 
@@ -23,7 +22,6 @@ class ColumnTimerParams(Registers):
     lead_per_speed: i4 = register("flight lead per speed value, 1/65536 emitter", unit="emitter/65536")
     flight_time: f8 = register("time from firing to the paper", unit="s")
     metres_per_unit: f8 = register("length of 1/256 emitter", unit="m")
-    bin_width: f8 = register("width of a bin of the error histogram", unit="m")
 
 
 class LineBuffer(Registers):
@@ -38,13 +36,6 @@ class LineBuffer(Registers):
     turned: i4_array = register("1 if the line of each bank was begun by a turn-around", length=2)
 
 
-class ErrorHistogram(Registers):
-    """Column errors counted per bin; errors beyond the ends count in the end bins."""
-
-    right: i4_array = register("columns printed moving right", unit="count", length=BINS)
-    left: i4_array = register("columns printed moving left", unit="count", length=BINS)
-
-
 class ColumnTimer(Registers):
     """State of the print timing of the running line and the errors of its columns."""
 
@@ -56,12 +47,7 @@ class ColumnTimer(Registers):
     fire_us: i8 = register("time at which the next column fires; far future when none is due", unit="us")
     fired: i8 = register("columns printed so far", unit="count")
     missed: i8 = register("inked columns passed without being fired", unit="count")
-    sum_squares: f8 = register("sum of squared column errors", unit="m^2")
-    worst: f8 = register("largest column error magnitude so far", unit="m")
-    line_fired: i4 = register("columns printed of this line", unit="count")
-    line_sum: f8 = register("sum of column errors of this line", unit="m")
-    line_squares: f8 = register("sum of squared column errors of this line", unit="m^2")
-    line_worst: f8 = register("largest column error magnitude of this line", unit="m")
+    offset: f8 = register("where the last column landed, right of its place", unit="m")
 
 
 @step
@@ -82,10 +68,6 @@ def start_line(r: ColumnTimer, b: LineBuffer, first: int, last: int, direction: 
     r.end_column = min(max(last, 0), COLUMNS - 1)
     r.active = 1 if (last - first) * direction >= 0 else 0
     r.fire_us = NEVER
-    r.line_fired = 0
-    r.line_sum = 0.0
-    r.line_squares = 0.0
-    r.line_worst = 0.0
     skip_white(r, b, direction)
 
 
@@ -126,34 +108,10 @@ def schedule(
 
 
 @step
-def book_error(p: ColumnTimerParams, r: ColumnTimer, h: ErrorHistogram, error: float, direction: int) -> None:
-    """Account the landing error of one column."""
-    size = abs(error)
-    r.fired += 1
-    r.sum_squares += error * error
-    r.worst = max(r.worst, size)
-    r.line_fired += 1
-    r.line_sum += error
-    r.line_squares += error * error
-    r.line_worst = max(r.line_worst, size)
-    place = error / p.bin_width + BINS // 2
-    k = 0 if place < 0.0 else (BINS - 1 if place >= BINS else int(place))
-    if direction > 0:
-        h.right[k] += 1
-    else:
-        h.left[k] += 1
-
-
-@step
-def fire(
-    p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, h: ErrorHistogram, x: float, v: float, direction: int
-) -> None:
-    """Print the due column: `x`, `v` are the true carriage position [m] and velocity [m/s] at the moment of firing.
-
-    The error is positive when the dot lands beyond its column in the direction of motion.
-    """
+def fire(p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, x: float, v: float, direction: int) -> None:
+    """Print the due column: `x`, `v` are the true head position [m] and velocity [m/s] at the moment of firing."""
     wanted = (p.column_zero + r.column * p.column_pitch) * p.metres_per_unit
-    offset = x + v * p.flight_time - wanted
-    b.landed[r.bank * COLUMNS + r.column] = int(offset * 1e9)
-    book_error(p, r, h, offset * direction, direction)
+    r.offset = x + v * p.flight_time - wanted
+    r.fired += 1
+    b.landed[r.bank * COLUMNS + r.column] = int(r.offset * 1e9)
     next_column(r, b, direction)

@@ -34,6 +34,9 @@ DEAD_US = 1_000_000
 RUNAWAY_US = 62
 """Emitter interval of 53 in/s: beyond every speed a plausible machine reaches with a drive of 300 counts or less."""
 
+BACKWARD = 60
+"""Emitters in a row against the drive, 0.2 in: the head is carried away, or leads of motor or encoder are swapped."""
+
 QUEUE = 4
 """Commands that wait, the last place for refused ones; only one of them may be a motion command."""
 
@@ -118,6 +121,8 @@ class HeadComputer(Registers):
     emitter_seen: u1 = register("1 once an emitter has come in this move")
     last_step: i1 = register("direction of the last emitter")
     too_fast: u1 = register("emitters in a row at runaway speed", unit="count")
+
+    against: u2 = register("emitters in a row against the direction of the move", unit="count")
 
     direction: i1 = register("direction of the move, 1 right, -1 left")
     speed: i2 = register("commanded speed value", unit="1/6 in/s")

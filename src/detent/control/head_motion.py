@@ -102,6 +102,7 @@ def begin_move(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
     c.emitter_seen = 0
     c.interval_us = 0
     c.too_fast = 0
+    c.against = 0
     c.phase_start = c.emitter
     c.steady = steady_value(p, c, direction, s)
     if c.operation == PRINT and not c.repositioning:
@@ -143,7 +144,7 @@ def begin_line(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
 
 @step
 def begin_steady(c: HeadComputer, state: int) -> None:
-    """Enter a steady phase. The first trim by count needs a whole window; the one by interval comes half a period on."""
+    """Enter a steady phase. The first trim by count needs a whole window, by interval it comes half a period on."""
     c.state = state
     c.drive = c.steady
     c.next_trim_us = c.now_us + (TRIM_US if state == HIGH_STEADY else TRIM_US // 2)

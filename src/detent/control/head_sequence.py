@@ -16,6 +16,7 @@ from detent.control.head_commands import (
     take_next,
 )
 from detent.control.head_computer import (
+    BACKWARD,
     CALCULATE,
     DEAD_US,
     FAULT,
@@ -65,7 +66,7 @@ and at speed a missing pulse looks like a reversal."""
 
 @step
 def stand(p: HeadParams, c: HeadComputer, state: int) -> None:
-    """Drive off, the line back in the direction of the move: what a reversed drive left of current returns to the supply.
+    """Drive off, the line back in the direction of the move: current left by a reversed drive returns to the supply.
 
     With the line of the reversed drive it would circulate for milliseconds and push the head back.
     """
@@ -101,6 +102,7 @@ def begin_homing(p: HeadParams, c: HeadComputer, state: int) -> None:
     c.emitter_seen = 0
     c.interval_us = 0
     c.too_fast = 0
+    c.against = 0
     c.drive = min(steady_drive(p.slope_default, p.friction_default, p.homing_speed), p.homing_limit)
     c.next_ramp_us = c.now_us + p.zero_speed_us
     put_drive(p, c, c.direction * c.drive)
@@ -278,15 +280,18 @@ def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change:
     c.emitter_seen = 1
     c.last_step = change
     c.too_fast = c.too_fast + 1 if 0 < c.interval_us < RUNAWAY_US else 0
+    c.against = c.against + 1 if change != c.direction else 0
     if c.state in (POWER_ON, IDLE, FAULT):
         return
     if c.too_fast >= RUNAWAY_EMITTERS:
         fault(p, c, OBSTRUCTION)
-    elif c.state in (HOME_LEFT, HOME_RIGHT):
-        c.next_ramp_us = c.now_us + p.zero_speed_us
     elif c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE):
         if change != c.direction:
             at_zero_speed(p, c, b)
+    elif c.against >= BACKWARD:
+        fault(p, c, OBSTRUCTION)
+    elif c.state in (HOME_LEFT, HOME_RIGHT):
+        c.next_ramp_us = c.now_us + p.zero_speed_us
     else:
         was_accelerating = c.state == HIGH_ACCEL
         move_emitter(p, c)

@@ -1,4 +1,4 @@
-"""One-byte latches with an interrupt flag, and the small queue in front of the status latch (specification 2.2, 3.1)."""
+"""One-byte latches with an interrupt flag, and the small queue before the status latch (specification 2.2, 3.1)."""
 
 from detent.kernel.registers import Registers, block, register, u1, u1_array
 from detent.kernel.step import step

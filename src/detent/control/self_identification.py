@@ -35,10 +35,8 @@ def identify(r: IdentifiedLine, p: PlausibleLimits, drive_fast: int, drive_slow:
     if rise <= max(p.rise_min, 0):
         return False
     slope = (512 * (drive_fast - drive_slow) + rise) // (2 * rise)
-    if p.literal_intercept:
-        friction = drive_slow - ((slope * 60) >> 8)
-    else:
-        friction = drive_slow - ((slope * r.speed_slow + 128) >> 8)
+    at_slow = (slope * 60) >> 8 if p.literal_intercept else (slope * r.speed_slow + 128) >> 8
+    friction = drive_slow - at_slow
     if slope < p.slope_min or slope > p.slope_max or friction < 0 or friction > p.friction_max:
         return False
     r.slope = slope

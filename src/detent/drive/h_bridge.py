@@ -1,7 +1,7 @@
 """Decoder and H-bridge: from PWM, right/left and transition lines to the motor terminals.
 
-Leg A is Q1 (upper) and Q3 (lower), leg B is Q2 and Q4; the motor lies between A and B and a free-wheel diode across each
-switch. A current i > 0 flows from A to B. Print-head specification 2.4; the decoder's table is its reconstruction.
+Leg A is Q1 (upper) and Q3 (lower), leg B is Q2 and Q4; the motor lies between A and B and a free-wheel diode across
+each switch. A current i > 0 flows from A to B. Print-head specification 2.4; the decoder's table is its reconstruction.
 """
 
 from detent.kernel.registers import Registers, f8, register, u1, u2

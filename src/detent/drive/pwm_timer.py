@@ -18,7 +18,7 @@ class PwmTimer(Registers):
 
 @hot_step
 def trigger(r: PwmTimer) -> None:
-    """25 kHz trigger: copy the count register and set the output, unless the count is 0 (a real 8254 would count 65536)."""
+    """25 kHz trigger: copy the count and set the output, unless it is 0 (which a real 8254 takes for 65536)."""
     r.pulse = r.count
     r.counter = r.count
     r.output = 1 if r.count > 0 else 0

@@ -4,9 +4,10 @@ Rigid belt: rotor, pulley, belt and carriage move as one mass. Between events th
 
     L di/dt = u - R i - k v,    m dv/dt = k i - b v + F,    dx/dt = v,
 
-with k = torque constant / pulley radius (and the back-EMF constant the same way), and is advanced by its exact solution: over a whole period with matrices made at
-build time, over part of one (`flow`) by the power series of the same solution, summed to rounding. Events are the change
-of the friction regime, contact with a frame, and the current reaching zero in a bridge that lets it flow one way only.
+with k = torque constant / pulley radius (and the back-EMF constant the same way), and is advanced by its exact
+solution: over a whole period with matrices made at build time, over part of one (`flow`) by the power series of the
+same solution, summed to rounding. Events are the change of the friction regime, contact with a frame, and the current
+reaching zero in a bridge that lets it flow one way only.
 """
 
 from detent.kernel.registers import Registers, block, f8, i1, i8, register
@@ -163,9 +164,9 @@ def account(p: DriveTrainParams, r: DriveTrain, voltage: float, mean_current: fl
 def move_averaged(p: DriveTrainParams, r: DriveTrain, u_positive: float, u_negative: float) -> None:
     """One tick with the mean terminal voltage of the period.
 
-    `u_positive` is the voltage the bridge imposes while the current is positive, `u_negative` while it is negative; they
-    differ where a diode carries the current. A current that would change sign inside the tick ends at zero: the bridge
-    states used here let it flow one way only.
+    `u_positive` is the voltage the bridge imposes while the current is positive, `u_negative` while it is negative;
+    they differ where a diode carries the current. A current that would change sign inside the tick ends at zero: the
+    bridge states used here let it flow one way only.
     """
     sense_of_motion(p, r)
     emf = p.emf_constant * r.velocity
@@ -191,8 +192,12 @@ def fill_transition(p: DriveTrainParams, target: Transition, sense: int, *, cond
     """Make the whole-period matrix of one regime from the exact solution of unit inputs."""
     coulomb = (p.friction.coulomb_right, p.friction.coulomb_left)
     p.friction.coulomb_right = p.friction.coulomb_left = 0.0
-    inputs = {"i": (1.0, 0.0, 0.0, 0.0), "v": (0.0, 1.0, 0.0, 0.0), "u": (0.0, 0.0, 1.0, 0.0), "f": (0.0, 0.0, 0.0, 1.0)}
-    for name, (current, velocity, voltage, force) in inputs.items():
+    for name, current, velocity, voltage, force in (
+        ("i", 1.0, 0.0, 0.0, 0.0),
+        ("v", 0.0, 1.0, 0.0, 0.0),
+        ("u", 0.0, 0.0, 1.0, 0.0),
+        ("f", 0.0, 0.0, 0.0, 1.0),
+    ):
         r = DriveTrain(current=current if conducting else 0.0, velocity=velocity, force=force, sense=sense)
         flow(p, r, voltage, conducting, p.period)
         setattr(target, "i_" + name, r.current)

@@ -76,7 +76,9 @@ def time_of_zero(p: DriveTrainParams, r: DriveTrain, w: Scratch, u: float, durat
 
 
 @step
-def part_of_period(p: DriveTrainParams, r: DriveTrain, w: Scratch, u_positive: float, u_negative: float, duration: float) -> None:
+def part_of_period(
+    p: DriveTrainParams, r: DriveTrain, w: Scratch, u_positive: float, u_negative: float, duration: float
+) -> None:
     """One part of the period with fixed switches, split where the current reaches zero."""
     left = duration
     for _ in range(MOST_PIECES):

@@ -14,6 +14,7 @@ class EncoderParams(Registers):
     """Graduation and its faults."""
 
     edge_pitch: f8 = register("carriage travel per quadrature edge", unit="m")
+    origin: f8 = register("carriage position of edge 0", unit="m")
     jitter: f8 = register("rms displacement of an edge, in quarter cycles")
     missing: f8 = register("probability that a pulse of channel A is missing")
 
@@ -35,8 +36,8 @@ class Encoder(Registers):
 @hot_step
 def place_edges(p: EncoderParams, r: Encoder) -> None:
     """Positions of the two neighbouring edges."""
-    r.next_right = (r.edge + 1 + r.above) * p.edge_pitch
-    r.next_left = (r.edge + r.below) * p.edge_pitch
+    r.next_right = (r.edge + 1 + r.above) * p.edge_pitch + p.origin
+    r.next_left = (r.edge + r.below) * p.edge_pitch + p.origin
 
 
 @hot_step
@@ -83,7 +84,7 @@ def pass_left(p: EncoderParams, r: Encoder) -> None:
 def stand_at(p: EncoderParams, r: Encoder, position: float, seed: int) -> None:
     """Power-on: the disc stands where the carriage stands; `position` in metres."""
     r.noise.state = seed
-    r.edge = math.floor(position / p.edge_pitch)
+    r.edge = math.floor((position - p.origin) / p.edge_pitch)
     r.above = r.below = 0.0
     place_edges(p, r)
     set_channels(p, r)

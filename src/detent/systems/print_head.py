@@ -11,7 +11,7 @@ last period, decide, actuate, move.
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.column_timer import ErrorHistogram, LineBuffer, fire, schedule
+from detent.control.column_timer import LineBuffer, fire, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
 from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
 from detent.drive.h_bridge import Bridge, BridgeLines, steer
@@ -66,7 +66,6 @@ class PrintHead(Registers):
     head: HeadComputer = block("axis computer")
     scratch: Scratch = block("work space of the switch-level solution")
     buffer: LineBuffer = block("columns of the running and of the next line")
-    errors: ErrorHistogram = block("column errors of the job")
 
 
 @hot_step
@@ -98,10 +97,11 @@ def take_reverse_edge(p: PrintHeadParams, r: PrintHead) -> None:
 
 @step
 def fire_column(p: PrintHeadParams, r: PrintHead, start: float, end: float, velocity: float) -> None:
-    """Fire the due column with the carriage where it truly was at that moment."""
+    """Fire the due column with the carriage where it truly was at that moment, counted from edge 0 of the encoder."""
     c = r.head.columns
     share = (c.fire_us - (r.head.now_us - PERIOD_US)) * (1.0 / PERIOD_US)
-    fire(p.head.columns, c, r.buffer, r.errors, start + (end - start) * share, velocity, r.head.direction)
+    x = start + (end - start) * share - p.encoder.origin
+    fire(p.head.columns, c, r.buffer, x, velocity, r.head.direction)
 
 
 @hot_step

@@ -75,7 +75,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "method.zero_speed_timeout": ("7 ms", ()),
     "method.max_print_speed": ("30 in/s", ()),
     "homing.speed": ("4 in/s", ()),
-    "homing.drive_limit_counts": ("100", ()),
+    "homing.drive_limit_counts": ("80", ()),
     "homing.contact_timeout": ("60 ms", ()),
     "homing.width_tolerance": ("2 in", ("disturbance.obstacle.position=13.5 in",)),
     "print.left_margin": ("2 in", ()),

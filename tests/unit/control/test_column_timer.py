@@ -5,12 +5,10 @@ import pytest
 from tests.print_head_rig import EMITTER, Rig
 
 from detent.control.column_timer import (
-    BINS,
     COLUMNS,
     NEVER,
     ColumnTimer,
     ColumnTimerParams,
-    ErrorHistogram,
     LineBuffer,
     fire,
     next_column,
@@ -32,7 +30,6 @@ def p():
         lead_per_speed=1147,
         flight_time=350e-6,
         metres_per_unit=UNIT,
-        bin_width=2e-6,
     )
 
 
@@ -135,39 +132,17 @@ def test_columns_behind_the_head_or_without_an_interval_are_missed(p):
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_error_is_positive_beyond_the_column_in_the_direction_of_motion(p, direction):
-    b, h = inked(4), ErrorHistogram()
+def test_a_fired_column_lands_after_its_flight(p, direction):
+    b = inked(4, 8)
     r = started(b, *((0, 20) if direction > 0 else (20, 0)), direction)
+    column = r.column
     speed = 0.5 * direction
-    beyond = 5e-6 * direction
-    fire(p, r, b, h, 110 * EMITTER - speed * 350e-6 + beyond, speed, direction)
-    assert r.worst == pytest.approx(5e-6)
-    assert r.line_sum == pytest.approx(5e-6)
-    assert b.landed[4] == pytest.approx(5000 * direction, abs=1)
-    assert (r.fired, r.line_fired, r.active) == (1, 1, 0)
-    counts = list(h.right) if direction > 0 else list(h.left)
-    assert counts.index(1) == BINS // 2 + 2
-    assert sum(h.right) + sum(h.left) == 1
-
-
-def test_errors_beyond_the_histogram_count_at_its_ends(p):
-    b, h = inked(3, 4, 5), ErrorHistogram()
-    r = started(b, 0, 20, 1)
-    for error in (-1.0, 1.0, 0.0):
-        fire(p, r, b, h, (100 + 2.5 * r.column) * EMITTER + error, 0.0, 1)
-    assert (h.right[0], h.right[BINS - 1], h.right[BINS // 2]) == (1, 1, 1)
-    assert r.line_worst == pytest.approx(1.0)
-    assert r.line_squares == pytest.approx(2.0)
-
-
-def test_a_new_line_forgets_the_figures_of_the_last_but_not_of_the_job(p):
-    b, h = inked(3), ErrorHistogram()
-    r = started(b, 0, 20, 1)
-    fire(p, r, b, h, 0.0, 0.0, 1)
-    start_line(r, b, 0, 20, 1)
-    assert (r.line_fired, r.line_sum, r.line_squares, r.line_worst) == (0, 0, 0, 0)
-    assert r.fired == 1
-    assert r.worst > 0
+    fire(p, r, b, (100 + 2.5 * column) * EMITTER - speed * 350e-6 + 5e-6, speed, direction)
+    assert r.offset == pytest.approx(5e-6)
+    assert b.landed[column] == pytest.approx(5000, abs=1)
+    assert (r.fired, r.column, r.fire_us, r.active) == (1, 12 - column, NEVER, 1)
+    fire(p, r, b, 0.0, 0.0, direction)
+    assert (r.fired, r.active) == (2, 0)
 
 
 def printed(rig, start, end):
@@ -196,7 +171,7 @@ def test_every_inked_column_of_a_line_is_fired_once_and_in_order(s):
         rows = printed(rig, start, round(end))
         assert rig.head.speed == s
         c = rig.head.columns
-        assert (c.bank, c.active, c.missed, c.line_fired) == (bank, 0, 0, 150)
+        assert (c.bank, c.active, c.missed, c.fired - fired_before) == (bank, 0, 0, 150)
         steps = np.flatnonzero(np.diff(rows["head.columns.fired"], prepend=fired_before))
         assert len(steps) == 150, "two columns in one period"
         np.testing.assert_array_equal(rows["head.columns.column"][steps - 1], order)
@@ -209,6 +184,4 @@ def test_every_inked_column_of_a_line_is_fired_once_and_in_order(s):
         rounding = EMITTER / 50 + 2e-6 * s / 6 * 0.0254
         np.testing.assert_allclose(landed[order] * 1e-9, speed_error * 350e-6, rtol=0, atol=rounding)
         assert np.abs(speed_error).max() < 0.1 * s / 6 * 0.0254
-        assert c.line_worst == pytest.approx(np.abs(landed[columns]).max() * 1e-9, abs=1e-9)
-    assert rig.r.errors.right[:].count(0) < BINS
-    assert sum(rig.r.errors.right) == sum(rig.r.errors.left) == 150
+        assert c.offset * 1e9 == pytest.approx(landed[order[-1]], abs=1)

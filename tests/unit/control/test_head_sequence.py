@@ -34,6 +34,7 @@ from detent.control.head_sequence import (
     on_reverse_edge,
     window_timer,
 )
+from detent.plant.drive_train import fill_period
 
 MOVING = (LOW_START, LOW_STEADY, LOW_STOP, HIGH_ACCEL, HIGH_STEADY, HIGH_TRANSITION, HIGH_REVERSE)
 
@@ -310,6 +311,22 @@ def test_stops_survive_missing_encoder_pulses():
         assert abs(rig.speed_value) < 6
 
 
+@pytest.mark.parametrize("command", ["run", "calculate"])
+def test_swapped_motor_leads_end_in_a_fault_within_a_finger_of_travel(command):
+    rig = Rig(start=0.2).pretend_identified(emitter=2000)
+    rig.p.train.force_constant *= -1
+    rig.p.train.emf_constant *= -1
+    fill_period(rig.p.train)
+    begin = rig.r.train.position
+    code = rig.run_to(3900) if command == "run" else rig.calculate()
+    assert code == OBSTRUCTION
+    assert rig.head.state == FAULT
+    assert rig.head.out.count == 0
+    rig.run(25000)
+    assert rig.r.train.velocity == 0
+    assert 60 <= abs(rig.r.train.position - begin) / EMITTER < 350
+
+
 @pytest.mark.parametrize("state", [POWER_ON, IDLE, FAULT])
 def test_a_head_that_is_pushed_keeps_its_position(state):
     rig = Rig().pretend_identified(emitter=1000)
@@ -318,7 +335,7 @@ def test_a_head_that_is_pushed_keeps_its_position(state):
     rig.run(30000)
     assert rig.head.state == state
     assert rig.r.train.velocity == 0
-    moved = rig.r.train.position / EMITTER
+    moved = (rig.r.train.position - rig.p.encoder.origin) / EMITTER
     assert moved > 1100
     assert rig.head.emitter == int(moved)
 
