@@ -639,7 +639,8 @@ static inline void move(const DriveTrainParams *p, DriveTrain *t, double u_posit
         t->velocity = m->v_i * i + m->v_v * v + m->v_u * applied + m->v_f * force;
         t->position += m->x_i * i + m->x_v * v + m->x_u * applied + m->x_f * force;
     } else {
-        t->current = positive || negative ? p->held_i * i + p->held_u * u : 0.0;
+        double held = positive || negative ? p->held_i * i + p->held_u * u : 0.0;
+        t->current = fabs(held) > 1e-9 ? held : 0.0;
         t->ticks_held++;
     }
     if ((positive && t->current < 0.0) || (negative && t->current > 0.0))

@@ -14,6 +14,9 @@ from detent.kernel.registers import Registers, block, f8, i1, i8, register
 from detent.kernel.step import hot_step, step
 from detent.plant.friction import Friction
 
+NO_CURRENT = 1e-9
+"""Current of a held motor that counts as none [A]: its exponential decay would otherwise never end."""
+
 SERIES_TERMS = 10
 """Terms of the power series per substep: with |M h| <= 0.25 the remainder is below 1e-14 of the step."""
 
@@ -176,7 +179,8 @@ def move_averaged(p: DriveTrainParams, r: DriveTrain, u_positive: float, u_negat
     u = u_positive if positive else (u_negative if negative else emf)
     force = friction_force(p, r)
     if r.sense == 0:
-        r.current = p.held_i * before + p.held_u * u if positive or negative else 0.0
+        held = p.held_i * before + p.held_u * u if positive or negative else 0.0
+        r.current = held if abs(held) > NO_CURRENT else 0.0
         r.ticks_held += 1
     elif positive or negative:
         apply_transition(p.right if r.sense > 0 else p.left, r, u, force)
