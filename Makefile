@@ -54,9 +54,12 @@ bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, millisec
 bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
 
-# Compiled code is invisible to coverage, so the steps run as plain Python here.
+# Compiled code is invisible to coverage, so the steps run as plain Python here; what simulates minutes of an axis is
+# added with the steps compiled.
 coverage: venv-test ## which lines and branches the unit and property tests reach
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest tests/unit tests/property $(PYTEST_ARGS)
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest tests/unit tests/property \
+		-m "not long and not bench and not compiled" $(PYTEST_ARGS)
+	$(BIN)/python -m coverage run --append -m pytest tests/unit tests/property -m "compiled and not long" $(PYTEST_ARGS)
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.print_head_rig import EMITTER, Rig
@@ -20,6 +21,8 @@ from detent.control.head_computer import (
     POWER_ON,
 )
 from detent.control.speed_selection import HIGH_SPEED
+
+pytestmark = pytest.mark.compiled
 
 OUTPUTS = (
     "head.out.count", "head.out.right_left", "head.out.transition", "head.drive_cmd", "head.state", "timer.pulse",

@@ -15,6 +15,8 @@ from detent.planning.print_job import load_job
 from detent.simulation.print_run import default_signals
 from detent.simulation.recorder import ROWS
 
+pytestmark = pytest.mark.compiled
+
 AXIS, LETTER = detent.example("print_head.toml"), detent.example("letter.txt")
 
 

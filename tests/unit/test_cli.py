@@ -23,6 +23,8 @@ from detent.report.words import GAP
 from detent.simulation.print_run import default_signals
 from detent.simulation.trace_files import load_trace
 
+pytestmark = pytest.mark.compiled
+
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
 VERBS = ("examples", "check", "run", "compare", "plot", "registers")
 OBSTACLE = ("--set", "disturbance.obstacle.position=7 in")

@@ -23,6 +23,8 @@ from detent.simulation.print_run import print_job
 from detent.simulation.recorder import Recorder
 from detent.systems.print_head import PrintHead
 
+pytestmark = pytest.mark.compiled
+
 JOB = parse_text("The quick brown fox jumps\n     over the lazy dog, and\nback.\n", "fox")
 
 PUSH = ("disturbance.push.force=1 N", "disturbance.push.at=1 s", "disturbance.push.duration=1 s")

@@ -19,6 +19,8 @@ from detent.simulation.recorder import Recorder
 from detent.simulation.trace import Trace
 from detent.systems.print_head import PrintHead
 
+pytestmark = pytest.mark.compiled
+
 Played = tuple[PrintHeadSpec, PrintRun, Trace]
 
 

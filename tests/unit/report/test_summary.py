@@ -6,6 +6,8 @@ from detent.planning.print_job import parse_text
 from detent.report.summary import summary_rows
 from detent.simulation.print_run import PrintRun, print_job
 
+pytestmark = pytest.mark.compiled
+
 
 def rows_of(text: str, *overrides: str) -> tuple[PrintRun, dict[str, str]]:
     run = print_job(load_spec(EXAMPLE, overrides), parse_text(text))

@@ -14,6 +14,8 @@ from detent.simulation.comparison import (
     nominal_constants,
 )
 
+pytestmark = pytest.mark.compiled
+
 INCH = 0.0254
 DRIFTED = ["disturbance.motor_constant=10 %", "disturbance.friction_right=20 %", "disturbance.friction_left=20 %"]
 TRUE = DriveConstants(slope_right=170, slope_left=170, friction_right=36, friction_left=28)

@@ -25,6 +25,8 @@ from detent.simulation.recorder import Recorder
 from detent.simulation.trace import Trace
 from detent.systems.print_head import PrintHead
 
+pytestmark = pytest.mark.compiled
+
 STREAM = Path(__file__).parents[4] / "shared/data/workloads/daisywheel_diablo630/wsprint.prn"
 LETTER = load_job(detent.example("letter.txt"))
 PUSH = ("disturbance.push.at=8 s", "disturbance.push.duration=60 ms")
