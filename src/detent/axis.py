@@ -16,7 +16,8 @@ from detent.simulation.machine import TICK
 from detent.simulation.print_run import PrintRun, Progress, default_signals, print_job
 from detent.simulation.recorder import Recorder, choose_leaves, make_trace
 from detent.simulation.trace import Trace
-from detent.simulation.trace_files import TraceWriter, load_trace, save_trace
+from detent.simulation.trace_files import load_trace, save_trace
+from detent.simulation.trace_store import TraceWriter
 from detent.systems.print_head import PrintHead
 
 EVERY = 10

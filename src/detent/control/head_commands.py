@@ -28,7 +28,7 @@ from detent.kernel.step import step
 ACKNOWLEDGE = 0xFF
 SLOWEST, FASTEST = 18, 240
 RUN_UP_RESERVE = 12
-"""Emitters that a run back leaves beyond the run-up: twice the stop error of a move (acceptance test 52)."""
+"""Emitters that a run back leaves beyond the run-up: more than a stop misses its target by, 11 at most."""
 
 CODE_PRINT, CODE_RUN, CODE_CONTROLLED, CODE_SPEED = 0x8D, 0x92, 0xA2, 0x99
 CODE_CALCULATE, CODE_HIGH, CODE_LOW = 0x01, 0x40, 0x41

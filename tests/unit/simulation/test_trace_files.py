@@ -14,15 +14,14 @@ from detent.errors import DetentError, InputError
 from detent.simulation import trace_files
 from detent.simulation.trace import Trace
 from detent.simulation.trace_files import (
-    TraceWriter,
     convert_trace,
     load_trace,
     need_parquet,
     save_csv,
-    save_hdf5,
     save_parquet,
     save_trace,
 )
+from detent.simulation.trace_store import TraceWriter, save_hdf5
 
 ROW = np.dtype([("t", "f8"), ("motor.current", "f8"), ("head.drive_cmd", "i2")])
 
