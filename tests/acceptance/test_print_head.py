@@ -1217,25 +1217,20 @@ def test_51_literal_span_ramps_too_fast():
 def short_low_move(direction, *, start=5, stop=13, s=30):
     """Time of a run of 20 emitters from the rules alone [ms]: 5 emitters of start, steady drive, reversed at 20 - 7.
 
-    Drive and speed in counts of back-EMF; electrical lag 1 ms, mechanical time constant 40.16 ms, steps of 10 us; the
-    trim falls into the run once, 16 ms after the start, and finds the head too slow.
+    Drive and speed in counts of back-EMF; electrical lag 1 ms, mechanical time constant 40.16 ms, steps of 10 us. The
+    steady part lasts 6 ms: no trim falls into it.
     """
     friction = FRICTION[direction]
-    drive, speed, current, way, t, begun, trimmed = friction + 96, 0.0, 0.0, 0.0, 0.0, 0.0, False
-    while True:
+    steady = (170 * s >> 8) + friction
+    speed = current = way = t = 0.0
+    while way < stop or speed > 0:
+        drive = friction + 96 if way < start else (steady if way < stop else -steady)
         current += (drive - speed - current) * 0.01 / 1.0
         net = current - friction if speed > 0 or current > friction else 0.0
         speed += net * 0.01 / 40.16
         way += speed * 256 / 170 * 50 * 1e-5
         t += 0.01
-        if drive == friction + 96 and way >= start:
-            drive, begun = (170 * s >> 8) + friction, t
-        elif begun and not trimmed and t >= begun + 16:
-            drive, trimmed = drive + (1 if drive > 0 else 0), True
-        if drive > 0 and way >= stop:
-            drive, trimmed = -drive, True
-        if drive < 0 and speed <= 0:
-            return t
+    return t
 
 
 def test_52_run_moves_end_where_they_should():

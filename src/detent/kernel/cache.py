@@ -78,6 +78,7 @@ def is_warm() -> bool:
 
 def _forget_old(root: Path, keep: Path) -> None:
     def age(folder: Path) -> float:
+        """Time of the last use."""
         try:
             return folder.stat().st_mtime
         except OSError:  # another process removed it meanwhile

@@ -95,6 +95,7 @@ class _RegistersAttributes(templates.AttributeTemplate):
     key = RegistersType
 
     def generic_resolve(self, value: RegistersType, attr: str) -> types.Type | None:
+        """A field reads as int64, float64, an array of these, or the nested file."""
         field = value.registers.__fields__.get(attr)
         if field is None:
             return None
@@ -125,6 +126,7 @@ def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> 
 @templates.infer_global(operator.getitem)
 class _ArrayRead(templates.AbstractTemplate):
     def generic(self, args: Any, _kws: Any) -> Any:
+        """``array[int]`` is a wide value."""
         array, index = args
         if isinstance(array, RegisterArrayType) and isinstance(index, types.Integer):
             return templates.signature(_scalar_type(array.width), array, types.int64)
@@ -134,6 +136,7 @@ class _ArrayRead(templates.AbstractTemplate):
 @templates.infer_global(operator.setitem)
 class _ArrayWrite(templates.AbstractTemplate):
     def generic(self, args: Any, _kws: Any) -> Any:
+        """``array[int] = value`` takes a wide value."""
         array, index, _value = args
         if isinstance(array, RegisterArrayType) and isinstance(index, types.Integer):
             return templates.signature(types.none, array, types.int64, _scalar_type(array.width))
