@@ -82,11 +82,10 @@ static inline void pass_edge(const EncoderParams *p, Encoder *e, bool rightward)
 
 static inline int count_edge(Quadrature *q, unsigned a, unsigned b)
 {
-    unsigned now = a ? (b ? 1u : 0u) : (b ? 2u : 3u);
-    unsigned change = (now - q->previous) & 3u;
-    q->previous = (uint8_t)now;
-    q->illegal += change == 2u;
-    int step = (change == 1u) - (change == 3u);
+    int step = (int)(a ^ q->channel_b) - (int)(b ^ q->channel_a);
+    q->illegal += a != q->channel_a && b != q->channel_b;
+    q->channel_a = (uint8_t)a;
+    q->channel_b = (uint8_t)b;
     q->count += step;
     return step;
 }
@@ -643,7 +642,7 @@ static inline void move(const DriveTrainParams *p, DriveTrain *t, double u_posit
         t->current = fabs(held) > 1e-9 ? held : 0.0;
         t->ticks_held++;
     }
-    if ((positive && t->current < 0.0) || (negative && t->current > 0.0))
+    if (((positive && t->current < 0.0) || (negative && t->current > 0.0)) && u_positive != u_negative)
         t->current = 0.0;
     if (t->velocity * sense < 0.0)
         t->velocity = 0.0;

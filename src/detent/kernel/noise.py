@@ -24,3 +24,26 @@ def uniform(r: NoiseSource) -> float:
 def bell(r: NoiseSource) -> float:
     """Next number of zero mean and unit variance: three uniforms summed, so never beyond 3."""
     return 2.0 * (uniform(r) + uniform(r) + uniform(r)) - 3.0
+
+
+@step
+def waiting_time(r: NoiseSource) -> float:
+    """Next waiting time of events that come at random, with a mean of 1: exponential, by comparisons alone.
+
+    Von Neumann's method: how often a run of falling numbers has an even length gives the exponential law exactly, and
+    no logarithm is needed, which C libraries round differently.
+    """
+    whole = 0
+    while True:
+        first = uniform(r)
+        last = first
+        length = 1
+        while True:
+            number = uniform(r)
+            length += 1
+            if number >= last:
+                break
+            last = number
+        if length & 1 == 0:
+            return whole + first
+        whole += 1

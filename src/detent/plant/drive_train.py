@@ -42,7 +42,7 @@ class DriveTrainParams(Registers):
     """Constants of motor, transmission and load."""
 
     resistance: f8 = register("winding, brushes and bridge", unit="ohm")
-    inductance: f8 = register("winding", unit="H")
+    inductance: f8 = register("winding; 0: the current follows voltage and velocity at once", unit="H")
     force_constant: f8 = register("belt force per ampere", unit="N/A")
     emf_constant: f8 = register("back-EMF per belt velocity", unit="V.s/m")
     mass: f8 = register("all that moves, at the carriage", unit="kg")
@@ -168,8 +168,8 @@ def move_averaged(p: DriveTrainParams, r: DriveTrain, u_positive: float, u_negat
     """One tick with the mean terminal voltage of the period.
 
     `u_positive` is the voltage the bridge imposes while the current is positive, `u_negative` while it is negative;
-    they differ where a diode carries the current. A current that would change sign inside the tick ends at zero: the
-    bridge states used here let it flow one way only.
+    they differ where a diode carries the current. A current that would change sign inside the tick then ends at zero:
+    such a bridge lets it flow one way only.
     """
     sense_of_motion(p, r)
     emf = p.emf_constant * r.velocity
@@ -187,27 +187,62 @@ def move_averaged(p: DriveTrainParams, r: DriveTrain, u_positive: float, u_negat
     else:
         apply_transition(p.coast_right if r.sense > 0 else p.coast_left, r, 0.0, force)
     if (positive and r.current < 0.0) or (negative and r.current > 0.0):
-        r.current = 0.0
+        r.current = r.current if u_positive == u_negative else 0.0
     settle_contacts(p, r)
     account(p, r, u, 0.5 * (before + r.current))
 
 
+@hot_step
+def move_with_current(p: DriveTrainParams, r: DriveTrain, current: float) -> None:
+    """One tick with the current that an amplifier of its own imposes: the winding does not matter to the motion."""
+    r.current = current
+    sense_of_motion(p, r)
+    if r.sense == 0:
+        r.ticks_held += 1
+    else:
+        force = p.force_constant * current + friction_force(p, r)
+        apply_transition(p.coast_right if r.sense > 0 else p.coast_left, r, 0.0, force)
+        r.current = current
+    settle_contacts(p, r)
+    account(p, r, p.resistance * current + p.emf_constant * r.velocity, current)
+
+
 def fill_transition(p: DriveTrainParams, target: Transition, sense: int, *, conducting: bool) -> None:
-    """Make the whole-period matrix of one regime from the exact solution of unit inputs."""
-    coulomb = (p.friction.coulomb_right, p.friction.coulomb_left)
-    p.friction.coulomb_right = p.friction.coulomb_left = 0.0
+    """Make the whole-period matrix of one regime from the exact solution of unit inputs.
+
+    Without inductance the winding is no state: its current follows from voltage and velocity at once, and acts as the
+    force ``k u / R`` and the viscous friction ``k^2 / R``.
+    """
+    at_once = conducting and p.inductance == 0.0
+    mechanics = without_friction(p)
+    if at_once:
+        drag = p.force_constant * p.emf_constant / p.resistance
+        mechanics.friction.viscous_right += drag
+        mechanics.friction.viscous_left += drag
     for name, current, velocity, voltage, force in (
         ("i", 1.0, 0.0, 0.0, 0.0),
         ("v", 0.0, 1.0, 0.0, 0.0),
         ("u", 0.0, 0.0, 1.0, 0.0),
         ("f", 0.0, 0.0, 0.0, 1.0),
     ):
-        r = DriveTrain(current=current if conducting else 0.0, velocity=velocity, force=force, sense=sense)
-        flow(p, r, voltage, conducting, p.period)
+        r = DriveTrain(velocity=velocity, force=force, sense=sense)
+        if at_once:
+            r.force += p.force_constant * voltage / p.resistance
+            flow(mechanics, r, 0.0, False, p.period)
+            r.current = (voltage - p.emf_constant * r.velocity) / p.resistance
+        else:
+            r.current = current if conducting else 0.0
+            flow(mechanics, r, voltage, conducting, p.period)
         setattr(target, "i_" + name, r.current)
         setattr(target, "v_" + name, r.velocity)
         setattr(target, "x_" + name, r.position)
-    p.friction.coulomb_right, p.friction.coulomb_left = coulomb
+
+
+def without_friction(p: DriveTrainParams) -> DriveTrainParams:
+    """Copy of the constants without Coulomb friction, which the whole-period matrices take as a force."""
+    mechanics = p.copy()
+    mechanics.friction.coulomb_right = mechanics.friction.coulomb_left = 0.0
+    return mechanics
 
 
 def fill_period(p: DriveTrainParams) -> None:
@@ -216,6 +251,9 @@ def fill_period(p: DriveTrainParams) -> None:
     fill_transition(p, p.left, -1, conducting=True)
     fill_transition(p, p.coast_right, 1, conducting=False)
     fill_transition(p, p.coast_left, -1, conducting=False)
+    if p.inductance == 0.0:
+        p.held_i, p.held_u = 0.0, 1.0 / p.resistance
+        return
     for name, current, voltage in (("held_i", 1.0, 0.0), ("held_u", 0.0, 1.0)):
         r = DriveTrain(current=current)
         flow(p, r, voltage, True, p.period)

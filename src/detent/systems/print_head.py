@@ -20,23 +20,18 @@ from detent.kernel.compiled import byte_at, copy_back, local_copy
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
+from detent.plant.push import Push, push_force
 from detent.plant.switched_motor import Scratch, SwitchedParams, move_switched
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right, stand_at
-from detent.sensing.quadrature import Quadrature, count_edge, cycle_position
+from detent.sensing.quadrature import Quadrature, count_edge
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
 
 PERIOD_US = 40
+TICK = PERIOD_US * 1e-6
+"""Base tick [s]."""
 AVERAGED, SWITCH_LEVEL = 0, 1
-
-
-class Push(Registers):
-    """External force on the carriage during a stretch of ticks."""
-
-    force: f8 = register("force, positive pushes right", unit="N")
-    begin: i8 = register("first tick of the push", unit="tick")
-    end: i8 = register("first tick after it", unit="tick")
 
 
 class PrintHeadParams(Registers):
@@ -151,7 +146,7 @@ def actuate(p: PrintHeadParams, r: PrintHead) -> None:
 def move(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> None:
     """The plant moves through the period."""
     b = r.bridge
-    train.force = p.push.force if p.push.begin <= r.tick < p.push.end else 0.0
+    train.force = push_force(p.push, r.tick)
     if p.fidelity == AVERAGED:
         move_averaged(p.train, train, b.mean_positive, b.mean_negative)
     else:
@@ -228,7 +223,7 @@ def switch_on(p: PrintHeadParams, r: PrintHead, position: float, seed: int) -> N
     r.train.position = r.sampled = position
     stand_at(p.encoder, r.encoder, position, seed)
     r.quadrature.count = r.encoder.edge & 3
-    r.quadrature.previous = cycle_position(r.encoder.channel_a, r.encoder.channel_b)
+    r.quadrature.channel_a, r.quadrature.channel_b = r.encoder.channel_a, r.encoder.channel_b
     r.cycle = 0
     power_on(p.head, r.head)
     steer(r.bridge, r.lines, 0, p.supply)

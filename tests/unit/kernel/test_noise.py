@@ -1,6 +1,6 @@
 import numpy as np
 
-from detent.kernel.noise import INCREMENT, MULTIPLIER, NoiseSource, bell, uniform
+from detent.kernel.noise import INCREMENT, MULTIPLIER, NoiseSource, bell, uniform, waiting_time
 
 
 def test_the_generator_is_the_stated_one_modulo_64_bit():
@@ -34,3 +34,34 @@ def test_bell_has_zero_mean_unit_variance_and_stays_within_three():
     assert abs(numbers.mean()) < 4 / np.sqrt(len(numbers))
     assert abs(numbers.var() - 1) < 0.04
     assert 2.5 < np.abs(numbers).max() <= 3.0
+
+
+def waiting_times(seed: int, count: int = 10_000) -> np.ndarray:
+    r = NoiseSource(state=seed)
+    return np.array([waiting_time(r) for _ in range(count)])
+
+
+def test_waiting_times_have_a_mean_and_a_standard_deviation_of_one():
+    times = waiting_times(3)
+    assert times.min() >= 0.0
+    assert abs(times.mean() - 1) < 4 / np.sqrt(len(times))
+    assert abs(times.var() - 1) < 4 * np.sqrt(8 / len(times))  # the fourth central moment is 9
+
+
+def test_waiting_times_are_exponential():
+    times = np.sort(waiting_times(4))
+    law = 1 - np.exp(-times)
+    steps = np.arange(len(times) + 1) / len(times)
+    distance = max((steps[1:] - law).max(), (law - steps[:-1]).max())
+    assert distance < 1.63 / np.sqrt(len(times))  # Kolmogorov-Smirnov, 1 %
+
+
+def test_waiting_times_do_not_depend_on_the_one_before():
+    times = waiting_times(5)
+    after_short, after_long = times[1:][times[:-1] < np.log(2)], times[1:][times[:-1] >= np.log(2)]
+    assert abs(after_short.mean() - after_long.mean()) < 4 * 2 / np.sqrt(len(times))
+
+
+def test_one_seed_gives_the_same_waiting_times_to_the_byte():
+    assert waiting_times(6, 1000).tobytes() == waiting_times(6, 1000).tobytes()
+    assert waiting_times(6, 1000).tobytes() != waiting_times(7, 1000).tobytes()

@@ -7,11 +7,13 @@ from tests.print_head_rig import Rig
 from detent.plant.drive_train import (
     DriveTrain,
     DriveTrainParams,
+    Transition,
     account,
     fill_period,
     flow,
     friction_force,
     move_averaged,
+    move_with_current,
     sense_of_motion,
     settle_contacts,
 )
@@ -170,6 +172,118 @@ def test_flow_agrees_with_the_matrix_exponential():
     r = DriveTrain(current=0.2, velocity=0.3, position=0.1, force=2.0, sense=1)
     flow(p, r, 15.0, True, 1.7e-3)
     assert [r.current, r.velocity, r.position, 1.0] == pytest.approx(total @ [0.2, 0.3, 0.1, 1.0], rel=1e-11)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_current_driven_against_itself_passes_through_zero_where_both_voltages_are_equal(sign):
+    p, r = machine(left_end=-1.0), DriveTrain(current=sign * 0.05, velocity=sign * 0.5)
+    free = r.copy()
+    for _ in range(3):
+        move_averaged(p, r, -sign * 38.0, -sign * 38.0)  # a transistor conducts either way
+        free.sense = sign  # the exact solution without an event
+        flow(p, free, -sign * 38.0, True, p.period)
+        assert r.current == pytest.approx(free.current, rel=1e-9)
+        assert r.velocity == pytest.approx(free.velocity, rel=1e-9)
+        assert sign * r.current < 0.0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_current_that_only_a_diode_carries_does_not_pass_through_zero(sign):
+    p, r = machine(left_end=-1.0), DriveTrain(current=sign * 0.05, velocity=sign * 0.5)
+    move_averaged(p, r, -38.0, 38.0)
+    assert r.current == 0.0
+    assert sign * r.velocity < 0.5
+
+
+def test_without_inductance_the_current_follows_voltage_and_velocity_at_once():
+    p, r = machine(inductance=0.0, right_end=100.0), DriveTrain()
+    speed = (24.0 - 12 * 7.55 / K) / K  # v(t) = speed (1 - exp(-t / time_constant)), from rest
+    time_constant = 1.3212 * 12 / K**2
+    r.current = 2.0  # what broke it loose
+    for n in range(1, 501):
+        move_averaged(p, r, 24.0, 24.0)
+        decay = math.exp(-n * p.period / time_constant)
+        assert r.velocity == pytest.approx(speed * (1 - decay), rel=1e-11)
+        assert r.current == pytest.approx((24.0 - K * r.velocity) / 12, rel=1e-12)
+        way = speed * (n * p.period - time_constant * (1 - decay))
+        assert r.position == pytest.approx(way, rel=1e-9)
+
+
+def test_without_inductance_a_held_motor_has_the_current_of_its_resistance():
+    p, r = machine(inductance=0.0), DriveTrain(position=0.5)
+    for volts in (3.0, -2.0, 0.0):
+        move_averaged(p, r, volts, volts)
+        assert (r.current, r.velocity, r.sense) == (volts / 12, 0.0, 0)
+
+
+@pytest.mark.parametrize(("name", "sense"), [("right", 1), ("left", -1)])
+def test_without_inductance_the_transition_is_the_limit_of_a_small_one(name, sense):
+    faults = {"viscous_right": 3.0, "viscous_left": 5.0, "mass": 0.05}  # so light that a period of 40 us shows the drag
+    none = getattr(machine(inductance=0.0, **faults), name)
+    velocity, u, force = 0.7 * sense, 20.0 * sense, -4.0
+    expected = responses(none, velocity, u, force)
+    distances = []
+    for inductance in (1e-5, 1e-6):
+        small = getattr(machine(inductance=inductance, substep=0.02 * inductance, **faults), name)
+        found = responses(small, velocity, u, force)
+        assert found == pytest.approx(expected, rel=1e3 * inductance)
+        distances.append(abs(found[1] / expected[1] - 1))
+    assert distances[1] == pytest.approx(0.1 * distances[0], rel=0.1)  # ever nearer, in proportion
+    assert none.i_i == none.v_i == none.x_i == 0.0  # the current is no state
+
+
+def responses(m: Transition, velocity: float, u: float, force: float) -> list[float]:
+    """Current, velocity and travel after a period."""
+    return [
+        getattr(m, f"{kind}_v") * velocity + getattr(m, f"{kind}_u") * u + getattr(m, f"{kind}_f") * force
+        for kind in "ivx"
+    ]
+
+
+@pytest.mark.parametrize(("current", "sense", "coulomb"), [(1.5, 1, 7.55), (-1.5, -1, 5.87)])
+def test_an_imposed_current_accelerates_as_its_force_less_friction(current, sense, coulomb):
+    p, r = machine(left_end=-10.0, right_end=10.0), DriveTrain(force=2.0)
+    acceleration = (K * current + 2.0 - sense * coulomb) / 1.3212
+    for n in range(1, 201):
+        before = r.velocity
+        move_with_current(p, r, current)
+        t = n * p.period
+        assert r.velocity == pytest.approx(acceleration * t, rel=1e-10)
+        assert r.position == pytest.approx(acceleration * t**2 / 2, rel=1e-9)
+        assert (r.current, r.mean_current, r.sense) == (current, current, sense)
+        assert r.voltage == pytest.approx(12 * current + K * r.velocity, rel=1e-12)
+        assert abs(r.velocity) > abs(before)
+    assert r.peak_current == 1.5
+
+
+def test_an_imposed_current_below_friction_holds():
+    p, r = machine(), DriveTrain(position=0.5)
+    for _ in range(10):
+        move_with_current(p, r, 0.4)  # 7.9 N of 8.68 N
+    assert (r.velocity, r.position, r.ticks_held, r.current) == (0.0, 0.5, 10, 0.4)
+    assert r.energy == pytest.approx(10 * 12 * 0.4**2 * p.period)
+
+
+def test_an_imposed_current_meets_viscous_friction_and_the_frames():
+    p, r = machine(viscous_right=10.0, right_end=0.02), DriveTrain()
+    top = (K * 2.0 - 7.55) / 10.0
+    for n in range(1, 300):
+        move_with_current(p, r, 2.0)
+        assert r.velocity == pytest.approx(top * (1 - math.exp(-10.0 / 1.3212 * n * p.period)), rel=1e-9)
+        assert r.position < 0.02
+    for _ in range(2000):
+        move_with_current(p, r, 2.0)
+    assert (r.position, r.velocity) == (0.02, 0.0)
+    move_with_current(p, r, 2.0)
+    assert (r.position, r.velocity, r.sense) == (0.02, 0.0, 0)
+
+
+def test_a_current_against_the_motion_brakes_to_rest_and_not_beyond():
+    p, r = machine(), DriveTrain(velocity=1e-6, position=0.5)
+    move_with_current(p, r, -0.2)  # 4 N: with friction it brakes, alone it holds
+    assert r.velocity == 0.0
+    move_with_current(p, r, -0.2)
+    assert (r.velocity, r.sense) == (0.0, 0)
 
 
 def test_default_plant_accelerates_at_600_in_s2_with_96_counts_of_ir():

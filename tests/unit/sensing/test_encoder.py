@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from detent.sensing.encoder import JITTER_LIMIT, Encoder, EncoderParams, pass_left, pass_right, stand_at
-from detent.sensing.quadrature import Quadrature, count_edge, cycle_position
+from detent.sensing.quadrature import Quadrature, count_edge
 
 PITCH = 84.667e-6 / 4
 
@@ -94,7 +94,7 @@ def test_share_of_missing_pulses():
 @pytest.mark.parametrize("step", [pass_right, pass_left])
 def test_a_missing_pulse_of_channel_a_loses_one_whole_cycle_and_is_never_illegal(step):
     p, r = encoder(2.5 * PITCH)
-    q = Quadrature(count=2, previous=cycle_position(r.channel_a, r.channel_b))
+    q = Quadrature(count=2, channel_a=r.channel_a, channel_b=r.channel_b)
     p.missing = 1.0
     for _ in range(4):  # one cycle, its pulse missing
         step(p, r)
