@@ -1,6 +1,6 @@
 """Quantities with units, at the border: text in, SI number out, and back to text for messages.
 
-The axis file is the only place where units other than SI are met, so `axisfile` is the only user of `parse_quantity`.
+Axis files and job files are the only places where units other than SI are met: their loaders use `parse_quantity`.
 Conversion is exact: factors are ratios of whole numbers, and the result is the double nearest to the true value, so
 that ``"3 in"`` and ``"76.2 mm"`` are the same number. Pint is imported at the first conversion.
 """
@@ -17,7 +17,9 @@ MAX_TEXT = 80
 KINDS: dict[str, tuple[str, str]] = {
     "m": ("a length", "12 mm"),
     "m/s": ("a velocity", "600 mm/s"),
+    "m/s^2": ("an acceleration", "10 m/s^2"),
     "s": ("a time", "5 ms"),
+    "Hz": ("a frequency", "20 kHz"),
     "kg": ("a mass", "1.1 kg"),
     "kg*m^2": ("a moment of inertia", "260 g*cm^2"),
     "N": ("a force", "7.5 N"),
@@ -37,6 +39,8 @@ KINDS: dict[str, tuple[str, str]] = {
 COMMON_UNITS: dict[str, dict[str, Fraction]] = {
     "m": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
     "m/s": {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
+    "m/s^2": {"m/s^2": Fraction(1), "mm/s^2": Fraction(1, 1000)},
+    "Hz": {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)},
     "s": {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
     "kg": {"kg": Fraction(1), "g": Fraction(1, 1000)},
     "kg*m^2": {"kg*m^2": Fraction(1), "g*cm^2": Fraction(1, 10**7)},
@@ -165,7 +169,7 @@ def _prefixed(size: float, unit: str) -> tuple[float, str]:
         return (1e-7, "g*cm^2") if size else (1.0, unit)
     if size == 0 or not math.isfinite(size):
         return 1.0, unit
-    largest = 0 if unit in {"m", "m/s", "s"} else 6
+    largest = 0 if unit in {"m", "m/s", "m/s^2", "s"} else 6
     exponent = max(-9, min(largest, 3 * math.floor(math.log10(size) / 3)))
     prefix = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}[exponent]
     return 10.0**exponent, prefix + unit
@@ -200,6 +204,8 @@ def _conversion_factor(unit_text: str, unit: str) -> Fraction:
     if "rad" in unit and re.search(r"[hH]z\b|[hH]ertz", unit_text):
         # Pint takes 1 Hz for 1 rad/s: silently wrong by 2 pi.
         raise QuantityError(f'the ambiguous unit "{unit_text}"', allowed, "write rad/s, rpm or turn/s instead of Hz")
+    if unit == "Hz" and re.search(r"rad|deg|turn|rev|rpm|cycle", unit_text):
+        raise QuantityError(f'the ambiguous unit "{unit_text}"', allowed, "write Hz, kHz or MHz")
     return _pint_factor(unit_text, unit, allowed)
 
 

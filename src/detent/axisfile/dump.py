@@ -6,15 +6,15 @@ from decimal import Decimal
 from pydantic.fields import FieldInfo
 
 from detent.axisfile.fields import Table, file_key, table_of, unit_of
-from detent.axisfile.schema import PrintHeadSpec
+from detent.axisfile.tables import AxisSpec
 
 
-def dump_spec(spec: PrintHeadSpec) -> str:
+def dump_spec(spec: AxisSpec) -> str:
     """Write a specification as an axis file, with every value stated in SI units.
 
     Parameters
     ----------
-    spec : PrintHeadSpec
+    spec : AxisSpec
         As `load_spec` returns it.
 
     Returns
@@ -41,7 +41,10 @@ def _table_lines(table: Table, path: tuple[str, ...]) -> list[str]:
 
 
 def _value_text(field: FieldInfo, value: object) -> str:
-    """Write a value as TOML: ``repr`` of a float is the shortest text that reads back as the same float."""
+    """Write a value as TOML.
+
+    ``repr`` of a float is the shortest text that reads back as the same float; that of a list of whole numbers is TOML.
+    """
     unit = unit_of(field)
     if isinstance(value, bool):
         return "true" if value else "false"

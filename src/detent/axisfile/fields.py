@@ -3,16 +3,19 @@
 Everything else that knows about keys (validation, messages, the printed axis, the reference) reads these declarations.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from detent.units import QuantityError, describe_kind, format_quantity, parse_quantity
+
+LIST_EXAMPLE = "[20000, 20096]"
+"""List of whole numbers shown for a key that has no example of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +42,13 @@ class Unit:
             raise PydanticCustomError("quantity", "not a quantity", context) from None
 
 
-class Table(BaseModel):
-    """A table of the axis file: unknown keys are errors, nothing is converted silently, nothing changes later."""
+class Table(BaseModel, frozen=True):
+    """A table of the axis file: unknown keys are errors, nothing is converted silently, nothing changes later.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    Each model says ``frozen=True`` again: pyright lets a method narrow a common field only where it reads that.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 def required(doc: str, example: str, *, allowed: str = "", **bounds: float) -> Any:
@@ -57,7 +63,8 @@ def required(doc: str, example: str, *, allowed: str = "", **bounds: float) -> A
     allowed : str
         Range in words, where the bounds in SI would be hard to recognise.
     **bounds : float
-        ``gt``, ``ge``, ``lt``, ``le`` in the SI unit of the field, or ``min_length``, ``max_length``.
+        ``gt``, ``ge``, ``lt``, ``le`` in the SI unit of the field, or ``min_length``, ``max_length`` of a text or a
+        list. The numbers of a list are bounded by its type: ``list[Annotated[int, Ge(0)]]``.
     """
     constraints: dict[str, Any] = dict(bounds)
     return Field(description=doc, examples=[example], json_schema_extra={"allowed": allowed}, **constraints)
@@ -101,6 +108,17 @@ def table_of(field: FieldInfo) -> type[Table] | None:
     return None
 
 
+def is_list(field: FieldInfo) -> bool:
+    """True for a key that holds a list of whole numbers."""
+    return list in {get_origin(candidate) for candidate in (field.annotation, *get_args(field.annotation))}
+
+
+def list_example(field: FieldInfo) -> str:
+    """Give an example of a list, as TOML text."""
+    held: object = field.default
+    return example_of(field) or (str(cast("list[int]", held)) if held and isinstance(held, list) else LIST_EXAMPLE)
+
+
 def extra_of(field: FieldInfo, name: str) -> str:
     """Word kept beside a field by `required` or `optional` (``allowed``, ``derived``)."""
     extra = field.json_schema_extra
@@ -131,17 +149,13 @@ def describe_allowed(field: FieldInfo) -> str:
     options = options_of(field)
     if options:
         return " or ".join(f'"{option}"' for option in options)
+    if is_list(field):
+        return _describe_list(field)
     if field.annotation is bool:
         return "true or false"
-    unit = unit_of(field)
-    if unit:
-        kind, example = describe_kind(unit)
-        bounds = _describe_bounds(field, unit)
-        return f"{kind} {bounds}".rstrip() if bounds else f'{kind} such as "{example}"'
     if field.annotation is str:
         return "text in quotes"
-    kind = "a whole number" if field.annotation is int else "a number"
-    return f"{kind} {_describe_bounds(field, '')}".rstrip()
+    return _describe_number(field)
 
 
 def options_of(field: FieldInfo) -> tuple[str, ...]:
@@ -149,6 +163,30 @@ def options_of(field: FieldInfo) -> tuple[str, ...]:
     if get_origin(field.annotation) is Literal:
         return tuple(str(option) for option in get_args(field.annotation))
     return ()
+
+
+def _describe_list(field: FieldInfo) -> str:
+    """Say what a list may be: its numbers, an example, its length."""
+    numbers = f"a list of whole numbers {_describe_bounds(field, '')}".rstrip()
+    lengths: list[str] = []
+    for entry in _annotations_of(field):
+        if isinstance(entry, MinLen) and entry.min_length > 0:
+            lengths.append(f"at least {entry.min_length}")
+        elif isinstance(entry, MaxLen):
+            lengths.append(f"at most {entry.max_length}")
+    many = f", {' and '.join(lengths)} of them" if lengths else ""
+    return f"{numbers}, such as {list_example(field)}{many}"
+
+
+def _describe_number(field: FieldInfo) -> str:
+    """Say what a quantity or a number may be."""
+    unit = unit_of(field)
+    bounds = _describe_bounds(field, unit)
+    if unit:
+        kind, example = describe_kind(unit)
+        return f"{kind} {bounds}" if bounds else f'{kind} such as "{example}"'
+    kind = "a whole number" if field.annotation is int else "a number"
+    return f"{kind} {bounds}".rstrip()
 
 
 def _describe_bounds(field: FieldInfo, unit: str) -> str:
@@ -174,7 +212,14 @@ def _bound_text(bound: object, unit: str) -> str:
 
 
 def _annotations_of(field: FieldInfo) -> Iterator[object]:
-    """Annotations of a field, those inside ``... | None`` included."""
+    """Annotations of a field, those inside ``... | None`` and ``list[...]`` included."""
     yield from field.metadata
-    for candidate in get_args(field.annotation):
+    yield from _annotations_inside(get_args(field.annotation))
+
+
+def _annotations_inside(candidates: Sequence[object]) -> Iterator[object]:
+    """Annotations of the types that a type is made of."""
+    for candidate in candidates:
         yield from getattr(candidate, "__metadata__", ())
+        if get_origin(candidate) is list:
+            yield from _annotations_inside(get_args(candidate))

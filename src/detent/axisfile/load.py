@@ -3,21 +3,25 @@
 import copy
 import difflib
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import Any, cast, get_origin
+from typing import Any, cast
 
 from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
 from detent.axisfile.catalogue import dc_motors, motor_constants
-from detent.axisfile.fields import Table, example_of, leaf_fields, table_of, unit_of
+from detent.axisfile.fields import Table, example_of, is_list, leaf_fields, options_of, table_of, unit_of
+from detent.axisfile.findings import Contradiction
 from detent.axisfile.locate import Path
-from detent.axisfile.problems import Reporter, dotted, field_at, nearest_key
-from detent.axisfile.rules import Contradiction, find_contradictions
-from detent.axisfile.schema import METHODS, PrintHeadSpec, fill_derived
+from detent.axisfile.methods import METHODS, AnySpec, Method
+from detent.axisfile.problems import Reporter, dotted, field_at, key_path, nearest_key
 from detent.axisfile.source import Source, read_source
 from detent.errors import FileProblem, InputError
+
+METHOD_KEY: Path = ("axis", "method")
 
 _NUMBER = re.compile(r"[+-]?[0-9][0-9_]*(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
@@ -30,8 +34,8 @@ class AxisFile:
     ----------
     file : str
         The file as the user named it.
-    spec : PrintHeadSpec
-        The specification, in SI units.
+    spec : AxisSpec
+        The specification of its method, in SI units.
     origins : dict
         By dotted key: "line 12", "--set" or "catalogue NAME"; keys left to their default are absent.
     texts : dict
@@ -39,7 +43,7 @@ class AxisFile:
     """
 
     file: str
-    spec: PrintHeadSpec
+    spec: AnySpec
     origins: dict[str, str]
     texts: dict[str, str]
 
@@ -55,7 +59,7 @@ class _Layers:
     doubtful: set[Path] = field(default_factory=set[Path])
 
 
-def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> PrintHeadSpec:
+def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> AnySpec:
     """Load an axis file.
 
     Parameters
@@ -67,8 +71,8 @@ def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> PrintHeadS
 
     Returns
     -------
-    PrintHeadSpec
-        All values, defaults filled, in SI units.
+    AxisSpec
+        The specification of the method the file names: all values, defaults filled, in SI units.
 
     Raises
     ------
@@ -87,33 +91,41 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
     """Check a source that has been read; parameters and errors as `load_spec`."""
     if not source.is_readable:
         raise InputError(source.problems)
-    model = _model_of(source, overrides)
+    method = _method_of(source, overrides)
+    model = method.spec
     layers = _Layers(copy.deepcopy(source.tables))
     _apply_overrides(layers, overrides, model)
     reporter = Reporter(source.file, source.places, layers.overrides, model)
-    _apply_catalogue(layers, reporter)
-    spec = _validated(layers, reporter, model, is_whole=source.is_whole)
+    _apply_catalogue(layers, reporter, model)
+    spec = _validated(layers, reporter, method, is_whole=source.is_whole)
     problems = [*source.problems, *layers.problems]
     if problems:
         raise InputError(problems)
     return AxisFile(source.file, spec, *_origins(source, layers, model))
 
 
-def _model_of(source: Source, overrides: Sequence[str]) -> type[PrintHeadSpec]:
-    """Model of the method the file names; without a name, the first, so that the rest is checked all the same."""
+def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
+    """Method the file names; without a name, the first, so that the rest is checked all the same."""
     name: object = _as_table(source.tables.get("axis")).get("method")
-    stated = [text.partition("=")[2].strip() for text in overrides if text.partition("=")[0].strip() == "axis.method"]
+    parts = [text.partition("=") for text in overrides]
+    stated = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == "axis.method"]
     name = stated[-1] if stated else name
-    if name is None or name in METHODS or (not isinstance(name, str) and not stated):
-        return METHODS.get(str(name), PrintHeadSpec)
-    near = difflib.get_close_matches(str(name).lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
+    if not isinstance(name, str):
+        return next(iter(METHODS.values()))
+    if name in METHODS:
+        return METHODS[name]
+    near = difflib.get_close_matches(name.lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
     remedy = f'did you mean "{near[0]}"?' if near else f'write method = "{next(iter(METHODS))}"'
-    overridden = {("axis", "method"): f'"{name}"'} if stated else {}
-    reporter = Reporter(source.file, source.places, overridden, PrintHeadSpec)
-    allowed = " or ".join(f'"{known}"' for known in METHODS)
+    overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
+    reporter = Reporter(source.file, source.places, overridden, Table)
     # Nothing else can be said: another method would have other keys.
-    problem = reporter.problem(("axis", "method"), reporter.came(("axis", "method"), name), allowed, remedy)
+    problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
+
+
+def _all_methods() -> str:
+    """Every word that ``axis.method`` may be."""
+    return " or ".join(f'"{known}"' for known in METHODS)
 
 
 def _apply_overrides(layers: _Layers, overrides: Sequence[str], model: type[Table]) -> None:
@@ -133,24 +145,34 @@ def _apply_overrides(layers: _Layers, overrides: Sequence[str], model: type[Tabl
                 FileProblem("--set", 0, 0, key, f'the unknown key "{key}"', "a key of the axis file", remedy)
             )
         else:
-            _put(layers.tables, path, _override_value(known[path].annotation, unit_of(known[path]), value))
+            _put(layers.tables, path, _override_value(known[path], value))
             layers.overrides[path] = value
 
 
-def _override_value(annotation: object, unit: str, text: str) -> object:
+def _override_value(field: FieldInfo, text: str) -> object:
     """Value of an override: what the same words mean in a file, quotes being optional."""
     if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
         return text[1:-1]
-    if unit and not _NUMBER.fullmatch(text):
+    if is_list(field) and text.startswith("["):
+        return _list_value(text)
+    if field.annotation is str or options_of(field):
         return text
-    if annotation is str or (get_origin(annotation) is not None and not unit):
-        return text
-    if text in {"true", "false"}:
+    if text in {"true", "false"} and not unit_of(field):
         return text == "true"
     match = _NUMBER.fullmatch(text)
     if match is None or len(text) > 40:
         return text
     return float(text) if match.group(1) or match.group(2) else int(text)
+
+
+def _list_value(text: str) -> object:
+    """Value of a list in an override; what is no TOML stays text, and validation refuses it."""
+    try:
+        tables = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    # After a line break anything could follow.
+    return tables["value"] if len(tables) == 1 else text
 
 
 def _as_table(value: object) -> dict[str, Any]:
@@ -165,11 +187,12 @@ def _put(tables: dict[str, Any], path: Path, value: object) -> None:
     tables[path[-1]] = value
 
 
-def _apply_catalogue(layers: _Layers, reporter: Reporter) -> None:
-    """Put a catalogue motor's constants under the stated ones."""
+def _apply_catalogue(layers: _Layers, reporter: Reporter, model: type[Table]) -> None:
+    """Put a catalogue motor's constants under the stated ones, where the method knows a catalogue."""
+    known = {path for path, _ in leaf_fields(model)}
     motor = _as_table(layers.tables.get("motor"))
     name: object = motor.get("catalogue")
-    if not name:
+    if not name or ("motor", "catalogue") not in known:
         return
     if not isinstance(name, str):
         # Validation refuses it; without the motor it names, missing constants are no news.
@@ -188,51 +211,58 @@ def _apply_catalogue(layers: _Layers, reporter: Reporter) -> None:
         layers.doubtful.add(("motor",))
         return
     for key, value in constants.items():
-        if key not in motor:
+        if key not in motor and ("motor", key) in known:
             motor[key] = value
             layers.catalogue["motor", key] = name
 
 
-def _validated(layers: _Layers, reporter: Reporter, model: type[PrintHeadSpec], *, is_whole: bool) -> PrintHeadSpec:
+def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AnySpec:
     """Validate all layers together; what is wrong joins ``layers.problems``."""
     tables = layers.tables
     # Rules between keys need a whole specification: keys with problems are replaced by ones that are allowed, and the
     # rules that look at them are passed over. Each round can uncover keys below a table that was replaced.
     for round_number in range(8):
         try:
-            spec = fill_derived(model.model_validate(tables))
+            spec = method.fill(method.spec.model_validate(tables))
         except ValidationError as error:
             found: list[dict[str, Any]] = [dict(entry) for entry in error.errors(include_url=False)]
             if round_number == 0:
-                layers.problems += _tell(found, layers, reporter, is_whole=is_whole)
-            layers.doubtful |= {tuple(str(part) for part in entry["loc"]) for entry in found}
-            tables = _patched(tables, found, model)
+                layers.problems += _tell(found, layers, reporter, method.spec, is_whole=is_whole)
+            layers.doubtful |= {key_path(entry["loc"]) for entry in found}
+            tables = _patched(tables, found, method.spec)
         else:
-            layers.problems += _contradictions(spec, layers, reporter)
+            found_together = (contradiction for rule in method.rules for contradiction in rule(spec))
+            layers.problems += _contradictions(found_together, layers, reporter)
             return spec
     raise InputError(layers.problems)
 
 
-def _tell(found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, *, is_whole: bool) -> list[FileProblem]:
+def _tell(
+    found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, model: type[Table], *, is_whole: bool
+) -> list[FileProblem]:
     """Problems of one validation, without those that only follow from others."""
-    paths = {id(entry): tuple(str(part) for part in entry["loc"]) for entry in found}
-    unknown = [paths[id(entry)] for entry in found if entry["type"] == "extra_forbidden"]
-    misspelt = {(*path[:-1], nearest_key(PrintHeadSpec, path)) for path in unknown}
-    problems: list[FileProblem] = []
+    by_key: dict[Path, list[dict[str, Any]]] = {}
     for entry in found:
-        path = paths[id(entry)]
+        by_key.setdefault(key_path(entry["loc"]), []).append(entry)
+    unknown = [path for path, entries in by_key.items() if entries[0]["type"] == "extra_forbidden"]
+    misspelt = {(*path[:-1], nearest_key(model, path)) for path in unknown}
+    problems: list[FileProblem] = []
+    for path, entries in by_key.items():
+        kind = entries[0]["type"]
         follows = path[:1] in layers.doubtful or path in misspelt or not is_whole
         # A default that is made from another key cannot be made when that key is wrong.
-        if entry["type"] == "default_factory_not_called" or (entry["type"] == "missing" and follows):
+        if kind == "default_factory_not_called" or (kind == "missing" and follows):
             continue
-        problems.append(reporter.from_error(entry))
+        problem = reporter.from_errors(entries)
+        # The model knows the one method it was made for; a file may name any.
+        problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
     return problems
 
 
-def _contradictions(spec: PrintHeadSpec, layers: _Layers, reporter: Reporter) -> list[FileProblem]:
+def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> list[FileProblem]:
     """Problems between keys that are each right for themselves."""
     problems: list[FileProblem] = []
-    for contradiction in find_contradictions(spec):
+    for contradiction in found:
         paths = contradiction.paths
         if any(_overlap(path, doubtful) for path in paths for doubtful in layers.doubtful):
             continue
@@ -267,7 +297,7 @@ def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Ta
     """Copy of the tables in which keys with problems are left out or replaced by an allowed value."""
     patched = copy.deepcopy(tables)
     for entry in found:
-        path: Path = tuple(str(part) for part in entry["loc"])
+        path = key_path(entry["loc"])
         if entry["type"] == "extra_forbidden" or not field_at(model, path).is_required():
             _drop(patched, path)
         elif table_of(field_at(model, path)) is not None:
@@ -285,8 +315,8 @@ def _drop(tables: dict[str, Any], path: Path) -> None:
 
 
 def _example_value(example: str) -> object:
-    """Value of an example, which is either quoted text or a whole number."""
-    return example.strip('"') if example.startswith('"') else int(example)
+    """Value of an example, which is TOML."""
+    return tomllib.loads(f"value = {example}")["value"]
 
 
 def _origins(source: Source, layers: _Layers, model: type[Table]) -> tuple[dict[str, str], dict[str, str]]:

@@ -1,7 +1,8 @@
 """What validation found, told to a person: from pydantic's errors to `FileProblem`."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
 from typing import Any
 
 from pydantic.fields import FieldInfo
@@ -12,7 +13,9 @@ from detent.axisfile.fields import (
     example_of,
     extra_of,
     file_key,
+    is_list,
     leaf_fields,
+    list_example,
     options_of,
     table_of,
     unit_of,
@@ -23,6 +26,9 @@ from detent.units import format_quantity
 
 MAX_SHOWN = 60
 """Characters of a value shown in a message."""
+
+MAX_ELEMENTS = 3
+"""Wrong numbers of a list shown in a message."""
 
 
 class Reporter:
@@ -60,12 +66,15 @@ class Reporter:
     def came(self, path: Path, value: object = None) -> str:
         """Value of a key as it was written."""
         text = self._overrides.get(path) or (self._places[path].text if path in self._places else repr(value))
-        first, *more = text.splitlines() or [""]
-        return f"{first[:MAX_SHOWN]}..." if more or len(first) > MAX_SHOWN else first
+        return _shortened(text)
 
-    def from_error(self, error: dict[str, Any]) -> FileProblem:
-        """Problem for one of pydantic's errors (an entry of ``ValidationError.errors()``)."""
-        path: Path = tuple(str(part) for part in error["loc"])
+    def from_errors(self, errors: Sequence[dict[str, Any]]) -> FileProblem:
+        """Problem for pydantic's errors about one key (entries of ``ValidationError.errors()``).
+
+        There is more than one only where several numbers of a list are wrong.
+        """
+        error = errors[0]
+        path = key_path(error["loc"])
         if error["type"] == "extra_forbidden":
             return self._unknown_key(path, error["input"])
         field = field_at(self._root, path)
@@ -73,6 +82,8 @@ class Reporter:
             return self._missing(path, field)
         if table_of(field) is not None:
             return self._not_a_table(path, error["input"])
+        if is_list(field):
+            return self._bad_list(path, field, errors)
         return self._bad_value(path, field, error)
 
     def _unknown_key(self, path: Path, value: object) -> FileProblem:
@@ -100,7 +111,7 @@ class Reporter:
             return self.problem(path, "nothing", f"the table [{dotted(path)}]", remedy)
         where = f"in [{dotted(path[:-1])}]"
         remedy = f"add {path[-1]} = {example_of(field)} {where} ({field.description})"
-        if path[0] == "motor":
+        if "catalogue" in known_keys(self._root, path[:-1]):
             remedy = f"{remedy}, or name a motor of the catalogue that has it"
         return self.problem(path, "nothing", describe_allowed(field), remedy)
 
@@ -125,6 +136,28 @@ class Reporter:
         elif error["type"].endswith("_type"):
             remedy = _type_remedy(path[-1], field, error["input"])
         return self.problem(path, came, allowed, remedy)
+
+    def _bad_list(self, path: Path, field: FieldInfo, errors: Sequence[dict[str, Any]]) -> FileProblem:
+        """Report what is no list, a list of the wrong length, or wrong numbers in a list."""
+        kinds = {error["type"] for error in errors}
+        example = f"{path[-1]} = {list_example(field)}"
+        remedy = f"give every number of {path[-1]} a value in this range ({field.description})"
+        if kinds & {"too_long", "too_short"}:
+            came = f"{len(errors[0]['input'])} numbers"
+            remedy = f"give {path[-1]} so many numbers ({field.description})"
+        elif "list_type" in kinds:
+            came = self.came(path, errors[0]["input"])
+            remedy = f"write whole numbers in brackets, as in {example}"
+        else:
+            came = ", ".join(_wrong_elements(errors))
+        if kinds & {"int_type", "int_parsing_size"}:
+            remedy = f"write every element as a whole number, as in {example}"
+        return self.problem(path, came, describe_allowed(field), remedy)
+
+
+def key_path(location: Sequence[str | int]) -> Path:
+    """Path of the key at a location of pydantic's, which may go on into a list by a number."""
+    return tuple(str(part) for part in takewhile(lambda part: isinstance(part, str), location))
 
 
 def field_at(root: type[Table], path: Path) -> FieldInfo:
@@ -163,6 +196,23 @@ def nearest_key(root: type[Table], path: Path) -> str:
 def dotted(path: Sequence[str]) -> str:
     """Key as written in messages; parts that need quotes get them."""
     return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in path)
+
+
+def _shortened(text: str) -> str:
+    """First line of a text, and no more of it than a message has room for."""
+    first, *more = text.splitlines() or [""]
+    return f"{first[:MAX_SHOWN]}..." if more or len(first) > MAX_SHOWN else first
+
+
+def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Tell which elements of a list are wrong, the first of them in full."""
+    for error in errors[:MAX_ELEMENTS]:
+        value = error["input"]
+        text = str(value).lower() if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
+        index = next(part for part in error["loc"] if isinstance(part, int))
+        yield f"{_shortened(text)} as element {index + 1}"
+    if len(errors) > MAX_ELEMENTS:
+        yield f"and {len(errors) - MAX_ELEMENTS} more"
 
 
 def _nearest_option(came: str, options: tuple[str, ...]) -> str:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from detent.axisfile.fields import describe_allowed, example_of, leaf_fields, unit_of
+from detent.axisfile.methods import METHODS
 from detent.axisfile.problems import default_text, dotted
-from detent.axisfile.schema import METHODS
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def reference_rows(method: str = "print_head") -> tuple[ReferenceRow, ...]:
     Parameters
     ----------
     method : str
-        A control method.
+        A control method, one of `METHODS`.
 
     Examples
     --------
@@ -62,5 +62,5 @@ def reference_rows(method: str = "print_head") -> tuple[ReferenceRow, ...]:
             allowed=describe_allowed(field),
             example=example_of(field),
         )
-        for path, field in leaf_fields(METHODS[method])
+        for path, field in leaf_fields(METHODS[method].spec)
     )

@@ -3,36 +3,8 @@
 Line numbers are those of the packaged example without its head comment: [axis] stands in line 1, [limits] in 6.
 """
 
-from dataclasses import dataclass
-
 import pytest
-
-from detent.errors import InputError
-
-
-@dataclass(frozen=True)
-class Bad:
-    """One bad file: edits of the good one, or a text of its own, and the problem expected."""
-
-    name: str
-    place: str
-    key: str
-    came: str
-    allowed: str
-    remedy: str
-    edits: tuple[tuple[str, str], ...] = ()
-    text: str | None = None
-    append: str = ""
-    overrides: tuple[str, ...] = ()
-    others: int = 0
-
-    def make(self, good):
-        text = good if self.text is None else self.text
-        for old, new in self.edits:
-            assert old in text, old
-            text = text.replace(old, new, 1)
-        return text + self.append
-
+from tests.bad_files import Bad, added, check_bad_file, edit, given, params
 
 TRAVEL = 'travel = "14.5 in"'
 SUPPLY = 'supply = "38 V"'
@@ -40,19 +12,6 @@ CYCLES = "cycles_per_revolution = 900"
 CATALOGUE = 'catalogue = "JDH-2250-DF-1C (inferred)"'
 RIGHT = 'coulomb = "7.55 N"'
 NAME = 'name = "print head"'
-
-
-def edit(name, old, new, place, key, came, allowed, remedy, **more):
-    return Bad(name, place, key, came, allowed, remedy, edits=((old, new),), **more)
-
-
-def added(name, lines, place, key, came, allowed, remedy, **more):
-    return Bad(name, place, key, came, allowed, remedy, append=f"\n{lines}\n", **more)
-
-
-def given(name, override, key, came, allowed, remedy, **more):
-    return Bad(name, "--set", key, came, allowed, remedy, overrides=(override,), **more)
-
 
 QUANTITIES = [
     edit("bare number", TRAVEL, "travel = 14.5", "7:1", "limits.travel", "14.5", "a length", '"12 mm"'),
@@ -440,182 +399,6 @@ SYNTAX = [
     Bad("unfinished text", "2:6", "", "abc", "TOML", "correct the line", text='a = """\nabc  ', append=""),
 ]
 
-CONTRADICTIONS = [
-    edit(
-        "effort",
-        'effort = "38 V"',
-        'effort = "39 V"',
-        "9:1",
-        "limits.effort",
-        '"39 V"',
-        "drive.supply, 38 V",
-        "lower limits.effort",
-    ),
-    edit("too fast", '"40 in/s"', '"41 in/s"', "8:1", "limits.speed", '"41 in/s"', "3 in/s to 40 in/s", "range"),
-    edit("too slow", '"40 in/s"', '"2.9 in/s"', "8:1", "limits.speed", '"2.9 in/s"', "3 in/s to 40 in/s", "range"),
-    edit(
-        "encoder",
-        CYCLES,
-        "cycles_per_revolution = 500",
-        "35:1",
-        "encoder.cycles_per_revolution",
-        "500",
-        "1/300 in",
-        "42.3333 mm",
-    ),
-    edit("pulley", '"3 in"', '"75 mm"', "35:1", "encoder.cycles_per_revolution", "900", "1/300 in", "use 886 cycles"),
-    edit("short way", TRAVEL, 'travel = "3 in"', "7:1", "limits.travel", '"3 in"', "101.6 mm", "correct limits.travel"),
-    edit("long way", TRAVEL, 'travel = "6 m"', "7:1", "limits.travel", '"6 m"', "5.549 m", "correct limits.travel"),
-    added(
-        "print speed",
-        '[method]\nmax_print_speed = "40 in/s"',
-        "--set",
-        "limits.speed",
-        "30 in/s",
-        "max_print_speed",
-        "lower",
-        overrides=("limits.speed=30 in/s",),
-    ),
-    added(
-        "homing speed",
-        '[homing]\nspeed = "10.1 in/s"',
-        "48:1",
-        "homing.speed",
-        '"10.1 in/s"',
-        "3 in/s to 10 in/s",
-        "range",
-    ),
-    added(
-        "homing above limit",
-        '[homing]\nspeed = "6 in/s"',
-        "--set",
-        "limits.speed",
-        "5 in/s",
-        "homing.speed",
-        "lower",
-        overrides=("limits.speed=5 in/s",),
-    ),
-    added("start outside", "[mechanics.x]", "47:1", "mechanics.x", "unknown table", "carriage_mass", "remove it"),
-    edit(
-        "start position",
-        'carriage_mass = "1.1 kg"',
-        'carriage_mass = "1.1 kg"\nstart_position = "15 in"',
-        "25:1",
-        "mechanics.start_position",
-        '"15 in"',
-        "368.3 mm",
-        "lower",
-    ),
-    added(
-        "left margin", '[print]\nleft_margin = "14.5 in"', "48:1", "print.left_margin", '"14.5 in"', "368.3 mm", "lower"
-    ),
-    added(
-        "width tolerance",
-        '[homing]\nwidth_tolerance = "1 m"',
-        "48:1",
-        "homing.width_tolerance",
-        '"1 m"',
-        "368.3 mm",
-        "lower",
-    ),
-    added(
-        "obstacle",
-        '[disturbance.obstacle]\nposition = "20 in"',
-        "48:1",
-        "disturbance.obstacle.position",
-        '"20 in"',
-        "14.5 in",
-        "lower",
-    ),
-    added(
-        "obstacle without place",
-        "[disturbance.obstacle]",
-        "47:1",
-        "disturbance.obstacle.position",
-        "nothing",
-        "a length",
-        "add position",
-    ),
-    added(
-        "push without time",
-        '[disturbance.push]\nforce = "3 N"\nduration = "1 s"',
-        "47:1",
-        "disturbance.push.at",
-        "nothing",
-        "a time",
-        "add at",
-    ),
-    edit(
-        "stiction",
-        RIGHT,
-        f'{RIGHT}\nstatic = "5 N"',
-        "30:1",
-        "mechanics.friction.right.static",
-        '"5 N"',
-        "7.55 N",
-        "1.15 x coulomb",
-    ),
-    edit("no mass", '"1.1 kg"', '"0 kg"', "24:1", "mechanics.carriage_mass", '"0 kg"', "above 0 kg", "range"),
-    added(
-        "slope range",
-        "[method]\nslope_min = 255",
-        "48:1",
-        "method.slope_min",
-        "255",
-        "slope_max, 255",
-        "lower method.slope_min",
-    ),
-    added("default slope", "[method]\ndefault_slope = 90", "48:1", "method.default_slope", "90", "100", "plausible"),
-    added(
-        "slope limit alone",
-        "[method]\nslope_min = 160",
-        "48:1",
-        "method.slope_min",
-        "160",
-        "method.default_slope (its default)",
-        "plausible",
-    ),
-    added(
-        "default friction",
-        "[method]\ndefault_friction_counts = 85",
-        "48:1",
-        "method.default_friction_counts",
-        "85",
-        "80",
-        "raise",
-    ),
-    added(
-        "homing drive", "[homing]\ndrive_limit_counts = 51", "48:1", "homing.drive_limit_counts", "51", "= 52", "raise"
-    ),
-    added(
-        "contact timeout",
-        '[homing]\ncontact_timeout = "5 ms"',
-        "48:1",
-        "homing.contact_timeout",
-        '"5 ms"',
-        "longer than",
-        "raise",
-    ),
-    added(
-        "zero-speed timeout",
-        '[method]\nzero_speed_timeout = "1 ms"',
-        "48:1",
-        "method.zero_speed_timeout",
-        '"1 ms"',
-        "1.2 ms",
-        "range",
-    ),
-    added(
-        "another supply",
-        '[disturbance]\nsupply = "12 V"',
-        "48:1",
-        "disturbance.supply",
-        '"12 V"',
-        "19 V to 76 V",
-        "a drift",
-    ),
-]
-
 OVERRIDES = [
     given("no equals sign", "nonsense", "nonsense", '"nonsense"', "KEY=VALUE", "--set 'drive.supply=34 V'"),
     given("no value", "drive.supply=", "drive.supply", '"drive.supply="', "KEY=VALUE", "--set 'drive.supply=34 V'"),
@@ -632,18 +415,7 @@ OVERRIDES = [
     given("supply below effort", "drive.supply=34 V", "drive.supply", "34 V", 'limits.effort ("38 V") up to', "lower"),
 ]
 
-TABLE = [
-    pytest.param(bad, id=f"{group}: {bad.name}")
-    for group, bads in {
-        "quantity": QUANTITIES,
-        "value": NUMBERS_AND_WORDS,
-        "key": KEYS_AND_TABLES,
-        "syntax": SYNTAX,
-        "contradiction": CONTRADICTIONS,
-        "override": OVERRIDES,
-    }.items()
-    for bad in bads
-]
+TABLE = params(quantity=QUANTITIES, value=NUMBERS_AND_WORDS, key=KEYS_AND_TABLES, syntax=SYNTAX, override=OVERRIDES)
 
 
 def test_the_table_is_long_enough_to_mean_something():
@@ -652,13 +424,4 @@ def test_the_table_is_long_enough_to_mean_something():
 
 @pytest.mark.parametrize("bad", TABLE)
 def test_bad_file(bad, good_text, load_text):
-    with pytest.raises(InputError) as caught:
-        load_text(bad.make(good_text), *bad.overrides)
-    first, *others = caught.value.problems
-    expected = bad.place if bad.place == "--set" else f"axis.toml:{bad.place}"
-    assert str(first).startswith(expected)
-    assert first.key == bad.key
-    assert bad.came in first.came
-    assert bad.allowed in first.allowed
-    assert bad.remedy in first.remedy
-    assert len(others) == bad.others, others
+    check_bad_file(bad, good_text, load_text)

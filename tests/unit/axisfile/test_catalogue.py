@@ -6,7 +6,7 @@ import pytest
 
 from detent.axisfile.catalogue import MOTOR_KEYS, MOTORS_FILE, dc_motors, motor_constants
 from detent.axisfile.fields import leaf_fields, unit_of
-from detent.axisfile.schema import MotorTable
+from detent.axisfile.tables import MotorTable
 from detent.units import parse_quantity
 
 REAL = [name for name, entry in dc_motors().items() if not entry.get("inferred")]

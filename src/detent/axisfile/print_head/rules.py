@@ -6,10 +6,12 @@ one of them is wrong already: a consequence of an error is not another error.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
-from detent.axisfile.locate import Path
-from detent.axisfile.schema import EMITTER, INCH, PrintHeadSpec
+from detent.axisfile.common_rules import Plant, static_friction, time_constants
+from detent.axisfile.findings import Contradiction
+from detent.axisfile.print_head.derive import Machine
+from detent.axisfile.print_head.schema import EMITTER, PrintHeadSpec
+from detent.axisfile.quantities import INCH
 from detent.units import format_quantity
 
 MAX_EMITTERS = 65535
@@ -18,36 +20,11 @@ MAX_EMITTERS = 65535
 MIN_TRAVEL = 1200 * EMITTER
 """Shortest way in which the calibration passes at 40 in/s can start, be measured and stop [m] (3.3)."""
 
+FASTEST = 1e9
+"""Largest sum of the machine's rates [1/s]: a PWM period then takes 160 000 steps of the power series to prepare."""
+
 PULLEY_TOLERANCE = 1e-3
 """How far one encoder cycle may be from 1/300 in, relative."""
-
-
-@dataclass(frozen=True, slots=True)
-class Contradiction:
-    """Keys that do not go together.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        Dotted keys the rule looked at, the one to blame first.
-    allowed, remedy : str
-        As in `FileProblem`.
-    """
-
-    keys: tuple[str, ...]
-    allowed: str
-    remedy: str
-
-    @property
-    def paths(self) -> tuple[Path, ...]:
-        """The keys as paths."""
-        return tuple(tuple(key.split(".")) for key in self.keys)
-
-
-def find_contradictions(spec: PrintHeadSpec) -> Iterator[Contradiction]:
-    """Apply all rules to a specification whose keys are each right for themselves."""
-    for rule in _RULES:
-        yield from rule(spec)
 
 
 def _effort_within_supply(spec: PrintHeadSpec) -> Iterator[Contradiction]:
@@ -114,15 +91,7 @@ def _positions_inside_travel(spec: PrintHeadSpec) -> Iterator[Contradiction]:
 
 
 def _static_friction(spec: PrintHeadSpec) -> Iterator[Contradiction]:
-    friction = spec.mechanics.friction
-    for direction, table in {"right": friction.right, "left": friction.left}.items():
-        if table.static < table.coulomb:
-            key = f"mechanics.friction.{direction}"
-            yield Contradiction(
-                (f"{key}.static", f"{key}.coulomb"),
-                f"at least the Coulomb friction, {format_quantity(table.coulomb, 'N')}",
-                f"raise {key}.static, or leave it out: it is then 1.15 x coulomb",
-            )
+    yield from static_friction(spec.mechanics.friction)
 
 
 def _slope_limits(spec: PrintHeadSpec) -> Iterator[Contradiction]:
@@ -182,7 +151,15 @@ def _drifted_supply(spec: PrintHeadSpec) -> Iterator[Contradiction]:
         )
 
 
-_RULES: tuple[Callable[[PrintHeadSpec], Iterator[Contradiction]], ...] = (
+def _time_constants(spec: PrintHeadSpec) -> Iterator[Contradiction]:
+    machine, drifts = Machine(spec), spec.disturbance
+    drift = (1 + drifts.motor_constant) * (1 + max(drifts.friction_right, drifts.friction_left))
+    coupling = machine.force_per_ampere * machine.volts_per_speed / machine.mass
+    plant = Plant(machine.resistance, spec.motor.inductance, coupling, machine.mass / max(1.0, drift))
+    yield from time_constants(plant, spec.mechanics.friction, FASTEST)
+
+
+RULES: tuple[Callable[[PrintHeadSpec], Iterator[Contradiction]], ...] = (
     _effort_within_supply,
     _emitter_pitch,
     _travel,
@@ -194,4 +171,6 @@ _RULES: tuple[Callable[[PrintHeadSpec], Iterator[Contradiction]], ...] = (
     _homing_drive,
     _timeouts,
     _drifted_supply,
+    _time_constants,
 )
+"""The rules, in the order in which their contradictions are told."""

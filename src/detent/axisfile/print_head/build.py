@@ -2,7 +2,14 @@
 
 import math
 
-from detent.axisfile.schema import COLUMN, EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
+from detent.axisfile.print_head.schema import (
+    COLUMN,
+    EMITTER,
+    FULL_DRIVE_COUNTS,
+    SPEED_STEP,
+    PrintHeadSpec,
+    speed_value,
+)
 from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.plant.switched_motor import fill_pulse_table
 from detent.systems.print_head import AVERAGED, PERIOD_US, SWITCH_LEVEL, PrintHeadParams

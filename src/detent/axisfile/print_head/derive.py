@@ -7,9 +7,10 @@ distance, ``V`` drive counts; sections are those of the print-head specification
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from detent.axisfile.schema import EMITTER, FULL_DRIVE_COUNTS, INCH, SPEED_STEP, PrintHeadSpec, speed_value
+from detent.axisfile.findings import Derived, count_figure, quantity_figure
+from detent.axisfile.print_head.schema import EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
+from detent.axisfile.quantities import INCH
 from detent.units import format_quantity
 
 DIRECTIONS = ("right", "left")
@@ -22,31 +23,6 @@ RUN_UP_RESERVE = 1.05
 
 FRAME_RESERVE = 12
 """Emitters a turning point keeps away from a frame."""
-
-
-@dataclass(frozen=True, slots=True)
-class Derived:
-    """One derived figure.
-
-    Attributes
-    ----------
-    name : str
-        What it is.
-    value : float
-        The figure in `unit`.
-    unit : str
-        SI unit, or the unit of the specification ("count", "emitter").
-    text : str
-        Value and unit as a person reads them.
-    formula : str
-        How it was computed.
-    """
-
-    name: str
-    value: float
-    unit: str
-    text: str
-    formula: str
 
 
 class Machine:
@@ -136,14 +112,15 @@ class Machine:
         return emitters * EMITTER
 
 
-def derive(machine: Machine) -> tuple[Derived, ...]:
+def derive(spec: PrintHeadSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
+    machine = Machine(spec)
     return (*_scales(machine), *_line(machine), *_dynamics(machine), *_limits(machine))
 
 
 def _scales(machine: Machine) -> Iterator[Derived]:
     """Units the axis computer thinks in."""
-    yield _counts("drive counts per volt", machine.counts_per_volt, "300 / supply", "count/V")
+    yield count_figure("drive counts per volt", machine.counts_per_volt, "300 / supply", "count/V")
     yield Derived(
         "top speed value",
         machine.top_speed,
@@ -159,7 +136,7 @@ def _line(machine: Machine) -> Iterator[Derived]:
         formula = "256 x (Ke/r + viscous x R x r/Kt) x 1/6 in/s x counts per volt"
         slope = machine.slope[direction]
         yield Derived(f"slope K, {direction}", slope, "1/256 count per 1/6 in/s", f"{slope:.4g}/256", formula)
-        yield _counts(
+        yield count_figure(
             f"friction, {direction}", machine.coulomb_counts[direction], "coulomb x r/Kt x R x counts per volt"
         )
     ir_counts = machine.spec.method.ir_counts
@@ -176,16 +153,16 @@ def _line(machine: Machine) -> Iterator[Derived]:
 
 def _dynamics(machine: Machine) -> Iterator[Derived]:
     """How fast things happen."""
-    yield _quantity("moving mass", machine.mass, "kg", "carriage + belt + rotor inertia / r^2")
-    yield _quantity("electrical time constant", machine.electrical_time_constant, "s", "L / R")
-    yield _quantity("mechanical time constant", machine.mechanical_time_constant, "s", "m R / (Kt/r x Ke/r)")
+    yield quantity_figure("moving mass", machine.mass, "kg", "carriage + belt + rotor inertia / r^2")
+    yield quantity_figure("electrical time constant", machine.electrical_time_constant, "s", "L / R")
+    yield quantity_figure("mechanical time constant", machine.mechanical_time_constant, "s", "m R / (Kt/r x Ke/r)")
     formula = f"0.133 s x s/240 / (VC right + VC left), span = {machine.spec.method.span}"
-    yield _quantity("ramp interval at top speed", machine.ramp_interval, "s", formula)
+    yield quantity_figure("ramp interval at top speed", machine.ramp_interval, "s", formula)
     distance = machine.stop_distance
     text = f"{distance:.4g} emitters ({format_quantity(distance * EMITTER, 'm')})"
     yield Derived("stop distance at top speed", distance, "emitter", text, "s^2 / 144")
     formula = "travel - 2 x (1.05 D + 12 emitters)"
-    yield _quantity("print line at top speed", machine.line_length, "m", formula)
+    yield quantity_figure("print line at top speed", machine.line_length, "m", formula)
 
 
 def _limits(machine: Machine) -> Iterator[Derived]:
@@ -201,16 +178,6 @@ def _limits(machine: Machine) -> Iterator[Derived]:
         peak = machine.open_loop_speed(machine.max_counts, direction) * SPEED_STEP
         text = f"{format_quantity(peak, 'm/s')} ({peak / INCH:.4g} in/s)"
         yield Derived(f"peak speed, {direction}", peak, "m/s", text, "(drive at limits.effort - friction) / K")
-    yield _quantity("stall current", machine.current(machine.max_counts), "A", "limits.effort / R")
+    yield quantity_figure("stall current", machine.current(machine.max_counts), "A", "limits.effort / R")
     homing = machine.current(machine.spec.homing.drive_limit_counts)
-    yield _quantity("stall current while homing", homing, "A", "homing.drive_limit_counts / counts per volt / R")
-
-
-def _quantity(name: str, value: float, unit: str, formula: str) -> Derived:
-    """Figure in an SI unit."""
-    return Derived(name, value, unit, format_quantity(value, unit), formula)
-
-
-def _counts(name: str, value: float, formula: str, unit: str = "count") -> Derived:
-    """Figure in drive counts."""
-    return Derived(name, value, unit, f"{value:.4g} {unit if '/' in unit else 'counts'}", formula)
+    yield quantity_figure("stall current while homing", homing, "A", "homing.drive_limit_counts / counts per volt / R")

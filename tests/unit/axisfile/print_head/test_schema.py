@@ -5,8 +5,8 @@ import math
 import pytest
 
 from detent.axisfile.fields import leaf_fields
+from detent.axisfile.print_head.schema import PrintHeadSpec, speed_value
 from detent.axisfile.problems import field_at
-from detent.axisfile.schema import PrintHeadSpec, speed_value
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,21 @@ overrides, by `load`, which also fills the defaults that depend on another table
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from detent.axisfile.fields import Table, Unit, optional, required
-
-INCH = 0.0254
-"""One inch [m]."""
+from detent.axisfile.fields import Table, optional, required
+from detent.axisfile.quantities import INCH, Length, Mass, Percentage, Resistance, Time, Velocity, Voltage
+from detent.axisfile.tables import (
+    AxisSpec,
+    AxisTable,
+    EncoderTable,
+    FrictionTables,
+    MotorTable,
+    ObstacleTable,
+    PushTable,
+)
 
 EMITTER = INCH / 300
 """Head travel per encoder cycle the method assumes [m] (2.1)."""
@@ -25,22 +32,6 @@ SPEED_STEP = INCH / 6
 
 FULL_DRIVE_COUNTS = 300
 """Drive value that gives the full supply voltage (2.1)."""
-
-Length = Annotated[float, Unit("m")]
-Velocity = Annotated[float, Unit("m/s")]
-Time = Annotated[float, Unit("s")]
-Mass = Annotated[float, Unit("kg")]
-Inertia = Annotated[float, Unit("kg*m^2")]
-Force = Annotated[float, Unit("N")]
-Viscosity = Annotated[float, Unit("N*s/m")]
-TorqueConstant = Annotated[float, Unit("N*m/A")]
-BackEmfConstant = Annotated[float, Unit("V*s/rad")]
-Voltage = Annotated[float, Unit("V")]
-Resistance = Annotated[float, Unit("ohm")]
-Inductance = Annotated[float, Unit("H")]
-Current = Annotated[float, Unit("A")]
-Angle = Annotated[float, Unit("rad")]
-Percentage = Annotated[float, Unit("%")]
 
 SPEED_RANGE = "a velocity from 3 in/s to 40 in/s (76.2 mm/s to 1.016 m/s)"
 MIN_SPEED = 3 * INCH
@@ -71,34 +62,16 @@ def speed_value(velocity: float) -> int:
     return math.floor(velocity / SPEED_STEP + 1e-9)
 
 
-def _stated_torque_constant(data: dict[str, Any]) -> float:
-    """Back-EMF constant [V*s/rad]: in SI units the same number as the torque constant."""
-    # A value that was refused is absent here; the file is then refused as a whole.
-    return float(data.get("torque_constant", math.nan))
-
-
-def _usual_stiction(data: dict[str, Any]) -> float:
-    """Static friction [N] of the default plant: 1.15 times Coulomb (7.2)."""
-    return 1.15 * float(data.get("coulomb", math.nan))
-
-
-class AxisTable(Table):
+class PrintHeadAxisTable(AxisTable, frozen=True):
     """Name and method of the axis."""
 
-    name: str = required(
-        "name of the axis, shown in reports",
-        '"print head"',
-        allowed="text of 1 to 80 characters",
-        min_length=1,
-        max_length=80,
-    )
     method: Literal["print_head"] = required("control method", '"print_head"')
     fidelity: Literal["averaged", "switch-level"] = optional(
         "bridge model: averaged over each PWM period, or every switch with its diodes", "averaged"
     )
 
 
-class LimitsTable(Table):
+class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
     travel: Length = required("free way of the head between the two side frames", '"14.5 in"', gt=0.0, le=10.0)
@@ -112,53 +85,14 @@ class LimitsTable(Table):
     effort: Voltage = required("largest average motor voltage", '"38 V"', gt=0.0, le=1000.0)
 
 
-class MotorTable(Table):
-    """Constants of the brush DC motor, from a catalogue or stated."""
-
-    catalogue: str = optional("motor of the catalogue that gives the constants not stated here", "", max_length=80)
-    torque_constant: TorqueConstant = required("torque per current", '"0.241 N*m/A"', gt=0.0, le=100.0)
-    back_emf_constant: BackEmfConstant = optional(
-        "voltage per speed",
-        _stated_torque_constant,
-        derived="motor.torque_constant",
-        gt=0.0,
-        le=100.0,
-    )
-    resistance: Resistance = required("winding and brushes", '"12 ohm"', ge=1e-3, le=1e5)
-    inductance: Inductance = required("winding", '"12 mH"', ge=1e-9, le=10.0)
-    rotor_inertia: Inertia = required("rotor, without load", '"260 g*cm^2"', gt=0.0, le=0.1)
-    max_current: Current | None = optional("current the motor stands; only warned about", None, gt=0.0, le=10000.0)
-
-
-class DriveTable(Table):
+class DriveTable(Table, frozen=True):
     """Supply and bridge."""
 
     supply: Voltage = required("supply of the bridge: what 300 drive counts give", '"38 V"', gt=0.0, le=1000.0)
     bridge_resistance: Resistance = optional("two closed switches and the wiring", 0.0, ge=0.0, le=1e5)
 
 
-class FrictionTable(Table):
-    """Friction in one direction of motion."""
-
-    coulomb: Force = required("friction while moving, at any speed", '"7.5 N"', ge=0.0, le=1e5)
-    viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e5)
-    static: Force = optional(
-        "force that breaks the head loose",
-        _usual_stiction,
-        derived="1.15 x coulomb",
-        ge=0.0,
-        le=1e5,
-    )
-
-
-class FrictionTables(Table):
-    """Friction, each direction for itself: a cable or a ribbon pulls one way."""
-
-    right: FrictionTable
-    left: FrictionTable
-
-
-class MechanicsTable(Table):
+class MechanicsTable(Table, frozen=True):
     """Pulley, belt and carriage."""
 
     pulley_circumference: Length = required("head travel per motor turn", '"3 in"', gt=0.0, le=10.0)
@@ -170,22 +104,7 @@ class MechanicsTable(Table):
     friction: FrictionTables
 
 
-class EncoderTable(Table):
-    """Incremental encoder on the motor shaft."""
-
-    cycles_per_revolution: int = required("full cycles (four edges each) per motor turn", "900", ge=1, le=1_000_000)
-    jitter: Angle = optional(
-        "rms error of an edge, in degrees of one cycle (360 deg = 1 emitter)",
-        0.0,
-        allowed='an angle from 0 deg to 30 deg of a cycle such as "5 deg"',
-        ge=0.0,
-        le=math.radians(30),
-    )
-    missing_edges: float = optional("probability that an edge is not seen", 0.0, ge=0.0, le=0.5)
-    seed: int = optional("start of the random sequence of jitter and missing edges", 1, ge=0, le=2**63 - 1)
-
-
-class MethodTable(Table):
+class MethodTable(Table, frozen=True):
     """Choices and constants of the axis computer's program."""
 
     span: Literal["emf", "steady"] = optional("what the ramp interval is computed from (3.10)", "emf")
@@ -219,7 +138,7 @@ class MethodTable(Table):
     )
 
 
-class HomingTable(Table):
+class HomingTable(Table, frozen=True):
     """Search for the two side frames."""
 
     speed: Velocity = optional(
@@ -234,28 +153,14 @@ class HomingTable(Table):
     width_tolerance: Length = optional("how much narrower than limits.travel the way may be found", 0.00127, ge=0.0)
 
 
-class PrintTable(Table):
+class PrintTable(Table, frozen=True):
     """The printed line."""
 
     left_margin: Length = optional("head position of column 0, from the left frame", 0.0381, ge=0.0)
     flight_time: Time = optional("from the trigger to the print on the paper", 350e-6, ge=0.0, le=0.01)
 
 
-class ObstacleTable(Table):
-    """Something solid in the way of the head."""
-
-    position: Length = required("where the head is blocked, from the left frame", '"7 in"', gt=0.0)
-
-
-class PushTable(Table):
-    """A force on the head for a while."""
-
-    force: Force = required("force on the head, + to the right", '"3 N"', ge=-1e5, le=1e5)
-    at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
-    duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)
-
-
-class DisturbanceTable(Table):
+class DisturbanceTable(Table, frozen=True):
     """How the true machine differs from the tables above; the axis computer does not know."""
 
     motor_constant: Percentage = optional("drift of torque and back-EMF constant", 0.0, ge=-0.9, le=2.0)
@@ -266,10 +171,10 @@ class DisturbanceTable(Table):
     push: PushTable | None = None
 
 
-class PrintHeadSpec(Table):
+class PrintHeadSpec(AxisSpec, frozen=True):
     """A print-head axis as its file describes it, in SI units."""
 
-    axis: AxisTable
+    axis: PrintHeadAxisTable
     limits: LimitsTable
     motor: MotorTable
     drive: DriveTable
@@ -279,10 +184,6 @@ class PrintHeadSpec(Table):
     homing: HomingTable = Field(default_factory=HomingTable)
     printing: PrintTable = Field(default_factory=PrintTable, alias="print")
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
-
-
-METHODS: dict[str, type[PrintHeadSpec]] = {"print_head": PrintHeadSpec}
-"""Model of each control method an axis file may name."""
 
 
 def fill_derived(spec: PrintHeadSpec) -> PrintHeadSpec:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from tests.print_head_rig import EXAMPLE, TICK
 
-from detent.axisfile.build import build_print_head
 from detent.axisfile.check import check_spec
 from detent.axisfile.fields import leaf_fields, options_of
 from detent.axisfile.load import load_spec, read_axis
+from detent.axisfile.print_head.build import build_print_head
+from detent.axisfile.print_head.schema import EMITTER, PrintHeadSpec
 from detent.axisfile.problems import dotted
 from detent.axisfile.reference import reference_rows
-from detent.axisfile.schema import EMITTER, PrintHeadSpec
 from detent.planning.print_job import parse_text
 from detent.simulation.print_run import print_job
 from detent.simulation.recorder import Recorder

@@ -1,0 +1,1 @@
+"""The filtered servo's part of the axis file."""

@@ -1,0 +1,149 @@
+"""The control methods an axis file may name, and what each of them brings."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from detent.axisfile.filtered_servo.cautions import find_cautions as find_filtered_servo_cautions
+from detent.axisfile.filtered_servo.derive import derive as derive_filtered_servo
+from detent.axisfile.filtered_servo.rules import RULES as FILTERED_SERVO_RULES
+from detent.axisfile.filtered_servo.schema import FilteredServoSpec
+from detent.axisfile.filtered_servo.schema import fill_derived as fill_filtered_servo
+from detent.axisfile.findings import Caution, Contradiction, Derived
+from detent.axisfile.phase_servo.cautions import find_cautions as find_phase_servo_cautions
+from detent.axisfile.phase_servo.derive import derive as derive_phase_servo
+from detent.axisfile.phase_servo.rules import RULES as PHASE_SERVO_RULES
+from detent.axisfile.phase_servo.schema import PhaseServoSpec
+from detent.axisfile.phase_servo.schema import fill_derived as fill_phase_servo
+from detent.axisfile.print_head.cautions import find_cautions as find_print_head_cautions
+from detent.axisfile.print_head.derive import derive as derive_print_head
+from detent.axisfile.print_head.rules import RULES as PRINT_HEAD_RULES
+from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.axisfile.print_head.schema import fill_derived as fill_print_head
+from detent.axisfile.tables import AxisSpec
+from detent.kernel.registers import Registers
+
+SpecT = TypeVar("SpecT", bound=AxisSpec)
+
+AnySpec: TypeAlias = PrintHeadSpec | PhaseServoSpec | FilteredServoSpec
+"""What a file is loaded to: the union of the specifications of all methods."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method(Generic[SpecT]):
+    """A control method, as far as the axis file is concerned.
+
+    Attributes
+    ----------
+    name : str
+        What ``axis.method`` says.
+    title : str
+        A few words for people.
+    spec : type of AxisSpec
+        Model of the whole file.
+    fill : callable
+        Fills the defaults that depend on another table.
+    rules : tuple of callable
+        What must hold between keys; each gives the contradictions it finds.
+    derive : callable
+        Derived figures, in the order they are read.
+    cautions : callable
+        What looks wrong with an axis that can be built.
+    registers, parameters : callable
+        Class of the axis's state and of its parameters. They load the compiled blocks, so they are only called where
+        these are wanted.
+    """
+
+    name: str
+    title: str
+    spec: type[SpecT]
+    fill: Callable[[SpecT], SpecT]
+    rules: tuple[Callable[[SpecT], Iterator[Contradiction]], ...]
+    derive: Callable[[SpecT], tuple[Derived, ...]]
+    cautions: Callable[[SpecT], Iterator[Caution]]
+    registers: Callable[[], type[Registers]]
+    parameters: Callable[[], type[Registers]]
+
+
+def _print_head_registers() -> type[Registers]:
+    """State of the print head."""
+    from detent.systems.print_head import PrintHead
+
+    return PrintHead
+
+
+def _print_head_parameters() -> type[Registers]:
+    """Parameters of the print head."""
+    from detent.systems.print_head import PrintHeadParams
+
+    return PrintHeadParams
+
+
+PRINT_HEAD = Method(
+    name="print_head",
+    title="print head: DC carriage that identifies itself",
+    spec=PrintHeadSpec,
+    fill=fill_print_head,
+    rules=PRINT_HEAD_RULES,
+    derive=derive_print_head,
+    cautions=find_print_head_cautions,
+    registers=_print_head_registers,
+    parameters=_print_head_parameters,
+)
+
+
+def _phase_servo_registers() -> type[Registers]:
+    """State of the phase servo."""
+    from detent.systems.phase_servo import PhaseServo
+
+    return PhaseServo
+
+
+def _phase_servo_parameters() -> type[Registers]:
+    """Parameters of the phase servo."""
+    from detent.systems.phase_servo import PhaseServoParams
+
+    return PhaseServoParams
+
+
+PHASE_SERVO = Method(
+    name="phase_servo",
+    title="phase servo: resolver phase to pulses for speed, absolute at the stop",
+    spec=PhaseServoSpec,
+    fill=fill_phase_servo,
+    rules=PHASE_SERVO_RULES,
+    derive=derive_phase_servo,
+    cautions=find_phase_servo_cautions,
+    registers=_phase_servo_registers,
+    parameters=_phase_servo_parameters,
+)
+
+
+def _filtered_servo_registers() -> type[Registers]:
+    """State of the filtered servo."""
+    from detent.systems.filtered_servo import FilteredServo
+
+    return FilteredServo
+
+
+def _filtered_servo_parameters() -> type[Registers]:
+    """Parameters of the filtered servo."""
+    from detent.systems.filtered_servo import FilteredServoParams
+
+    return FilteredServoParams
+
+
+FILTERED_SERVO = Method(
+    name="filtered_servo",
+    title="filtered servo: command pulses, counted speed with a low-pass",
+    spec=FilteredServoSpec,
+    fill=fill_filtered_servo,
+    rules=FILTERED_SERVO_RULES,
+    derive=derive_filtered_servo,
+    cautions=find_filtered_servo_cautions,
+    registers=_filtered_servo_registers,
+    parameters=_filtered_servo_parameters,
+)
+
+METHODS: dict[str, Method[Any]] = {method.name: method for method in (PRINT_HEAD, PHASE_SERVO, FILTERED_SERVO)}
+"""All methods by name; the first is the one a file without a method is checked against."""

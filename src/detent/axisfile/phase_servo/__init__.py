@@ -1,0 +1,1 @@
+"""The phase servo's part of the axis file."""

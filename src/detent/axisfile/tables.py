@@ -1,0 +1,149 @@
+"""Tables of the axis file that several control methods share, and what every specification has in common."""
+
+import math
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Le
+
+from detent.axisfile.fields import Table, optional, required
+from detent.axisfile.quantities import (
+    Angle,
+    BackEmfConstant,
+    Current,
+    Force,
+    Frequency,
+    Inductance,
+    Inertia,
+    Length,
+    Resistance,
+    Time,
+    TorqueConstant,
+    Viscosity,
+)
+
+
+class AxisTable(Table, frozen=True):
+    """Name and method of the axis; each method states the one word its `method` may be."""
+
+    name: str = required(
+        "name of the axis, shown in reports",
+        '"print head"',
+        allowed="text of 1 to 80 characters",
+        min_length=1,
+        max_length=80,
+    )
+    method: str
+
+
+class AxisSpec(Table, frozen=True):
+    """What the specification of every control method has; the models of `methods.METHODS` derive from it."""
+
+    axis: AxisTable
+
+
+def _stated_torque_constant(data: dict[str, Any]) -> float:
+    """Back-EMF constant [V*s/rad]: in SI units the same number as the torque constant."""
+    # A value that was refused is absent here; the file is then refused as a whole.
+    return float(data.get("torque_constant", math.nan))
+
+
+def _usual_stiction(data: dict[str, Any]) -> float:
+    """Static friction [N] by default: 1.15 times Coulomb (print-head specification, 7.2)."""
+    return 1.15 * float(data.get("coulomb", math.nan))
+
+
+class MotorTable(Table, frozen=True):
+    """Constants of the brush DC motor, from a catalogue or stated."""
+
+    catalogue: str = optional("motor of the catalogue that gives the constants not stated here", "", max_length=80)
+    torque_constant: TorqueConstant = required("torque per current", '"0.241 N*m/A"', ge=1e-6, le=100.0)
+    back_emf_constant: BackEmfConstant = optional(
+        "voltage per speed",
+        _stated_torque_constant,
+        derived="motor.torque_constant",
+        ge=1e-6,
+        le=100.0,
+    )
+    resistance: Resistance = required("winding and brushes", '"12 ohm"', ge=1e-3, le=1e5)
+    inductance: Inductance = required("winding", '"12 mH"', ge=1e-9, le=10.0)
+    rotor_inertia: Inertia = required("rotor, without load", '"260 g*cm^2"', ge=1e-12, le=0.1)
+    max_current: Current | None = optional("current the motor stands; only warned about", None, gt=0.0, le=10000.0)
+
+
+class FrictionTable(Table, frozen=True):
+    """Friction in one direction of motion."""
+
+    coulomb: Force = required("friction while moving, at any speed", '"7.5 N"', ge=0.0, le=1e5)
+    viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e5)
+    static: Force = optional(
+        "force that breaks the carriage loose",
+        _usual_stiction,
+        derived="1.15 x coulomb",
+        ge=0.0,
+        le=1e5,
+    )
+
+
+class FrictionTables(Table, frozen=True):
+    """Friction, each direction for itself: a cable or a ribbon pulls one way."""
+
+    right: FrictionTable
+    left: FrictionTable
+
+
+class EncoderTable(Table, frozen=True):
+    """Incremental encoder on the motor shaft."""
+
+    cycles_per_revolution: int = required("full cycles (four edges each) per motor turn", "900", ge=1, le=1_000_000)
+    jitter: Angle = optional(
+        "rms error of an edge, in degrees of one cycle (360 deg = 4 edges)",
+        0.0,
+        allowed='an angle from 0 deg to 30 deg of a cycle such as "5 deg"',
+        ge=0.0,
+        le=0.5236,  # 30 deg read back lie a rounding error above math.radians(30)
+    )
+    missing_edges: float = optional("probability that an edge is not seen", 0.0, ge=0.0, le=0.5)
+    seed: int = optional("start of the random sequence of jitter and missing edges", 1, ge=0, le=2**63 - 1)
+
+
+class BurstTable(Table, frozen=True):
+    """Disturbances of the pulse lines at chosen moments: evenly spaced from `at`, or in the base ticks listed."""
+
+    kind: Literal["+", "-", "remove", "lose sample", "corrupt"] = required(
+        "a + or - pulse put in, a pulse taken away, a sample lost, or a sample of the sensor inverted", '"+"'
+    )
+    at: Time | None = optional(
+        "first moment, in simulated time", None, derived="none: ticks are listed", ge=0.0, le=1e5
+    )
+    count: int = optional("how many", 1, ge=1, le=64)
+    spacing: Time = optional("time between two of them", 24e-6, ge=0.0, le=100.0)
+    ticks: list[Annotated[int, Ge(0), Le(2**53)]] = optional(
+        "base ticks in place of at, count and spacing",
+        [],
+        allowed="up to 64 whole numbers from 0, rising, such as [20000, 20096]",
+        max_length=64,
+    )
+
+
+class InterferenceTable(Table, frozen=True):
+    """Induction noise on the lines between sensor and counters, by rate; each kind at random moments."""
+
+    inserted: Frequency = optional("pulses put in, of either sign", 0.0, ge=0.0, le=1e5)
+    removed: Frequency = optional("pulses taken away", 0.0, ge=0.0, le=1e5)
+    lost_samples: Frequency = optional("speed samples lost", 0.0, ge=0.0, le=1e5)
+    corrupted: Frequency = optional("samples of the sensor inverted for a clock", 0.0, ge=0.0, le=1e5)
+    burst: BurstTable | None = None
+
+
+class ObstacleTable(Table, frozen=True):
+    """Something solid in the way of the carriage."""
+
+    position: Length = required("where the carriage is blocked, from the left end of its way", '"7 in"', gt=0.0)
+
+
+class PushTable(Table, frozen=True):
+    """A force on the carriage for a while."""
+
+    force: Force = required("force on the carriage, + to the right", '"3 N"', ge=-1e5, le=1e5)
+    at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
+    duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)

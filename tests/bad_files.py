@@ -1,0 +1,62 @@
+"""Bad axis files: edits of a good one, and the problem each of them must give."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from detent.errors import InputError
+
+
+@dataclass(frozen=True)
+class Bad:
+    """One bad file: edits of the good one, or a text of its own, and the problem expected."""
+
+    name: str
+    place: str
+    key: str
+    came: str
+    allowed: str
+    remedy: str
+    edits: tuple[tuple[str, str], ...] = ()
+    text: str | None = None
+    append: str = ""
+    overrides: tuple[str, ...] = ()
+    others: int = 0
+
+    def make(self, good):
+        text = good if self.text is None else self.text
+        for old, new in self.edits:
+            assert old in text, old
+            text = text.replace(old, new, 1)
+        return text + self.append
+
+
+def edit(name, old, new, place, key, came, allowed, remedy, **more):
+    return Bad(name, place, key, came, allowed, remedy, edits=((old, new),), **more)
+
+
+def added(name, lines, place, key, came, allowed, remedy, **more):
+    return Bad(name, place, key, came, allowed, remedy, append=f"\n{lines}\n", **more)
+
+
+def given(name, override, key, came, allowed, remedy, **more):
+    return Bad(name, "--set", key, came, allowed, remedy, overrides=(override,), **more)
+
+
+def params(**groups):
+    """Parameters of a test, named by their groups."""
+    return [pytest.param(bad, id=f"{group}: {bad.name}") for group, bads in groups.items() for bad in bads]
+
+
+def check_bad_file(bad, good_text, load_text):
+    """Load the bad file: the first problem must be the expected one, and as many others as the entry says."""
+    with pytest.raises(InputError) as caught:
+        load_text(bad.make(good_text), *bad.overrides)
+    first, *others = caught.value.problems
+    expected = bad.place if bad.place == "--set" else f"axis.toml:{bad.place}"
+    assert str(first).startswith(expected)
+    assert first.key == bad.key
+    assert bad.came in first.came
+    assert bad.allowed in first.allowed
+    assert bad.remedy in first.remedy
+    assert len(others) == bad.others, others
