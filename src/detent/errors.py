@@ -102,6 +102,15 @@ SB1_TEXT: dict[int, str] = {
 """Meaning of each bit of the axis computer's status byte SB1 (specification of the print head, 3.1)."""
 
 
+SERVO_FAULT_TEXT: dict[int, str] = {
+    1: "the following error left the range of the position counter and the drive is off; lower the speed or the "
+    "command's acceleration, look for a blocked slide, or widen method.position_bits",
+    2: "the speed counter was about to wrap and the drive is off: the slide moves more pulses in a sample than it can "
+    "count; lower the speed, shorten method.sample_period, or widen method.counter_bits",
+}
+"""Causes of a fault of the filtered servo (control.deviation_counter)."""
+
+
 def describe_sb1(code: int) -> str:
     """Say what a status byte means and what to do.
 
