@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.axisfile.build import build_print_head
-from detent.axisfile.derive import Machine as Figures
-from detent.axisfile.schema import EMITTER, INCH, PrintHeadSpec, speed_value
+from detent.axisfile.print_head.build import build_print_head
+from detent.axisfile.print_head.derive import Machine as Figures
+from detent.axisfile.print_head.schema import EMITTER, PrintHeadSpec, speed_value
+from detent.axisfile.quantities import INCH
 from detent.control.head_computer import HIGH_STEADY, IDLE
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
-from detent.systems.print_head import PERIOD_US, PrintHead, advance, switch_on
+from detent.systems.print_head import TICK, PrintHead, advance, switch_on
 
-TICK = PERIOD_US * 1e-6
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
 BENCH_EMITTERS = 65_535

@@ -1,57 +1,135 @@
-"""A print-head axis in simulated time: parameters, state, recorder, and the passing of time."""
+"""An axis in simulated time: parameters, state, recorder, and the passing of time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from detent.axisfile.build import build_print_head
-from detent.axisfile.schema import PrintHeadSpec
+from detent.axisfile.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.axisfile.filtered_servo.schema import FilteredServoSpec
+from detent.axisfile.phase_servo.build import build_phase_servo
+from detent.axisfile.phase_servo.schema import PhaseServoSpec
+from detent.axisfile.print_head.build import build_print_head
+from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.kernel.registers import Registers
+from detent.simulation.capture import Capture
 from detent.simulation.recorder import Recorder
-from detent.systems.print_head import PERIOD_US, PrintHead, advance, switch_on
+from detent.systems import filtered_servo, phase_servo, print_head
 
-TICK = PERIOD_US * 1e-6
 LONGEST_STRETCH = 1 << 20
 """Ticks of one call into compiled code: progress can be shown between two."""
 
+AnyRecorder = Recorder | Capture
+"""What records a run: every n-th tick of all of it, or each clock of a stretch."""
 
-class Machine:
-    """The simulated axis.
+P = TypeVar("P", bound=Registers)
+S = TypeVar("S", bound=Registers)
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """The compiled loop of an axis.
 
     Attributes
     ----------
-    params : PrintHeadParams
-        What does not change.
-    state : PrintHead
-        The registers.
+    tick : float
+        Base tick [s].
+    advance : callable
+        ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its
+        host.
+    by_clocks : callable, optional
+        ``by_clocks(params, state, ticks, trace, picks)``: the same, recording every clock inside a tick.
     """
 
-    def __init__(self, spec: PrintHeadSpec, recorder: Recorder | None = None) -> None:
-        self.spec = spec
-        self.params = build_print_head(spec)
-        self.state = PrintHead()
-        self.recorder = recorder
-        switch_on(self.params, self.state, spec.mechanics.start_position, spec.encoder.seed)
+    tick: float
+    advance: Callable[..., int]
+    by_clocks: Callable[..., int] | None = None
+
+
+class Machine(Generic[P, S]):
+    """A simulated axis.
+
+    Parameters
+    ----------
+    params : Registers
+        What does not change.
+    state : Registers
+        The registers; the field ``tick`` counts base ticks.
+    loop : Loop
+        What advances them.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    """
+
+    def __init__(self, params: P, state: S, loop: Loop, recorder: AnyRecorder | None = None) -> None:
+        self.params, self.state, self.tick, self.recorder = params, state, loop.tick, recorder
+        self._loop = loop
+        self._clock: Any = state  # every axis's state has a field `tick`, which the base class cannot name
         self._no_rows = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
 
     @property
     def time(self) -> float:
         """Simulated time since power-on [s]."""
-        return self.state.tick * TICK
+        return self._clock.tick * self.tick
 
     def pass_time(self, seconds: float) -> None:
-        """Let at most `seconds` pass (a tick at least); returns earlier when a status byte waits."""
-        left = max(1, round(seconds / TICK))
-        while left > 0 and not self.state.head.status.latch.flag:
-            left -= self._run(min(left, LONGEST_STRETCH))
+        """Let at most `seconds` pass (a tick at least); returns earlier when the axis waits for its host."""
+        self.pass_ticks(max(1, round(seconds / self.tick)))
+
+    def pass_ticks(self, ticks: int) -> int:
+        """Let at most so many ticks pass; returns how many did: fewer when the axis waits for its host."""
+        left = ticks
+        while left > 0:
+            asked = min(left, LONGEST_STRETCH)
+            done = self._run(asked)
+            left -= done
+            if done == 0:
+                break
+        return ticks - left
 
     def _run(self, ticks: int) -> int:
-        r = self.recorder
+        r, now = self.recorder, self._clock.tick
         if r is None:
-            return advance(self.params, self.state, ticks, *self._no_rows, 0)
-        done = advance(self.params, self.state, min(ticks, r.room(self.state.tick)), r.rows, r.picks, r.every)
-        if r.room(self.state.tick) <= 0:
-            r.flush(self.state.tick)
+            return self._loop.advance(self.params, self.state, ticks, *self._no_rows, 0)
+        ticks = min(ticks, r.room(now))
+        if isinstance(r, Capture) and r.fine and self._loop.by_clocks is not None:
+            done = self._loop.by_clocks(self.params, self.state, ticks, r.rows, r.picks)
+        else:
+            done = self._loop.advance(self.params, self.state, ticks, r.rows, r.picks, r.every)
+        if r.room(now + done) <= 0:
+            r.flush(now + done)
         return done
 
     def close(self) -> None:
         """Hand the last rows to the recorder's sink."""
         if self.recorder is not None:
-            self.recorder.flush(self.state.tick)
+            self.recorder.flush(self._clock.tick)
+
+
+def print_head_machine(
+    spec: PrintHeadSpec, recorder: AnyRecorder | None = None
+) -> Machine[print_head.PrintHeadParams, print_head.PrintHead]:
+    """Print head at power-on."""
+    p, r = build_print_head(spec), print_head.PrintHead()
+    print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
+    return Machine(p, r, Loop(print_head.TICK, print_head.advance), recorder)
+
+
+def phase_servo_machine(
+    spec: PhaseServoSpec, recorder: AnyRecorder | None = None
+) -> Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo]:
+    """Phase servo at power-on."""
+    p, r = build_phase_servo(spec), phase_servo.PhaseServo()
+    phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
+    return Machine(p, r, Loop(spec.tick, phase_servo.advance), recorder)
+
+
+def filtered_servo_machine(
+    spec: FilteredServoSpec, recorder: AnyRecorder | None = None
+) -> Machine[filtered_servo.FilteredServoParams, filtered_servo.FilteredServo]:
+    """Filtered servo at power-on."""
+    p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
+    filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
+    loop = Loop(filtered_servo.TICK, filtered_servo.advance, filtered_servo.advance_by_clocks)
+    return Machine(p, r, loop, recorder)

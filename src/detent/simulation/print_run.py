@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.axisfile.derive import Machine as TrueMachine
-from detent.axisfile.schema import EMITTER, INCH, SPEED_STEP, PrintHeadSpec
+from detent.axisfile.print_head.derive import Machine as TrueMachine
+from detent.axisfile.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
+from detent.axisfile.quantities import INCH
 from detent.control.column_timer import COLUMNS
 from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
 from detent.control.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
 from detent.errors import AxisError, describe_sb1
 from detent.planning.line_plan import Geometry, LinePlan, plan_lines
 from detent.planning.printed_page import PrintedCharacter, PrintJob, PrintLine
-from detent.simulation.machine import Machine
-from detent.simulation.recorder import Recorder
+from detent.simulation.machine import AnyRecorder, print_head_machine
 
 NOT_FIRED = -(1 << 31)
 EMITTERS_PER_COLUMN = 2.5
@@ -83,10 +83,10 @@ class PrintRun:
 
     Attributes
     ----------
-    printed : bool
+    done : bool
         Every inked column of the job is on paper.
     failure : str
-        Why not, and what to do; empty if `printed`.
+        Why not, and what to do; empty if `done`.
     time_ready, time_end : float
         End of identification, end of the job, since power-on.
     lines : list of LineRecord
@@ -104,7 +104,7 @@ class PrintRun:
     """
 
     job: PrintJob
-    printed: bool = False
+    done: bool = False
     failure: str = ""
     warnings: list[str] = field(default_factory=list[str])
     time_ready: float = 0.0
@@ -146,7 +146,7 @@ class PrintRun:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
         names = (
-            "printed", "failure", "warnings", "time_ready", "time_end", "print_time", "characters",
+            "done", "failure", "warnings", "time_ready", "time_end", "print_time", "characters",
             "characters_per_second", "columns", "missed", "worst_error", "rms_error", "turn_arounds", "repositions",
             "peak_current", "energy", "width",
         )  # fmt: skip
@@ -170,7 +170,7 @@ MOST_STRIKES = 20_000
 
 
 def print_job(
-    spec: PrintHeadSpec, job: PrintJob, *, recorder: Recorder | None = None, progress: Progress | None = None
+    spec: PrintHeadSpec, job: PrintJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
 ) -> PrintRun:
     """Print a job on the axis of `spec`, from power-on.
 
@@ -180,7 +180,7 @@ def print_job(
         The axis.
     job : PrintJob
         What to print.
-    recorder : Recorder, optional
+    recorder : Recorder or Capture, optional
         Records registers on the way.
     progress : callable, optional
         Told the share done.
@@ -210,9 +210,9 @@ def print_job(
 class _Runner:
     """The supervisor's program for one job."""
 
-    def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: Recorder | None, progress: Progress) -> None:
+    def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: AnyRecorder | None, progress: Progress) -> None:
         self.spec, self.job, self.progress = spec, job, progress
-        self.machine = Machine(spec, recorder)
+        self.machine = print_head_machine(spec, recorder)
         self.state = self.machine.state
         self.result = PrintRun(job)
         self.supervisor = Supervisor(
@@ -340,7 +340,7 @@ class _Runner:
                 f"{result.missed} of {result.columns + result.missed} columns were not fired; look at the encoder "
                 "(missing edges, jitter)"
             )
-        result.printed = not result.failure and len(result.lines) == len(self.job.lines)
+        result.done = not result.failure and len(result.lines) == len(self.job.lines)
         return result
 
     def _bank(self, index: int) -> slice:

@@ -6,13 +6,13 @@ from detent.control.head_computer import HOME_LEFT, POWER_ON
 from detent.control.latch import read_latch, write_latch
 from detent.simulation import machine as machine_module
 from detent.simulation import recorder as recorder_module
-from detent.simulation.machine import TICK, Machine
+from detent.simulation.machine import print_head_machine
 from detent.simulation.recorder import Recorder
-from detent.systems.print_head import PrintHead
+from detent.systems.print_head import TICK, PrintHead
 
 
 def test_power_on_is_at_the_start_position_with_the_drive_off() -> None:
-    machine = Machine(load_spec(EXAMPLE, ["mechanics.start_position=5 in"]))
+    machine = print_head_machine(load_spec(EXAMPLE, ["mechanics.start_position=5 in"]))
     assert machine.time == 0.0
     assert machine.state.train.position == pytest.approx(0.127)
     assert machine.state.head.state == POWER_ON
@@ -23,14 +23,14 @@ def test_power_on_is_at_the_start_position_with_the_drive_off() -> None:
 
 @pytest.mark.parametrize(("seconds", "ticks"), [(0.0, 1), (1e-9, 1), (40e-6, 1), (1e-3, 25), (0.5, 12_500)])
 def test_time_passes_in_whole_ticks_and_at_least_one(seconds: float, ticks: int) -> None:
-    machine = Machine(load_spec(EXAMPLE))
+    machine = print_head_machine(load_spec(EXAMPLE))
     machine.pass_time(seconds)
     assert machine.state.tick == ticks
     assert machine.time == pytest.approx(ticks * TICK)
 
 
 def test_a_status_byte_stops_time_until_it_is_read() -> None:
-    machine = Machine(load_spec(EXAMPLE))
+    machine = print_head_machine(load_spec(EXAMPLE))
     write_latch(machine.state.head.command_latch, 0x40)  # POSITION HIGH: answered within a tick
     machine.pass_time(1.0)
     assert machine.state.tick <= 2
@@ -43,7 +43,7 @@ def test_a_status_byte_stops_time_until_it_is_read() -> None:
 
 
 def test_a_long_time_is_cut_into_stretches_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, pieces = (Machine(load_spec(EXAMPLE)) for _ in range(2))
+    whole, pieces = (print_head_machine(load_spec(EXAMPLE)) for _ in range(2))
     for machine in (whole, pieces):
         write_latch(machine.state.head.command_latch, 0x01)
     whole.pass_time(0.5)
@@ -58,7 +58,7 @@ def test_recording_changes_nothing_and_loses_no_row(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(recorder_module, "ROWS", 64)
     spec = load_spec(EXAMPLE)
     recorder = Recorder(PrintHead, ["train.velocity"], every=3, period=TICK)
-    recorded, plain = Machine(spec, recorder), Machine(spec)
+    recorded, plain = print_head_machine(spec, recorder), print_head_machine(spec)
     for machine in (recorded, plain):
         write_latch(machine.state.head.command_latch, 0x01)
         machine.pass_time(0.1)

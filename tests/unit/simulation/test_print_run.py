@@ -8,10 +8,10 @@ from tests.print_head_rig import EXAMPLE
 
 import detent
 from detent.axisfile.load import load_spec
-from detent.axisfile.schema import EMITTER, INCH
+from detent.axisfile.print_head.schema import EMITTER
+from detent.axisfile.quantities import INCH
 from detent.errors import InputError
 from detent.planning.print_job import PrintJob, load_job, parse_text
-from detent.simulation.machine import TICK
 from detent.simulation.print_run import (
     ERROR_BIN,
     ERROR_BINS,
@@ -23,7 +23,7 @@ from detent.simulation.print_run import (
 )
 from detent.simulation.recorder import Recorder
 from detent.simulation.trace import Trace
-from detent.systems.print_head import PrintHead
+from detent.systems.print_head import TICK, PrintHead
 
 pytestmark = pytest.mark.compiled
 
@@ -66,7 +66,7 @@ def play_recorded(job: PrintJob | str, *overrides: str, every: int = 5) -> tuple
 def test_a_job_is_printed_whole(path: Path) -> None:
     job = load_job(path)
     run = play(job)
-    assert run.printed
+    assert run.done
     assert run.failure == ""
     assert run.missed == 0
     assert [line.number for line in run.lines] == [line.number for line in job.lines]
@@ -135,7 +135,7 @@ def test_a_word_at_the_right_edge_is_printed_slower_than_the_same_in_the_middle(
     middle, edge = run.lines
     assert middle.speed_value == 240
     assert 18 <= edge.speed_value < 220
-    assert run.printed
+    assert run.done
     assert edge.worst_error < 20e-6
 
 
@@ -160,7 +160,7 @@ def test_a_machine_that_is_not_as_described_is_identified_and_prints(
     overrides: tuple[str, ...], slope: float, friction_right: float, friction_left: float
 ) -> None:
     run = play(LETTER, *overrides)
-    assert run.printed
+    assert run.done
     assert run.warnings == []
     assert run.identified["right"].true_slope == pytest.approx(slope, rel=2e-3)
     assert run.identified["right"].true_friction == pytest.approx(friction_right, rel=2e-2)
@@ -175,8 +175,8 @@ def test_jitter_spreads_the_columns_and_missing_edges_shift_them() -> None:
     clean, jitter, missing = (
         play(LETTER, *texts) for texts in ((), ("encoder.jitter=10 deg",), ("encoder.missing_edges=0.001",))
     )
-    assert jitter.printed
-    assert missing.printed
+    assert jitter.done
+    assert missing.done
     places = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN
 
     def spread(run: PrintRun) -> float:
@@ -198,7 +198,7 @@ def test_an_implausible_machine_prints_with_the_defaults_and_says_so() -> None:
 @pytest.mark.parametrize(("place", "found"), [("7 in", "177.8 mm = 7.00 in"), ("2 in", "= 12.50 in")])
 def test_an_obstacle_before_homing_is_met_and_said(place: str, found: str) -> None:
     run = play(LETTER, f"disturbance.obstacle.position={place}")
-    assert not run.printed
+    assert not run.done
     assert run.failure.startswith(
         "CALCULATE PARAMETERS: the head is obstructed or stalled, or moves against its drive, and the drive"
     )
@@ -215,7 +215,7 @@ def test_an_obstacle_after_homing_stops_the_job_where_it_stands() -> None:
     runner.machine.params.train.left_end = 4 * INCH
     runner.print_all()
     run = runner.finish()
-    assert not run.printed
+    assert not run.done
     assert "the head is obstructed or stalled" in run.failure
     assert f"(line {run.lines[-1].number + 1 if run.lines else 1})" in run.failure
     assert "= 4.00 in from the left frame" in run.failure
@@ -226,7 +226,7 @@ def test_an_obstacle_after_homing_stops_the_job_where_it_stands() -> None:
 
 def test_a_push_disturbs_the_line_it_meets_and_no_other() -> None:
     clean, pushed = play(LETTER), play(LETTER, "disturbance.push.force=8 N", *PUSH)
-    assert pushed.printed
+    assert pushed.done
     met = [line.number for line in pushed.lines if line.start < 8.06 and line.stop > 8.0]
     worst = {line.number: line.worst_error for line in pushed.lines}
     usual = {line.number: line.worst_error for line in clean.lines}
@@ -239,14 +239,14 @@ def test_a_push_disturbs_the_line_it_meets_and_no_other() -> None:
 def test_a_push_that_stops_the_head_is_an_obstruction() -> None:
     push = ("disturbance.push.at=8.05 s", "disturbance.push.duration=300 ms")
     run = play(LETTER, "disturbance.push.force=-60 N", *push)
-    assert not run.printed
+    assert not run.done
     assert "(line 2): the head is obstructed or stalled" in run.failure
     assert len(run.lines) == 1
 
 
 def test_every_switch_of_the_bridge_gives_the_same_lines() -> None:
     averaged, switched = play(LETTER), play(LETTER, "axis.fidelity=switch-level")
-    assert switched.printed
+    assert switched.done
     for one, other in zip(averaged.lines, switched.lines, strict=True):
         assert (one.number, one.direction, one.speed_value, one.turn_around, one.columns) == (
             other.number, other.direction, other.speed_value, other.turn_around, other.columns,
@@ -310,7 +310,7 @@ def test_the_summary_is_plain_data_with_every_figure() -> None:
     run = play("ab\ncd\n")
     found = run.to_dict()
     assert json.loads(json.dumps(found)) == found
-    assert found["printed"] is True
+    assert found["done"] is True
     assert found["speeds"] == {"240": 2}
     assert found["print_time"] == pytest.approx(run.time_end - run.time_ready)
     assert found["identified"]["left"]["slope"] == run.identified["left"].slope

@@ -8,9 +8,9 @@ from detent.axisfile.load import load_spec
 from detent.errors import DetentError
 from detent.kernel.registers import Registers, block, f8, i4_array, i8, register, u1
 from detent.simulation import recorder as recorder_module
-from detent.simulation.machine import TICK, Machine
+from detent.simulation.machine import print_head_machine
 from detent.simulation.recorder import Recorder, choose_leaves
-from detent.systems.print_head import PrintHead
+from detent.systems.print_head import TICK, PrintHead
 
 
 class Motor(Registers):
@@ -118,7 +118,7 @@ def test_a_recorded_axis_shows_its_registers_as_they_were(every: int) -> None:
     )
     names = ["train.position", "train.velocity", "head.state", "encoder.edge"]
     recorder = Recorder(PrintHead, names, every=every, period=TICK)
-    recorded, stepped = Machine(spec, recorder), Machine(spec)
+    recorded, stepped = print_head_machine(spec, recorder), print_head_machine(spec)
     recorded.pass_time(200 * TICK)
     recorded.close()
     trace = recorder.trace()

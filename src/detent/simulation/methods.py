@@ -1,0 +1,152 @@
+"""What each control method brings to the simulation: what runs, what is recorded, how it is clocked."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from detent.axisfile.filtered_servo.schema import FilteredServoSpec
+from detent.axisfile.methods import AnySpec
+from detent.axisfile.phase_servo.schema import PhaseServoSpec
+from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.kernel.registers import Registers
+from detent.planning.move_job import Move, MoveJob
+from detent.planning.print_job import PrintJob, load_job, parse_text
+from detent.simulation.capture import Clocking, filtered_servo_clocking, phase_servo_clocking
+from detent.simulation.machine import AnyRecorder
+from detent.simulation.move_file import load_moves
+from detent.simulation.move_run import FILTERED_SIGNALS, PHASE_SIGNALS, MoveRun, run_moves
+from detent.simulation.print_run import PrintRun, Progress, default_signals, print_job
+from detent.systems import filtered_servo, phase_servo, print_head
+
+AnyJob = PrintJob | MoveJob
+AnyResult = PrintRun | MoveRun
+
+PRINT_HEAD_TIMING = (
+    "encoder.channel_a", "encoder.channel_b", "quadrature.count", "head.state", "head.drive_cmd", "timer.pulse",
+    "lines.right_left", "lines.transition", "train.current",
+)  # fmt: skip
+PHASE_SERVO_TIMING = (
+    "converters.carrier.count", "detector.ps", "converters.tracking.reference", "converters.tracking.ps_first",
+    "converters.tracking.ps_second", "converters.tracking.msb_first", "converters.tracking.msb_second",
+    "converters.tracking.gate", "converters.tracking.plus", "converters.tracking.minus", "converters.absolute.gated",
+    "converters.absolute.word", "speed.count", "sequencer.distance", "sequencer.mode", "law.word", "pwm.request",
+    "train.current",
+)  # fmt: skip
+FILTERED_SERVO_TIMING = (
+    "encoder.channel_a", "encoder.channel_b", "decoder.a1", "decoder.a2", "decoder.b1", "decoder.b2",
+    "decoder.forward", "decoder.reverse", "generator.command", "deviation.deviation", "speed.count", "speed.word",
+    "clock.left", "filter.output", "deviation.word",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """A method as the simulation knows it.
+
+    Attributes
+    ----------
+    registers : type of Registers
+        Class of the state.
+    tick : float
+        Base tick [s].
+    every : int
+        Ticks between two rows of a trace unless told otherwise.
+    seed : int
+        What its noise starts from.
+    signals, timing : tuple of str
+        Registers that a run records, and that a timing diagram shows, unless told otherwise.
+    clocking : Clocking
+        How registers change inside a tick.
+    load : callable
+        Reads a job file of the kind the method takes.
+    run : callable
+        ``run(job, recorder=, progress=)`` makes a job.
+    sample_job : callable
+        A short job for looking at signals.
+    """
+
+    registers: type[Registers]
+    tick: float
+    every: int
+    seed: int
+    signals: tuple[str, ...]
+    timing: tuple[str, ...]
+    clocking: Clocking
+    load: Callable[[Path], AnyJob]
+    run: Callable[..., AnyResult]
+    sample_job: Callable[[], AnyJob]
+
+
+def simulated(spec: AnySpec) -> Simulated:
+    """The simulation's side of a specification."""
+    if isinstance(spec, PrintHeadSpec):
+        return _print_head(spec)
+    if isinstance(spec, PhaseServoSpec):
+        return _phase_servo(spec)
+    return _filtered_servo(spec)
+
+
+def _print_head(spec: PrintHeadSpec) -> Simulated:
+    def run(job: Any, recorder: AnyRecorder | None = None, progress: Progress | None = None) -> PrintRun:
+        return print_job(spec, job, recorder=recorder, progress=progress)
+
+    return Simulated(
+        registers=print_head.PrintHead,
+        tick=print_head.TICK,
+        every=10,
+        seed=spec.encoder.seed,
+        signals=tuple(default_signals()),
+        timing=PRINT_HEAD_TIMING,
+        clocking=Clocking(),
+        load=load_job,
+        run=run,
+        sample_job=lambda: parse_text("detent", "one word"),
+    )
+
+
+def _moves(spec: PhaseServoSpec | FilteredServoSpec) -> Callable[..., MoveRun]:
+    def run(job: Any, recorder: AnyRecorder | None = None, progress: Progress | None = None) -> MoveRun:
+        return run_moves(spec, job, recorder=recorder, progress=progress)
+
+    return run
+
+
+def _one_move(name: str, by: float, dwell: float) -> Callable[[], MoveJob]:
+    return lambda: MoveJob(name, "moves", (Move(number=1, row=0, by=by, dwell=dwell),))
+
+
+def _phase_servo(spec: PhaseServoSpec) -> Simulated:
+    p = spec.printing
+
+    def load(path: Path) -> MoveJob:
+        margin = round(p.left_margin / spec.pitch) * spec.pitch
+        return load_moves(path, pitch=p.character_pitch, left_margin=margin, hammer_time=p.hammer_time)
+
+    return Simulated(
+        registers=phase_servo.PhaseServo,
+        tick=spec.tick,
+        every=256,
+        seed=spec.detector.seed,
+        signals=PHASE_SIGNALS,
+        timing=PHASE_SERVO_TIMING,
+        clocking=phase_servo_clocking(spec),
+        load=load,
+        run=_moves(spec),
+        sample_job=_one_move("one move of 6 pitches", 6 * spec.pitch, 0.05),
+    )
+
+
+def _filtered_servo(spec: FilteredServoSpec) -> Simulated:
+    return Simulated(
+        registers=filtered_servo.FilteredServo,
+        tick=filtered_servo.TICK,
+        every=10,
+        seed=spec.encoder.seed,
+        signals=FILTERED_SIGNALS,
+        timing=FILTERED_SERVO_TIMING,
+        clocking=filtered_servo_clocking(),
+        load=load_moves,
+        run=_moves(spec),
+        sample_job=_one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2),
+    )

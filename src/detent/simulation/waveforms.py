@@ -1,0 +1,400 @@
+"""Waveforms: the registers of clocked logic as levels over time, the form that logic viewers and timing diagrams show.
+
+A recorded row says what each register holds after a tick. Inside the tick, which is where a timing diagram looks, a
+register takes its new value at a moment of its own - at a clock edge - or shows it only for a while, as a strobe does:
+that moment is its `Phase`. Time is a whole number of picoseconds since power-on, so that edges which coincide do.
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.kernel.registers import Leaf
+
+Times = NDArray[np.int64]
+"""Moments since power-on [ps]."""
+
+Values = NDArray[Any]
+"""One value per moment: integers, or floats."""
+
+PICOSECONDS = 1e12
+"""Picoseconds in a second."""
+
+MAX_BITS = 64
+"""Widest register."""
+
+_NAME = re.compile(r"[!-~]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """When inside a tick a register takes its new value.
+
+    Parameters
+    ----------
+    changes_at : float
+        Fraction of the tick, 0 <= changes_at < 1.
+    pulse : (float, float), optional
+        Fractions of the tick, 0 <= from < to <= 1: the value is shown between the two only, and 0 in the rest of the
+        tick. Replaces `changes_at`.
+
+    Raises
+    ------
+    DetentError
+        A fraction lies outside, or both are given.
+    """
+
+    changes_at: float = 0.0
+    pulse: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.changes_at < 1:
+            raise DetentError(
+                f"phase: changes_at is {self.changes_at!r}; allowed: 0 <= fraction < 1; give one of these"
+            )
+        first, last = self.pulse or (0.0, 1.0)
+        if not 0 <= first < last <= 1:
+            raise DetentError(f"phase: pulse is {self.pulse!r}; allowed: 0 <= from < to <= 1; give fractions of a tick")
+        if self.pulse and self.changes_at:
+            raise DetentError(f"phase: changes_at {self.changes_at!r} and pulse {self.pulse!r} are given; give one")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waveform:
+    """One signal over time: each value holds from its moment to the next.
+
+    Parameters
+    ----------
+    name : str
+        Dotted path of the register, such as ``tracker.reference``; printable ASCII without spaces.
+    bits : int
+        1 for a flag, else the width of the register, at most 64; 64 for a float.
+    signed : bool
+        Whether an integer may be negative; True for a float.
+    is_float : bool
+        Whether the values are floats.
+    unit : str
+        Unit of the values; "" for a number without unit or a flag.
+    doc : str
+        What the signal is, in a few words.
+    times : ndarray of int64
+        Moments since power-on [ps], rising, shape (n,), n >= 1; the first is where the signal begins.
+    values : ndarray
+        Value from each moment on, shape (n,); booleans, integers or floats.
+
+    Raises
+    ------
+    DetentError
+        Times and values do not fit together, or a value does not fit the width.
+    """
+
+    name: str
+    bits: int
+    signed: bool
+    is_float: bool
+    unit: str
+    doc: str
+    times: Times
+    values: Values
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name) or "" in self.name.split("."):
+            raise DetentError(
+                f"waveform: the name is {self.name!r}; allowed: printable ASCII without spaces, parts joined by single "
+                "dots, such as 'tracker.reference'; rename it"
+            )
+        if self.times.dtype != np.int64 or self.times.ndim != 1 or not self.times.size:
+            raise self._refusal(f"times have type {self.times.dtype} and shape {self.times.shape}", "int64, shape (n,)")
+        if self.values.shape != self.times.shape:
+            raise self._refusal(f"values have shape {self.values.shape}", f"{self.times.shape}, as times have")
+        late = np.flatnonzero(np.diff(self.times) <= 0)
+        if late.size:
+            first = int(late[0])
+            came = f"the time {self.times[first]} ps is followed by {self.times[first + 1]} ps"
+            raise self._refusal(came, "each moment after the one before")
+        self._check_values()
+
+    def _check_values(self) -> None:
+        if self.values.dtype.kind not in ("f" if self.is_float else "biu"):
+            raise self._refusal(f"values of {self.values.dtype}", "floats" if self.is_float else "integers")
+        if not 1 <= self.bits <= MAX_BITS or (self.is_float and self.bits != MAX_BITS):
+            allowed = f"{MAX_BITS} for a float" if self.is_float else f"1 to {MAX_BITS}"
+            raise self._refusal(f"{self.bits} bits", allowed)
+        if self.is_float:
+            return
+        low = -(1 << (self.bits - 1)) if self.signed else 0
+        high = low + (1 << self.bits) - 1
+        least, most = int(self.values.min()), int(self.values.max())
+        if least < low or most > high:
+            raise self._refusal(f"values from {least} to {most}", f"{low} to {high} in {self.bits} bits")
+
+    def _refusal(self, came: str, allowed: str) -> DetentError:
+        return DetentError(f"waveform {self.name!r}: {came}; allowed: {allowed}; correct what is recorded")
+
+    @property
+    def block(self) -> str:
+        """Path of the block that the signal belongs to; "" at the top."""
+        return self.name.rpartition(".")[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waveforms:
+    """Signals over one stretch of time.
+
+    Parameters
+    ----------
+    begin, end : int
+        The stretch [ps] since power-on; begin >= 0, `end` itself is outside.
+    signals : tuple of Waveform
+        Each begins at `begin`, changes before `end`, and has a name of its own.
+    title : str
+        What the whole shows, such as the axis; "" for nothing.
+
+    Raises
+    ------
+    DetentError
+        The stretch is empty, or a signal does not fit it.
+    """
+
+    begin: int
+    end: int
+    signals: tuple[Waveform, ...]
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.begin < self.end:
+            came = f"the window is {self.begin} ps to {self.end} ps"
+            raise DetentError(f"waveforms: {came}; allowed: 0 <= begin < end; choose at least one tick")
+        names: set[str] = set()
+        for signal in self.signals:
+            if signal.name in names:
+                raise DetentError(f"waveforms: two signals {signal.name!r}; allowed: one of each name; rename one")
+            names.add(signal.name)
+            first, last = int(signal.times[0]), int(signal.times[-1])
+            if first != self.begin or last >= self.end:
+                raise DetentError(
+                    f"waveforms: {signal.name!r} runs from {first} ps to a change at {last} ps; allowed: from "
+                    f"{self.begin} ps, with changes before {self.end} ps; cut it with window()"
+                )
+
+    def __getitem__(self, name: str) -> Waveform:
+        """Give one signal by its name; without it a `DetentError` lists those that exist."""
+        found = next((signal for signal in self.signals if signal.name == name), None)
+        if found is not None:
+            return found
+        held = ", ".join(signal.name for signal in self.signals) or "none"
+        raise DetentError(f"waveforms: no signal {name!r}; allowed: {held}; name one of these")
+
+    def window(self, begin: int, end: int) -> "Waveforms":
+        """Cut out a stretch of time.
+
+        Parameters
+        ----------
+        begin, end : int
+            The stretch [ps] since power-on; what lies outside of these waveforms is left out.
+
+        Returns
+        -------
+        Waveforms
+            The same signals; each begins with the value that holds at the new begin.
+
+        Raises
+        ------
+        DetentError
+            The stretch holds nothing of these waveforms.
+        """
+        first, last = max(begin, self.begin), min(end, self.end)
+        if first >= last:
+            held = f"{self.begin} ps to {self.end} ps"
+            raise DetentError(
+                f"waveforms: nothing from {begin} ps to {end} ps; allowed: within {held}; choose it there"
+            )
+        return Waveforms(first, last, tuple(_cut(signal, first, last) for signal in self.signals), self.title)
+
+
+def _cut(signal: Waveform, begin: int, end: int) -> Waveform:
+    start = max(int(np.searchsorted(signal.times, begin, side="right")) - 1, 0)
+    stop = int(np.searchsorted(signal.times, end, side="left"))
+    times = signal.times[start:stop].copy()
+    times[0] = begin
+    return replace(signal, times=times, values=signal.values[start:stop])
+
+
+def waveforms_from_rows(
+    rows: NDArray[np.void],
+    leaves: Sequence[Leaf],
+    *,
+    period: float,
+    phases: Mapping[str, Phase] | None = None,
+    title: str = "",
+) -> Waveforms:
+    """Turn rows recorded at consecutive ticks into waveforms.
+
+    The row with ``tick`` = n was recorded after tick n - 1, which spans [(n - 1)·T, n·T). Before the first change of a
+    register inside the first tick nothing is known of it: the first value is carried back. Where that matters, record
+    one tick more and cut it off with `Waveforms.window`.
+
+    Parameters
+    ----------
+    rows : ndarray
+        Structured array, shape (n,), n >= 1: ``tick`` (the tick counter after the tick) and one field per register.
+    leaves : sequence of Leaf
+        The registers to show, in order; those of one value.
+    period : float
+        Period T of a tick [s], at least 1 ps.
+    phases : mapping of str to Phase, optional
+        When registers change: by path (``tracker.plus``) or by block (``tracker``); of several that fit, the longest
+        holds. Without an entry a register changes as its tick begins.
+    title : str
+        As of `Waveforms`.
+
+    Returns
+    -------
+    Waveforms
+        From the begin of the first tick to the end of the last, changes only. A ``u1`` without unit that holds only 0
+        and 1 is a flag of 1 bit; any other register has its full width.
+
+    Raises
+    ------
+    DetentError
+        There are no rows, a tick is missing between two rows, a register was not recorded or is an array, the period
+        is no time, or a pulse is shorter than a picosecond.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from detent.kernel.registers import Registers, register, u1
+    >>> class Divider(Registers):
+    ...     msb: u1 = register("top bit")
+    >>> rows = np.array([(1, 0), (2, 1), (3, 1), (4, 0)], dtype=[("tick", "i8"), ("msb", "u1")])
+    >>> shown = waveforms_from_rows(rows, list(Divider.leaves()), period=250e-9, phases={"msb": Phase(0.25)})
+    >>> shown["msb"].times.tolist(), shown["msb"].values.tolist(), shown.end
+    ([0, 312500, 812500], [0, 1, 0], 1000000)
+    """
+    period_ps = _checked_period(period)
+    ticks = _checked_ticks(rows)
+    signals = tuple(
+        _signal(leaf, ticks, _column(rows, leaf), period_ps, _phase_of(leaf.path, phases or {})) for leaf in leaves
+    )
+    edges = _picoseconds(np.array([ticks[0], ticks[-1] + 1]), 0.0, period_ps)
+    return Waveforms(int(edges[0]), int(edges[1]), signals, title)
+
+
+def clock_waveform(name: str, period: float, ticks: range, *, high: tuple[float, float], doc: str = "") -> Waveform:
+    """Make the waveform of a clock, which is no register: high in the same part of every tick.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``clocks.ck1``.
+    period : float
+        Period of a tick [s], at least 1 ps.
+    ticks : range
+        The ticks shown, step 1; tick k spans [k·T, (k + 1)·T). ``range(0, 4)`` are the first four after power-on.
+    high : (float, float)
+        Part of the tick in which the clock is high, 0 <= from < to <= 1.
+    doc : str
+        What the clock does.
+
+    Raises
+    ------
+    DetentError
+        The range is empty, the fractions lie outside a tick, or the period is no time.
+    """
+    period_ps = _checked_period(period)
+    if not len(ticks) or ticks.step != 1 or ticks.start < 0:
+        raise DetentError(f"clock {name!r}: came {ticks!r}; allowed: ticks from 0 on, step 1; give those to show")
+    numbers = np.arange(ticks.start, ticks.stop, dtype=np.int64)
+    times, values = _changes(*_pulses(numbers, np.ones(len(numbers), np.uint8), period_ps, Phase(pulse=high)))
+    return Waveform(name=name, bits=1, signed=False, is_float=False, unit="", doc=doc, times=times, values=values)
+
+
+def _checked_period(period: float) -> float:
+    """Period of a tick [ps]; whole where the period is meant to be, so that its multiples are exact for ever."""
+    period_ps = period * PICOSECONDS
+    if not (math.isfinite(period_ps) and period_ps >= 1):
+        raise DetentError(f"waveforms: the period of a tick is {period!r} s; allowed: 1e-12 s or more; give it in s")
+    whole = round(period_ps)
+    # 250e-9 s is not a double, and a product with 1e12 rounds once more: two roundings, 2.3e-16 at most.
+    return float(whole) if math.isclose(period_ps, whole, rel_tol=1e-15) else period_ps
+
+
+def _checked_ticks(rows: NDArray[np.void]) -> Times:
+    """Numbers of the ticks that the rows describe, counted from 0 at power-on."""
+    if "tick" not in (rows.dtype.names or ()):
+        raise DetentError("waveforms: the rows have no field 'tick'; record the tick counter with the registers")
+    after: Any = rows["tick"]
+    if not len(after):
+        raise DetentError("waveforms: there are no rows; allowed: one or more; record at least one tick")
+    ticks = np.asarray(after, dtype=np.int64) - 1
+    gaps = np.flatnonzero(np.diff(ticks) != 1)
+    if gaps.size or ticks[0] < 0:
+        first = int(gaps[0]) if gaps.size else 0
+        came = f"tick {after[first]} is followed by {after[first + 1]}" if gaps.size else f"tick {after[0]} comes first"
+        raise DetentError(f"waveforms: {came}; allowed: consecutive ticks, from 1 on; record every tick")
+    return ticks
+
+
+def _column(rows: NDArray[np.void], leaf: Leaf) -> Values:
+    if leaf.length:
+        raise DetentError(f"waveforms: {leaf.path!r} is an array of {leaf.length}; allowed: one value; leave it out")
+    if leaf.path not in (rows.dtype.names or ()):
+        raise DetentError(f"waveforms: {leaf.path!r} was not recorded; record it with the others, or leave it out")
+    return np.asarray(rows[leaf.path])
+
+
+def _phase_of(path: str, phases: Mapping[str, Phase]) -> Phase:
+    """Phase of the longest path that is the register or a block around it."""
+    fitting = [key for key in phases if path == key or path.startswith(key + ".")]
+    return phases[max(fitting, key=len)] if fitting else Phase()
+
+
+def _signal(leaf: Leaf, ticks: Times, column: Values, period_ps: float, phase: Phase) -> Waveform:
+    if phase.pulse is None:
+        times, values = _picoseconds(ticks, phase.changes_at, period_ps), column
+        times[0] = _picoseconds(ticks[:1], 0.0, period_ps)[0]
+    else:
+        times, values = _pulses(ticks, column, period_ps, phase)
+    width = leaf.width
+    # A count or a code of one byte stays a word, whatever values the window happens to show.
+    bits = 1 if width.code == "u1" and not leaf.unit and int(column.max()) <= 1 else 8 * width.size
+    changes = _changes(times, values)
+    return Waveform(leaf.path, bits, width.is_signed, width.is_float, leaf.unit, leaf.doc, *changes)
+
+
+def _picoseconds(ticks: Times, fraction: float, period_ps: float) -> Times:
+    """Moments `fraction` into the ticks [ps]: multiples of the period, never sums."""
+    if period_ps.is_integer():
+        return ticks * int(period_ps) + round(fraction * period_ps)
+    return np.rint((ticks + fraction) * period_ps).astype(np.int64)
+
+
+def _pulses(ticks: Times, column: Values, period_ps: float, phase: Phase) -> tuple[Times, Values]:
+    """Value between the two moments of each tick, 0 outside."""
+    first, last = phase.pulse or (0.0, 1.0)
+    up, down = _picoseconds(ticks, first, period_ps), _picoseconds(ticks, last, period_ps)
+    if np.any(up >= down):
+        came = f"a pulse from {first!r} to {last!r} of a tick of {period_ps:g} ps is shorter than 1 ps"
+        raise DetentError(f"waveforms: {came}; allowed: 1 ps or more; give a wider pulse")
+    times = np.concatenate((_picoseconds(ticks[:1], 0.0, period_ps), np.column_stack((up, down)).ravel()))
+    values = np.concatenate((np.zeros(1, column.dtype), np.column_stack((column, np.zeros_like(column))).ravel()))
+    # The last fall may lie on the end of the window, outside of it.
+    inside = times < _picoseconds(ticks[-1:] + 1, 0.0, period_ps)[0]
+    return times[inside], values[inside]
+
+
+def _changes(times: Times, values: Values) -> tuple[Times, Values]:
+    """Only the moments at which the value changes; of several at one moment the last holds."""
+    last = np.concatenate((times[1:] != times[:-1], [True]))
+    times, values = times[last], values[last]
+    same = values[1:] == values[:-1]
+    if values.dtype.kind == "f":
+        same |= np.isnan(values[1:]) & np.isnan(values[:-1])
+    kept = np.concatenate(([True], ~same))
+    return times[kept], np.ascontiguousarray(values[kept])
