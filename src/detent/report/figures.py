@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.report.data import INCH, Comparison, Numbers
+from detent.report.comparison_data import Comparison
+from detent.report.data import INCH, Numbers
 from detent.report.thin import thin_indices
 from detent.simulation.trace import Trace
 
@@ -43,6 +44,7 @@ STYLE: dict[str, Any] = {
     "svg.fonttype": "none",  # text stays text: searchable and editable
     "svg.hashsalt": "detent",  # the same figure gives the same file
     "savefig.dpi": 150,
+    "text.parse_math": False,  # a dollar sign in a name or a description is one
 }
 
 
@@ -78,7 +80,7 @@ def plot_signals(
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(trace.units.get(name, ""), []).append(name)
-    with _figure(path, 9.0, 1.0 + 2.1 * len(groups)) as figure:
+    with new_figure(path, 9.0, 1.0 + 2.1 * len(groups)) as figure:
         axes: list[Axes] = list(figure.subplots(len(groups), sharex=True, squeeze=False)[:, 0])
         scale, unit = _time_unit(trace)
         for area, (group_unit, members) in zip(axes, groups.items(), strict=True):
@@ -144,7 +146,7 @@ def plot_comparison(comparison: Comparison, path: str | Path) -> None:
         raise DetentError(
             f"{path}: errors have shape {comparison.errors.shape}, allowed: {shape} (methods, speeds, right and left)"
         )
-    with _figure(path, 9.0, 8.0 if comparison.starts else 4.2) as figure:
+    with new_figure(path, 9.0, 8.0 if comparison.starts else 4.2) as figure:
         areas = figure.subplots(2 if comparison.starts else 1, 1, squeeze=False)[:, 0]
         _draw_errors(areas[0], comparison)
         if comparison.starts:
@@ -261,8 +263,26 @@ def check_figure_path(path: str | Path) -> Path:
 
 
 @contextmanager
-def _figure(path: Path, width: float, height: float) -> Generator[Figure]:
-    """Give an empty figure of so many inches and write it at the end, without pyplot: no window, no global state."""
+def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
+    """Give an empty figure and write it at the end, without pyplot: no window, no global state.
+
+    Parameters
+    ----------
+    path : Path
+        Target, as `check_figure_path` has found it good; replaced if it exists.
+    width, height : float
+        Size [in].
+
+    Yields
+    ------
+    Figure
+        A matplotlib figure in the style of all figures.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
     mpl: Any = importlib.import_module("matplotlib")
     figures: Any = importlib.import_module("matplotlib.figure")
     # Around drawing and saving: matplotlib looks some settings up only when it writes.

@@ -4,7 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from detent.axisfile.schema import FULL_DRIVE_COUNTS, INCH, SPEED_STEP, PrintHeadSpec
+from detent.axisfile.print_head.schema import FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec
+from detent.axisfile.quantities import INCH
 from detent.control.head_computer import (
     HIGH_ACCEL,
     HIGH_REVERSE,
@@ -16,20 +17,17 @@ from detent.control.head_computer import (
     LOW_STOP,
 )
 from detent.planning.printed_page import PrintJob
-from detent.report.data import (
+from detent.report.comparison_data import Comparison, StartCurve
+from detent.report.data import Event, Note, Numbers
+from detent.report.print_data import (
     ColumnErrors,
-    Comparison,
     Constant,
-    Event,
     HeadPath,
     IdentifiedLine,
     LineResult,
     Marks,
-    Note,
-    Numbers,
     ReportData,
     SpeedProfile,
-    StartCurve,
     TurnAround,
 )
 from detent.simulation.comparison import DriveComparison
@@ -82,7 +80,7 @@ def print_report(
     return ReportData(
         axis_name=spec.axis.name,
         job_name=run.job.name,
-        printed=run.printed,
+        printed=run.done,
         failure=run.failure,
         duration=run.print_time,
         line_count=len(run.job.lines),

@@ -36,6 +36,29 @@ def count(value: int, word: str = "", plural: str = "") -> str:
     return f"{digits} {word if value == 1 else plural or word + 's'}"
 
 
+def further(value: int, word: str) -> str:
+    """Begin a sentence about what is left out.
+
+    Parameters
+    ----------
+    value : int
+        How many, at least 1.
+    word : str
+        What is counted.
+
+    Returns
+    -------
+    str
+        Such as "1 further line is" or "12 further lines are".
+
+    Examples
+    --------
+    >>> further(1, "line"), further(12, "line")
+    ('1 further line is', '12 further lines are')
+    """
+    return f"{count(value, 'further ' + word)} {'is' if value == 1 else 'are'}"
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """Write a number with so many significant digits and no exponent; "-" for None and NaN.
 
@@ -142,6 +165,29 @@ def arrow(direction: int) -> str:
     """
     name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
     return f'<span class="arrow {name}">{sign} {name}</span>'
+
+
+def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
+    """Make a cell of a table with a bar before its number, so that rows can be compared at a glance.
+
+    Parameters
+    ----------
+    value : float
+        What it shows, >= 0; NaN for nothing.
+    longest : float
+        Value of the longest bar in the column, > 0.
+    over : bool
+        The value is beyond its limit.
+
+    Returns
+    -------
+    str
+        HTML, with its own attributes.
+    """
+    if isnan(value):
+        return '<td class="n">\u2013</td>'
+    bar = f'<span class="bar" style="width:{48 * value / longest:.0f}px"></span>'
+    return f'<td class="{"n over" if over else "n"}">{bar}{number(value, 2)}</td>'
 
 
 def table(heads: Sequence[tuple[str, bool]], rows: Iterable[Sequence[str]], *, tall: bool = False) -> str:

@@ -1,16 +1,14 @@
 import numpy as np
 import pytest
 
-from detent.report.data import (
-    INCH,
+from detent.report.data import INCH, Event, Note
+from detent.report.print_data import (
     ColumnErrors,
     Constant,
-    Event,
     HeadPath,
     IdentifiedLine,
     LineResult,
     Marks,
-    Note,
     ReportData,
     SpeedProfile,
     TurnAround,

@@ -8,7 +8,8 @@ import pytest
 
 from detent.errors import DetentError
 from detent.report import figures
-from detent.report.data import INCH, Comparison, StartCurve
+from detent.report.comparison_data import Comparison, StartCurve
+from detent.report.data import INCH
 from detent.report.figures import check_figure_path, plot_comparison, plot_signals, settling_time
 from detent.simulation.trace import Trace
 
@@ -79,6 +80,12 @@ def test_signals_share_a_plot_area_by_unit_and_carry_it(tmp_path: Path, trace: T
     for text in ("[m/s]", "carriage.velocity", "carriage.velocity_ref", "[A]", "[count]", "time [s]", "on", "off"):
         assert text in words
     assert "demo axis · LETTER.TXT" in words
+
+
+def test_a_dollar_sign_is_one(tmp_path: Path, trace: Trace) -> None:
+    named = dataclasses.replace(trace, attributes={"axis": "from $1", "job": "to $2"})
+    plot_signals(named, ["motor.current"], tmp_path / "run.svg")
+    assert "from $1 · to $2" in texts(tmp_path / "run.svg")
 
 
 def test_a_short_stretch_is_in_milliseconds(tmp_path: Path, trace: Trace) -> None:

@@ -3,7 +3,18 @@ import doctest
 import pytest
 
 from detent.report import words
-from detent.report.words import GAP, arrow, count, duration, inches_per_second, micrometres, number, table
+from detent.report.words import (
+    GAP,
+    arrow,
+    bar_cell,
+    count,
+    duration,
+    further,
+    inches_per_second,
+    micrometres,
+    number,
+    table,
+)
 
 
 def plain(text: str) -> str:
@@ -65,3 +76,14 @@ def test_a_row_of_the_wrong_length_is_refused() -> None:
 def test_directions_have_their_arrow() -> None:
     assert arrow(1) == '<span class="arrow right">→ right</span>'
     assert arrow(-1) == '<span class="arrow left">← left</span>'
+
+
+def test_what_is_left_out_is_counted() -> None:
+    assert plain(further(1, "line")) == "1 further line is"
+    assert plain(further(1200, "move")) == "1 200 further moves are"
+
+
+def test_a_bar_is_as_long_as_its_number_is_large() -> None:
+    assert bar_cell(3.0, 6.0) == '<td class="n"><span class="bar" style="width:24px"></span>3</td>'
+    assert bar_cell(6.0, 6.0, over=True) == '<td class="n over"><span class="bar" style="width:48px"></span>6</td>'
+    assert bar_cell(float("nan"), 6.0) == '<td class="n">–</td>'

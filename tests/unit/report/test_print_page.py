@@ -1,66 +1,21 @@
 import dataclasses
-import json
 import re
 import subprocess
 import sys
-from html.parser import HTMLParser
-from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from tests.unit.report.page_reader import Reader, charts_of, paper_of
 
 import detent
-from detent.errors import DetentError
-from detent.report.data import ColumnErrors, Marks, Note, ReportData
-from detent.report.html import render_report, write_report
-from detent.report.words import GAP
-
-VOID = {"meta", "br", "link", "img", "input", "hr"}
-
-
-class Page(HTMLParser):
-    """Collects text, ids and outside references, and checks that every element is closed."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.open: list[str] = []
-        self.words: list[str] = []
-        self.fetched: list[str] = []
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-        for name, value in attrs:
-            if name == "id":
-                self.ids.append(value or "")
-            if name in {"src", "href", "srcset", "data"}:
-                self.fetched.append(value or "")
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if not {"script", "style"} & set(self.open):
-            self.words.append(data)
-
-    @property
-    def text(self) -> str:
-        return re.sub(r"\s+", " ", "".join(self.words).replace(GAP, " "))
-
-
-def embedded(text: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="report-data">(.*?)</script>', text, flags=re.DOTALL)
-    assert found
-    return json.loads(found[1])
+from detent.report.data import Note
+from detent.report.print_data import ColumnErrors, Marks, ReportData
+from detent.report.print_page import render_report, write_report
 
 
 def test_the_first_lines_say_what_happened(report: ReportData) -> None:
-    text = Page(render_report(report)).text
+    text = Reader(render_report(report)).text
     assert "✔ Printed LETTER.TXT" in text
     assert "2 lines and 4 characters on 2 pages in 0.800 s." in text
     assert "Every column of dots landed within 60 µm of its place." in text
@@ -68,7 +23,7 @@ def test_the_first_lines_say_what_happened(report: ReportData) -> None:
 
 
 def test_the_cards_carry_the_figures(report: ReportData) -> None:
-    text = Page(render_report(report)).text
+    text = Reader(render_report(report)).text
     assert "Lines printed2 of 24 characters" in text
     assert "Throughput5 characters/sin 0.800 s" in text
     assert "Worst column error60 µmrms 11 µm, allowed 100 µm" in text
@@ -80,7 +35,7 @@ def test_a_run_that_stopped_says_where_why_and_what_to_do(report: ReportData) ->
     stopped = dataclasses.replace(
         report, printed=False, failure="Obstruction <7 in>; clear the way.", lines=report.lines[:1]
     )
-    text = Page(render_report(stopped)).text
+    text = Reader(render_report(stopped)).text
     assert "✘ Not printed LETTER.TXT" in text
     assert "Stopped after 1 of 2 lines, 0.800 s into the job. Obstruction <7 in>; clear the way." in text
     assert "✔" not in text
@@ -88,7 +43,7 @@ def test_a_run_that_stopped_says_where_why_and_what_to_do(report: ReportData) ->
 
 def test_columns_off_their_place_spoil_the_headline(report: ReportData) -> None:
     html = render_report(dataclasses.replace(report, column_limit=50e-6))
-    text = Page(html).text
+    text = Reader(html).text
     assert "! Printed, but off its columns" in text
     assert "✔" not in text
     assert "1 column landed more than 50 µm from its place." in text
@@ -97,29 +52,29 @@ def test_columns_off_their_place_spoil_the_headline(report: ReportData) -> None:
 
 
 def test_several_columns_off_their_place_are_counted_in_both_directions(report: ReportData) -> None:
-    text = Page(render_report(dataclasses.replace(report, column_limit=1.5e-6))).text
+    text = Reader(render_report(dataclasses.replace(report, column_limit=1.5e-6))).text
     assert "9 columns landed more than 1.5 µm from their place." in text
 
 
 def test_a_run_without_columns_shows_no_column_error(report: ReportData, errors: ColumnErrors) -> None:
     nothing = dataclasses.replace(errors, right=errors.right * 0, left=errors.left * 0, worst=0.0, rms=0.0)
     html = render_report(dataclasses.replace(report, errors=nothing))
-    assert "olumn error" not in Page(html).text
-    assert "histogram" not in {chart["id"] for chart in embedded(html)["charts"]}
-    assert "landed" not in Page(html).text.partition("What came out")[0]
+    assert "olumn error" not in Reader(html).text
+    assert "histogram" not in {chart["id"] for chart in charts_of(html)}
+    assert "landed" not in Reader(html).text.partition("What came out")[0]
 
 
 def test_errors_come_before_warnings_and_notes(report: ReportData) -> None:
     noted = dataclasses.replace(report, notes=[*report.notes, Note("error", "stalled")])
-    text = Page(render_report(noted)).text
+    text = Reader(render_report(noted)).text
     assert text.index("Errorstalled") < text.index("Warningheadroom <3 %") < text.index("NoteESC A accepted")
 
 
 def test_a_long_job_says_that_its_path_is_cut(report: ReportData) -> None:
-    assert "The whole job" in Page(render_report(report)).text
+    assert "The whole job" in Reader(render_report(report)).text
     assert report.path
     long = dataclasses.replace(report, path=dataclasses.replace(report.path, t=report.path.t * 40), duration=80.0)
-    text = Page(render_report(long)).text
+    text = Reader(render_report(long)).text
     assert "The first 30 seconds of 80 s" in text
     assert "The whole job" not in text
 
@@ -127,7 +82,7 @@ def test_a_long_job_says_that_its_path_is_cut(report: ReportData) -> None:
 def test_tables_compare_lines_and_constants(report: ReportData) -> None:
     html = render_report(report)
     rows = re.findall(r"<tr>(.*?)</tr>", html, flags=re.DOTALL)
-    cells = [[Page(cell).text for cell in re.findall(r"<td.*?</td>", row, flags=re.DOTALL)] for row in rows]
+    cells = [[Reader(cell).text for cell in re.findall(r"<td.*?</td>", row, flags=re.DOTALL)] for row in rows]
     assert ["1", "→ right", "40", "standing start", "0.000", "0.300", "2", "2", "1.6"] in cells
     assert ["2", "← left", "20", "turn-around", "0.300", "0.500", "2", "60", "42"] in cells
     assert ["slope K, rightback-EMF", "171", "170", "+1 (+0.6 %)", "1/256 count per speed value"] in cells
@@ -138,10 +93,10 @@ def test_tables_compare_lines_and_constants(report: ReportData) -> None:
 
 def test_the_page_is_well_formed_and_every_chart_has_its_place(report: ReportData) -> None:
     html = render_report(report)
-    page = Page(html)
+    page = Reader(html)
     assert page.open == []
     assert len(page.ids) == len(set(page.ids))
-    charts = {chart["id"] for chart in embedded(html)["charts"]}
+    charts = {chart["id"] for chart in charts_of(html)}
     assert charts == {
         "histogram", "path", "profile-speed", "profile-drive", "turn-current", "turn-speed", "identified-right",
         "identified-left",
@@ -152,7 +107,7 @@ def test_the_page_is_well_formed_and_every_chart_has_its_place(report: ReportDat
 
 def test_the_page_fetches_nothing_and_forbids_it(report: ReportData) -> None:
     html = render_report(report)
-    assert Page(html).fetched == []
+    assert Reader(html).fetched == []
     assert "Content-Security-Policy\" content=\"default-src 'none'" in html
     assert not re.search(r"@import|url\(|\bfetch\(|XMLHttpRequest", html)
 
@@ -166,8 +121,10 @@ def test_what_the_job_printed_cannot_break_the_page(report: ReportData, marks: M
     )  # fmt: skip
     html = render_report(dataclasses.replace(report, marks=evil, job_name="<b>$data</b>", axis_name="</title>"))
     assert "<script>alert" not in html
-    assert embedded(html)["paper"]["pages"][0]["lines"][0]["text"] == "".join(text)
-    page = Page(html)
+    paper = paper_of(html)
+    assert paper
+    assert paper["pages"][0]["lines"][0]["text"] == "".join(text)
+    page = Reader(html)
     assert page.open == []
     assert "<b>$data</b>" in page.text
     assert len(marks) == 4
@@ -179,8 +136,10 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
         failure="Not calibrated.",
     )  # fmt: skip
     html = render_report(bare)
-    page = Page(html)
-    assert embedded(html) == {"charts": [], "paper": None}
+    page = Reader(html)
+    assert charts_of(html) == []
+    assert paper_of(html) is None
+    assert "drawPaper" not in html
     assert 'class="chart"' not in html
     assert "<h2>" not in html
     assert "Stopped after 0 of 3 lines, 0 s into the job. Not calibrated." in page.text
@@ -190,7 +149,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
 def test_lines_without_marks_are_counted_and_have_no_error(report: ReportData) -> None:
     lines = [dataclasses.replace(line, worst_error=float("nan"), rms_error=float("nan")) for line in report.lines]
     html = render_report(dataclasses.replace(report, marks=Marks(), errors=None, lines=lines))
-    page = Page(html)
+    page = Reader(html)
     assert "Throughput5 characters/s" in page.text
     assert "column error" not in page.text
     assert "What came out" not in page.text
@@ -199,9 +158,15 @@ def test_lines_without_marks_are_counted_and_have_no_error(report: ReportData) -
 
 
 def test_pages_that_are_not_drawn_are_counted(report: ReportData, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "not drawn" not in Page(render_report(report)).text
-    monkeypatch.setattr("detent.report.charts.MARKS", 3)
-    assert "1 further page is not drawn." in Page(render_report(report)).text
+    assert "not drawn" not in Reader(render_report(report)).text
+    monkeypatch.setattr("detent.report.print_charts.MARKS", 3)
+    assert "1 further page is not drawn." in Reader(render_report(report)).text
+
+
+def test_lines_that_are_not_listed_are_counted(report: ReportData, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "further line" not in Reader(render_report(report)).text
+    monkeypatch.setattr("detent.report.print_page.MOST_LINES", 1)
+    assert "1 further line is in the JSON summary only." in Reader(render_report(report)).text
 
 
 def test_a_report_does_not_change_from_one_writing_to_the_next(report: ReportData, tmp_path: Path) -> None:
@@ -216,20 +181,9 @@ def test_a_file_name_that_is_no_text_still_gives_a_page(report: ReportData, tmp_
     assert "letter?.txt" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
-def test_a_folder_that_is_not_there_is_said(report: ReportData, tmp_path: Path) -> None:
-    with pytest.raises(DetentError, match=r"nowhere.*cannot be written \(No such file or directory\); choose another"):
-        write_report(report, tmp_path / "nowhere" / "a.html")
-
-
-def test_the_vendored_library_carries_its_licence(report: ReportData) -> None:
-    vendor = resources.files("detent.report").joinpath("vendor")
-    assert "MIT License" in vendor.joinpath("uPlot-LICENSE").read_text(encoding="utf-8")
-    assert "uPlot (v1.6.32)" in render_report(report)
-
-
 def test_writing_a_report_loads_no_plotting_library() -> None:
     code = (
-        "import sys, detent.report.html, detent.report.figures; "
+        "import sys, detent.report.print_page, detent.report.figures; "
         "print([name for name in ('matplotlib', 'h5py', 'numba', 'pint', 'pydantic') if name in sys.modules])"
     )
     source = Path(detent.__file__).parents[1]

@@ -8,9 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detent.report import charts
-from detent.report.data import INCH, ColumnErrors, HeadPath, IdentifiedLine, Marks, ReportData, SpeedProfile, TurnAround
-from detent.report.html import _all_charts
+from detent.report import print_charts as charts
+from detent.report.chart import POINTS
+from detent.report.data import INCH
+from detent.report.print_data import (
+    ColumnErrors,
+    HeadPath,
+    IdentifiedLine,
+    Marks,
+    ReportData,
+    SpeedProfile,
+    TurnAround,
+)
+from detent.report.print_page import _all_charts
 
 
 def test_the_profile_is_speed_over_drive_in_the_units_of_the_trade(profile: SpeedProfile) -> None:
@@ -66,7 +76,7 @@ def test_a_long_path_shows_its_first_stretch_and_keeps_where_lines_begin(path: H
     )  # fmt: skip
     chart = charts.path_chart(long)
     assert 29.99 < chart["x"][-1] <= 30.0
-    assert 120 < len(chart["x"]) <= charts.POINTS + 2 + 120
+    assert 120 < len(chart["x"]) <= POINTS + 2 + 120
     changes = np.flatnonzero(np.diff(long.printing.astype(int)))
     assert {round(float(t[row]), 4) for row in changes if t[row] < 30} <= set(chart["x"])
 
@@ -80,7 +90,7 @@ def test_every_column_is_in_the_histogram_once(to_the_right: dict[int, int], to_
     for counts, found in zip(counted, (to_the_right, to_the_left), strict=True):
         counts[list(found)] = list(found.values())
     made = ColumnErrors(bin_width=1e-7, right=counted[0], left=counted[1], worst=1e-6, rms=1e-6)
-    chart = charts.histogram_chart(made, 50e-6)
+    chart = charts.column_chart(made, 50e-6)
     for series, found in zip(chart["series"], (to_the_right, to_the_left), strict=True):
         assert sum(series["y"]) == sum(found.values())
         # No column is drawn farther from its place than the width of a bar says.
@@ -91,7 +101,7 @@ def test_every_column_is_in_the_histogram_once(to_the_right: dict[int, int], to_
 
 
 def test_a_bar_stands_where_its_columns_landed(errors: ColumnErrors) -> None:
-    chart = charts.histogram_chart(errors, 50e-6)
+    chart = charts.column_chart(errors, 50e-6)
     right, left = (dict(zip(chart["x"], series["y"], strict=True)) for series in chart["series"])
     assert {x: y for x, y in right.items() if y} == {0.0: 16}
     assert {x: y for x, y in left.items() if y} == {0.0: 15, 60.0: 1}
@@ -100,19 +110,19 @@ def test_a_bar_stands_where_its_columns_landed(errors: ColumnErrors) -> None:
 def test_errors_without_spread_are_one_bar() -> None:
     right = np.zeros(6001, dtype=np.int64)
     right[3000] = 7
-    chart = charts.histogram_chart(ColumnErrors(bin_width=1e-7, right=right, left=right * 0, worst=0.0, rms=0.0), 1e-4)
+    chart = charts.column_chart(ColumnErrors(bin_width=1e-7, right=right, left=right * 0, worst=0.0, rms=0.0), 1e-4)
     assert {x: y for x, y in zip(chart["x"], chart["series"][0]["y"], strict=True) if y} == {0.0: 7}
     assert len(chart["x"]) >= 3
 
 
 def test_the_histogram_is_centred_and_shows_limits_that_are_near(errors: ColumnErrors) -> None:
-    near = charts.histogram_chart(errors, 50e-6)
+    near = charts.column_chart(errors, 50e-6)
     assert [mark["x"] for mark in near["marks"]] == [-50.0, 50.0]
     assert near["x"] == [-value for value in reversed(near["x"])]
     assert 0.0 in near["x"]
     steps = {round(b - a, 6) for a, b in pairwise(near["x"])}
     assert steps == {5.0}
-    assert charts.histogram_chart(errors, 1e-3)["marks"] == []
+    assert charts.column_chart(errors, 1e-3)["marks"] == []
 
 
 def test_identified_lines_go_through_friction_and_top_speed(identified: tuple[IdentifiedLine, ...]) -> None:

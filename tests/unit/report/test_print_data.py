@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from detent.errors import DetentError
-from detent.report.data import COLUMN, INCH, SPEED_STEP, ColumnErrors, Marks
+from detent.report.data import INCH
+from detent.report.print_data import COLUMN, SPEED_STEP, ColumnErrors, Marks
 
 
 def test_the_units_of_the_specification() -> None:
