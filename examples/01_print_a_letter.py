@@ -15,7 +15,7 @@ for warning in axis.check().warnings:
 # %% Print a job, from power-on: homing, identification, line by line.
 run = axis.run(detent.example("letter.txt"))
 found = run.result
-print(f"printed: {run.printed}, {found.characters} characters in {found.print_time:.2f} s")
+print(f"printed: {run.done}, {found.characters} characters in {found.print_time:.2f} s")
 print(f"worst column {found.worst_error * 1e6:.1f} um, {found.turn_arounds} turn-arounds")
 for side, line in found.identified.items():
     print(f"{side}: slope {line.slope} (true {line.true_slope:.1f}), friction {line.friction} counts")

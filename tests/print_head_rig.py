@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from detent.axisfile.build import build_print_head
 from detent.axisfile.load import load_spec
-from detent.axisfile.schema import EMITTER, PrintHeadSpec
+from detent.axisfile.print_head.build import build_print_head
+from detent.axisfile.print_head.schema import EMITTER, PrintHeadSpec
 from detent.control.head_computer import FAULT, HIGH_STEADY, IDLE, POWER_ON
 from detent.systems.print_head import PERIOD_US, PrintHead, PrintHeadParams, advance, switch_on
 

@@ -7,21 +7,19 @@ from typing import Any
 
 from detent.axisfile.check import CheckReport, check_spec
 from detent.axisfile.load import AxisFile, read_axis
-from detent.axisfile.schema import PrintHeadSpec
-from detent.planning.print_job import PrintJob, load_job
-from detent.report.data import ReportData
-from detent.report.print_report import print_report
-from detent.simulation.comparison import DriveComparison, compare_drives
-from detent.simulation.machine import TICK
-from detent.simulation.print_run import PrintRun, Progress, default_signals, print_job
+from detent.axisfile.methods import AnySpec
+from detent.errors import DetentError
+from detent.report.methods import report_of, summary_rows
+from detent.simulation.capture import Stretch, capture
+from detent.simulation.comparisons import AnyComparison, compare_methods
+from detent.simulation.methods import AnyJob, AnyResult, Simulated, simulated
+from detent.simulation.print_run import Progress
 from detent.simulation.recorder import Recorder, choose_leaves, make_trace
 from detent.simulation.trace import Trace
 from detent.simulation.trace_files import load_trace, save_trace
 from detent.simulation.trace_store import TraceWriter
-from detent.systems.print_head import PrintHead
-
-EVERY = 10
-"""Ticks between two rows of a trace unless told otherwise: 0.4 ms, the time of a count of the ramp."""
+from detent.simulation.vcd_file import save_vcd
+from detent.simulation.waveforms import Waveforms
 
 KEPT_ROWS = 100_000
 """Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
@@ -40,7 +38,7 @@ class Axis:
     file: AxisFile
 
     @property
-    def spec(self) -> PrintHeadSpec:
+    def spec(self) -> AnySpec:
         """The specification, in SI units."""
         return self.file.spec
 
@@ -48,6 +46,11 @@ class Axis:
     def name(self) -> str:
         """Name of the axis."""
         return self.spec.axis.name
+
+    @property
+    def method(self) -> Simulated:
+        """What its control method brings to the simulation: registers, base tick, usual signals."""
+        return simulated(self.spec)
 
     def check(self) -> CheckReport:
         """Effective values, derived figures and warnings."""
@@ -61,27 +64,43 @@ class Axis:
         DetentError
             A name is unknown; the message names the nearest.
         """
-        choose_leaves(PrintHead, names)
+        choose_leaves(self.method.registers, names)
 
-    def run(
-        self,
-        job: str | Path | PrintJob,
-        *,
-        signals: Sequence[str] | None = None,
-        every: int = EVERY,
-        trace_file: str | Path | None = None,
-        progress: Progress | None = None,
-    ) -> "Run":
-        """Print a job from power-on.
+    def load_job(self, path: str | Path) -> AnyJob:
+        """Read a job of the kind the axis takes.
 
         Parameters
         ----------
-        job : path or PrintJob
-            Text or a Diablo 630 stream.
+        path : path
+            Print head: plain text or a Diablo 630 stream. Servos: a list of moves as CSV or TOML; phase servo: also a
+            line of text.
+
+        Raises
+        ------
+        InputError
+            Everything that is wrong with it.
+        """
+        return self.method.load(Path(path))
+
+    def run(
+        self,
+        job: str | Path | AnyJob,
+        *,
+        signals: Sequence[str] | None = None,
+        every: int | None = None,
+        trace_file: str | Path | None = None,
+        progress: Progress | None = None,
+    ) -> "Run":
+        """Do a job from power-on.
+
+        Parameters
+        ----------
+        job : path or job
+            A file as of `load_job`, or what that returned.
         signals : sequence of str, optional
             Registers to record; "all" for every one. Default: what the report needs.
-        every : int
-            Ticks of 40 us between two rows; 0 records nothing.
+        every : int, optional
+            Base ticks between two rows; 0 records nothing. Default: the method's.
         trace_file : path, optional
             Stream the trace to this HDF5 file as it arises: memory then stays constant however long the job is.
         progress : callable, optional
@@ -90,7 +109,7 @@ class Axis:
         Returns
         -------
         Run
-            Also when the axis failed: see `Run.printed` and `Run.failure`.
+            Also when the axis failed: see `Run.done` and `Run.failure`.
 
         Raises
         ------
@@ -99,28 +118,100 @@ class Axis:
         DetentError
             A signal is unknown, or the trace cannot be written.
         """
-        loaded = job if isinstance(job, PrintJob) else load_job(job)
+        method = self.method
+        loaded = self.load_job(job) if isinstance(job, str | Path) else job
+        every = method.every if every is None else every
         if every == 0:
-            return Run(self, print_job(self.spec, loaded, progress=progress), None)
-        names = list(default_signals() if signals is None else signals)
-        about: dict[str, str | float | int] = {
-            "axis": self.name, "job": loaded.name, "seed": self.spec.encoder.seed, "fidelity": self.spec.axis.fidelity,
-        }  # fmt: skip
+            return Run(self, method.run(loaded, progress=progress), None)
+        names = list(method.signals if signals is None else signals)
+        about: dict[str, str | float | int] = {"axis": self.name, "job": loaded.name, "seed": method.seed}
+        fidelity = getattr(self.spec.axis, "fidelity", None)
+        about |= {"fidelity": fidelity} if fidelity else {}
         memory = _Memory()
-        recorder = Recorder(PrintHead, names, every=every, period=TICK, sink=memory)
+        recorder = Recorder(method.registers, names, every=every, period=method.tick, sink=memory)
         if trace_file is None:
-            result = print_job(self.spec, loaded, recorder=recorder, progress=progress)
+            result = method.run(loaded, recorder=recorder, progress=progress)
         else:
             with TraceWriter(
                 trace_file, recorder.dtype, units=recorder.units, docs=recorder.docs, attributes=about
             ) as writer:
                 memory.also, memory.most = writer.append, KEPT_ROWS
-                result = print_job(self.spec, loaded, recorder=recorder, progress=progress)
+                result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, memory.trace(recorder, about))
 
-    def compare(self) -> DriveComparison:
-        """Power-on default, nominal table and identified drive on this (drifted) axis."""
-        return compare_drives(self.spec)
+    def compare(self, progress: Progress | None = None) -> tuple[AnyComparison, ...]:
+        """Hold the method against the ways it was made to better, on this axis.
+
+        Returns
+        -------
+        tuple
+            Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo:
+            one `FeedbackComparison`.
+        """
+        return compare_methods(self.spec, progress)
+
+    def timing(
+        self,
+        at: float,
+        duration: float,
+        *,
+        job: str | Path | AnyJob | None = None,
+        signals: Sequence[str] | None = None,
+        progress: Progress | None = None,
+    ) -> "Timing":
+        """Record every clock of a short stretch of a run.
+
+        Parameters
+        ----------
+        at, duration : float
+            Begin, since power-on, and length [s].
+        job : path or job, optional
+            What the axis does meanwhile; a short move or word of its own by default.
+        signals : sequence of str, optional
+            Registers; a choice of the method's by default.
+        progress : callable, optional
+            ``progress(share, text)``.
+
+        Raises
+        ------
+        InputError
+            The job cannot be read or does not fit the axis.
+        DetentError
+            A signal is unknown, the stretch is too long, or the run ends before it.
+        """
+        method = self.method
+        loaded = self.load_job(job) if isinstance(job, str | Path) else job or method.sample_job()
+        stretch = Stretch(at, duration, tuple(method.timing if signals is None else signals), self.name)
+
+        def run(recorder: Any) -> AnyResult:
+            return method.run(loaded, recorder=recorder, progress=progress)
+
+        return Timing(capture(method.registers, method.clocking, method.tick, run, stretch))
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Clocked signals over a short stretch.
+
+    Attributes
+    ----------
+    waveforms : Waveforms
+        Each signal as its changes over time.
+    """
+
+    waveforms: Waveforms
+
+    def plot(self, path: str | Path) -> Path:
+        """Draw the timing diagram into a PNG, SVG or PDF file."""
+        from detent.report.timing import plot_timing
+
+        plot_timing(self.waveforms, path)
+        return Path(path)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a VCD file, which GTKWave and Surfer open."""
+        save_vcd(self.waveforms, path)
+        return Path(path)
 
 
 class _Memory:
@@ -152,47 +243,44 @@ class Run:
     ----------
     axis : Axis
         The axis.
-    result : PrintRun
-        Figures, lines, identified constants.
+    result : PrintRun or MoveRun
+        Figures; lines and identified constants, or moves.
     trace : Trace or None
         Recorded registers over time.
     settings : dict
-        Small print for the report, beside file, fidelity and seed.
+        Small print for the report, beside file and seed.
+    comparisons : tuple
+        What `Axis.compare` found, if the report shall show it.
     """
 
     axis: Axis
-    result: PrintRun
+    result: AnyResult
     trace: Trace | None
     settings: dict[str, str] = field(default_factory=dict[str, str])
+    comparisons: tuple[AnyComparison, ...] = ()
 
     @property
-    def printed(self) -> bool:
-        """True when the whole job is on paper."""
-        return self.result.printed
+    def done(self) -> bool:
+        """True when the axis did the whole job."""
+        return self.result.done
 
     @property
     def failure(self) -> str:
-        """Why it is not, and what to do."""
+        """Why it did not, and what to do."""
         return self.result.failure
+
+    def summary(self) -> list[tuple[str, str]]:
+        """The figures a person wants first: name and text."""
+        return summary_rows(self.axis.spec, self.result)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
         return {"axis": self.axis.name, "file": self.axis.file.file} | self.result.to_dict()
 
-    def report_data(self) -> ReportData:
-        """What the report shows."""
-        settings = {
-            "axis file": self.axis.file.file,
-            "fidelity": self.axis.spec.axis.fidelity,
-            "seed": str(self.axis.spec.encoder.seed),
-        }
-        return print_report(self.axis.spec, self.result, self.trace, settings=settings | self.settings)
-
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
-        from detent.report.html import write_report
-
-        write_report(self.report_data(), path)
+        settings = {"axis file": self.axis.file.file, "seed": str(self.axis.method.seed)} | self.settings
+        report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings)(path)
         return Path(path)
 
     def save(self, path: str | Path) -> Path:
@@ -208,8 +296,6 @@ class Run:
         return Path(path)
 
     def _trace(self) -> Trace:
-        from detent.errors import DetentError
-
         if self.trace is None:
             raise DetentError("this run recorded nothing; run with every >= 1")
         return self.trace
@@ -237,4 +323,4 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-__all__ = ["Axis", "Run", "load", "load_trace"]
+__all__ = ["Axis", "Run", "Timing", "load", "load_trace"]

@@ -12,6 +12,8 @@ import detent
 from detent import axis as axis_module
 from detent.errors import DetentError, InputError
 from detent.planning.print_job import load_job
+from detent.report.print_report import print_report
+from detent.simulation.move_file import load_moves
 from detent.simulation.print_run import default_signals
 from detent.simulation.recorder import ROWS
 
@@ -55,12 +57,15 @@ def test_examples_are_files_that_load() -> None:
     assert names == sorted(names)
     for path in detent.examples():
         assert detent.example(path.name) == path
-        assert detent.load(path).check().rows if path.suffix == ".toml" else load_job(path).lines
+        if path.suffix == ".csv" or "moves" in path.name:
+            assert load_moves(path).count
+        else:
+            assert detent.load(path).check().rows if path.suffix == ".toml" else load_job(path).lines
 
 
 def test_an_example_that_is_not_there_is_said_with_those_that_are() -> None:
     with pytest.raises(
-        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, letter\.txt, print_"
+        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, filtered_servo\.toml, letter\.txt, "
     ):
         detent.example("robot.toml")
 
@@ -88,7 +93,7 @@ def test_a_file_with_errors_tells_all_of_them(tmp_path: Path) -> None:
 
 
 def test_a_run_tells_what_happened(run: detent.Run) -> None:
-    assert run.printed
+    assert run.done
     assert run.failure == ""
     found = run.to_dict()
     assert (found["axis"], found["file"], found["job"]) == ("print head", str(AXIS), "letter.txt")
@@ -130,7 +135,7 @@ def test_signals_can_be_checked_before_a_run() -> None:
 
 def test_a_run_without_record_says_so_when_asked_for_it(tmp_path: Path) -> None:
     done = detent.load(AXIS).run(LETTER, every=0)
-    assert done.printed
+    assert done.done
     assert done.trace is None
     for wanted in (lambda: done.save(tmp_path / "t.csv"), lambda: done.plot(["train.current"], tmp_path / "t.png")):
         with pytest.raises(DetentError, match="this run recorded nothing; run with every >= 1"):
@@ -145,10 +150,10 @@ def test_a_job_that_is_missing_is_an_input_error(tmp_path: Path) -> None:
 
 def test_an_axis_that_fails_gives_a_run_all_the_same() -> None:
     done = detent.load(AXIS, ["disturbance.obstacle.position=7 in"]).run(LETTER)
-    assert not done.printed
+    assert not done.done
     assert "obstructed" in done.failure
     assert done.trace is not None
-    assert done.to_dict()["printed"] is False
+    assert done.to_dict()["done"] is False
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".csv", ".parquet"])
@@ -186,7 +191,7 @@ def test_memory_is_bounded_and_the_file_is_not(
     assert len(done.trace) == 20_000
     assert len(detent.load_trace(tmp_path / "long.h5")) == len(run.trace)
     # The report draws from what was kept, and from the first lines when the last ones are beyond it.
-    data = done.report_data()
+    data = print_report(done.axis.spec, done.result, done.trace, settings={})
     assert data.errors is not None
     assert data.errors.total == run.result.columns
     assert data.profile is not None
@@ -219,7 +224,7 @@ def test_progress_is_told() -> None:
 
 
 def test_three_drives_are_compared_on_the_drifted_machine() -> None:
-    found = detent.load(AXIS, ["disturbance.motor_constant=10 %"]).compare()
+    (found,) = detent.load(AXIS, ["disturbance.motor_constant=10 %"]).compare()
     worst = np.abs(found.errors).max(axis=(1, 2))
     assert found.methods == ("power-on default", "nominal table", "identified")
     assert worst[2] < 0.03 < worst[1] < worst[0]

@@ -26,7 +26,7 @@ from detent.simulation.trace_files import load_trace
 pytestmark = pytest.mark.compiled
 
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
-VERBS = ("examples", "check", "run", "compare", "plot", "registers")
+VERBS = ("examples", "check", "run", "compare", "timing", "plot", "registers")
 OBSTACLE = ("--set", "disturbance.obstacle.position=7 in")
 
 
@@ -299,7 +299,7 @@ def test_check_as_json_has_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     ).items()
     assert set(data["derived"][0]) == {"name", "value", "unit", "text", "formula"}
     assert [set(warning) for warning in data["warnings"]] == [{"name", "value", "limit", "consequence", "remedy"}]
-    monkeypatch.setattr("detent.axisfile.derive.Machine.acceleration", float("inf"))
+    monkeypatch.setattr("detent.axisfile.print_head.derive.Machine.acceleration", float("inf"))
     assert None in [row["value"] for row in call("check", AXIS, "--json").data["derived"]]  # not Infinity
 
 
@@ -391,7 +391,7 @@ def test_a_run_as_json_has_every_figure_and_the_files(tmp_path: Path) -> None:
     assert answer.status == 0
     data = answer.data
     assert set(data) == {
-        "axis", "file", "job", "kind", "pages", "printed", "failure", "warnings", "time_ready", "time_end",
+        "axis", "file", "job", "kind", "pages", "done", "failure", "warnings", "time_ready", "time_end",
         "print_time", "characters", "characters_per_second", "columns", "missed", "worst_error", "rms_error",
         "turn_arounds", "repositions", "peak_current", "energy", "width", "speeds", "identified", "lines", "notes",
         "files",
@@ -415,7 +415,7 @@ def test_an_obstacle_in_the_way_is_status_1_and_the_reason() -> None:
     assert "Not printed" in Path("runs/print_head-letter/report.html").read_text(encoding="utf-8")
     data = call("run", AXIS, "--job", LETTER, *OBSTACLE, "--json")
     assert data.status == 1
-    assert data.data["printed"] is False
+    assert data.data["done"] is False
     assert "obstructed" in data.data["failure"]
 
 
@@ -482,12 +482,14 @@ def test_compare_shows_three_drives_and_draws_them(tmp_path: Path) -> None:
 
 def test_compare_as_json(tmp_path: Path) -> None:
     data = call("compare", AXIS, "--json").data
-    assert set(data) == {"target", "speeds", "methods", "machine", "files"}
+    assert set(data) == {"comparisons", "files"}
+    (data,) = data["comparisons"]
+    assert set(data) == {"title", "target", "speeds", "methods"}
     assert [method["method"] for method in data["methods"]] == ["power-on default", "nominal table", "identified"]
     assert set(data["methods"][0]) == {
         "method", "constants", "errors_right", "errors_left", "mean_error", "time_to_band",
     }  # fmt: skip
-    assert data["machine"] == "machine as in its file"
+    assert data["title"] == "Steady speed error, right / left (machine as in its file)"
     assert (tmp_path / "comparison.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -576,7 +578,7 @@ def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path: P
     env = {"DETENT_CACHE_DIR": str(tmp_path / "cache")}
     first, second = (shell(*words, cwd=tmp_path, env=env) for _ in range(2))
     assert (first.status, second.status) == (0, 0)
-    assert first.err == "First run with this version: compiling the axis, about 15 s; later runs start at once.\n"
+    assert first.err == "First run with this version: compiling the axis, up to 15 s; later runs start at once.\n"
     assert second.err == ""
     assert first.out == second.out
 

@@ -1,0 +1,98 @@
+"""The command `detent`: its verbs register themselves here, and its errors become one message and an exit status."""
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, cast
+
+import typer
+from typer.core import TyperGroup
+
+from detent import __version__
+from detent.cli.terminal import discard_output
+from detent.errors import DetentError
+
+DONE, NOT_DONE = 0, 1
+
+
+class Commands(TyperGroup):
+    """The verbs. Errors that detent raises on purpose become one message and an exit status, never a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb."""
+        status = DONE
+        try:
+            super().invoke(ctx)
+        except DetentError as error:
+            sys.stderr.write(f"{error}\n")
+            status = error.exit_status
+        except typer.Exit as left:
+            status = left.exit_code
+        except BrokenPipeError:
+            discard_output()
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
+            discard_output()
+        raise typer.Exit(status)
+
+
+app = typer.Typer(
+    name="detent",
+    cls=Commands,
+    help="Positioning control as software: describe an axis in one file, check it, run a job on it.",
+    epilog="Exit status: 0 done, 1 the axis did not do it (the reason is shown), 2 wrong input.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace or add a value of the file; repeat for more."),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print machine-readable JSON instead of text.")]
+Signals = Annotated[
+    list[str] | None,
+    typer.Option("--signals", metavar="NAMES", help="Registers, comma-separated; patterns such as 'head.*' too."),
+]
+
+
+JOB_HELP = (
+    "What the axis does. Print head: plain text or a Diablo 630 stream. Servos: a list of moves (.csv, .toml); "
+    "phase servo: text (.txt) too."
+)
+Job = Annotated[
+    Path | None,
+    typer.Option(
+        "--job",
+        help=JOB_HELP,
+    ),
+]
+
+
+def main() -> NoReturn:
+    """Entry point."""
+    for stream in (sys.stdout, sys.stderr):
+        # A file name may hold bytes, and a letter signs, that the terminal's encoding does not know.
+        with suppress(AttributeError):
+            cast("Any", stream).reconfigure(errors="backslashreplace")
+    app()
+    raise SystemExit(DONE)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"detent {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options before the verb."""

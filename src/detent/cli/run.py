@@ -1,0 +1,147 @@
+"""`detent run`: a job on the simulated axis."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, Set, app
+from detent.cli.terminal import make_console, print_json, progress_bar, say_if_cold, split_names
+from detent.errors import DetentError
+
+TRACE_KINDS = ("h5", "csv", "parquet")
+
+
+@app.command()
+def run(
+    file: File,
+    job: Annotated[
+        Path,
+        typer.Option(
+            "--job",
+            help=JOB_HELP,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FOLDER",
+            help="Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB",
+        ),
+    ] = None,
+    overrides: Set = None,
+    signals: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--signals",
+            metavar="NAMES",
+            help="Registers to record beside the usual, comma-separated; "
+            "patterns such as 'head.*' or 'all' too. `detent registers` lists them.",
+        ),
+    ] = None,
+    every: Annotated[
+        int | None,
+        typer.Option(
+            "--every",
+            min=0,
+            max=10_000_000,
+            help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us); 0 records "
+            "nothing. Default: 10, 256, 10.",
+        ),
+    ] = None,
+    formats: Annotated[
+        str, typer.Option("--trace", metavar="KINDS", help="Trace files: h5, csv, parquet, comma-separated.")
+    ] = "h5,csv",
+    comparison: Annotated[
+        bool,
+        typer.Option("--compare/--no-compare", help="Servos: show the comparison with other methods in the report."),
+    ] = True,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Do a job on the simulated axis, from power-on: print a text, or make a list of moves."""
+    from detent.axis import load
+
+    kinds = _trace_kinds(formats) if every != 0 else []
+    axis = load(file, overrides or [])
+    loaded = axis.load_job(job)
+    folder = output or Path("runs") / f"{file.stem}-{job.stem}"
+    wanted = [*axis.method.signals, *split_names(signals)]
+    axis.check_signals(wanted)
+    _make_folder(folder)
+    say_if_cold()
+    with progress_bar(quiet=as_json) as progress:
+        store = folder / "trace.h5" if kinds else None
+        done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
+        done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
+        if comparison and axis.spec.axis.method != "print_head":
+            done.comparisons = axis.compare(progress)
+        progress(1.0, "writing the report")
+        written = [done.report(folder / "report.html"), *_convert_trace(folder, kinds)]
+    if as_json:
+        print_json(done.to_dict() | {"files": [str(path) for path in written]})
+    else:
+        _print_run(done, written)
+    if not done.done:
+        raise typer.Exit(NOT_DONE)
+
+
+def _trace_kinds(formats: str) -> list[str]:
+    kinds = split_names([formats])
+    for kind in kinds:
+        if kind not in TRACE_KINDS:
+            raise DetentError(f"--trace: came {kind!r}; allowed: h5, csv, parquet, comma-separated; choose of these")
+    if "parquet" in kinds:
+        from detent.simulation.trace_files import need_parquet
+
+        need_parquet()
+    return list(dict.fromkeys(kinds))
+
+
+def _make_folder(folder: Path) -> None:
+    """An output folder without the files of an earlier run: a report must not stand beside another run's trace."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise DetentError(f"--output {folder}: cannot be written ({error.strerror}); choose another folder") from error
+
+
+def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
+    """The HDF5 trace is there; make the others from it and drop it if it was not asked for."""
+    from detent.simulation.trace_files import convert_trace
+
+    store = folder / "trace.h5"
+    for kind in kinds:
+        if kind != "h5":
+            convert_trace(store, folder / f"trace.{kind}")
+    if kinds and "h5" not in kinds:
+        store.unlink()
+    return [folder / f"trace.{kind}" for kind in kinds]
+
+
+def _print_run(done: Any, written: list[Path]) -> None:
+    console = make_console()
+    result, prints = done.result, done.axis.spec.axis.method == "print_head"
+    if done.done:
+        words = f"Printed {result.job.name} on" if prints else f"{result.job.name}: every move arrived on"
+        console.print(f"{words} {done.axis.name}.", style="bold green", soft_wrap=True)
+    else:
+        words = "Not printed" if prints else "Not done"
+        console.print(f"{words}: {result.failure}", style="bold red", soft_wrap=True)
+    for name, text in done.summary():
+        console.print(f"  {name:<20} {text}", soft_wrap=True)
+    for text in result.warnings:
+        console.print(f"  warning: {text}", style="yellow", soft_wrap=True)
+    notes = getattr(result.job, "notes", ())
+    for note in notes[:5]:
+        console.print(f"  note: byte {note.offset}, {note.code}: {note.text}", soft_wrap=True)
+    if len(notes) > 5:
+        console.print(f"  {len(notes) - 5} more notes; --json shows them all")
+    for path in written:
+        console.print(f"  {path.stem if path.stem == 'report' else 'trace':<20} {path}", soft_wrap=True)
