@@ -1,11 +1,14 @@
 """How Sphinx builds the documentation: Markdown through MyST, the furo theme, API pages from the docstrings.
 
-The reference tables (generate.py) and the figures of the explanation (figures.py) are made anew from the code.
+The reference tables (generate.py) and the figures of the explanation (figures.py, figures_servos.py) are made anew from
+the code.
 """
 
+import re
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "docs")]
@@ -39,10 +42,18 @@ html_css_files = ["captions.css"]
 html_show_sourcelink = False
 
 
-def setup(_app: object) -> None:
+def keep_bars(_app: Any, _what: str, _name: str, _object: object, _options: object, lines: list[str]) -> None:
+    """Leave |x| in a docstring the magnitude that it is there; reStructuredText would take it for a substitution."""
+    lines[:] = [re.sub(r"\|(\w+)\|", r"\|\1\|", line) for line in lines]
+
+
+def setup(app: Any) -> None:
     """Make the generated parts before any page is read."""
+    app.connect("autodoc-process-docstring", keep_bars)
     import figures
+    import figures_servos
     import generate
 
     generate.write_all()
     figures.draw_all()
+    figures_servos.draw_all()

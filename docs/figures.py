@@ -1,9 +1,10 @@
 """The figures of the explanation: each is drawn from a run of the simulation when the documentation is built.
 
-Called by conf.py; they are drawn again when this file or the package has changed.
+Called by conf.py; they are drawn again when this file or the package has changed. The figures of the servos are in
+figures_servos.py, which uses the helpers of this file.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -200,34 +201,40 @@ def comparison() -> None:
     from detent.report.print_report import comparison_figure
 
     axis = detent.load(detent.example("print_head.toml"), DRIFTED)
-    plot_comparison(comparison_figure(axis.compare(), axis.spec), FOLDER / "comparison.svg")
+    (drives,) = axis.compare()
+    plot_comparison(comparison_figure(drives, axis.spec), FOLDER / "comparison.svg")
 
 
 FIGURES = (power_up, parts_of_the_drive, two_points, transition, turn_around, comparison)
 
 
-def stamp() -> str:
-    """Changes with this file and with every source of the package, examples included."""
+def stamp(source: Path) -> str:
+    """Changes with this file, with `source`, and with every source of the package, examples included."""
     from hashlib import sha256
 
     from detent.kernel.cache import PACKAGE
 
-    digest = sha256(Path(__file__).read_bytes())
-    for source in sorted(path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".toml", ".txt")):
-        digest.update(source.read_bytes())
+    digest = sha256(Path(__file__).read_bytes() + source.read_bytes())
+    for part in sorted(path for path in PACKAGE.rglob("*") if path.suffix in (".py", ".toml", ".txt", ".csv")):
+        digest.update(part.read_bytes())
     return digest.hexdigest()
 
 
-def draw_all() -> None:
-    """Draw every figure, unless those of this stamp are there."""
+def draw_stale(figures: Sequence[Callable[[], None]], source: Path) -> None:
+    """Draw the figures of the file `source`, unless those of its present stamp are there."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    kept, now = FOLDER / "figures.stamp", stamp()
+    kept, now = FOLDER / f"{source.stem}.stamp", stamp(source)
     if kept.exists() and kept.read_text(encoding="utf-8") == now:
         return
-    for draw in FIGURES:
+    for draw in figures:
         draw()
-    run.cache_clear()
     kept.write_text(now, encoding="utf-8")
+
+
+def draw_all() -> None:
+    """Draw every figure of this file."""
+    draw_stale(FIGURES, Path(__file__))
+    run.cache_clear()
 
 
 if __name__ == "__main__":

@@ -29,39 +29,56 @@ def code(text: str) -> str:
     return f"`{text}`" if text else ""
 
 
+STATE = "What changes while the axis runs. `--signals` records any of it but the arrays."
+PARAMETERS = "What the axis file decides. It does not change while the axis runs."
+
+
+def method_heading(method: Any) -> str:
+    """Heading of a method's section, with the word the axis file names it by."""
+    return f'## {method.title[:1].upper()}{method.title[1:]}\n\n`method = "{method.name}"`\n'
+
+
 def registers() -> str:
-    """State and parameters of the print-head axis."""
-    from detent.systems.print_head import PrintHead, PrintHeadParams
+    """State and parameters of the axis of each method."""
+    from detent.axisfile.methods import METHODS
 
     parts: list[str] = []
-    for title, declared, what in (
-        ("State", PrintHead, "What changes while the axis runs. `--signals` records any of it but the arrays."),
-        ("Parameters", PrintHeadParams, "What the axis file decides. It does not change while the axis runs."),
-    ):
-        parts.append(f"## {title}\n\n{what} Class `{declared.__name__}`.\n\n{declared.markdown_table()}")
+    for method in METHODS.values():
+        parts.append(method_heading(method))
+        for title, what, declared in (
+            ("State", STATE, method.registers()),
+            ("Parameters", PARAMETERS, method.parameters()),
+        ):
+            parts.append(f"### {title}\n\n{what} Class `{declared.__name__}`.\n\n{declared.markdown_table()}")
     return "\n".join(parts)
 
 
 def axis_file() -> str:
-    """Every key of the axis file, one section per table."""
+    """Every key of the axis file, one section per method, in it one per table."""
+    from detent.axisfile.methods import METHODS
+
+    return "\n".join(f"{method_heading(method)}\n{keys_of(method)}" for method in METHODS.values())
+
+
+def keys_of(method: Any) -> str:
+    """Every key of a method's axis file, one section per table."""
     from detent.axisfile.reference import reference_rows
 
     sections: dict[str, list[tuple[str, ...]]] = {}
-    for row in reference_rows():
+    for row in reference_rows(method.name):
         place, _, key = row.key.rpartition(".")
         default = f"must be stated, such as {code(row.example)}" if row.required else row.default or "none"
         sections.setdefault(place, []).append((code(key), default, row.allowed, row.unit, row.doc))
-    docs = dict(_tables())
+    docs = dict(_tables(method.spec))
     head = ("key", "default", "allowed", "SI unit inside", "meaning")
-    return "\n".join(f"## `[{place}]`\n\n{docs[place]}\n\n{table(head, rows)}" for place, rows in sections.items())
+    return "\n".join(f"### `[{place}]`\n\n{docs[place]}\n\n{table(head, rows)}" for place, rows in sections.items())
 
 
-def _tables(model: Any = None, prefix: str = "") -> Iterator[tuple[str, str]]:
+def _tables(model: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Dotted name and first sentence of every table of the schema."""
     from detent.axisfile.fields import file_key, table_of
-    from detent.axisfile.schema import PrintHeadSpec
 
-    for name, field in (model or PrintHeadSpec).model_fields.items():
+    for name, field in model.model_fields.items():
         below = table_of(field)
         if below is not None:
             path = prefix + file_key(name, field)
@@ -102,12 +119,25 @@ def command_line() -> str:
     return "\n".join(parts)
 
 
-def status_codes() -> str:
-    """Bits of the status byte SB1."""
-    from detent.errors import SB1_TEXT
+PRINT_HEAD_STATUS = """## Print head: status byte SB1
 
-    rows = [(code("00"), "done")] + [(code(f"{bit:02X}"), text) for bit, text in SB1_TEXT.items()]
-    return table(("bit", "what happened; what to do"), rows)
+The axis computer answers every command with one status byte, SB1. `00` means done; each bit that is set means one
+thing. During a command of several bytes `FF` means: byte taken, send the next.
+"""
+SERVO_FAULTS = """## Filtered servo: faults
+
+The cause stands in the register `deviation.cause`. A phase servo knows no faults: it settles, or it is never ready.
+"""
+
+
+def status_codes() -> str:
+    """Bits of the status byte SB1, and causes of a servo's faults."""
+    from detent.errors import SB1_TEXT, SERVO_FAULT_TEXT
+
+    head = "what happened; what to do"
+    bits = [(code("00"), "done")] + [(code(f"{bit:02X}"), text) for bit, text in SB1_TEXT.items()]
+    causes = [(code(str(cause)), text) for cause, text in SERVO_FAULT_TEXT.items()]
+    return f"{PRINT_HEAD_STATUS}\n{table(('bit', head), bits)}\n{SERVO_FAULTS}\n{table(('cause', head), causes)}"
 
 
 def motors() -> str:

@@ -7,11 +7,14 @@ from functools import cache
 import pytest
 from tests.docs.pages import ROOT, inline_code_of, page_name
 
+from detent.axisfile.methods import METHODS
 from detent.axisfile.reference import reference_rows
 from detent.kernel.registers import Registers
-from detent.systems.print_head import PrintHead, PrintHeadParams
 
-PAGES = [ROOT / "docs" / "explanation" / name for name in ("one-tick.md", "print-head.md")]
+PAGES = [
+    ROOT / "docs" / "explanation" / name
+    for name in ("one-tick.md", "print-head.md", "phase-servo.md", "filtered-servo.md")
+]
 # `module.function`, `module.Class.method`, `block.register`; a file name such as `letter.txt` has a known ending.
 DOTTED = re.compile(r"[a-z_]+(\.\w+)+")
 FILE_ENDINGS = (".toml", ".txt", ".py", ".h5", ".md", ".prn", ".html")
@@ -31,7 +34,8 @@ def modules():
 
 def is_register(name):
     """Tell whether `name` is a register, or a block of them, of the state or of the parameters."""
-    leaves = [leaf.path for registers in (PrintHead, PrintHeadParams) for leaf in registers.leaves()]
+    declared = [registers for method in METHODS.values() for registers in (method.registers(), method.parameters())]
+    leaves = [leaf.path for registers in declared for leaf in registers.leaves()]
     return any(path == name or path.startswith(name + ".") for path in leaves)
 
 
@@ -52,7 +56,9 @@ def is_code(name):
 
 def is_axis_key(name):
     """Tell whether `name` is a key, or a table, of the axis file."""
-    return any(row.key == name or row.key.startswith(name + ".") for row in reference_rows())
+    return any(
+        row.key == name or row.key.startswith(name + ".") for method in METHODS for row in reference_rows(method)
+    )
 
 
 def exists(name):

@@ -8,18 +8,25 @@ import pytest
 from tests.docs.pages import ROOT
 
 import detent
+from detent.axisfile.methods import METHODS
 from detent.axisfile.reference import reference_rows
 from detent.control import head_computer
 from detent.errors import SB1_TEXT
 from detent.simulation.trace import Trace
-from detent.systems.print_head import PrintHead, PrintHeadParams
 
-LEAVES = [*PrintHead.leaves(), *PrintHeadParams.leaves()]
+LEAVES = [
+    (f"{name}: {leaf.path}", leaf)
+    for name, method in METHODS.items()
+    for declared in (method.registers(), method.parameters())
+    for leaf in declared.leaves()
+]
+KEYS = [(f"{name}: {row.key}", row) for name in METHODS for row in reference_rows(name)]
 
-# Registers without a unit are flags, directions, indices, or pure numbers; their text says so in one of these ways.
+# Registers without a unit are flags (one byte), directions, indices, or pure numbers; their text says so in one of
+# these ways.
 PURE = re.compile(
     r"\b[01]:? |\b[01],|direction|level|line\b|quarter cycles|probability|column|bank"
-    r"|from (current|velocity)|pulse responses"
+    r"|from (current|velocity)|pulse responses|K[SP]?[123]: |multiplier|2\^-|bits after"
 )
 # Classes that a script works with.
 DOCUMENTED = {
@@ -40,13 +47,15 @@ GENERATE = generator()
 OPTIONS = [(name, option) for name, command in GENERATE.commands().items() for option in command.params]
 
 
-@pytest.mark.parametrize("leaf", LEAVES, ids=lambda leaf: leaf.path)
+@pytest.mark.parametrize("leaf", [pytest.param(leaf, id=name) for name, leaf in LEAVES])
 def test_register_has_a_meaning_and_a_unit(leaf):
     assert len(leaf.doc) > 3
-    assert leaf.unit or PURE.search(leaf.doc), f"{leaf.path}: no unit, and {leaf.doc!r} is no pure number or flag"
+    assert leaf.unit or leaf.width.code == "u1" or PURE.search(leaf.doc), (
+        f"{leaf.path}: no unit, and {leaf.doc!r} is no pure number or flag"
+    )
 
 
-@pytest.mark.parametrize("row", reference_rows(), ids=lambda row: row.key)
+@pytest.mark.parametrize("row", [pytest.param(row, id=name) for name, row in KEYS])
 def test_key_of_the_axis_file_has_a_meaning_and_a_range(row):
     assert len(row.doc) > 3
     assert row.allowed
@@ -76,8 +85,11 @@ def test_a_page_includes_each_generated_part(name):
 
 def test_generated_parts_hold_every_register_key_command_and_motor():
     registers, keys = GENERATE.registers(), GENERATE.axis_file()
-    assert all(f"`{leaf.path}`" in registers for leaf in LEAVES)
-    assert all(f"`{row.key.rpartition('.')[2]}`" in keys for row in reference_rows())
+    assert all(f"`{leaf.path}`" in registers for _, leaf in LEAVES)
+    assert all(f"`{row.key.rpartition('.')[2]}`" in keys for _, row in KEYS)
+    for page in (registers, keys):
+        sections = [line for line in page.splitlines() if line.startswith("## ")]
+        assert [line.lower() for line in sections] == [f"## {method.title.lower()}" for method in METHODS.values()]
     text = GENERATE.command_line()
     assert all(f"\n## {name}\n" in "\n" + text for name in GENERATE.commands())
     assert all(

@@ -26,7 +26,9 @@ class PulseGeneratorParams(Registers):
 class PulseGenerator(Registers):
     """What was asked for and what has been put out."""
 
-    goal: i8 = register("command position asked for, written by the host; set to `command` it stops at once", unit="count")
+    goal: i8 = register(
+        "command position asked for, written by the host; where the command is: stop at once", unit="count"
+    )
     rate: i8 = register("rate asked for, written by the host", unit="uHz")
     command: i8 = register("command position: pulses put out so far", unit="count")
     direction: i1 = register("direction of the pulses: 1, -1, or 0 at rest")

@@ -8,8 +8,8 @@ from detent.axisfile.methods import AnySpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.report.summary import move_summary_rows
 from detent.report.summary import summary_rows as print_summary_rows
-from detent.simulation.comparison import DriveComparison
 from detent.simulation.comparisons import AnyComparison
+from detent.simulation.drive_comparison import DriveComparison
 from detent.simulation.feedback_comparison import FeedbackComparison
 from detent.simulation.hold_comparison import HoldComparison
 from detent.simulation.methods import AnyResult

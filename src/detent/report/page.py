@@ -286,9 +286,7 @@ def paper_figure(title: str, caption: str, paper: Mapping[str, Any]) -> str:
             '<span class="group"><button id="page-back" disabled aria-label="page before">\u2039</button>'
             '<button id="page-next" aria-label="next page">\u203a</button></span><span id="page-label"></span>'
         )
-    caption += (
-        f" <b>Errors × {factor}</b> moves every character so many times too far, so that the errors can be seen."
-    )
+    caption += f" <b>Errors × {factor}</b> moves every character so many times too far, so that the errors can be seen."
     if left_out:
         caption += f" {further(left_out, 'page')} not drawn."
     content = f'<div class="controls">{controls}</div><div class="paper" id="paper" tabindex="0"></div>'

@@ -30,7 +30,7 @@ from detent.report.print_data import (
     SpeedProfile,
     TurnAround,
 )
-from detent.simulation.comparison import DriveComparison
+from detent.simulation.drive_comparison import DriveComparison
 from detent.simulation.print_run import ERROR_BIN, LineRecord, PrintRun
 from detent.simulation.trace import Trace
 

@@ -3,7 +3,7 @@
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
-from detent.simulation.comparison import DriveComparison, compare_drives
+from detent.simulation.drive_comparison import DriveComparison, compare_drives
 from detent.simulation.feedback_comparison import FeedbackComparison, compare_feedback
 from detent.simulation.hold_comparison import HoldComparison, compare_hold
 from detent.simulation.noise_comparison import NoiseComparison, compare_noise

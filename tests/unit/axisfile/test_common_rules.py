@@ -73,7 +73,7 @@ def test_the_override_that_a_remedy_shows_is_one_of_every_method(load_text, name
         load_text(text, "nonsense")
     (problem,) = caught.value.problems
     key, value = re.search(r"--set '([a-z.]+)=(.+)'", problem.remedy).groups()
-    field = dict((dotted(path), field) for path, field in leaf_fields(METHODS[name].spec))[key]
+    field = {dotted(path): field for path, field in leaf_fields(METHODS[name].spec)}[key]
     assert parse_quantity(value, unit_of(field)) > 0
 
 

@@ -14,7 +14,7 @@ from detent.planning.print_job import load_job, parse_diablo, parse_text
 from detent.report.print_data import ReportData
 from detent.report.print_page import render_report
 from detent.report.print_report import NEEDED, comparison_figure, drift_text, print_report
-from detent.simulation.comparison import DriveComparison, DriveConstants, DriveStart
+from detent.simulation.drive_comparison import DriveComparison, DriveConstants, DriveStart
 from detent.simulation.print_run import PrintRun, default_signals, print_job
 from detent.simulation.recorder import Recorder
 from detent.simulation.trace import Trace

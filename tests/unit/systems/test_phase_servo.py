@@ -13,8 +13,9 @@ from tests.phase_servo_rig import NO_TRACE, ConverterBench, Rig, make_spec
 
 from detent.axisfile.phase_servo.build import build_phase_servo
 from detent.control.phase_sequencer import ACQUIRE, HOLD, POSITION_MODE, SETTLE_BUSY, SETTLE_READY, SPEED, SPEED_MODE
+from detent.kernel.step import step
 from detent.simulation.machine import phase_servo_machine
-from detent.systems.phase_servo import PhaseServo, PhaseServoParams, advance, be_ready, switch_on
+from detent.systems.phase_servo import PhaseServo, PhaseServoParams, advance, be_ready, switch_on, tick
 
 ROOT = Path(__file__).resolve().parents[3]
 N = 64
@@ -254,10 +255,10 @@ def test_a_lost_sample_leaves_word_and_count():
 
 def test_a_corrupted_sample_turns_the_comparator_for_one_tick():
     rig, clean = unmoved(*burst("corrupt", 70)), unmoved()
-    for tick in range(80):
+    for n in range(80):
         rig.run_ticks(1)
         clean.run_ticks(1)
-        assert (rig.r.detector.ps != clean.r.detector.ps) == (tick == 70)
+        assert (rig.r.detector.ps != clean.r.detector.ps) == (n == 70)
 
 
 def test_a_push_acts_on_the_carriage_in_its_ticks():
@@ -329,3 +330,26 @@ def run_hash() -> str:
     advance(p, r, 5000, *NO_TRACE)
     digest.update(r.snapshot())
     return digest.hexdigest()
+
+
+@step
+def advance_eagerly(p: PhaseServoParams, r: PhaseServo, ticks: int) -> None:
+    """The same ticks with every word of the logic worked out in each of them."""
+    for _ in range(ticks):
+        r.changed = 1
+        tick(p, r, r.converters, r.train)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("overrides", [(), ("disturbance.lines.inserted=500 Hz", "detector.jitter=5 ns")])
+def test_words_worked_out_in_every_tick_are_the_same_bits(overrides):
+    """ADR 8: the words are combinational, so leaving out the ticks in which nothing changed leaves out nothing."""
+    lazy, eager = (Rig(*overrides) for _ in range(2))
+    for rig in (lazy, eager):
+        rig.run(0.25e-3)
+        rig.command(2)
+    lazy.run_ticks(120_000)
+    advance_eagerly(eager.p, eager.r, 120_000)
+    eager.r.sequencer.event = 0
+    assert lazy.r.snapshot() == eager.r.snapshot(), lazy.r.diff(eager.r)
+    assert lazy.r.sequencer.position != 0

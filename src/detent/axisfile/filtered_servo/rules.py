@@ -141,8 +141,8 @@ def _command(spec: FilteredServoSpec) -> Iterator[Contradiction]:
     if 0 < spec.method.command_acceleration < least * spec.pulse * (1 - BARELY):
         yield Contradiction(
             ("method.command_acceleration", "encoder.cycles_per_revolution", "mechanics.travel_per_revolution"),
-            f"0 m/s^2, or at least {least:.3g} pulses/s^2, {format_quantity(least * spec.pulse, 'm/s^2')}: a command that grows more "
-            "slowly does not grow at all",
+            f"0 m/s^2, or at least {least:.3g} pulses/s^2, {format_quantity(least * spec.pulse, 'm/s^2')}: a command "
+            "that grows more slowly does not grow at all",
             offer(FilteredServoSpec, "method.command_acceleration", at_least(least * spec.pulse, "m/s^2")),
         )
 

@@ -5,7 +5,7 @@ import pytest
 from tests.print_head_rig import make_spec
 
 from detent.errors import AxisError, DetentError
-from detent.simulation.comparison import (
+from detent.simulation.drive_comparison import (
     DriveConstants,
     MeasuringBench,
     compare_drives,
