@@ -1,12 +1,14 @@
 """Remedies that name a value: what they name is accepted, and nothing nearer to what was refused would be."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
+from detent.axisfile.methods import METHODS
 from detent.errors import InputError
 from detent.units import format_quantity
-from tests.bad_files import check_bad_file
+from tests.bad_files import Bad, check_bad_file
 
 VALUE = r'"[^"]*"|\[[^\]]*\]|[\w.+-]*\w'
 NAMED = re.compile(rf"set ([a-z_.]+) = ({VALUE})(?: and ([a-z_.]+) = ({VALUE}))?")
@@ -59,3 +61,27 @@ def check_rule(bad, good_text, load_text):
     count = check_remedies(load_text, text, bad.overrides, caught.value.problems[0])
     # A table of rules says how many values it expects a message to name.
     assert count == bad.remedy.count("set ")
+
+
+def given(name, *overrides, key, came, allowed, remedy, others=0):
+    """A bad axis made by overrides of the good file; the problem stands at the last that the rule looks at."""
+    return Bad(name, "--set", key, came, allowed, remedy, overrides=overrides, others=others)
+
+
+def broken_rules(method, entries, good_text, load_text, monkeypatch):
+    """Names of the rules of a method that bad files break."""
+    broken = set()
+
+    def noting(rule):
+        def run(spec):
+            for contradiction in rule(spec):
+                broken.add(rule.__name__)
+                yield contradiction
+
+        return run
+
+    watched = replace(METHODS[method], rules=tuple(noting(rule) for rule in METHODS[method].rules))
+    monkeypatch.setitem(METHODS, method, watched)
+    for bad in entries:
+        is_refused(load_text, bad.make(good_text), bad.overrides)
+    return broken

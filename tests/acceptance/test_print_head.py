@@ -49,7 +49,7 @@ from detent.drive.pwm_timer import CLOCKS_PER_PERIOD, PwmTimer, clock, trigger
 from detent.kernel.step import step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, fill_period
 from detent.plant.switched_motor import Scratch, SwitchedParams, fill_pulse_table, move_switched
-from detent.simulation.comparison import DriveComparison, DriveConstants, MeasuringBench, compare_drives
+from detent.simulation.drive_comparison import DriveComparison, DriveConstants, MeasuringBench, compare_drives
 
 INCH = 0.0254
 RIGHT, LEFT = 1, -1

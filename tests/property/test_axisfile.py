@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from detent.axisfile.check import check_spec
 from detent.axisfile.dump import dump_spec
 from detent.axisfile.load import axis_of
+from detent.axisfile.methods import METHODS
 from detent.axisfile.source import parse_source
 from detent.errors import InputError
 from detent.units import KINDS, QuantityError, format_quantity, parse_quantity
 
-GOOD = files("detent").joinpath("examples/print_head.toml").read_text(encoding="utf-8")
+EXAMPLES = {name: files("detent").joinpath(f"examples/{name}.toml").read_text(encoding="utf-8") for name in METHODS}
+GOOD = EXAMPLES["print_head"]
 
 FRAGMENTS = [
     "",
@@ -45,6 +47,10 @@ FRAGMENTS = [
     "[limits]",
     "[[motor]]",
     "[disturbance.push]",
+    "[disturbance.lines.burst]",
+    "[method]",
+    "[4, 16, 1]",
+    '"8 MHz"',
     "axis.method = 3",
     "drive = 3",
     "\x00",
@@ -115,14 +121,14 @@ def test_every_good_axis_can_be_looked_over(values):
 
 
 @given(
-    st.lists(
-        st.tuples(st.integers(0, len(GOOD)), st.integers(0, 40), st.sampled_from(FRAGMENTS)), min_size=1, max_size=6
-    )
+    st.sampled_from(sorted(EXAMPLES)),
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 40), st.sampled_from(FRAGMENTS)), min_size=1, max_size=6),
 )
-@settings(max_examples=300)
-def test_random_edits_give_problems_with_places_or_a_specification(edits):
-    text = GOOD
-    for start, length, fragment in edits:
+@settings(max_examples=500)
+def test_random_edits_give_problems_with_places_or_a_specification(name, edits):
+    text = EXAMPLES[name]
+    for place, length, fragment in edits:
+        start = round(place * len(text))
         text = text[:start] + fragment + text[start + length :]
     spec, problems = attempt(text)
     assert (spec is None) == bool(problems)
@@ -143,14 +149,15 @@ def test_any_text_gives_problems(text):
 
 
 @given(
+    st.sampled_from(sorted(EXAMPLES)),
     st.lists(
-        st.text(max_size=40) | st.from_regex(r"(limits|motor|drive|method)\.[a-z_]{2,10}=.{0,12}"),
+        st.text(max_size=40) | st.from_regex(r"(limits|motor|drive|method|clock|detector)\.[a-z_]{2,10}=.{0,12}"),
         min_size=1,
         max_size=3,
-    )
+    ),
 )
-def test_any_override_gives_problems_or_a_specification(overrides):
-    spec, problems = attempt(GOOD, *overrides)
+def test_any_override_gives_problems_or_a_specification(name, overrides):
+    spec, problems = attempt(EXAMPLES[name], *overrides)
     assert (spec is None) == bool(problems)
     assert all(problem.remedy for problem in problems)
 

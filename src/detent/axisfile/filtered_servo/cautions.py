@@ -10,7 +10,7 @@ from detent.axisfile.filtered_servo.derive import Machine, damping_of
 from detent.axisfile.filtered_servo.rules import RATE_UNIT, TICK
 from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.findings import Caution
-from detent.axisfile.nearest import BARELY, at_least, at_most, either, put
+from detent.axisfile.nearest import BARELY, at_least, at_most, either, offer, put
 from detent.units import format_quantity
 
 LEAST_GAIN_MARGIN = 1.5
@@ -137,7 +137,7 @@ def _resolution(machine: Machine) -> Iterator[Caution]:
             f"{counted:.3g} pulses in a sample",
             f"at least {WELL_COUNTED}",
             f"a count is uncertain by one, {100 / counted:.3g} % of the largest speed",
-            either(put("method.sample_period", f'"{micros} us"') if micros <= 100_000 else "", "use a finer encoder"),
+            either(offer(FilteredServoSpec, "method.sample_period", f'"{micros} us"'), "use a finer encoder"),
         )
     jump = machine.coefficient * method.scale
     if jump > LARGEST_JUMP:
@@ -154,14 +154,10 @@ def _resolution(machine: Machine) -> Iterator[Caution]:
         )
 
 
-def _ramp(machine: Machine) -> Iterator[Caution]:
-    spec, method = machine.spec, machine.spec.method
-    acceleration = method.command_acceleration
-    if acceleration == 0 or machine.gain_margin < 1:
-        return
-    least = RATE_UNIT / TICK * spec.pulse
-    per_tick = acceleration / least
-    if per_tick < FINE_RAMP * (1 - BARELY):
+def _command(machine: Machine) -> Iterator[Caution]:
+    least = RATE_UNIT / TICK * machine.spec.pulse
+    per_tick = machine.spec.method.command_acceleration / least
+    if 0 < per_tick < FINE_RAMP * (1 - BARELY):
         yield Caution(
             "method.command_acceleration",
             f"{per_tick:.3g} millionths of a pulse per second in each tick",
@@ -169,6 +165,12 @@ def _ramp(machine: Machine) -> Iterator[Caution]:
             "they are rounded down, and the command speeds up more slowly than stated",
             put("method.command_acceleration", at_least(FINE_RAMP * least, "m/s^2")),
         )
+
+
+def _ramp(machine: Machine) -> Iterator[Caution]:
+    spec, method = machine.spec, machine.spec.method
+    if method.command_acceleration == 0 or machine.gain_margin < 1:
+        return
     if machine.largest_count > spec.most_counted >= spec.counted(spec.limits.speed):
         bits = (machine.largest_count + 1).bit_length() + 1
         yield Caution(
@@ -177,7 +179,7 @@ def _ramp(machine: Machine) -> Iterator[Caution]:
             f"up to {spec.most_counted}",
             "the slide overshoots its speed, and a speed counter about to wrap is a fault",
             either(
-                put("method.counter_bits", bits) if bits <= 12 else "",
+                offer(FilteredServoSpec, "method.counter_bits", bits),
                 "lower limits.speed or the command's acceleration",
             ),
         )
@@ -189,14 +191,13 @@ def _ramp(machine: Machine) -> Iterator[Caution]:
             f"{machine.largest_error:.4g} pulses",
             f"up to {most}, the range of the position counter",
             "the following error leaves its range, which is a fault",
-            either(put("method.position_bits", bits) if bits <= 16 else "", "lower method.command_acceleration"),
+            either(offer(FilteredServoSpec, "method.position_bits", bits), "lower method.command_acceleration"),
         )
 
 
-def _force(machine: Machine) -> Iterator[Caution]:
+def _effort(machine: Machine) -> Iterator[Caution]:
     spec = machine.spec
     full = ((1 << (spec.drive.word_bits - 1)) - 1) * spec.force_per_count
-    force = spec.word_limit * spec.force_per_count
     if spec.limits.effort > full * (1 + BARELY):
         yield Caution(
             "limits.effort",
@@ -205,6 +206,11 @@ def _force(machine: Machine) -> Iterator[Caution]:
             "the limit never acts: the drive is weaker",
             put("limits.effort", at_most(full, "N")),
         )
+
+
+def _force(machine: Machine) -> Iterator[Caution]:
+    spec = machine.spec
+    force, top = spec.word_limit * spec.force_per_count, machine.top_speed
     if machine.static >= force:
         yield Caution(
             "static friction",
@@ -213,9 +219,7 @@ def _force(machine: Machine) -> Iterator[Caution]:
             "the slide never breaks loose",
             "raise limits.effort or the drive, or lower mechanics.friction",
         )
-        return
-    top = machine.top_speed
-    if top < spec.limits.speed:
+    elif top < spec.limits.speed:
         yield Caution(
             "drive at limits.speed",
             f"{spec.holding_word(spec.limits.speed):.4g} counts",
@@ -224,17 +228,18 @@ def _force(machine: Machine) -> Iterator[Caution]:
             "end above it",
             either(put("limits.speed", at_most(top, "m/s")) if top > 0 else "", "raise drive.supply"),
         )
-        return
+
+
+def _acceleration(machine: Machine) -> Iterator[Caution]:
+    spec = machine.spec
     left = (spec.word_limit - spec.holding_word(spec.limits.speed)) * spec.force_per_count / spec.mass
-    if spec.method.command_acceleration > left:
+    if spec.method.command_acceleration > left > 0:
         yield Caution(
             "force for method.command_acceleration",
             format_quantity(spec.method.command_acceleration, "m/s^2"),
             f"up to {format_quantity(left, 'm/s^2')}, what the drive gives at limits.speed",
             "the drive is clipped and the following error grows while the command speeds up",
-            either(
-                put("method.command_acceleration", at_most(left, "m/s^2")) if left > 0 else "", "lower limits.speed"
-            ),
+            either(put("method.command_acceleration", at_most(left, "m/s^2")), "lower limits.speed"),
         )
 
 
@@ -246,9 +251,7 @@ def _rest(machine: Machine) -> Iterator[Caution]:
             f"up to {error} pulses",
             f"up to method.in_position, {method.in_position}",
             "the slide rests off its place, and moves end by method.timeout",
-            either(
-                put("method.in_position", error) if error <= 1000 else "", "raise method.position_gain or the drive"
-            ),
+            either(offer(FilteredServoSpec, "method.in_position", error), "raise method.position_gain or the drive"),
         )
 
 
@@ -265,13 +268,12 @@ def _arithmetic(machine: Machine) -> Iterator[Caution]:
             f"sticks up to {stuck:.3g} pulses below its input",
             f"up to {SMALL_ERROR:g} pulses",
             "the speed word is wrong in one direction, and with it the following error",
-            put("method.fraction_bits", bits) if bits <= 16 else "raise method.coefficient",
+            offer(FilteredServoSpec, "method.fraction_bits", bits) or "raise method.coefficient",
         )
 
 
-def _drive(machine: Machine) -> Iterator[Caution]:
-    spec = machine.spec
-    window, drive = spec.method.sample_period, spec.drive
+def _pwm(machine: Machine) -> Iterator[Caution]:
+    window, drive = machine.spec.method.sample_period, machine.spec.drive
     if 10 / drive.pwm_frequency > window * (1 + BARELY):
         ticks = max(1, math.floor(window / 10 / TICK * (1 + BARELY)))
         yield Caution(
@@ -281,6 +283,10 @@ def _drive(machine: Machine) -> Iterator[Caution]:
             "the drive word waits for the PWM, a delay that the figures of the loop leave out",
             put("drive.pwm_frequency", f'"{format_quantity(1e5 / ticks, "Hz", digits=9)}"'),
         )
+
+
+def _current(machine: Machine) -> Iterator[Caution]:
+    spec, drive, window = machine.spec, machine.spec.drive, machine.spec.method.sample_period
     resistance = spec.motor.resistance + drive.bridge_resistance
     lag = spec.motor.inductance / resistance
     if drive.amplifier == "voltage" and lag > window / 5:
@@ -311,9 +317,13 @@ _LOOKS: tuple[Callable[[Machine], Iterator[Caution]], ...] = (
     _stability,
     _damping,
     _resolution,
+    _command,
     _ramp,
+    _effort,
     _force,
+    _acceleration,
     _rest,
     _arithmetic,
-    _drive,
+    _pwm,
+    _current,
 )

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from detent.axisfile.findings import Caution
-from detent.axisfile.nearest import BARELY, at_least, at_most, either, put
+from detent.axisfile.nearest import BARELY, at_least, at_most, either, offer, put
 from detent.axisfile.phase_servo.derive import Machine
 from detent.axisfile.phase_servo.detector import JITTER_PEAK
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
@@ -189,7 +189,7 @@ def _integral(machine: Machine) -> Iterator[Caution]:
             f"{machine.integral_rate:.3g} steps within 1 rad of the position loop",
             f"up to {INTEGRAL_PACE:g}",
             "under load the integral hunts for ever",
-            either(put("clock.integrate_tap", tap) if tap <= 24 else "", "raise KP1 of method.position_gains"),
+            either(offer(PhaseServoSpec, "clock.integrate_tap", tap), "raise KP1 of method.position_gains"),
         )
     if method.dead_band == 0:
         yield Caution(
@@ -199,6 +199,12 @@ def _integral(machine: Machine) -> Iterator[Caution]:
             "the integral never rests: the carriage hunts across the boundary",
             put("method.dead_band", 1),
         )
+
+
+def _integral_limit(machine: Machine) -> Iterator[Caution]:
+    method = machine.spec.method
+    if not method.integrator or method.stop_always_off:
+        return
     largest = method.integral_limit * method.position_gains[2]
     if largest < machine.breakaway_counts:
         needed = math.ceil(machine.breakaway_counts / method.position_gains[2])
@@ -207,7 +213,7 @@ def _integral(machine: Machine) -> Iterator[Caution]:
             f"{method.integral_limit}, worth {largest} counts of drive",
             f"enough to break the carriage loose, {machine.breakaway_counts:.3g} counts",
             "the integral cannot bring a carriage that friction holds to its target",
-            put("method.integral_limit", needed) if needed <= 32767 else "lower friction",
+            offer(PhaseServoSpec, "method.integral_limit", needed) or "lower friction",
         )
 
 
@@ -294,6 +300,7 @@ _LOOKS: tuple[Callable[[Machine], Iterator[Caution]], ...] = (
     _overshoot,
     _settling,
     _integral,
+    _integral_limit,
     _alignment,
     _noise,
     _burst,

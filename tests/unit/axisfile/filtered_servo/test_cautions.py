@@ -45,6 +45,11 @@ CASES = [
         "stability of the loop",
         ["gain margin 1.27", "lower drive.supply"],
     ),
+    (
+        ["mechanics.moving_mass=0 kg", "motor.rotor_inertia=1 g*cm^2", "drive.current_per_count=281 mA"],
+        "stability of the loop",
+        ["gain margin 0.000", "do: lower drive.current_per_count"],
+    ),
     ([], "damping of the loop", ["trap 1"]),
     (VOLTAGE[:2], "damping of the loop", ["0.149", "set method.coefficient = 0.5"]),
     (
