@@ -48,7 +48,10 @@ class Sequencer(Registers):
     switched: i8 = register("tick in which position mode was entered", unit="tick")
     ready_at: i8 = register("end of one-shot 108", unit="tick")
     stop_at: i8 = register("end of one-shot 109", unit="tick")
-    last_pulse: i8 = register("tick of the last pulse of the tracker", unit="tick")
+    last_sign: i1 = register("sign of the tracker's last pulse: 1 or -1, 0 before the first")
+    last_pulse: i8 = register(
+        "tick of the tracker's last pulse, but for one that took back the one before", unit="tick"
+    )
 
 
 @step
@@ -57,6 +60,18 @@ def count_pulses(r: Sequencer, plus: int, minus: int) -> None:
     r.distance -= plus + minus
     r.remaining -= plus - minus
     r.position += plus - minus
+
+
+@step
+def hear_tracker(r: Sequencer, sign: int, tick: int) -> None:
+    """A pulse of the tracker: is it still acquiring?
+
+    Noise makes pairs of opposite pulses where the carriage stands at the boundary of two steps (trap 5). Such a pair
+    says that the tracker is locked, so a pulse that takes back the one before does not break the silence.
+    """
+    if sign != -r.last_sign:
+        r.last_pulse = tick
+    r.last_sign = sign
 
 
 @step

@@ -24,6 +24,7 @@ from detent.control.phase_sequencer import (
     SequencerParams,
     count_pulses,
     enter_position,
+    hear_tracker,
     next_timer,
     run_timers,
     setpoint,
@@ -126,7 +127,7 @@ def receive_pulses(p: PhaseServoParams, r: PhaseServo, plus: int, minus: int) ->
     """Pulses as they arrive on the counting lines: with what interference has put in or taken away."""
     n = r.interference
     if plus + minus:
-        r.sequencer.last_pulse = r.tick
+        hear_tracker(r.sequencer, plus - minus, r.tick)
         if take_away(n):
             plus = minus = 0
     plus += n.plus

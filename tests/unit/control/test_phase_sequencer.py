@@ -13,6 +13,7 @@ from detent.control.phase_sequencer import (
     SequencerParams,
     count_pulses,
     enter_position,
+    hear_tracker,
     next_timer,
     run_timers,
     setpoint,
@@ -128,3 +129,12 @@ def test_the_setpoint_is_a_signed_velocity_in_speed_mode_and_the_error_in_positi
     r.mode = POSITION_MODE
     assert setpoint(p, r, 4) == 4
     assert setpoint(params(incremental=1), r, 4) == -7
+
+
+def test_a_pulse_that_takes_back_the_one_before_does_not_break_the_silence():
+    r = Sequencer()
+    for tick, sign in ((5, -1), (9, -1), (20, 1), (31, -1), (40, 1)):
+        hear_tracker(r, sign, tick)
+    assert r.last_pulse == 9
+    hear_tracker(r, 1, 50)  # two of a sign: the tracker still follows something
+    assert r.last_pulse == 50

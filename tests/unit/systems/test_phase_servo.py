@@ -353,3 +353,14 @@ def test_words_worked_out_in_every_tick_are_the_same_bits(overrides):
     eager.r.sequencer.event = 0
     assert lazy.r.snapshot() == eager.r.snapshot(), lazy.r.diff(eager.r)
     assert lazy.r.sequencer.position != 0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("jitter", ["5 ns", "20 ns", "100 ns"])
+def test_an_axis_at_the_boundary_of_two_steps_comes_out_of_its_acquisition_in_spite_of_noise(jitter):
+    """Pairs of opposite pulses came for ever there (trap 5), and the axis waited for silence in vain."""
+    p, r, point = power_on(0.0, f"detector.jitter={jitter}", *SHORT)
+    advance(p, r, round(20e-3 * 4e6), *NO_TRACE)
+    assert r.sequencer.event == 1
+    assert r.sequencer.state == SETTLE_READY
+    assert abs(r.train.position - point) < 2 * 0.0254 / 60 / 64

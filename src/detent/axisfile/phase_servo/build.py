@@ -45,13 +45,11 @@ def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
 def velocity_table(spec: PhaseServoSpec) -> list[int]:
     """Reference velocity against distance [pulses per sample], up to the entry that all larger distances take (7).
 
-    ``floor(sqrt(2 a n step) / step * Tv + 0.5)``, capped at the largest velocity.
+    See `PhaseServoSpec.table_velocity`.
     """
-    step, window, top = spec.step, spec.sample_period, spec.peak_count
     table: list[int] = []
-    while not table or (table[-1] < top and len(table) < TABLE):
-        v = math.sqrt(2 * spec.method.table_acceleration * len(table) * step) / step * window
-        table.append(min(top, math.floor(v + 0.5)))
+    while not table or (table[-1] < spec.peak_count and len(table) < TABLE):
+        table.append(spec.table_velocity(len(table)))
     return table
 
 

@@ -25,6 +25,9 @@ INTEGRAL_PACE = 1.5
 """Steps within 1 rad of the position loop above which the integral hunts: 1.3 with the literal clocks is quiet, 1.7
 with two taps less than the default is not (7)."""
 
+QUIET = 0.25
+"""Displacement of an edge by noise with which a move counts a few pairs of pulses, of the dozens it bears [step]."""
+
 
 def find_cautions(spec: PhaseServoSpec) -> Iterator[Caution]:
     """Look a phase-servo axis over."""
@@ -238,22 +241,14 @@ def _alignment(machine: Machine) -> Iterator[Caution]:
 def _noise(machine: Machine) -> Iterator[Caution]:
     spec = machine.spec
     peak = JITTER_PEAK * spec.detector.jitter / spec.tick
-    start = spec.mechanics.start_position / spec.step
-    boundary = abs(start - round(start))
-    if peak > 0 and peak > boundary:
-        everywhere = peak >= 0.5
+    if peak > QUIET:
         yield Caution(
             "detector.jitter",
             f"up to {peak:.2g} steps on an edge",
-            "below half a step" if everywhere else f"below {boundary:.2g} step where the carriage starts",
-            "at a step boundary noise makes pulses for ever, and the axis does not come out of its acquisition, which "
-            "waits for silence",
-            either(
-                put("detector.jitter", at_most(0.49 * spec.tick / JITTER_PEAK, "s"))
-                if everywhere
-                else "start between two steps: move mechanics.start_position by half a step, "
-                f"{format_quantity(spec.step / 2, 'm')}",
-            ),
+            f"up to {QUIET:g} step",
+            "noise makes pairs of opposite pulses on the way, the distance counter counts both of them down, and a "
+            "long move stops at another positioning point",
+            put("detector.jitter", at_most(QUIET * spec.tick / JITTER_PEAK, "s")),
         )
 
 
