@@ -279,7 +279,7 @@ def answers_to_a_start(path: SpeedPath, period_us: int, rate: float, samples: in
     for k in range(1, samples * period_us + 1):
         if count_clock(clock):
             found.append((k, path.strobe()))
-        pulse = clock_generator(generator)
+        pulse = clock_generator(generator, 1)
         if pulse:
             add_pulses(path.counter_p, path.counter, pulse)
     return found

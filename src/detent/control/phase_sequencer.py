@@ -64,7 +64,7 @@ def count_pulses(r: Sequencer, plus: int, minus: int) -> None:
 
 @step
 def hear_tracker(r: Sequencer, sign: int, tick: int) -> None:
-    """A pulse of the tracker: is it still acquiring?
+    """Note a pulse of the tracker, which may still be acquiring.
 
     Noise makes pairs of opposite pulses where the carriage stands at the boundary of two steps (trap 5). Such a pair
     says that the tracker is locked, so a pulse that takes back the one before does not break the silence.

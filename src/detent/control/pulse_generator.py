@@ -36,6 +36,14 @@ class PulseGenerator(Registers):
     phase: i8 = register("phase accumulator, 10^12 to a pulse", unit="count")
 
 
+@hot_step
+def keeps_rate(p: PulseGeneratorParams, r: PulseGenerator) -> bool:
+    """True while the rate asked for is reached and braking is still off: ``v^2 <= 2 a s``, with `s` a pulse short."""
+    ahead = (r.goal - r.command) * r.direction - 1
+    limit = 2.0 * p.acceleration * p.ticks_per_second * PER_PULSE * ahead
+    return r.present == r.rate and ahead >= 0 and 1.0 * r.rate * r.rate <= limit
+
+
 @step
 def ramp_rate(p: PulseGeneratorParams, r: PulseGenerator) -> None:
     """Rate and direction of this tick.
@@ -63,25 +71,19 @@ def ramp_rate(p: PulseGeneratorParams, r: PulseGenerator) -> None:
 
 
 @hot_step
-def pulse_within(r: PulseGenerator, clocks: int) -> bool:
-    """True when a pulse falls due within so many clocks."""
-    return r.command != r.goal and r.phase + r.present * clocks >= FULL
-
-
-@hot_step
-def skip_clocks(r: PulseGenerator, clocks: int) -> None:
-    """Clocks in which no pulse falls due."""
-    r.phase += r.present * clocks
-
-
-@step
-def clock_generator(r: PulseGenerator) -> int:
-    """One decoder clock; the command pulse of it: 1, -1 or 0."""
+def clock_generator(r: PulseGenerator, clocks: int) -> int:
+    """So many decoder clocks; the command pulses in them, signed."""
     if r.command == r.goal:
         return 0
-    r.phase += r.present
+    r.phase += r.present * clocks
     if r.phase < FULL:
         return 0
-    r.phase -= FULL
-    r.command += r.direction
-    return r.direction
+    pulses = r.phase // FULL
+    ahead = (r.goal - r.command) * r.direction
+    if 0 < ahead <= pulses:
+        pulses = ahead
+        r.phase = (r.phase - pulses * FULL) % r.present  # the clocks after the last pulse add nothing
+    else:
+        r.phase -= pulses * FULL
+    r.command += pulses * r.direction
+    return pulses * r.direction

@@ -81,6 +81,13 @@ def pass_left(p: EncoderParams, r: Encoder) -> None:
     set_channels(p, r)
 
 
+@hot_step
+def is_one_edge(p: EncoderParams, r: Encoder, x: float) -> bool:
+    """True when certainly no more than one edge, whatever its jitter, lies between the disc's place and `x` [m]."""
+    place = x - p.origin
+    return (r.edge - 1 + JITTER_LIMIT) * p.edge_pitch < place < (r.edge + 2 - JITTER_LIMIT) * p.edge_pitch
+
+
 def stand_at(p: EncoderParams, r: Encoder, position: float, seed: int) -> None:
     """Power-on: the disc stands where the carriage stands; `position` in metres."""
     r.noise.state = seed

@@ -40,13 +40,13 @@ def count_reference(p: TrackingParams, r: TrackingConverter) -> None:
 def emit_pulse(p: TrackingParams, r: TrackingConverter) -> None:
     """Second clock active: at the gate, PS already high twice is a lead, still low twice a lag."""
     r.gate = r.msb_first & (r.msb_second ^ 1)
-    lead = r.ps_first & r.ps_second
-    # Seen at the gate, PS that has just fallen is half a cycle away: neither lead nor lag, unless it is counted as one.
-    lead |= p.leave_antiphase & r.ps_second & (r.ps_first ^ 1)
-    lag = (r.ps_first | r.ps_second) ^ 1
-    r.plus = r.gate & lead
-    r.minus = r.gate & lag
-    r.reference = (r.reference + r.plus - r.minus) & p.mask
+    r.plus = 0
+    r.minus = 0
+    if r.gate:
+        # Seen at the gate, PS that has just fallen is half a cycle away: neither lead nor lag, unless it counts as one.
+        r.plus = r.ps_second & (r.ps_first | p.leave_antiphase)
+        r.minus = (r.ps_first | r.ps_second) ^ 1
+        r.reference = (r.reference + r.plus - r.minus) & p.mask
 
 
 @hot_step

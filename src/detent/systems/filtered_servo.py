@@ -7,7 +7,7 @@
                                     sample clock drives counter and filter
 
 One tick is 10 us, ten clocks of the decoder. Its order is: sample what the encoder saw during the last tick, decide,
-actuate, move. A tick without an edge, a command pulse or a strobe changes nothing in the logic and skips its clocks.
+actuate, move. Decoder clocks in which nothing happens, or nothing whose moment matters, are skipped.
 """
 
 import numpy as np
@@ -27,9 +27,8 @@ from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
     clock_generator,
-    pulse_within,
+    keeps_rate,
     ramp_rate,
-    skip_clocks,
 )
 from detent.control.sample_clock import SampleClock, count_clock
 from detent.kernel.compiled import byte_at, copy_back, local_copy
@@ -37,7 +36,7 @@ from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged, move_with_current
 from detent.plant.push import Push, push_force
-from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right, stand_at
+from detent.sensing.encoder import Encoder, EncoderParams, is_one_edge, pass_left, pass_right, stand_at
 from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.interference import (
     Interference,
@@ -144,7 +143,7 @@ def sample_speed(p: FilteredServoParams, r: FilteredServo) -> None:
         filter_speed(p.filter, r.filter, r.speed.word)
 
 
-@step
+@hot_step
 def one_clock(p: FilteredServoParams, r: FilteredServo, x: float, k: int) -> None:
     """Decoder clock `k` of a tick in which the slide went from `sampled` to `x` [m].
 
@@ -159,16 +158,46 @@ def one_clock(p: FilteredServoParams, r: FilteredServo, x: float, k: int) -> Non
         moved = 0
     if k == 0:
         moved += r.interference.plus - r.interference.minus
-    count_movement(p, r, clock_generator(r.generator), moved)
+    count_movement(p, r, clock_generator(r.generator, 1), moved)
     flip = r.interference.corrupt if k == 0 else 0
     clock_decoder(r.decoder, r.encoder.channel_a ^ flip, r.encoder.channel_b)
 
 
+@hot_step
+def skip_clocks(p: FilteredServoParams, r: FilteredServo, clocks: int) -> int:
+    """Clocks in which nothing but command pulses can come, which count alike wherever they do; returns them, signed."""
+    r.clock.left -= clocks
+    commanded = clock_generator(r.generator, clocks)
+    count_movement(p, r, commanded, 0)
+    return commanded
+
+
+@hot_step
+def is_calm(p: FilteredServoParams, r: FilteredServo, x: float, clocks: int) -> bool:
+    """True when the order of events in the last `clocks` of the tick does not matter.
+
+    The decoder is at rest, no strobe is due, no more than one edge comes, and the deviation is far from its limit.
+    """
+    if not is_settled(r.decoder, r.encoder.channel_a, r.encoder.channel_b) or r.clock.left <= clocks:
+        return False
+    return abs(r.deviation.deviation) + clocks < p.deviation.range and is_one_edge(p.encoder, r.encoder, x)
+
+
 @step
-def run_clocks(p: FilteredServoParams, r: FilteredServo, x: float) -> None:
-    """Ten decoder clocks in which something happens, and what follows from them."""
-    for k in range(CLOCKS):
+def run_clocks(p: FilteredServoParams, r: FilteredServo, x: float, stray: int) -> None:
+    """Ten decoder clocks in which something happens, and what follows from them.
+
+    From where the tick is calm only its last two clocks are run: an edge is counted in the tick in which it comes,
+    unless it comes in the last clock. Interference acts in the first.
+    """
+    k = 0
+    while k < CLOCKS:
+        if k < CLOCKS - 2 and stray == 0 and is_calm(p, r, x, CLOCKS - k):
+            skip_clocks(p, r, CLOCKS - 2 - k)
+            k = CLOCKS - 2
         one_clock(p, r, x, k)
+        stray = 0
+        k += 1
     conclude(p, r)
 
 
@@ -199,7 +228,8 @@ def decide(p: FilteredServoParams, r: FilteredServo) -> None:
 @hot_step
 def prepare(p: FilteredServoParams, r: FilteredServo) -> int:
     """Rate of the command and noise of this tick; not zero when noise has come."""
-    if r.generator.command != r.generator.goal or r.generator.present > 0:
+    moving = r.generator.command != r.generator.goal or r.generator.present > 0
+    if moving and not keeps_rate(p.generator, r.generator):
         ramp_rate(p.generator, r.generator)
     if r.tick < r.interference.next_tick:
         return 0
@@ -212,11 +242,10 @@ def sample(p: FilteredServoParams, r: FilteredServo, x: float) -> None:
     """What happened on the lines during the last tick; the slide stands at `x` [m] now."""
     stray = prepare(p, r)
     moved = x >= r.encoder.next_right or x < r.encoder.next_left
-    if moved or r.busy or stray or r.clock.left <= CLOCKS or pulse_within(r.generator, CLOCKS):
-        run_clocks(p, r, x)
-    else:
-        r.clock.left -= CLOCKS
-        skip_clocks(r.generator, CLOCKS)
+    if moved or r.busy or stray or r.clock.left <= CLOCKS:
+        run_clocks(p, r, x, stray)
+    elif skip_clocks(p, r, CLOCKS):
+        decide(p, r)
     r.sampled = x
 
 

@@ -13,9 +13,8 @@ from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
     clock_generator,
-    pulse_within,
+    keeps_rate,
     ramp_rate,
-    skip_clocks,
 )
 
 CLOCKS = 10
@@ -41,23 +40,24 @@ class Generator:
             self.rates.append(self.r.present)
             for _ in range(CLOCKS):
                 self.clock += 1
-                pulse = clock_generator(self.r)
+                pulse = clock_generator(self.r, 1)
                 if pulse:
                     self.pulses.append((self.clock, pulse))
         return self
 
     def skipping_ticks(self, number):
-        """So many ticks; those without a pulse are skipped, as the axis does it."""
+        """So many ticks as the axis runs them: all clocks at once, the rule of the rate only where it may change."""
         for _ in range(number):
-            ramp_rate(self.p, self.r)
+            if not keeps_rate(self.p, self.r):
+                ramp_rate(self.p, self.r)
             self.rates.append(self.r.present)
-            if pulse_within(self.r, CLOCKS):
-                for k in range(CLOCKS):
-                    pulse = clock_generator(self.r)
-                    if pulse:
-                        self.pulses.append((self.clock + k + 1, pulse))
-            else:
-                skip_clocks(self.r, CLOCKS)
+            before = self.r.copy()
+            pulses = clock_generator(self.r, CLOCKS)
+            if pulses:
+                each = [clock_generator(before, 1) for _ in range(CLOCKS)]
+                assert sum(each) == pulses
+                assert before.snapshot() == self.r.snapshot()
+                self.pulses += [(self.clock + k + 1, pulse) for k, pulse in enumerate(each) if pulse]
             self.clock += CLOCKS
         return self
 
@@ -77,8 +77,8 @@ def test_after_many_pulses_the_spacing_is_as_exact_as_at_first():
     r, clock, rate = PulseGenerator(goal=FOR_EVER, direction=1, present=1037 * PER_PULSE), 0, 1037 * PER_PULSE
     for _ in range(20_000):
         due = (FULL - r.phase - 1) // rate
-        skip_clocks(r, due)
-        assert clock_generator(r) == 1
+        assert clock_generator(r, due) == 0
+        assert clock_generator(r, 1) == 1
         clock += due + 1
     assert clock == -(-20_000 * FULL // rate)
     assert r.phase == clock * rate % FULL
@@ -86,26 +86,22 @@ def test_after_many_pulses_the_spacing_is_as_exact_as_at_first():
 
 def test_a_millionth_of_a_pulse_per_second_comes_after_a_million_seconds():
     r = PulseGenerator(goal=1, direction=1, present=1)
-    skip_clocks(r, FULL - 10)
-    assert not pulse_within(r, 9)
-    assert pulse_within(r, 10)
-    assert [clock_generator(r) for _ in range(10)] == [0] * 9 + [1]
+    assert clock_generator(r, FULL - 10) == 0
+    assert [clock_generator(r, 1) for _ in range(10)] == [0] * 9 + [1]
 
 
 @given(
     rate=st.integers(1, FULL),
     phase=st.integers(0, FULL - 1),
     clocks=st.integers(1, 40),
-    goal=st.sampled_from([-FOR_EVER, 0, FOR_EVER]),
+    goal=st.sampled_from([-FOR_EVER, -3, -1, 0, 1, 2, 5, FOR_EVER]),
 )
-def test_skipped_clocks_are_those_without_a_pulse(rate, phase, clocks, goal):
+def test_clocks_at_once_are_clocks_one_by_one(rate, phase, clocks, goal):
     r = PulseGenerator(goal=goal, direction=1 if goal > 0 else -1, present=rate, phase=phase)
-    skipped = r.copy()
-    pulses = [clock_generator(r) for _ in range(clocks)]
-    assert pulse_within(skipped, clocks) == any(pulses)
-    if not any(pulses) and goal != 0:
-        skip_clocks(skipped, clocks)
-        assert skipped.snapshot() == r.snapshot()
+    at_once = r.copy()
+    pulses = [clock_generator(r, 1) for _ in range(clocks)]
+    assert clock_generator(at_once, clocks) == sum(pulses)
+    assert at_once.snapshot() == r.snapshot()
 
 
 def test_skipping_changes_no_pulse():
