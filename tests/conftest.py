@@ -2,6 +2,9 @@
 
 import os
 
+# The matrices here are small: threads of the linear algebra only stand in one another's way. Read when numpy loads.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from hypothesis import settings
 
 # A compiled step costs seconds the first time it is called, which says nothing about the example that met it: no

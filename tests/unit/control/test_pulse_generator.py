@@ -274,3 +274,17 @@ def test_a_goal_behind_is_gone_back_to_after_braking():
     farthest = max(np.cumsum(signs))
     assert farthest - turned == pytest.approx(20_000**2 / (2 * 2e5), abs=3)
     assert g.r.command == turned - 100
+
+
+def test_the_rule_of_the_rate_is_left_out_only_where_it_would_change_nothing():
+    g = Generator(20_000, 4000, acceleration=2.0)
+    left_out = 0
+    while g.r.command != g.r.goal:
+        before = g.r.copy()
+        kept = keeps_rate(g.p, g.r)
+        ramp_rate(g.p, before)
+        assert not kept or before.snapshot() == g.r.snapshot()
+        left_out += kept
+        g.skipping_ticks(1)
+    assert left_out > 5_000
+    assert not keeps_rate(g.p, g.r)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from detent.sensing.encoder import JITTER_LIMIT, Encoder, EncoderParams, pass_left, pass_right, stand_at
+from detent.sensing.encoder import JITTER_LIMIT, Encoder, EncoderParams, is_one_edge, pass_left, pass_right, stand_at
 from detent.sensing.quadrature import Quadrature, count_edge
 
 PITCH = 84.667e-6 / 4
@@ -107,3 +107,12 @@ def test_a_missing_pulse_of_channel_a_loses_one_whole_cycle_and_is_never_illegal
         count_edge(q, r.channel_a, r.channel_b)
     assert q.count == 2 + (4 if step is pass_right else -4)
     assert q.illegal == 0
+
+
+@pytest.mark.parametrize("origin", [0.0, -0.5 * PITCH])
+def test_one_edge_is_promised_only_where_jitter_cannot_make_it_two(origin):
+    p, r = encoder(1001.5 * PITCH)
+    p.origin = origin
+    stand_at(p, r, 1001.5 * PITCH + origin, 1)
+    places = np.array([999.9, 1000.4, 1000.5, 1001.1, 1001.9, 1002.5, 1002.6, 1003.1]) * PITCH + origin
+    assert [is_one_edge(p, r, x) for x in places] == [False, False, True, True, True, True, False, False]
