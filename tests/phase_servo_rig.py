@@ -11,11 +11,12 @@ import numpy as np
 from detent.axisfile.load import load_spec
 from detent.axisfile.phase_servo.build import build_phase_servo
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
+from detent.kernel.turn_table import TURN
 from detent.sensing.absolute_converter import AbsoluteConverter
 from detent.sensing.carrier import count_carrier, reset_carrier
 from detent.sensing.gauge import set_gauge
 from detent.sensing.interference import plan_next
-from detent.sensing.phase_detector import TURN, Detector, DetectorParams, compare
+from detent.sensing.phase_detector import Detector, DetectorParams, compare
 from detent.systems.phase_servo import (
     ConverterParams,
     Converters,

@@ -9,16 +9,12 @@ that depend on position only; a table per pitch holds them (`fill_errors`).
 import math
 
 from detent.kernel.noise import NoiseSource, bell
-from detent.kernel.registers import Registers, block, f8, i4_array, i8, register, u1
+from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
+from detent.kernel.turn_table import FRACTION, POINTS, TURN, TurnTable, at_phase
 
-TURN = 1 << 32
 QUARTER = TURN >> 2
 HALF = TURN >> 1
-FRACTION = TURN - 1
-
-POINTS = 256
-"""Entries of the error table per pitch; between them it is linear."""
 
 JITTER_LIMIT = 0.2
 """An edge is never displaced by more turns than this: the two edges of a cycle cannot meet."""
@@ -30,9 +26,8 @@ class DetectorParams(Registers):
     turns_per_metre: f8 = register("electrical turns per travel", unit="turn/2^32/m")
     offset: i8 = register("phase at position 0", unit="turn/2^32")
     carrier_shift: i8 = register("32 - log2 N: the carrier counter as a phase", unit="count")
-    imperfect: u1 = register("1 when the error tables are not all zero")
-    rise: i4_array = register("lead of the rising edge against position", unit="turn/2^32", length=POINTS + 1)
-    fall: i4_array = register("lead of the falling edge against position", unit="turn/2^32", length=POINTS + 1)
+    rise: TurnTable = block("lead of the rising edge against position")
+    fall: TurnTable = block("lead of the falling edge against position")
     jitter: f8 = register("rms displacement of an edge of the comparator", unit="turn/2^32")
 
 
@@ -50,7 +45,7 @@ class Detector(Registers):
 def compare(p: DetectorParams, r: Detector, count: int, x: float) -> None:
     """Comparator at carrier count `count` with the carriage at `x` [m]: PS is high in the second half of a turn."""
     r.phase = (math.floor(x * p.turns_per_metre + 0.5) + p.offset) & FRACTION
-    if p.imperfect == 0 and p.jitter == 0.0:
+    if p.rise.used == 0 and p.jitter == 0.0:
         r.ps = ((r.phase + (count << p.carrier_shift)) & FRACTION) >> 31
     else:
         compare_imperfect(p, r, count)
@@ -67,18 +62,10 @@ def compare_imperfect(p: DetectorParams, r: Detector, count: int) -> None:
             limit = JITTER_LIMIT * TURN
             r.shake = int(min(max(p.jitter * bell(r.noise), -limit), limit))
     # Less than a quarter turn: the two edges of a cycle never change places.
-    rise = min(max(lead_at(p.rise, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
-    fall = min(max(lead_at(p.fall, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
+    rise = min(max(at_phase(p.rise, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
+    fall = min(max(at_phase(p.fall, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
     from_middle = ((angle - HALF - QUARTER + HALF) & FRACTION) - HALF
     r.ps = 1 if -QUARTER - rise <= from_middle < QUARTER - fall else 0
-
-
-@hot_step
-def lead_at(table: i4_array, phase: int) -> int:
-    """Entry of an error table at a phase, interpolated."""
-    k = phase >> 24
-    share = phase & 0xFFFFFF
-    return table[k] + ((table[k + 1] - table[k]) * share >> 24)
 
 
 def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float) -> None:
@@ -100,7 +87,7 @@ def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float
         Of the comparator, as a fraction of the secondary's amplitude. Together the three may displace an edge by
         less than a quarter of a turn; more is cut off.
     """
-    p.imperfect = 1 if gain or quadrature or offset else 0
+    p.rise.used = p.fall.used = 1 if gain or quadrature or offset else 0
     for k in range(POINTS + 1):
         x = 2 * math.pi * k / POINTS
         a = (1 + gain) * math.cos(x) - math.sin(quadrature) * math.sin(x)
@@ -108,5 +95,5 @@ def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float
         lead = math.remainder(math.atan2(b, a) - x, 2 * math.pi)
         late = math.asin(max(-1.0, min(1.0, offset / math.hypot(a, b))))
         # PS is high where the voltage is below the offset: it then rises earlier and falls later.
-        p.rise[k] = round((lead + late) / (2 * math.pi) * TURN)
-        p.fall[k] = round((lead - late) / (2 * math.pi) * TURN)
+        p.rise.value[k] = round((lead + late) / (2 * math.pi) * TURN)
+        p.fall.value[k] = round((lead - late) / (2 * math.pi) * TURN)

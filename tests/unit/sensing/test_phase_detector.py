@@ -6,16 +6,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from detent.kernel.step import step
+from detent.kernel.turn_table import FRACTION, POINTS, TURN, at_phase
 from detent.sensing.phase_detector import (
-    FRACTION,
     JITTER_LIMIT,
-    POINTS,
-    TURN,
     Detector,
     DetectorParams,
     compare,
     fill_errors,
-    lead_at,
 )
 
 COUNTS = 64
@@ -63,21 +60,22 @@ def test_the_phase_is_the_fraction_of_the_pitch_and_leads_for_plus_x():
 def test_both_ways_of_comparing_agree_where_there_is_nothing_to_displace(x, jitter):
     p = params()
     fill_errors(p, 0.0, 0.0, 0.0)
-    assert p.imperfect == 0
-    imperfect = params(imperfect=1, jitter=jitter)
+    assert p.rise.used == 0
+    imperfect = params(jitter=jitter)
+    imperfect.rise.used = 1
     assert (cycle(p, x * PITCH) == cycle(imperfect, x * PITCH)).all()
 
 
 @step
 def rise_at(p: DetectorParams, phase: int) -> int:
     """Entry of a table: only a step can hand one to a step."""
-    return lead_at(p.rise, phase)
+    return at_phase(p.rise, phase)
 
 
 def test_an_entry_of_the_table_is_interpolated():
     p = params()
     for k in range(POINTS + 1):
-        p.rise[k] = 1000 * k * k
+        p.rise.value[k] = 1000 * k * k
     spacing = TURN // POINTS
     assert rise_at(p, 0) == 0
     assert rise_at(p, 7 * spacing) == 49_000
@@ -111,7 +109,7 @@ def test_displaced_edges_are_those_of_the_voltage(gain, quadrature, offset, x):
     v = voltage(gain, quadrature, 2 * np.pi * turn, x) - offset
     # Between two of the 256 points the table is linear, and off by an eighth of its second difference at most: an edge
     # so near to a count may fall on either side of it.
-    bend = max(np.abs(np.diff(list(table), 2)).max() for table in (p.rise, p.fall)) / 8 / TURN * 1.2 + 1e-6
+    bend = max(np.abs(np.diff(list(table), 2)).max() for table in (p.rise.value, p.fall.value)) / 8 / TURN * 1.2 + 1e-6
     near = np.zeros(counts, bool)
     for shift in (-bend, bend):
         near |= np.sign(voltage(gain, quadrature, 2 * np.pi * (turn + shift), x) - offset) != np.sign(v)
@@ -131,8 +129,8 @@ def test_at_a_point_of_the_table_both_crossings_are_exact(gain, quadrature, offs
     k = int(x / (2 * math.pi) * POINTS)
     angle = 2 * math.pi * k / POINTS
     # PS rises where the voltage falls through the offset: half a turn from the start of the carrier, less the place.
-    rise = math.pi - angle - 2 * math.pi * p.rise[k] / TURN
-    fall = -angle - 2 * math.pi * p.fall[k] / TURN
+    rise = math.pi - angle - 2 * math.pi * p.rise.value[k] / TURN
+    fall = -angle - 2 * math.pi * p.fall.value[k] / TURN
     for carrier, slope in ((rise, -1), (fall, 1)):
         assert voltage(gain, quadrature, carrier, angle) == pytest.approx(offset, abs=1e-8)
         later = voltage(gain, quadrature, carrier + 1e-4, angle)
@@ -142,9 +140,9 @@ def test_at_a_point_of_the_table_both_crossings_are_exact(gain, quadrature, offs
 def test_the_ends_of_the_table_meet():
     p = params()
     fill_errors(p, 0.1, -0.2, 0.3)
-    assert p.imperfect == 1
-    assert abs(p.rise[0] - p.rise[POINTS]) <= 1
-    assert abs(p.fall[0] - p.fall[POINTS]) <= 1
+    assert p.rise.used == 1
+    assert abs(p.rise.value[0] - p.rise.value[POINTS]) <= 1
+    assert abs(p.fall.value[0] - p.fall.value[POINTS]) <= 1
 
 
 def test_each_fault_has_its_own_signature():
@@ -153,7 +151,7 @@ def test_each_fault_has_its_own_signature():
     tables = {}
     for name, faults in (("gain", (0.01, 0, 0)), ("quadrature", (0, 0.01, 0)), ("offset", (0, 0, 0.01))):
         fill_errors(p, *faults)
-        tables[name] = np.array(list(p.rise)) / TURN * 2 * np.pi, np.array(list(p.fall)) / TURN * 2 * np.pi
+        tables[name] = np.array(list(p.rise.value)) / TURN * 2 * np.pi, np.array(list(p.fall.value)) / TURN * 2 * np.pi
     # First order: unequal windings err twice per pitch, so do windings off the right angle; an offset is the same
     # everywhere and of opposite sign at the two edges.
     for rise_or_fall in (0, 1):

@@ -6,8 +6,9 @@ from detent.axisfile.interference import fill_interference, fill_push
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
+from detent.kernel.turn_table import TURN
 from detent.plant.drive_train import DriveTrainParams, fill_period
-from detent.sensing.phase_detector import TURN, DetectorParams, fill_errors
+from detent.sensing.phase_detector import DetectorParams, fill_errors
 from detent.systems.phase_servo import ConverterParams, PhaseServoParams
 
 SUBSTEP = 1e-5

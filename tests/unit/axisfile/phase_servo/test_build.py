@@ -187,7 +187,7 @@ def test_the_detector_lags_at_the_positioning_points() -> None:
     assert d.carrier_shift == 26
     assert d.turns_per_metre * 0.0254 / 60 == pytest.approx(TURN)
     assert d.jitter / TURN == pytest.approx(100e-9 * 62_500)
-    assert d.imperfect == 1
+    assert d.rise.used == 1
 
 
 @pytest.mark.parametrize("counts", [16, 32, 64, 128, 256, 512, 1024])

@@ -1,0 +1,241 @@
+"""The rule of the stepper envelope: raise, hold or lower before every step (stepper-envelope specification 3.3 to 3.5).
+
+While a step runs, the entry of the next one is read and compared with the present ramp index; that is all the motion
+costs. The ramp list may hold frequencies or the timer's reload values: the comparison is one of indices, which neither
+the reversed order of reloads nor equal neighbours among them can disturb.
+
+The literal rule of the claim sets the frequency of the entry, whatever the present one is. It is safe on the envelope
+only, that is for runs that begin at a start extreme.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.kernel.registers import Registers, i1, i2, i4, i4_array, i8, register, u1, u2
+from detent.kernel.step import step
+
+Entries = NDArray[np.int16]
+
+REST, ACCEL, CRUISE, DECEL, TURN, FAULT = 0, 1, 2, 3, 4, 5
+"""States of specification 4."""
+
+IDLE, STEP, PAUSE = 0, 1, 2
+"""What comes next: nothing, a step with the frequency of `word`, or the waiting time of a reversal."""
+
+INFEASIBLE, OUT_OF_RANGE = 1, 2
+"""Causes of a fault."""
+
+AT_REST = -1
+"""Ramp index of a motor that stands; also the entry of a step that is not allowed."""
+
+RAMP = 2048
+LIMITS = 16
+
+
+class StepRuleParams(Registers):
+    """Ramp list, zone limits and what an entry of the table consists of."""
+
+    ramp: i4_array = register("word of each ramp index: frequency [Hz] or period [tick]", unit="count", length=RAMP)
+    limit: i4_array = register("word of each zone limit: frequency [Hz] or period [tick]", unit="count", length=LIMITS)
+    index_mask: i4 = register("bits of an entry that hold the ramp index")
+    zone_shift: u1 = register("place of the zone number in an entry")
+    reload: u1 = register("1: words are periods, a larger one is slower")
+    literal: u1 = register("1: the literal rule of the claim, without a limit on the change")
+
+
+class StepRule(Registers):
+    """Registers of one motor's control unit and the lines from and to the host."""
+
+    start: u1 = register("start signal of an automatic move, written by the host, cleared when taken")
+    heading: i1 = register("direction wanted, written by the host: 1 or -1; a running motor slows down to turn")
+    turns: u2 = register("reversals at sentinels that the automatic move still has to make", unit="count")
+    manual: u1 = register("1: the operator has taken over")
+    request: i2 = register("ramp index that the operator asks for, -1 when released", unit="count")
+    request_word: i4 = register("word that the operator asks for", unit="count")
+    reset: u1 = register("leave a fault, written by the host, cleared when done")
+    event: u1 = register("1 when the motor has come to rest; the host clears it")
+    active: u1 = register("1 during an automatic move")
+    state: u1 = register("0 rest, 1 accelerate, 2 cruise, 3 decelerate, 4 turn, 5 fault", unit="code")
+    cause: u1 = register("of the last fault: 1 the envelope fell too fast, 2 position out of range", unit="code")
+    index: i2 = register("ramp index of the running step, -1 at rest", unit="count")
+    word: i4 = register("frequency [Hz] or period [tick] of the running step, 0 at rest", unit="count")
+    relation: i1 = register("last comparison of present and permissible: -1 less, 0 equal, 1 greater")
+    direction: i1 = register("direction line: 1 or -1")
+    position: i8 = register("steps made, forward less backward", unit="count")
+
+
+@step
+def slower(p: StepRuleParams, one: int, other: int) -> int:
+    """The word of the lower frequency."""
+    return max(one, other) if p.reload else min(one, other)
+
+
+@step
+def entry_word(p: StepRuleParams, entry: int) -> int:
+    """Permissible frequency of an entry, as a word; 0 for the sentinel."""
+    if entry < 0:
+        return 0
+    return slower(p, p.ramp[entry & p.index_mask], p.limit[entry >> p.zone_shift])
+
+
+@step
+def compare_words(p: StepRuleParams, present: int, permissible: int) -> int:
+    """-1, 0 or 1 for a present frequency below, at or above the permissible one; 0 is standstill, reload or not."""
+    if present == permissible:
+        return 0
+    faster = present < permissible if p.reload and present and permissible else present > permissible
+    return 1 if faster else -1
+
+
+@step
+def follow(r: StepRule, permissible: int, goal: int) -> None:
+    """One index up, none or one down, towards `goal`; that must reach `permissible` when it falls.
+
+    Three-way comparison and increment: with the table read, the whole cost of a step.
+    """
+    if r.index < goal:
+        r.index += 1
+        r.relation, r.state = -1, ACCEL
+    elif r.index > goal:
+        r.index -= 1
+        r.relation, r.state = 1, DECEL if r.state != FAULT else FAULT
+        if r.index > permissible and r.state != FAULT:
+            r.state, r.cause = FAULT, INFEASIBLE
+    else:
+        r.relation, r.state = 0, CRUISE
+
+
+@step
+def follow_literally(p: StepRuleParams, r: StepRule, entry: int, goal: int) -> None:
+    """The claim's rule: the frequency becomes that of the entry, by however much that is."""
+    r.relation = compare_words(p, r.word, entry_word(p, entry))
+    r.state = CRUISE
+    if r.relation:
+        r.state = ACCEL if r.relation < 0 else DECEL
+    r.index = goal
+
+
+@step
+def wanted_index(r: StepRule, permissible: int) -> int:
+    """Ramp index to go for: what the table allows, what the operator asks for, or rest."""
+    if r.state == FAULT or r.heading != r.direction:
+        return AT_REST
+    if r.manual:
+        return min(permissible, r.request)
+    return permissible if r.active else AT_REST
+
+
+@step
+def take_inputs(r: StepRule, positions: int) -> bool:
+    """Lines of the host, read before every step; True when the motor runs or may be set running."""
+    if r.reset:
+        r.reset = r.start = 0
+        if r.index < 0:
+            r.state = REST
+    if r.manual:
+        r.start = r.active = 0
+    if r.start and r.state != FAULT:
+        r.start, r.active = 0, 1
+    if r.index >= 0:
+        return True
+    if r.state == FAULT or not (r.active or (r.manual and r.request >= 0)):
+        return False
+    r.direction = r.heading
+    if not 0 <= r.position < positions:
+        r.state, r.cause = FAULT, OUT_OF_RANGE
+        r.active, r.event = 0, 1
+        return False
+    return True
+
+
+@step
+def come_to_rest(r: StepRule, permissible: int, moved: bool) -> int:
+    """No further step in this direction: turn where a reversal is due, else rest."""
+    r.word = 0
+    if r.active and permissible < 0 and r.turns > 0:
+        r.turns -= 1
+        r.heading = -r.direction
+    if r.state != FAULT and r.heading != r.direction and (r.active or (r.manual and r.request >= 0)):
+        r.direction = r.heading
+        r.state = TURN
+        return PAUSE
+    if moved or r.active:
+        r.event = 1
+    r.active = 0
+    if r.state != FAULT:
+        r.state = REST
+    return IDLE
+
+
+@step
+def next_step(p: StepRuleParams, r: StepRule, up: Entries, down: Entries) -> int:
+    """Decide about the next step, and make it.
+
+    Parameters
+    ----------
+    p, r : StepRuleParams, StepRule
+        Parameters and state.
+    up, down : int16 array, shape (N + 1,)
+        Table of each direction by the position that a step departs from: zone number above the ramp index, negative
+        where no step is allowed, as `up[N]` and `down[0]` always are.
+
+    Returns
+    -------
+    int
+        IDLE, STEP (its frequency stands in `word`) or PAUSE.
+    """
+    if not take_inputs(r, len(up)):
+        return IDLE
+    entry = AT_REST  # a motor in fault slows down whatever the table says, even beyond the travel
+    if r.state != FAULT:
+        entry = int(up[r.position] if r.direction > 0 else down[r.position])
+    permissible = entry & p.index_mask if entry >= 0 else AT_REST
+    goal = wanted_index(r, permissible)
+    moved = r.index >= 0
+    if p.literal:
+        follow_literally(p, r, entry, goal)
+    else:
+        follow(r, permissible, goal)
+    if r.index < 0:
+        return come_to_rest(r, permissible, moved)
+    r.word = p.ramp[r.index] if entry < 0 else slower(p, p.ramp[r.index], p.limit[entry >> p.zone_shift])
+    if r.manual and r.index == r.request:
+        r.word = slower(p, r.word, r.request_word)
+    r.position += r.direction
+    return STEP
+
+
+def place_motor(r: StepRule, position: int) -> None:
+    """Power-on or homing: the motor stands at `position` [step]."""
+    r.position = position
+    r.index = r.request = AT_REST
+    r.direction = r.heading = 1
+    r.word = 0
+    r.state = REST
+
+
+def start_move(r: StepRule, heading: int, turns: int = 0) -> None:
+    """Start signal for an automatic move to the sentinel of a direction, with `turns` reversals on the way."""
+    r.heading, r.turns, r.start, r.manual, r.event = heading, turns, 1, 0, 0
+
+
+def deflect(p: StepRuleParams, r: StepRule, word: int, last: int, heading: int) -> None:
+    """The operator takes over and asks for a frequency.
+
+    Parameters
+    ----------
+    p, r : StepRuleParams, StepRule
+        Parameters and state.
+    word : int
+        Frequency [Hz] or, with reload words, period [tick]; 0 releases.
+    last : int
+        Last index of the ramp list.
+    heading : int
+        1 or -1.
+    """
+    r.manual, r.heading, r.event = 1, heading, 0
+    r.request_word = word
+    words = list(p.ramp[: last + 1])
+    # The first index that is fast enough; of several with this very word the last, which the motor passes them to.
+    below = sum(one > word if p.reload else one < word for one in words)
+    r.request = AT_REST if word == 0 else min(below + max(words.count(word) - 1, 0), last)

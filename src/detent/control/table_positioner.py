@@ -1,0 +1,278 @@
+"""Positioner of a rotary table: the 2 ms interrupt and the 20 ms task (rotary-table specification 3, 4; A1, A3 to A6).
+
+During a jog the target is two periods ahead. When less than one period of the interpolated way remains, the task moves
+measurement and interpolated target back by one period together, so the servo never sees an end. Registers have their
+names of the specification; the target is OAR, the interpolated one is ``C = OAR - Z IR``.
+"""
+
+import math
+
+from detent.control.angle_interpolator import Interpolator, InterpolatorParams, braking_path, interpolate
+from detent.control.endless_angle import (
+    RAW,
+    TURN_COUNTER,
+    EndlessAngle,
+    EndlessAngleParams,
+    extend,
+    first_angle,
+    read_angle,
+    shift_back,
+    start_raw,
+)
+from detent.control.position_table import AS_COMMANDED, PositionTable, way_to
+from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
+from detent.kernel.step import step
+
+POWER_ON, HOLD, JOG, STOPPING, MOVE = 0, 1, 2, 3, 4
+"""States of specification 4; JOG-RAW and JOG-EXT differ in FLG and n only."""
+
+BY_THEORETICAL, BY_ACTUAL = 0, 1
+"""Remaining angle that the judge looks at."""
+
+ATOMIC, FLAG_FIRST, REMAINING_FIRST = 0, 1, 2
+"""How steps 118 and 120 are stored; in the last two an interrupt can come between."""
+
+BUSY, NO_SUCH_POSITION, TOO_FAR = 1, 2, 3
+"""Reasons for a refusal."""
+
+LONGEST_WAY = 1 << 31
+"""Ways are shorter: IR has 32 bits before its point [count]."""
+
+
+class PositionerParams(Registers):
+    """Range, format, gain, forms."""
+
+    angle: EndlessAngleParams = block("extension of the detected angle")
+    interpolator: InterpolatorParams = block("interpolator")
+    pdt: PositionTable = block("position table PDT")
+    gain: f8 = register("words of register 5 per deviation", unit="count/(count/2^f)")
+    speed_gain: f8 = register("words of register 5 per speed, without position control", unit="count/(count/2^f)")
+    max_word: i8 = register("largest magnitude of the word: 2047 with 12 bits", unit="count")
+    window: i8 = register("deviation that counts as in position", unit="count")
+    window_interrupts: i8 = register("interrupts inside it until the axis says so", unit="count")
+    judge: u1 = register("remaining angle of step 116: 0 theoretical IR, 1 actual AR", unit="code")
+    inclusive: u1 = register("1: the judge fires at T or less, 0: below T")
+    guarded: u1 = register("1: it fires only with FLG on; the turn counter does not need that")
+    update: u1 = register("118 and 120: 0 indivisible, 1 flag first, 2 remaining first", unit="code")
+    unsigned_remaining: u1 = register("1: AR = |M - R| as in the flowchart, 0: signed along Z")
+    open_loop: u1 = register(
+        "1: S4 is the interpolated speed, without position control; what the method is compared with"
+    )
+
+
+class Positioner(Registers):
+    """Registers of the positioner and the lines from and to sequence controller and panel."""
+
+    plus: u1 = register("+ button, written by the host: held down to jog to larger angles")
+    minus: u1 = register("- button, written by the host")
+    dial: i8 = register("speed dial, written by the host", unit="count/2^f")
+    number: u1 = register("position number, written by the host", unit="code")
+    start: u1 = register("start of a positioning, written by the host, cleared when taken")
+    event: u1 = register("1 when the axis has come to rest in HOLD; the host clears it")
+    refused: i8 = register("starts that were not taken", unit="count")
+    reason: u1 = register("why the last was not: 1 busy, 2 no such position, 3 too far", unit="code")
+    state: u1 = register("0 power-on, 1 hold, 2 jog, 3 stopping, 4 move", unit="code")
+    angle: EndlessAngle = block("detected and present angle")
+    interpolator: Interpolator = block("theoretical remaining angle and speed")
+    oar: i8 = register("OAR: target M", unit="count")
+    arr: i8 = register("ARR: actual remaining angle AR, along Z", unit="count")
+    z: i1 = register("Z: direction, 1 or -1")
+    limit: i8 = register("speed of the present positioning", unit="count/2^f")
+    dr: i8 = register("deviation dR = AR - IR; positive: the table lags", unit="count/2^f")
+    s4: i4 = register("speed signal S4, the word for register 5", unit="count")
+    unfinished: u1 = register("rollover of which one half is stored: 1 flag, 2 remaining", unit="code")
+    inside: i8 = register("interrupts in position so far", unit="count")
+    interrupts: i8 = register("interrupts so far", unit="count")
+    passes: i8 = register("passes of the task so far", unit="count")
+    rollovers: i8 = register("rollovers so far", unit="count")
+
+
+# ------------------------------------------------------------------------------------------------- 2 ms interrupt
+
+
+@step
+def interrupt(p: PositionerParams, r: Positioner, d: int) -> None:
+    """Interrupt S8 with the detected angle: steps 200 to 228."""
+    if r.state == POWER_ON:
+        power_on(r, d)
+    manual = r.state in (JOG, STOPPING)
+    read_angle(p.angle, r.angle, d, manual)
+    extend(p.angle, r.angle, r.z)
+    r.arr = remaining(p, r)
+    interpolate(p.interpolator, r.interpolator, speed_limit(p, r))
+    r.dr = (r.arr << p.interpolator.fraction) - r.interpolator.irr
+    r.s4 = speed_word(p, r)
+    r.interrupts += 1
+    watch_end(p, r)
+
+
+@step
+def speed_limit(p: PositionerParams, r: Positioner) -> int:
+    """Speed the interpolator may reach: of the table, of the dial, or in a stop what it has."""
+    if r.state == MOVE:
+        return r.limit
+    if r.state == STOPPING:  # from rest it must still use up the fraction of a count that is left
+        return max(r.interpolator.speed, p.interpolator.acceleration)
+    return max(r.dial, 0)
+
+
+@step
+def power_on(r: Positioner, d: int) -> None:
+    """The table is held where the first angle finds it."""
+    first_angle(r.angle, d)
+    r.oar = d
+    r.z = 1
+    r.state = HOLD
+
+
+@step
+def remaining(p: PositionerParams, r: Positioner) -> int:
+    """Steps 214 to 218: distance from R to M along Z [count]."""
+    distance = r.oar - r.angle.aar
+    return abs(distance) if p.unsigned_remaining else r.z * distance
+
+
+@step
+def speed_word(p: PositionerParams, r: Positioner) -> int:
+    """Steps 226 to 228: ``S4 = Z Kp dR`` in words of register 5, rounded and limited."""
+    wanted = p.speed_gain * r.interpolator.speed if p.open_loop else p.gain * r.dr
+    limit = p.max_word * 1.0
+    return r.z * math.floor(min(max(wanted, -limit), limit) + 0.5)
+
+
+@step
+def watch_end(p: PositionerParams, r: Positioner) -> None:
+    """Come to rest when a stop has run out or a positioning has arrived."""
+    if r.interpolator.irr > 0:
+        return
+    if r.state == STOPPING:
+        rest(p, r)
+    elif r.state == MOVE:
+        near = abs(r.oar - r.angle.aar) <= p.window
+        r.inside = r.inside + 1 if near else 0
+        if r.inside >= p.window_interrupts:
+            rest(p, r)
+
+
+@step
+def rest(p: PositionerParams, r: Positioner) -> None:
+    """HOLD; with the turn counter the target is brought back into [0, T), and R with it."""
+    if p.angle.form == TURN_COUNTER:
+        periods = r.oar // p.angle.period
+        r.oar -= periods * p.angle.period
+        r.angle.turn -= periods
+        extend(p.angle, r.angle, r.z)
+    r.state = HOLD
+    r.event = 1
+
+
+# ------------------------------------------------------------------------------------------------- 20 ms task
+
+
+@step
+def begin_pass(p: PositionerParams, r: Positioner) -> None:
+    """Timer task, steps 100 to 122, up to where an interrupt can come between the halves of a rollover."""
+    r.passes += 1
+    if r.state == HOLD and r.plus != r.minus:
+        start_jog(p, r, 1 if r.plus else -1)
+    elif r.state == JOG:
+        held = r.plus if r.z > 0 else r.minus
+        if held == 0:
+            stop_jog(p, r)
+        elif is_due(p, r):
+            begin_rollover(p, r)
+    if r.start:
+        take_position(p, r)
+
+
+@step
+def end_pass(p: PositionerParams, r: Positioner) -> None:
+    """The rest of the pass: the other half of a rollover."""
+    if r.unfinished == FLAG_FIRST:
+        advance_remaining(p, r)
+    elif r.unfinished == REMAINING_FIRST:
+        shift_back(r.angle, r.z)
+    r.unfinished = 0
+
+
+@step
+def start_jog(p: PositionerParams, r: Positioner, z: int) -> None:
+    """First pass with a button: steps 102 to 114, the target two periods ahead."""
+    r.z = z
+    start_raw(r.angle)
+    ahead = 2 * p.angle.period
+    r.oar = r.angle.dar + ahead * z
+    r.arr = ahead
+    r.interpolator.irr = ahead << p.interpolator.fraction
+    r.interpolator.speed = 0
+    r.state = JOG
+
+
+@step
+def is_due(p: PositionerParams, r: Positioner) -> bool:
+    """Step 116: less than one period remains."""
+    if p.angle.form == RAW or (p.guarded and r.angle.flg == 0):
+        return False
+    left = r.arr << p.interpolator.fraction if p.judge == BY_ACTUAL else r.interpolator.irr
+    limit = p.angle.period << p.interpolator.fraction
+    return left < limit + (1 if p.inclusive else 0)
+
+
+@step
+def begin_rollover(p: PositionerParams, r: Positioner) -> None:
+    """Steps 118 and 120: measurement and interpolated target go back by one period, at once or in halves."""
+    r.rollovers += 1
+    r.unfinished = p.update
+    if p.update != REMAINING_FIRST:
+        shift_back(r.angle, r.z)
+    if p.update != FLAG_FIRST:
+        advance_remaining(p, r)
+
+
+@step
+def advance_remaining(p: PositionerParams, r: Positioner) -> None:
+    """Step 120: one period more remains."""
+    r.interpolator.irr += p.angle.period << p.interpolator.fraction
+
+
+@step
+def stop_jog(p: PositionerParams, r: Positioner) -> None:
+    """Release: the target comes to where the interpolated one can stop, by whole counts, so C stays where it is."""
+    f = p.interpolator.fraction
+    spare = (r.interpolator.irr - braking_path(p.interpolator, r.interpolator)) >> f
+    r.interpolator.irr -= spare << f
+    r.oar -= r.z * spare
+    r.state = STOPPING
+
+
+@step
+def take_position(p: PositionerParams, r: Positioner) -> None:
+    """Position number: only the turn counter carries a positioning over the boundary."""
+    r.start = 0
+    if r.state != HOLD:
+        refuse(r, BUSY)
+        return
+    if r.number >= p.pdt.entries:
+        refuse(r, NO_SUCH_POSITION)
+        return
+    if p.angle.form != TURN_COUNTER:
+        start_raw(r.angle)
+    policy = p.pdt.policy[r.number] if p.angle.form == TURN_COUNTER else AS_COMMANDED
+    way = way_to(p.angle.period, p.pdt.tolerance, policy, p.pdt.angle[r.number], r.angle.aar)
+    if abs(way) >= LONGEST_WAY:
+        refuse(r, TOO_FAR)
+        return
+    r.z = -1 if way < 0 else 1
+    r.oar = r.angle.aar + way
+    r.interpolator.irr = abs(way) << p.interpolator.fraction
+    r.interpolator.speed = 0
+    r.limit = p.pdt.speed[r.number]
+    r.inside = 0
+    r.state = MOVE
+
+
+@step
+def refuse(r: Positioner, reason: int) -> None:
+    """A start that is not taken."""
+    r.refused += 1
+    r.reason = reason

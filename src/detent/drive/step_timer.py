@@ -1,0 +1,59 @@
+"""Step timer and phase sequencer of a stepper: one pulse per period (stepper-envelope specification 2.2, block B5)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from detent.kernel.registers import Registers, i8, register, u1
+from detent.kernel.step import step
+
+
+class StepTimerParams(Registers):
+    """Clock of the timer and what its word means."""
+
+    clock_hz: i8 = register("ticks of the timer per second", unit="Hz")
+    reload: u1 = register("1: a word is the period itself [tick]; 0: it is a frequency [Hz]")
+
+
+class StepTimer(Registers):
+    """Period counter and coil pattern."""
+
+    period: i8 = register("running period; 0 at rest", unit="tick")
+    expires: i8 = register("time at which the running period is over", unit="tick")
+    phase: u1 = register("place in the full-step pattern of the two coils, 0..3", unit="code")
+    pulses: i8 = register("step pulses since power-on", unit="count")
+
+
+@step
+def load_period(p: StepTimerParams, r: StepTimer, word: int) -> None:
+    """Begin a period where the last one was over; a frequency costs a division, a reload value none."""
+    if p.reload:
+        r.period = word
+    else:
+        r.period = (p.clock_hz + word // 2) // word
+    r.expires += r.period
+
+
+@step
+def pulse(r: StepTimer, direction: int) -> None:
+    """Step pulse: the coil pattern moves on by one place."""
+    r.phase = (r.phase + direction) & 3
+    r.pulses += 1
+
+
+@step
+def frequency(p: StepTimerParams, r: StepTimer) -> float:
+    """Frequency of the running period [Hz]; 0 at rest."""
+    return p.clock_hz / r.period if r.period > 0 else 0.0
+
+
+def reload_values(hz: ArrayLike, clock_hz: int) -> NDArray[np.int64]:
+    """Period of each frequency in whole ticks, shape as `hz` [tick].
+
+    Parameters
+    ----------
+    hz : array_like of float
+        Frequencies above 0 [Hz].
+    clock_hz : int
+        Ticks per second.
+    """
+    return np.rint(clock_hz / np.asarray(hz, float)).astype(np.int64)

@@ -1,0 +1,254 @@
+"""How fast an open-loop stepper may gain speed: its ramp list (stepper-envelope specification 3.1).
+
+A stepper has no sensor: a step that the rotor does not follow is lost for good. Coil current rises at a limited rate,
+so the torque falls with the step frequency, and part of it accelerates the inertia. From this follow the frequency at
+which the motor starts and stops directly, and the frequency that each further step may have: the ramp list.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot, isfinite, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEAST_GAIN_HZ = 0.5
+"""A ramp ends where a step gains less than this: the torque left over is used up."""
+
+MAX_HZ = 65535
+"""Largest frequency in a 16-bit word."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepperMotor:
+    """What a stepper can do.
+
+    Attributes
+    ----------
+    steps_per_turn : int
+        200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree.
+    rotor_inertia : float
+        [kg m^2].
+    holding_torque : float
+        Peak of the static torque curve [N m].
+    pull_out_torque : float
+        Pull-out torque at standstill [N m].
+    corner_hz : float
+        Step frequency at which coil current, and with it the torque, has fallen to 1/sqrt 2 [Hz].
+    unloaded_start_hz : float
+        Start frequency of the bare rotor [Hz].
+    """
+
+    steps_per_turn: int
+    rotor_inertia: float
+    holding_torque: float
+    pull_out_torque: float
+    corner_hz: float
+    unloaded_start_hz: float
+
+    def __post_init__(self) -> None:
+        _above_zero(
+            self,
+            "steps_per_turn",
+            "rotor_inertia",
+            "holding_torque",
+            "pull_out_torque",
+            "corner_hz",
+            "unloaded_start_hz",
+        )
+
+    @property
+    def step_angle(self) -> float:
+        """Angle of one step [rad]."""
+        return 2 * pi / self.steps_per_turn
+
+    def pull_out(self, hz: float) -> float:
+        """Pull-out torque at a step frequency [N m]: T_po0 / sqrt(1 + (f/f_c)^2)."""
+        return self.pull_out_torque / hypot(1.0, hz / self.corner_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class StepperLoad:
+    """What hangs on the shaft: coupling, spindle and the mass that the spindle moves.
+
+    Attributes
+    ----------
+    pitch : float
+        Travel per turn of the spindle [m].
+    mass : float
+        Moved mass [kg].
+    spindle_inertia, coupling_inertia : float
+        [kg m^2].
+    friction_torque : float
+        Coulomb friction at the shaft [N m].
+    """
+
+    pitch: float
+    mass: float
+    spindle_inertia: float
+    coupling_inertia: float
+    friction_torque: float
+
+    def __post_init__(self) -> None:
+        _above_zero(self, "pitch")
+        for name in ("mass", "spindle_inertia", "coupling_inertia", "friction_torque"):
+            value = getattr(self, name)
+            if not 0 <= value < float("inf"):
+                raise ValueError(f"StepperLoad.{name} is {value}, must be 0 or more and finite")
+
+    @property
+    def inertia(self) -> float:
+        """All that turns with the rotor, the mass as m (pitch / 2 pi)^2 [kg m^2]."""
+        return self.spindle_inertia + self.coupling_inertia + self.mass * (self.pitch / (2 * pi)) ** 2
+
+
+def total_inertia(motor: StepperMotor, load: StepperLoad) -> float:
+    """Inertia that the motor accelerates, its own rotor included [kg m^2]."""
+    return motor.rotor_inertia + load.inertia
+
+
+def travel_per_step(motor: StepperMotor, load: StepperLoad) -> float:
+    """Travel of the moved mass per step [m]."""
+    return load.pitch / motor.steps_per_turn
+
+
+def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1) -> float:
+    """Frequency at which the loaded motor starts and stops without losing steps [Hz].
+
+    Parameters
+    ----------
+    motor, load : StepperMotor, StepperLoad
+        Motor and load.
+    safety : float
+        Reserve for age and temperature, 1 or more.
+
+    Returns
+    -------
+    float
+        f_start0 / sqrt(1 + J_load/J_rotor) / safety [Hz].
+
+    Raises
+    ------
+    ValueError
+        The reserve is below 1.
+    """
+    if not safety >= 1:
+        raise ValueError(f"safety is {safety}, must be 1 or more")
+    return motor.unloaded_start_hz / sqrt(1 + load.inertia / motor.rotor_inertia) / safety
+
+
+def acceleration_limit(
+    motor: StepperMotor, load: StepperLoad, max_acceleration: float, safety_factor: float = 2.0
+) -> Callable[[float], float]:
+    """Acceleration that motor and load allow, as a function of the step frequency.
+
+    Parameters
+    ----------
+    motor, load : StepperMotor, StepperLoad
+        Motor and load.
+    max_acceleration : float
+        Limit a_lin of the linear part [step/s^2].
+    safety_factor : float
+        SF: the pull-out torque is divided by it, 1 or more.
+
+    Returns
+    -------
+    callable
+        a(f) = min(a_lin, (T_po(f)/SF - T_fric) / (J theta)) [step/s^2] for f [Hz]; below 0 where the torque does not
+        even overcome the friction.
+
+    Raises
+    ------
+    ValueError
+        The acceleration is not above 0, or the safety factor is below 1.
+    """
+    if not 0 < max_acceleration < float("inf"):
+        raise ValueError(f"max_acceleration is {max_acceleration} step/s^2, must be above 0 and finite")
+    if not safety_factor >= 1:
+        raise ValueError(f"safety_factor is {safety_factor}, must be 1 or more")
+    per_torque = 1 / (total_inertia(motor, load) * motor.step_angle)
+
+    def acceleration(hz: float) -> float:
+        spare = motor.pull_out(hz) / safety_factor - load.friction_torque
+        return min(max_acceleration, spare * per_torque)
+
+    return acceleration
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepRamp:
+    """The frequencies of a run-up from rest, one per step.
+
+    Attributes
+    ----------
+    hz : float64 array, shape (L,)
+        Strictly increasing; `hz[0]` is the frequency to start and to stop at [Hz].
+    """
+
+    hz: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.hz)
+
+    @property
+    def duration(self) -> float:
+        """Time that the whole list takes, one period each [s]."""
+        return float(np.sum(1 / self.hz))
+
+    def index_of(self, hz: float) -> int:
+        """Smallest index whose frequency reaches `hz` [Hz]; the last one where none does."""
+        return min(int(np.searchsorted(self.hz, hz)), len(self.hz) - 1)
+
+    def words(self) -> NDArray[np.uint16]:
+        """The list as the control unit stores it, in whole Hz, shape (L,)."""
+        return np.rint(self.hz).astype(np.uint16)
+
+
+def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], float]) -> StepRamp:
+    """Ramp list from the start frequency up; braking uses it backwards (friction helps, so that is the safe side).
+
+    Parameters
+    ----------
+    start_hz : float
+        The lower one of start and stop frequency [Hz].
+    max_hz : float
+        Where the list ends at the latest, the limit of the motor's drive [Hz].
+    acceleration : callable
+        Permissible acceleration [step/s^2] at a frequency [Hz]; 0 or less ends the list.
+
+    Returns
+    -------
+    StepRamp
+        At least one entry. It ends below `max_hz` where a step gains less than 0.5 Hz.
+
+    Raises
+    ------
+    ValueError
+        The frequencies are not in 0 < start <= max <= 65535 Hz.
+
+    Notes
+    -----
+    f^2 grows by 2 a(f) per step, with a(f) at the middle of the step. It is f^2 that is summed up: at constant
+    acceleration the entries are then those of sqrt(f_start^2 + 2 a n) to the last bit, and an index found by
+    comparison with a round frequency is the right one.
+    """
+    if not 1 <= start_hz <= max_hz <= MAX_HZ:
+        raise ValueError(f"start_hz is {start_hz}, max_hz is {max_hz}, must be 1 <= start_hz <= max_hz <= {MAX_HZ}")
+    found = [start_hz]
+    square = start_hz * start_hz
+    while found[-1] < max_hz:
+        hz = found[-1]
+        predicted = sqrt(max(square + 2 * acceleration(hz), 0.0))
+        square += 2 * acceleration(min(max_hz, (hz + predicted) / 2))
+        gained = min(max_hz, sqrt(max(square, 0.0)))
+        if gained - hz < LEAST_GAIN_HZ and gained < max_hz:
+            break
+        found.append(gained)
+    return StepRamp(np.array(found))
+
+
+def _above_zero(record: object, *names: str) -> None:
+    for name in names:
+        value = getattr(record, name)
+        if not (isfinite(value) and value > 0):
+            raise ValueError(f"{type(record).__name__}.{name} is {value}, must be above 0 and finite")

@@ -1,0 +1,77 @@
+"""Rotor of a stepper in the field of its coils: the judge of whether steps are lost (stepper-envelope spec 7.2).
+
+    J th'' = T_pk(f) sin(teeth (th_cmd - th)) + B(f) (w_cmd - th') - T_fric sign(th')
+
+Coil current rises at a limited rate, so torque and damping fall with the step frequency by 1 / sqrt(1 + (f/f_c)^2).
+The damping works against the field, so that it does not brake steady running. A rotor that falls out of step catches
+the field again whole tooth pitches, that is four steps, later.
+"""
+
+import math
+
+from detent.kernel.registers import Registers, f8, i8, register
+from detent.kernel.step import hot_step, step
+
+
+class RotorParams(Registers):
+    """Motor and load of one shaft."""
+
+    dt: f8 = register("time step of the integration", unit="s")
+    teeth: f8 = register("rotor teeth: periods of the torque curve per turn")
+    step_angle: f8 = register("angle of one step", unit="rad")
+    inertia: f8 = register("rotor and all that turns with it", unit="kg.m2")
+    torque: f8 = register("peak torque at standstill", unit="N.m")
+    damping: f8 = register("damping against the field at standstill", unit="N.m.s/rad")
+    corner_hz: f8 = register("step frequency at which the torque has fallen to 1/sqrt 2", unit="Hz")
+    friction: f8 = register("Coulomb friction torque", unit="N.m")
+
+
+class StepperRotor(Registers):
+    """Field and rotor."""
+
+    commanded: i8 = register("position of the field: step pulses, forward less backward", unit="count")
+    field_velocity: f8 = register("velocity of the field, 0 one period after the last pulse", unit="rad/s")
+    strength: f8 = register("torque as a part of that at standstill")
+    angle: f8 = register("rotor angle", unit="rad")
+    velocity: f8 = register("rotor velocity", unit="rad/s")
+    peak_lag: f8 = register("largest distance of the rotor from the field so far, in steps", unit="count")
+
+
+@step
+def step_field(p: RotorParams, r: StepperRotor, direction: int, hz: float) -> None:
+    """Step pulse: the field jumps by one step and goes on at the frequency of its period."""
+    r.commanded += direction
+    r.field_velocity = direction * hz * p.step_angle
+    ratio = hz / p.corner_hz
+    r.strength = 1.0 / math.sqrt(1.0 + ratio * ratio)
+
+
+@step
+def hold_field(r: StepperRotor) -> None:
+    """The period after the last pulse is over: the field stands, with the full current."""
+    r.field_velocity = 0.0
+    r.strength = 1.0
+
+
+@hot_step
+def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
+    """One time step; friction takes speed away but never turns it round."""
+    lag = r.commanded * p.step_angle - r.angle
+    torque = p.torque * math.sin(p.teeth * lag) + p.damping * (r.field_velocity - r.velocity)
+    velocity = r.velocity + p.dt * r.strength * torque / p.inertia
+    loss = p.dt * p.friction / p.inertia
+    if velocity > loss:
+        velocity -= loss
+    elif velocity < -loss:
+        velocity += loss
+    else:
+        velocity = 0.0
+    r.velocity = velocity
+    r.angle += p.dt * velocity
+    r.peak_lag = max(r.peak_lag, abs(r.commanded - r.angle / p.step_angle))
+
+
+@step
+def lost_steps(p: RotorParams, r: StepperRotor) -> int:
+    """Commanded less actual position of a rotor that has come to rest, in whole steps."""
+    return math.floor(r.commanded - r.angle / p.step_angle + 0.5)

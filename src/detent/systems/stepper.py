@@ -1,0 +1,212 @@
+"""One stepper of the envelope method, wired as its block diagram (stepper-envelope specification 2.2).
+
+    host -> envelope builder -> table (up, down) -> control unit -> timer, phases -> motor, spindle, load
+                                                        ^              |
+                                                        +-- period over+
+
+The base tick is one step: `advance` runs the control unit and the timer alone, as firmware does. `advance_on_rig` adds
+the rotor in fixed time steps, to see whether it follows. The order is: decide, actuate, move, record; an open-loop
+motor has nothing to sample. Several motors are several of these records, each with its own tables; nothing is shared.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
+from detent.control.step_rule import IDLE, LIMITS, PAUSE, RAMP, STEP, StepRule, StepRuleParams, next_step, place_motor
+from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
+from detent.kernel.compiled import byte_at
+from detent.kernel.registers import Registers, block, i8, register, u1
+from detent.kernel.step import step
+from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
+from detent.planning.step_ramp import StepRamp
+from detent.plant.stepper_rotor import RotorParams, StepperRotor, hold_field, step_field, turn_rotor
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
+Entries = NDArray[np.int16]
+
+NOWHERE = -(1 << 62)
+"""Position that no motor reaches."""
+
+
+class StepperParams(Registers):
+    """Everything about one motor that does not change while it runs, but its tables."""
+
+    rule: StepRuleParams = block("control unit")
+    comparison: ComparisonParams = block("a method to compare with, instead of the control unit")
+    pause: u1 = register("waiting time of a reversal, in periods of the start frequency", unit="count")
+    timer: StepTimerParams = block("step timer")
+    instant_ticks: i8 = register("time step of the rotor in ticks of the step timer", unit="tick")
+    rotor: RotorParams = block("motor and load")
+
+
+class Stepper(Registers):
+    """State of one motor with its control unit."""
+
+    rule: StepRule = block("control unit")
+    comparison: Comparison = block("a method to compare with")
+    timer: StepTimer = block("step timer and phases")
+    instant: i8 = register("time steps of the rotor since power-on", unit="count")
+    stop_at: i8 = register("position at which the loop returns to the host", unit="count")
+    rotor: StepperRotor = block("motor")
+
+
+@step
+def step_once(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> int:
+    """The running period is over: decide, and begin the next one. Returns IDLE, STEP or PAUSE."""
+    if p.comparison.method:
+        outcome = next_compared_step(p.comparison, r.comparison, r.rule)
+    else:
+        outcome = next_step(p.rule, r.rule, up, down)
+    if outcome == STEP:
+        load_period(p.timer, r.timer, r.rule.word)
+        pulse(r.timer, r.rule.direction)
+        if r.rule.position == r.stop_at:
+            r.rule.event = 1
+    elif outcome == PAUSE:
+        start = r.timer.expires
+        if p.pause:
+            load_period(p.timer, r.timer, p.rule.ramp[0])
+        r.timer.expires = start + p.pause * r.timer.period
+    else:
+        r.timer.period = 0
+    return outcome
+
+
+@step
+def advance(
+    p: StepperParams, r: Stepper, up: Entries, down: Entries, steps: int, trace: Bytes, picks: Offsets, every: int
+) -> int:
+    """Run up to `steps` steps without the rotor; stops when the motor rests, or has raised an event.
+
+    Parameters
+    ----------
+    p, r : StepperParams, Stepper
+        Parameters and state.
+    up, down : int16 array, shape (N + 1,)
+        Tables, see `control.step_rule.next_step`.
+    steps : int
+        Most steps to make.
+    trace : uint8 array, shape (rows, bytes)
+        One row per record, the registers after a step; row number ``pulses // every`` modulo rows.
+    picks : int64 array, shape (bytes,)
+        Byte offsets in the state that make a row.
+    every : int
+        Steps between two records; 0 records nothing.
+
+    Returns
+    -------
+    int
+        Steps made.
+    """
+    done = 0
+    while done < steps and r.rule.event == 0:
+        outcome = step_once(p, r, up, down)
+        if outcome == IDLE:
+            break
+        if outcome == STEP:
+            done += 1
+            if every > 0 and r.timer.pulses % every == 0:
+                row = (r.timer.pulses // every) % trace.shape[0]
+                for k in range(picks.shape[0]):
+                    trace[row, k] = byte_at(r, picks[k])
+    return done
+
+
+@step
+def actuate(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> None:
+    """Step timer up to the present instant, and what its pulses do to the field."""
+    now = r.instant * p.instant_ticks
+    while r.timer.expires <= now:
+        if r.timer.period == 0:
+            r.timer.expires = now  # at rest time passes until a start, which takes effect at once
+        outcome = step_once(p, r, up, down)
+        if outcome == STEP:
+            step_field(p.rotor, r.rotor, r.rule.direction, frequency(p.timer, r.timer))
+        elif outcome == PAUSE:
+            hold_field(r.rotor)
+        else:
+            hold_field(r.rotor)
+            return
+
+
+@step
+def advance_on_rig(
+    p: StepperParams, r: Stepper, up: Entries, down: Entries, instants: int, trace: Bytes, picks: Offsets, every: int
+) -> int:
+    """Run up to `instants` time steps of the rotor; stops early when the motor has raised an event.
+
+    Parameters
+    ----------
+    p, r, up, down, picks
+        As for `advance`.
+    instants : int
+        Most time steps to run.
+    trace : uint8 array, shape (rows, bytes)
+        One row per record; row number ``instant // every`` modulo rows.
+    every : int
+        Time steps between two records; 0 records nothing.
+
+    Returns
+    -------
+    int
+        Time steps run.
+    """
+    done = 0
+    while done < instants and r.rule.event == 0:
+        actuate(p, r, up, down)
+        turn_rotor(p.rotor, r.rotor)
+        r.instant += 1
+        done += 1
+        if every > 0 and r.instant % every == 0:
+            row = (r.instant // every) % trace.shape[0]
+            for k in range(picks.shape[0]):
+                trace[row, k] = byte_at(r, picks[k])
+    return done
+
+
+def load_rule(p: StepperParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool) -> None:
+    """Put ramp list and zone limits into the control unit, in the words of its timer.
+
+    Parameters
+    ----------
+    p : StepperParams
+        Written: `rule` and `timer`.
+    ramp : StepRamp
+        Ramp list.
+    limits : sequence of float
+        Zone limits by their numbers, `ZoneMap.limits` [Hz].
+    clock_hz : int
+        Ticks of the timer per second.
+    reload : bool
+        Words are periods in ticks instead of frequencies in Hz. A limit is rounded to the slower side.
+
+    Raises
+    ------
+    ValueError
+        Ramp or limits do not fit the registers.
+    """
+    if len(ramp) > RAMP or len(limits) > LIMITS:
+        raise ValueError(
+            f"{len(ramp)} ramp entries and {len(limits)} zone limits, must be {RAMP} and {LIMITS} or fewer"
+        )
+    bounds = np.asarray(limits, float)
+    words = reload_values(ramp.hz, clock_hz) if reload else ramp.words()
+    bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)
+    p.rule.ramp[: len(words)] = [int(word) for word in words]
+    p.rule.limit[: len(bounds)] = [int(word) for word in bound_words]
+    p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
+    p.rule.reload = p.timer.reload = int(reload)
+    p.timer.clock_hz = clock_hz
+
+
+def switch_on(r: Stepper, position: int, step_angle: float) -> None:
+    """Power-on with the motor standing at `position` [step], the rotor in the middle of its field."""
+    place_motor(r.rule, position)
+    r.rotor.commanded = position
+    r.rotor.angle = position * step_angle
+    hold_field(r.rotor)
+    r.stop_at = NOWHERE

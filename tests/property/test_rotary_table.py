@@ -1,0 +1,218 @@
+"""The rotary table for every start, every number of turns, every sequence of buttons, starts and noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.rotary_table_rig import COUNT, FINE, KP, ONE, RATIO, PositionerBench, Rig, T
+
+from detent.control.endless_angle import EndlessAngle, EndlessAngleParams, extend, first_angle, read_angle
+from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
+from detent.control.table_positioner import HOLD, begin_pass, end_pass
+from detent.kernel.step import step
+from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
+
+FASTEST = T // 2
+"""Counts per interrupt that can still be told from a crossing."""
+
+
+@step
+def turn_evenly(p: EndlessAngleParams, r: EndlessAngle, start: int, rate: int, interrupts: int) -> int:
+    """Feed an even rotation; returns interrupts after which record or present angle was not exact."""
+    first_angle(r, start % p.period)
+    wrong = 0
+    for n in range(1, interrupts + 1):
+        place = start + n * rate
+        read_angle(p, r, place % p.period, False)
+        extend(p, r, 1)
+        wrong += r.position != place or r.aar != place
+    return wrong
+
+
+@settings(max_examples=50)
+@given(start=st.integers(0, T - 1), rate=st.integers(-FASTEST, FASTEST), interrupts=st.integers(1, 300))
+def test_the_record_is_exact_at_any_rate(start, rate, interrupts):
+    p, r = EndlessAngleParams(period=T), EndlessAngle()
+    if 2 * abs(rate) == T:  # half a period is no crossing: a change of exactly that has no direction
+        rate -= 1 if rate > 0 else -1
+    assert turn_evenly(p, r, start, rate, interrupts) == 0
+    assert r.crossings == abs((start + interrupts * rate) // T)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("rate", [FASTEST - 1, 1 - FASTEST, 123_457, -99_991])
+def test_millions_of_turns(rate):
+    p, r = EndlessAngleParams(period=T), EndlessAngle()
+    interrupts = 6_000_000
+    assert turn_evenly(p, r, 777, rate, interrupts) == 0
+    assert abs(r.position) > 1_000_000 * T
+    assert r.position == 777 + interrupts * rate
+
+
+@given(
+    turns=st.integers(-(2**62) // T, 2**62 // T - 1),
+    place=st.integers(0, T - 1),
+    changes=st.lists(st.integers(1 - FASTEST, FASTEST - 1), min_size=1, max_size=30),
+)
+def test_the_record_is_exact_2_62_counts_from_home(turns, place, changes):
+    p, r = EndlessAngleParams(period=T), EndlessAngle()
+    first_angle(r, place)
+    wanted = r.position = turns * T + place
+    r.turn = turns
+    for change in changes:
+        wanted += change
+        read_angle(p, r, wanted % T, False)
+        extend(p, r, 1)
+        assert r.position == r.aar == wanted
+
+
+@given(
+    ratio=st.integers(1, 400),
+    fine=st.integers(2, 1 << 20),
+    coarse=st.integers(2, 1 << 20),
+    share=st.floats(0, 1, exclude_max=True),
+    error=st.floats(-0.5, 0.5),
+)
+def test_composition_is_exact_within_half_a_motor_turn(ratio, fine, coarse, share, error):
+    p, r = CompositionParams(ratio=ratio, fine=fine, coarse=coarse), AbsoluteAngle()
+    period = ratio * fine
+    theta = int(share * period)
+    # Room for the count by which each word lies behind its angle.
+    room = 0.5 - ratio / coarse - 1 / fine
+    if room <= 0:
+        return
+    turns = theta / period + error * 2 * room / ratio
+    compose(p, r, theta % fine, int(turns % 1.0 * coarse))
+    assert r.theta == theta
+
+
+@settings(max_examples=60)
+@given(
+    place=st.integers(0, T - 1),
+    plus=st.booleans(),
+    lag=st.integers(0, 3000),
+    speed=st.integers(1, 270 * ONE),
+    irr=st.integers(1, 2 * T * ONE),
+)
+def test_a_rollover_and_a_stop_never_move_command_against_measurement(place, plus, lag, speed, irr):
+    bench = PositionerBench(place)
+    r, z = bench.r, 1 if plus else -1
+    r.plus, r.minus = plus, not plus
+    begin_pass(bench.p, r)
+    r.interpolator.irr = irr
+    r.interpolator.speed = min(speed, int((2 * bench.p.interpolator.acceleration * irr) ** 0.5))
+    bench.p.interpolator.max_speed = 0
+    bench.feed(round(bench.command) - z * lag)
+    before = r.dr
+    r.plus = r.minus = 0 if irr % 2 else 1
+    begin_pass(bench.p, r)
+    end_pass(bench.p, r)
+    extend(bench.p.angle, r.angle, z)
+    left = z * (r.oar - r.angle.aar)
+    assert (left << 16) - r.interpolator.irr == before
+
+
+@dataclass(frozen=True)
+class Act:
+    """A button held for a time, or a positioning; then a time without."""
+
+    kind: int
+    speed: float
+    target: float
+    hold: float
+    pause: float
+
+
+ACTS = st.lists(
+    st.builds(
+        Act,
+        kind=st.sampled_from(("+", "-", SHORTEST, POSITIVE, NEGATIVE, AS_COMMANDED)),
+        speed=st.floats(0.1, 60),
+        target=st.floats(0, 359.99),
+        hold=st.floats(0.0, 9.0),
+        pause=st.floats(0.0, 1.0),
+    ),
+    min_size=1,
+    max_size=5,
+)
+NAMES = [
+    "positioner.dr",
+    "positioner.angle.position",
+    "positioner.angle.dar",
+    "positioner.state",
+    "machine.motor.velocity",
+    "positioner.s4",
+]
+
+
+def perform(rig: Rig, act: Act) -> dict[str, np.ndarray]:
+    """One act, its records at every interrupt."""
+    if isinstance(act.kind, str):
+        rig.press(1 if act.kind == "+" else -1, act.speed)
+    else:
+        rig.entry(0, act.target, act.speed, act.kind).go(0)
+    held = rig.record(rig.time + act.hold, NAMES)
+    rig.release()
+    after = rig.record(rig.time + act.pause, NAMES)
+    return {name: np.concatenate([held[name], after[name]]) for name in NAMES}
+
+
+@pytest.mark.compiled
+@settings(max_examples=60)
+@given(
+    place=st.one_of(st.integers(0, T - 1), st.integers(-4, 4).map(lambda n: n % T)),
+    acts=ACTS,
+    noise=st.sampled_from((0.0, 0.0, 1.0, 3.0)),
+    seed=st.integers(0, 2**62),
+    task_at=st.integers(0, 19),
+)
+def test_the_table_never_jumps(place, acts, noise, seed, task_at):
+    rig = Rig(place * COUNT, noise=noise, seed=seed, task_at=task_at)
+    # Behind a speed v it lags by v / Kp, 3.5 % more at the end of the acceleration; noise of n counts moves D by up to
+    # n and the table by less.
+    lag = 60 / KP * 1.04 + (2 * noise + 2) * COUNT
+    for act in acts:
+        seen = perform(rig, act)
+        assert np.abs(seen["positioner.dr"]).max(initial=0) / ONE * COUNT <= lag
+        steps = np.diff(seen["positioner.angle.position"])
+        assert np.abs(steps).max(initial=0) * COUNT <= 63 * 2e-3 + (2 * noise + 1) * COUNT
+        speed = np.degrees(seen["machine.motor.velocity"]) / RATIO
+        assert np.abs(speed).max(initial=0) <= 63
+        assert (seen["positioner.angle.position"] % T == seen["positioner.angle.dar"]).all()
+    rig.run_until(rig.time + 12)  # the longest way at 60 deg/s, and to rest
+    if rig.positioner.state == HOLD:
+        assert abs(rig.present - rig.target) <= (2 * noise + 2) * COUNT
+        assert 0 <= rig.positioner.oar < T
+    else:
+        assert noise > 0 or acts[-1].speed < 60
+
+
+@pytest.mark.compiled
+@settings(max_examples=25)
+@given(
+    velocity=st.floats(-2e4, 2e4),
+    oar=st.integers(-(10**9), 10**9),
+    irr=st.integers(0, 2**47),
+    word=st.integers(-32767, 32767),
+    state=st.integers(0, 4),
+    z=st.sampled_from((1, -1)),
+    task_at=st.integers(0, 19),
+)
+def test_from_any_state_no_tick_exceeds_the_limits(velocity, oar, irr, word, state, z, task_at):
+    rig = Rig(123.4, task_at=task_at)
+    r = rig.positioner
+    rig.r.machine.motor.velocity = velocity
+    rig.r.amplifier.word = word
+    r.oar, r.state, r.z, r.plus = oar, state, z, 1
+    rig.interpolator.irr = irr
+    fastest = max(abs(velocity), 32767 * rig.p.amplifier.speed_per_count)
+    for _ in range(20):
+        rig.run_ticks(37)
+        assert abs(r.s4) <= 32767
+        assert abs(rig.r.machine.motor.velocity) <= fastest * (1 + 1e-12)
+        assert 0 <= rig.interpolator.irr <= irr + 2 * T * ONE
+        assert 0 <= rig.angle.dar < T
+        assert 0 <= rig.r.machine.motor.angle < 6.283185307179587
+        assert rig.r.detector.fine.word < FINE

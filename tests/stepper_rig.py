@@ -1,0 +1,246 @@
+"""A stepper on the bench: the defaults of stepper-envelope specification 7, with the rotor of 7.2 as the judge."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from detent.control.step_comparison import CONSTANT_FREQUENCY
+from detent.control.step_rule import FAULT, REST, deflect, start_move
+from detent.kernel.registers import Leaf
+from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
+from detent.plant.stepper_rotor import RotorParams, lost_steps
+from detent.systems.stepper import (
+    NOWHERE,
+    Stepper,
+    StepperParams,
+    advance,
+    advance_on_rig,
+    load_rule,
+    switch_on,
+)
+
+N = 8000
+START_HZ, MAX_HZ, FINE_HZ = 400.0, 4000.0, 1000.0
+A_LIN = 40_000.0
+MOTOR = StepperMotor(
+    steps_per_turn=200,
+    rotor_inertia=9.0e-7,
+    holding_torque=0.06,
+    pull_out_torque=0.045,
+    corner_hz=1200.0,
+    unloaded_start_hz=900.0,
+)
+LOAD = StepperLoad(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
+DT = 2e-6
+SETTLE = 0.05
+CLOCK_HZ = 1_000_000_000
+"""Ticks of the timer that takes frequencies: fine enough for its rounding not to be seen."""
+
+RELOAD_CLOCK_HZ = 1_000_000
+
+
+def default_ramp(max_hz: float = MAX_HZ) -> StepRamp:
+    return make_ramp(START_HZ, max_hz, acceleration_limit(MOTOR, LOAD, A_LIN))
+
+
+RAMP = default_ramp()
+COARSE_FINE = (Zone(2000, 2600, FINE_HZ), Zone(5000, 6000, FINE_HZ))
+
+
+def rotor_params(motor: StepperMotor = MOTOR, load: StepperLoad = LOAD, inertia: float | None = None) -> RotorParams:
+    """Rotor of specification 7.2; `inertia` in place of the sum of motor and load [kg m^2]."""
+    total = total_inertia(motor, load) if inertia is None else inertia
+    teeth = motor.steps_per_turn / 4
+    return RotorParams(
+        dt=DT,
+        teeth=teeth,
+        step_angle=motor.step_angle,
+        inertia=total,
+        torque=motor.holding_torque,
+        damping=0.4 * math.sqrt(teeth * motor.holding_torque * total),
+        corner_hz=motor.corner_hz,
+        friction=load.friction_torque,
+    )
+
+
+@dataclass
+class Course:
+    """What a run without the rotor was: one value per step, and its whole time [s]."""
+
+    position: np.ndarray
+    """Before the step."""
+
+    direction: np.ndarray
+    hz: np.ndarray
+    index: np.ndarray
+    relation: np.ndarray
+    state: np.ndarray
+    seconds: float
+
+
+class Rig:
+    """One motor at rest at `at`, with tables from `start` up to `turn` and from there down to `stop`."""
+
+    def __init__(
+        self,
+        steps: int = N,
+        zones: Sequence[Zone] = (),
+        *,
+        turn: int | None = None,
+        stop: int = 0,
+        at: int = 0,
+        max_hz: float = MAX_HZ,
+        ramp: StepRamp = RAMP,
+        motor: StepperMotor = MOTOR,
+        load: StepperLoad = LOAD,
+        inertia: float | None = None,
+        reload: bool = False,
+        literal: bool = False,
+        pause: int = 0,
+    ) -> None:
+        self.ramp, self.zones = ramp, ZoneMap(steps, max_hz, zones)
+        self.up, self.down = turn_envelopes(ramp, self.zones, 0, steps if turn is None else turn, stop)
+        self.p, self.r = StepperParams(pause=pause), Stepper()
+        self.clock_hz = RELOAD_CLOCK_HZ if reload else CLOCK_HZ
+        load_rule(self.p, ramp, self.zones.limits, self.clock_hz, reload=reload)
+        self.p.rule.literal = literal
+        self.p.instant_ticks = round(DT * self.clock_hz)
+        self.p.rotor = rotor_params(motor, load, inertia)
+        switch_on(self.r, at, motor.step_angle)
+        self.seconds = 0.0
+        """Time of all runs so far, up to the end of the last period [s]."""
+
+    @property
+    def position(self) -> int:
+        return self.r.rule.position
+
+    @property
+    def hz(self) -> float:
+        """Frequency of the running step [Hz]."""
+        return self.clock_hz / self.r.timer.period if self.r.timer.period else 0.0
+
+    @property
+    def lost(self) -> int:
+        return lost_steps(self.p.rotor, self.r.rotor)
+
+    @property
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.up.entries, self.down.entries
+
+    @property
+    def resting(self) -> bool:
+        return self.r.rule.index < 0 and self.r.rule.state in {REST, FAULT} and not self.r.rule.start
+
+    def flat(self, hz: Sequence[float] | np.ndarray, *, up: bool = True) -> "Rig":
+        """Overwrite a table: the literal rule then drives each step i with hz[i], whatever the ramp."""
+        limits = sorted(set(hz), reverse=True)
+        load_rule(self.p, self.ramp, limits, self.clock_hz, reload=bool(self.p.rule.reload))
+        top = len(self.ramp) - 1
+        table = self.up.entries[:-1] if up else self.down.entries[1:]
+        table[:] = [limits.index(f) << self.p.rule.zone_shift | top for f in hz]
+        self.p.rule.literal = 1
+        return self
+
+    def constant(self, hz: float) -> "Rig":
+        """The naive drive: one frequency from the first step to the last."""
+        return self.compared(CONSTANT_FREQUENCY, hz)
+
+    def compared(self, method: int, start_hz: float = START_HZ) -> "Rig":
+        """Another method drives, upwards from here to the end of the travel."""
+        c = self.p.comparison
+        c.method, c.start_hz, c.acceleration = method, start_hz, A_LIN
+        c.begin, c.steps = self.position, self.zones.steps - self.position
+        c.zones = len(self.zones.numbers)
+        for k, number in enumerate(self.zones.numbers):
+            c.edge[k] = int(self.zones.edges[k + 1]) - c.begin
+            c.limit[k] = self.zones.limits[number]
+        return self
+
+    def start(self, heading: int = 1, turns: int = 0) -> "Rig":
+        start_move(self.r.rule, heading, turns)
+        return self
+
+    def joystick(self, hz: float, heading: int = 1) -> "Rig":
+        """Deflect it as far as `hz` is of the largest frequency; 0 releases."""
+        word = hz if not self.p.rule.reload or not hz else self.clock_hz / hz
+        deflect(self.p.rule, self.r.rule, round(word), len(self.ramp) - 1, heading)
+        return self
+
+    def run_to(self, position: int) -> "Rig":
+        """On the rig, until the step that reaches `position` has begun."""
+        self.r.stop_at = position
+        begin = self.r.timer.expires
+        self._turn(10**9)
+        assert self.position == position
+        self.seconds += (self.r.timer.expires - begin) / self.clock_hz
+        self.r.stop_at = NOWHERE
+        return self
+
+    def run_to_rest(self) -> "Rig":
+        """On the rig, until the motor rests."""
+        begin = self.r.timer.expires
+        self._turn(10**9)
+        assert self.resting
+        self.seconds += (self.r.timer.expires - begin) / self.clock_hz
+        return self
+
+    def settle(self) -> "Rig":
+        """Let the rotor come to rest."""
+        self._turn(round(SETTLE / DT))
+        return self
+
+    def run(self) -> "Rig":
+        """On the rig to rest, then let the rotor settle."""
+        return self.run_to_rest().settle()
+
+    def _turn(self, instants: int) -> None:
+        self.r.rule.event = 0
+        advance_on_rig(self.p, self.r, *self.tables, instants, *NO_TRACE)
+        self.r.rule.event = 0
+
+    def edit_stop(self, position: int) -> StopEdit:
+        """Move the stop extreme of the running direction between two steps."""
+        rule = self.r.rule
+        table = self.up if rule.direction > 0 else self.down
+        return table.move_stop(position, rule.position, rule.index)
+
+    def course(self, most: int = 10**7) -> Course:
+        """Run without the rotor until the motor rests or an event comes; one row per step."""
+        names = ["rule.position", "rule.direction", "timer.period", "rule.index", "rule.relation", "rule.state"]
+        leaves: dict[str, Leaf] = {leaf.path: leaf for leaf in Stepper.leaves()}
+        chosen = [leaves[name] for name in names]
+        picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
+        dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])
+        rows = np.zeros((min(most, 3 * self.zones.steps + 10), dtype.itemsize), np.uint8)
+        begin, first = self.r.timer.expires, self.r.timer.pulses
+        self.r.rule.event = 0
+        done = advance(self.p, self.r, *self.tables, min(most, len(rows)), rows, picks, 1)
+        self.r.rule.event = 0
+        found = rows[np.arange(first + 1, first + done + 1) % len(rows)].view(dtype)[:, 0]
+        position, direction = found["rule.position"].copy(), found["rule.direction"].astype(np.int64)
+        return Course(
+            position=position - direction,
+            direction=direction,
+            hz=self.clock_hz / found["timer.period"],
+            index=found["rule.index"].astype(np.int64),
+            relation=found["rule.relation"].astype(np.int64),
+            state=found["rule.state"].astype(np.int64),
+            seconds=(self.r.timer.expires - begin) / self.clock_hz,
+        )
+
+
+NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
+
+
+def heavier(load: StepperLoad, **changes: float) -> StepperLoad:
+    """The load with other figures."""
+    return replace(load, **changes)
+
+
+def envelope(steps: int, zones: Sequence[Zone] = (), ramp: StepRamp = RAMP, max_hz: float = MAX_HZ) -> StepEnvelope:
+    """Table upwards between the ends of the travel."""
+    return StepEnvelope(ramp, ZoneMap(steps, max_hz, zones))

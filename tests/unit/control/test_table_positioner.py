@@ -1,0 +1,251 @@
+import pytest
+from tests.rotary_table_rig import ONE, PositionerBench, T, speed_word
+
+from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
+from detent.control.position_table import AS_COMMANDED
+from detent.control.table_positioner import (
+    BUSY,
+    BY_ACTUAL,
+    FLAG_FIRST,
+    HOLD,
+    JOG,
+    MOVE,
+    NO_SUCH_POSITION,
+    REMAINING_FIRST,
+    STOPPING,
+    TOO_FAR,
+    begin_pass,
+    end_pass,
+)
+
+PLACE = 100_000
+
+
+def jogging(sign: int = 1, interrupts: int = 0, **changes) -> PositionerBench:
+    """A jog whose table follows at once."""
+    bench = PositionerBench(PLACE, **changes)
+    bench.r.dial = speed_word(60)
+    bench.r.plus, bench.r.minus = sign > 0, sign < 0
+    begin_pass(bench.p, bench.r)
+    for _ in range(interrupts):
+        bench.feed(round(bench.command))
+    return bench
+
+
+def run_pass(bench: PositionerBench) -> None:
+    begin_pass(bench.p, bench.r)
+    end_pass(bench.p, bench.r)
+
+
+def test_power_on_holds_where_the_table_stands():
+    bench = PositionerBench(PLACE)
+    assert (bench.r.state, bench.r.oar, bench.r.angle.aar, bench.r.s4) == (HOLD, PLACE, PLACE, 0)
+    bench.feed(PLACE - 10)
+    assert bench.r.arr == 10
+    assert bench.r.s4 == round(bench.p.gain * 10 * ONE)
+    bench.feed(PLACE + 10)
+    assert bench.r.s4 == -round(bench.p.gain * 10 * ONE)
+
+
+@pytest.mark.parametrize("place", [0, 5, T - 3])
+def test_hold_at_the_boundary_does_not_see_it(place):
+    bench = PositionerBench(place)
+    for noise in (4, -4, -6, 3, -1, 0):
+        bench.feed(place + noise)
+        assert bench.r.arr == -noise
+    assert bench.r.angle.position == place
+
+
+def test_the_speed_signal_is_limited():
+    bench = PositionerBench(PLACE)
+    bench.feed(PLACE - 50_000)
+    assert bench.r.s4 == bench.p.max_word
+    bench.feed(PLACE + 50_000)
+    assert bench.r.s4 == -bench.p.max_word
+
+
+@pytest.mark.parametrize(("plus", "minus", "state"), [(0, 0, HOLD), (1, 1, HOLD), (1, 0, JOG), (0, 1, JOG)])
+def test_one_button_starts_a_jog(plus, minus, state):
+    bench = PositionerBench(PLACE)
+    bench.r.plus, bench.r.minus = plus, minus
+    run_pass(bench)
+    assert bench.r.state == state
+    assert state == HOLD or bench.r.z == plus - minus
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_other_button_is_not_heard_until_release(sign):
+    bench = jogging(sign, 50)
+    bench.r.plus = bench.r.minus = 1
+    run_pass(bench)
+    assert (bench.r.state, bench.r.z) == (JOG, sign)
+    bench.r.plus, bench.r.minus = sign < 0, sign > 0
+    run_pass(bench)
+    assert bench.r.state == STOPPING
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("interrupts", [0, 1, 3, 60, 500])
+def test_a_release_leaves_the_command_where_it_is_and_brings_it_to_rest(sign, interrupts):
+    bench = jogging(sign, interrupts)
+    before, speed = bench.command, bench.r.interpolator.speed
+    bench.r.plus = bench.r.minus = 0
+    run_pass(bench)
+    assert (bench.command, bench.r.state) == (before, STOPPING)
+    path = speed**2 / (2 * bench.p.interpolator.acceleration) / ONE
+    assert 0 <= sign * (bench.r.oar - before) - path < 1.001
+    for n in range(200):
+        bench.feed(round(bench.command))
+        if bench.r.state == HOLD:
+            break
+        assert n < 150
+    assert (bench.r.event, bench.command) == (1, bench.r.oar)
+    assert 0 <= bench.r.oar < T
+
+
+def test_the_judge_fires_below_one_period():
+    bench = jogging(1, 20)
+    for irr, due in ((T * ONE + 1, 0), (T * ONE, 0), (T * ONE - 1, 1)):
+        bench.r.interpolator.irr = irr
+        bench.r.rollovers = 0
+        run_pass(bench)
+        assert bench.r.rollovers == due
+    bench.p.inclusive = 1
+    bench.r.interpolator.irr = T * ONE
+    run_pass(bench)
+    assert bench.r.rollovers == 2
+
+
+def test_the_judge_by_the_actual_angle():
+    bench = jogging(1, 20, judge=BY_ACTUAL)
+    bench.r.interpolator.irr = T * ONE - 5
+    bench.r.arr = T
+    run_pass(bench)
+    assert bench.r.rollovers == 0
+    bench.r.arr = T - 1
+    run_pass(bench)
+    assert bench.r.rollovers == 1
+
+
+def test_a_guarded_judge_waits_for_the_flag():
+    bench = jogging(1, 20, form=FLAG, guarded=1)
+    bench.r.interpolator.irr = T * ONE - 5
+    run_pass(bench)
+    assert bench.r.rollovers == 0
+    bench.r.angle.flg = 1
+    run_pass(bench)
+    assert (bench.r.rollovers, bench.r.angle.flg, bench.r.interpolator.irr) == (1, 0, 2 * T * ONE - 5)
+
+
+def test_the_conventional_unit_never_rolls_over():
+    bench = jogging(1, 20, form=RAW)
+    bench.r.interpolator.irr = 5
+    run_pass(bench)
+    assert bench.r.rollovers == 0
+
+
+@pytest.mark.parametrize(
+    ("update", "halfway"),
+    [(0, (-1, 2)), (FLAG_FIRST, (-1, 1)), (REMAINING_FIRST, (0, 2))],
+    ids=["at once", "118", "120"],
+)
+def test_a_rollover_in_halves_ends_the_same(update, halfway):
+    bench = jogging(1, 20, update=update)
+    bench.r.interpolator.irr = T * ONE - 5
+    begin_pass(bench.p, bench.r)
+    assert (bench.r.angle.turn, round(bench.r.interpolator.irr / T / ONE)) == halfway
+    end_pass(bench.p, bench.r)
+    assert (bench.r.angle.turn, bench.r.interpolator.irr, bench.r.unfinished) == (-1, 2 * T * ONE - 5, 0)
+    run_pass(bench)
+    assert bench.r.rollovers == 1
+
+
+def ready(angle: int, policy: int = 0, *, place: int = PLACE, **changes) -> PositionerBench:
+    """A bench with one position, its start given."""
+    bench = PositionerBench(place, **changes)
+    pdt = bench.p.pdt
+    pdt.entries, pdt.angle[0], pdt.speed[0], pdt.policy[0] = 1, angle, speed_word(30), policy
+    bench.r.start = 1
+    return bench
+
+
+def test_a_positioning_arrives_when_it_has_been_in_its_window():
+    bench = ready(PLACE + 500)
+    run_pass(bench)
+    assert (bench.r.state, bench.r.oar, bench.r.z, bench.r.start) == (MOVE, PLACE + 500, 1, 0)
+    while bench.r.interpolator.irr > 0:
+        bench.feed(round(bench.command))
+        assert bench.r.interpolator.speed <= speed_word(30)
+    for off in (0, 2, -2, 3, 0, 1, 2, 0, -1, -2, 0, 1, 1):
+        bench.feed(PLACE + 500 + off)
+        assert (bench.r.state, bench.r.event) == (MOVE, 0)
+    bench.feed(PLACE + 500)
+    assert (bench.r.state, bench.r.event) == (HOLD, 1)
+
+
+@pytest.mark.parametrize(("form", "target"), [(TURN_COUNTER, T + 1000), (FLAG, 1000), (RAW, 1000)])
+def test_only_the_turn_counter_goes_the_shortest_way(form, target):
+    bench = ready(1000, place=T - 1000, form=form)
+    run_pass(bench)
+    assert (bench.r.oar, bench.r.z) == (target, 1 if form == TURN_COUNTER else -1)
+
+
+@pytest.mark.parametrize(("start", "target", "end"), [(T - 100, 50, 1), (50, T - 100, -1), (T - 5, 0, 0)])
+def test_after_arrival_the_target_is_within_the_turn_and_the_angle_with_it(start, target, end):
+    bench = ready(target, place=start)
+    run_pass(bench)
+    way = bench.r.oar - start
+    while bench.r.state == MOVE:
+        bench.feed(round(bench.command) - (end == 0))  # the last stands a count before the boundary
+    assert (bench.r.oar, bench.r.angle.aar - bench.r.oar) == (target, -1 if end == 0 else 0)
+    assert bench.r.angle.position == start + way - (end == 0)
+    bench.feed(target + 3)
+    assert bench.r.arr == -3 * bench.r.z
+
+
+@pytest.mark.parametrize("state", [JOG, STOPPING, MOVE])
+def test_a_start_while_busy_is_refused(state):
+    bench = ready(PLACE + 5000)
+    bench.r.state = state
+    bench.r.plus = 1
+    run_pass(bench)
+    assert (bench.r.state, bench.r.start, bench.r.refused, bench.r.reason) == (state, 0, 1, BUSY)
+
+
+def test_a_button_goes_before_a_start():
+    bench = ready(PLACE + 5000)
+    bench.r.plus = 1
+    run_pass(bench)
+    assert (bench.r.state, bench.r.reason) == (JOG, BUSY)
+
+
+def test_an_unknown_number_and_a_way_too_long_are_refused():
+    bench = ready(5)
+    bench.r.number = 1
+    run_pass(bench)
+    assert (bench.r.state, bench.r.reason) == (HOLD, NO_SUCH_POSITION)
+    bench = ready(PLACE + (1 << 31), AS_COMMANDED)
+    run_pass(bench)
+    assert (bench.r.state, bench.r.reason, bench.r.oar) == (HOLD, TOO_FAR, PLACE)
+    bench = ready(PLACE - (1 << 31) + 1, AS_COMMANDED)
+    run_pass(bench)
+    assert (bench.r.state, bench.r.z, bench.r.interpolator.irr) == (MOVE, -1, ((1 << 31) - 1) << 16)
+
+
+def test_open_loop_sends_the_speed_itself():
+    bench = jogging(-1, 200, open_loop=1)
+    assert bench.r.s4 == -round(60 / (180 / 32767))
+
+
+def test_unsigned_remaining_drives_away():
+    bench = PositionerBench(PLACE, unsigned_remaining=1)
+    bench.feed(PLACE + 3)
+    assert (bench.r.arr, bench.r.s4 > 0) == (3, True)
+
+
+def test_a_dial_below_zero_does_not_move():
+    bench = PositionerBench(PLACE)
+    bench.r.dial, bench.r.plus = -5, 1
+    run_pass(bench)
+    bench.feed(PLACE)
+    assert bench.r.interpolator.irr == 2 * T * ONE

@@ -1,0 +1,99 @@
+import math
+
+import numpy as np
+import pytest
+from tests.stepper_rig import LOAD, MOTOR, heavier
+
+from detent.planning.step_ramp import (
+    StepperLoad,
+    StepperMotor,
+    acceleration_limit,
+    make_ramp,
+    start_frequency,
+    total_inertia,
+    travel_per_step,
+)
+
+
+def test_inertia_of_the_default_load():
+    assert LOAD.inertia == pytest.approx(6.0e-8 + 5.0e-8 + 0.12 * (1e-3 / (2 * math.pi)) ** 2)
+    assert total_inertia(MOTOR, LOAD) == pytest.approx(1.013e-6, rel=1e-3)
+
+
+def test_a_stage_with_two_millimetres_pitch_starts_more_slowly():
+    stage = heavier(LOAD, pitch=2e-3, mass=1.0)
+    assert stage.inertia - 1.1e-7 == pytest.approx(1.01e-7, rel=0.01)
+    assert start_frequency(MOTOR, stage, 1.0) == pytest.approx(810, abs=1)
+    assert start_frequency(MOTOR, stage, 2.1) == pytest.approx(810 / 2.1, abs=0.5)
+
+
+def test_torque_falls_with_the_step_frequency():
+    assert MOTOR.pull_out(0) == 0.045
+    assert MOTOR.pull_out(1200) == pytest.approx(0.045 / math.sqrt(2))
+    assert MOTOR.pull_out(4000) == pytest.approx(0.0129, abs=5e-5)
+
+
+def test_acceleration_is_limited_first_by_the_stated_value_then_by_the_torque():
+    a = acceleration_limit(MOTOR, LOAD, 40_000.0)
+    assert a(400) == a(3500) == 40_000
+    assert a(3520) < 40_000
+    assert a(4000) == pytest.approx(14_600, rel=0.01)
+    assert a(4340) == pytest.approx(0, abs=200)  # of 40 000
+    assert a(5000) < 0
+
+
+def test_a_constant_acceleration_gives_the_closed_form_to_the_last_bit():
+    ramp = make_ramp(300.0, 2000.0, lambda _: 10_000.0)
+    n = np.arange(len(ramp) - 1)
+    assert ramp.hz[:-1].tolist() == np.sqrt(300.0**2 + 20_000.0 * n).tolist()
+    assert ramp.hz[-1] == 2000.0
+    assert ramp.hz[-2] < 2000.0
+
+
+def test_the_list_ends_where_the_torque_is_used_up():
+    ramp = make_ramp(400.0, 10_000.0, acceleration_limit(MOTOR, LOAD, 40_000.0))
+    assert 4200 < ramp.hz[-1] < 4340
+    assert np.diff(ramp.hz).min() >= 0.5
+
+
+@pytest.mark.parametrize("acceleration", [0.0, -1000.0])
+def test_without_spare_torque_there_is_the_start_frequency_only(acceleration):
+    assert make_ramp(400.0, 4000.0, lambda _: acceleration).hz.tolist() == [400.0]
+
+
+def test_equal_start_and_largest_frequency_make_one_entry():
+    assert make_ramp(400.0, 400.0, lambda _: 1e4).hz.tolist() == [400.0]
+
+
+def test_index_of_a_frequency():
+    ramp = make_ramp(100.0, 1000.0, lambda _: 10_000.0)
+    assert ramp.index_of(1.0) == ramp.index_of(100.0) == 0
+    assert ramp.index_of(100.1) == 1
+    assert ramp.index_of(1000.0) == ramp.index_of(9999.0) == len(ramp) - 1
+    assert ramp.words().dtype == np.uint16
+    assert np.abs(ramp.words() - ramp.hz).max() <= 0.5
+
+
+def test_travel_per_step():
+    assert travel_per_step(MOTOR, LOAD) == pytest.approx(5e-6)
+
+
+@pytest.mark.parametrize(("start", "top"), [(0, 100), (200, 100), (100, 65536), (math.nan, 100), (100, math.inf)])
+def test_bad_frequencies_are_refused(start, top):
+    with pytest.raises(ValueError, match="start_hz is"):
+        make_ramp(start, top, lambda _: 1.0)
+
+
+def test_bad_figures_are_refused():
+    with pytest.raises(ValueError, match=r"StepperMotor\.corner_hz is 0"):
+        StepperMotor(200, 9e-7, 0.06, 0.045, 0, 900)
+    with pytest.raises(ValueError, match=r"StepperLoad\.pitch is -1"):
+        StepperLoad(-1, 0, 0, 0, 0)
+    with pytest.raises(ValueError, match=r"StepperLoad\.mass is nan"):
+        StepperLoad(1e-3, math.nan, 0, 0, 0)
+    with pytest.raises(ValueError, match="safety is 0"):
+        start_frequency(MOTOR, LOAD, 0.5)
+    with pytest.raises(ValueError, match="max_acceleration is 0"):
+        acceleration_limit(MOTOR, LOAD, 0)
+    with pytest.raises(ValueError, match=r"safety_factor is 0\.9"):
+        acceleration_limit(MOTOR, LOAD, 1, 0.9)
