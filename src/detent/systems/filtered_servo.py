@@ -31,7 +31,8 @@ from detent.control.pulse_generator import (
     ramp_rate,
 )
 from detent.control.sample_clock import SampleClock, count_clock
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.recording import until_row, write_row
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged, move_with_current
@@ -331,7 +332,7 @@ def advance(p: FilteredServoParams, r: FilteredServo, ticks: int, trace: Bytes, 
     """
     done = 0
     while done < ticks and r.event == 0:
-        stretch = min(ticks - done, every - r.tick % every) if every > 0 else ticks - done
+        stretch = until_row(r.tick, ticks - done, every)
         train = local_copy(r.train)
         n = 0
         while n < stretch and r.event == 0:
@@ -339,10 +340,7 @@ def advance(p: FilteredServoParams, r: FilteredServo, ticks: int, trace: Bytes, 
             n += 1
         copy_back(r.train, train)
         done += n
-        if every > 0 and r.tick % every == 0:
-            row = (r.tick // every) % trace.shape[0]
-            for k in range(picks.shape[0]):
-                trace[row, k] = byte_at(r, picks[k])
+        write_row(r, r.tick, trace, picks, every)
     return done
 
 
@@ -359,9 +357,7 @@ def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, ticks: int, trac
         prepare(p, r)
         for k in range(CLOCKS):
             one_clock(p, r, r.train.position, k)
-            row = (r.tick * CLOCKS + k) % trace.shape[0]
-            for j in range(picks.shape[0]):
-                trace[row, j] = byte_at(r, picks[j])
+            write_row(r, r.tick * CLOCKS + k, trace, picks, 1)
         conclude(p, r)
         r.sampled = r.train.position
         drive(p, r, r.train)

@@ -32,7 +32,8 @@ from detent.control.phase_sequencer import (
 )
 from detent.drive.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, SplitBridgeParams, drive_two, sense_current
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.recording import until_row, write_row
 from detent.kernel.registers import Registers, block, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
@@ -256,7 +257,7 @@ def advance(p: PhaseServoParams, r: PhaseServo, ticks: int, trace: Bytes, picks:
     """
     done = 0
     while done < ticks and r.sequencer.event == 0:
-        stretch = min(ticks - done, every - r.tick % every) if every > 0 else ticks - done
+        stretch = until_row(r.tick, ticks - done, every)
         converters = local_copy(r.converters)
         train = local_copy(r.train)
         n = 0
@@ -266,10 +267,7 @@ def advance(p: PhaseServoParams, r: PhaseServo, ticks: int, trace: Bytes, picks:
         copy_back(r.converters, converters)
         copy_back(r.train, train)
         done += n
-        if every > 0 and r.tick % every == 0:
-            row = (r.tick // every) % trace.shape[0]
-            for k in range(picks.shape[0]):
-                trace[row, k] = byte_at(r, picks[k])
+        write_row(r, r.tick, trace, picks, every)
     return done
 
 

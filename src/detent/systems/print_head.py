@@ -16,7 +16,8 @@ from detent.control.head_computer import HeadComputer, HeadParams
 from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
 from detent.drive.h_bridge import Bridge, BridgeLines, steer
 from detent.drive.pwm_timer import PwmTimer, trigger
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.recording import until_row, write_row
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
@@ -203,7 +204,7 @@ def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: O
     """
     done = 0
     while done < ticks and r.head.status.latch.flag == 0:
-        stretch = min(ticks - done, every - r.tick % every) if every > 0 else ticks - done
+        stretch = until_row(r.tick, ticks - done, every)
         train = local_copy(r.train)
         n = 0
         while n < stretch and r.head.status.latch.flag == 0:
@@ -211,10 +212,7 @@ def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: O
             n += 1
         copy_back(r.train, train)
         done += n
-        if every > 0 and r.tick % every == 0:
-            row = (r.tick // every) % trace.shape[0]
-            for k in range(picks.shape[0]):
-                trace[row, k] = byte_at(r, picks[k])
+        write_row(r, r.tick, trace, picks, every)
     return done
 
 

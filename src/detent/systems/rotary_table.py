@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from detent.control.table_positioner import Positioner, PositionerParams, begin_pass, end_pass, interrupt
 from detent.drive.velocity_amplifier import VelocityAmplifier, VelocityAmplifierParams, drive_torque
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.recording import until_row, write_row
 from detent.kernel.registers import Registers, block, i8, register, u4
 from detent.kernel.step import hot_step, step
 from detent.plant.gearing import PHASE_PER_RADIAN, Gear, GearParams, follow, output_phase
@@ -182,7 +183,7 @@ def advance(p: RotaryTableParams, r: RotaryTable, ticks: int, trace: Bytes, pick
     """
     done = 0
     while done < ticks and r.positioner.event == 0:
-        stretch = min(ticks - done, every - r.tick % every) if every > 0 else ticks - done
+        stretch = until_row(r.tick, ticks - done, every)
         machine = local_copy(r.machine)
         n = 0
         while n < stretch and r.positioner.event == 0:
@@ -190,10 +191,7 @@ def advance(p: RotaryTableParams, r: RotaryTable, ticks: int, trace: Bytes, pick
             n += 1
         copy_back(r.machine, machine)
         done += n
-        if every > 0 and r.tick % every == 0:
-            row = (r.tick // every) % trace.shape[0]
-            for k in range(picks.shape[0]):
-                trace[row, k] = byte_at(r, picks[k])
+        write_row(r, r.tick, trace, picks, every)
     return done
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
 from detent.control.step_rule import IDLE, LIMITS, PAUSE, RAMP, STEP, StepRule, StepRuleParams, next_step, place_motor
 from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
-from detent.kernel.compiled import byte_at
+from detent.kernel.recording import write_row
 from detent.kernel.registers import Registers, block, i8, register, u1
 from detent.kernel.step import step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
@@ -109,10 +109,7 @@ def advance(
             break
         if outcome == STEP:
             done += 1
-            if every > 0 and r.timer.pulses % every == 0:
-                row = (r.timer.pulses // every) % trace.shape[0]
-                for k in range(picks.shape[0]):
-                    trace[row, k] = byte_at(r, picks[k])
+            write_row(r, r.timer.pulses, trace, picks, every)
     return done
 
 
@@ -161,10 +158,7 @@ def advance_on_rig(
         turn_rotor(p.rotor, r.rotor)
         r.instant += 1
         done += 1
-        if every > 0 and r.instant % every == 0:
-            row = (r.instant // every) % trace.shape[0]
-            for k in range(picks.shape[0]):
-                trace[row, k] = byte_at(r, picks[k])
+        write_row(r, r.instant, trace, picks, every)
     return done
 
 
