@@ -1028,3 +1028,23 @@ def test_32_without_the_incremental_path_after_the_switch_the_stop_is_the_same(p
     assert abs(stops["absolute"][1]) <= 1
     # The same cut moves the stop of the servo that ends by counting: the cut is real.
     assert abs(stops["incremental"][0] - stops["incremental"][1]) > 1
+
+
+# ------------------------------------------------------------------------------------------------- literal variant
+
+
+def test_23_29_the_literal_order_of_the_taps_settles_later_and_holds_the_force():
+    """Section 7: integration 2^12, sample 2^13, KS3 = 8, KP1 = 3, KP2 = 6, table peak 54."""
+    literal = "clock.order=literal"
+    rig = Rig(literal, locked=True)
+    assert (rig.spec.clock.integrate_tap, rig.spec.clock.sample_tap, rig.spec.peak_count) == (12, 13, 54)
+    assert (rig.spec.method.speed_gains, rig.spec.method.position_gains) == ([1, 1, 8], [3, 6, 1])
+    rig.move(6, 0.2)
+    assert 23e-3 <= rig.r.gauge.outside * rig.tick <= 24e-3
+    assert rig.r.gauge.beyond < rig.step
+    assert abs(rig.error) < 1
+    for force in (3, -3):
+        run = pushed(force, literal)
+        late = run.t >= 120e-3
+        assert np.abs(run.offset[late]).max() <= 1
+        assert run.integral[-1] * force < 0

@@ -67,8 +67,8 @@ def _fill_detector(d: DetectorParams, spec: PhaseServoSpec) -> None:
     d.turns_per_metre = TURN / spec.pitch
     d.offset = -table.lag_counts * TURN // table.counts % TURN
     d.carrier_shift = 32 - (table.counts.bit_length() - 1)
-    d.jitter = table.jitter * carrier * TURN
-    fill_errors(d, table.gain_error, table.quadrature_error, table.offset_error)
+    d.jitter = spec.edge_jitter * carrier * TURN
+    fill_errors(d, table.gain_error, table.quadrature_error, spec.offset_share)
 
 
 def _fill_sequencer(s: SequencerParams, spec: PhaseServoSpec) -> None:

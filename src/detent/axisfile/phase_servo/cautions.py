@@ -240,7 +240,7 @@ def _alignment(machine: Machine) -> Iterator[Caution]:
 
 def _noise(machine: Machine) -> Iterator[Caution]:
     spec = machine.spec
-    peak = JITTER_PEAK * spec.detector.jitter / spec.tick
+    peak = JITTER_PEAK * spec.edge_jitter / spec.tick
     if peak > QUIET:
         yield Caution(
             "detector.jitter",
@@ -248,7 +248,7 @@ def _noise(machine: Machine) -> Iterator[Caution]:
             f"up to {QUIET:g} step",
             "noise makes pairs of opposite pulses on the way, the distance counter counts both of them down, and a "
             "long move stops at another positioning point",
-            put("detector.jitter", at_most(QUIET * spec.tick / JITTER_PEAK, "s")),
+            put("detector.jitter", at_most(QUIET * spec.tick / JITTER_PEAK * spec.detector.amplitude, "s")),
         )
 
 

@@ -39,15 +39,16 @@ def edge_separation(spec: PhaseServoSpec) -> EdgeSeparation:
 
     With the electrical angle x the secondary's amplitude is ``hypot((1 + g) cos x - sin q sin x, cos q sin x)`` (gain
     error g, quadrature error q; `sensing.phase_detector.fill_errors`); its minimum over x is the smaller singular
-    value of that matrix.
+    value of that matrix, times the amplitude over its nominal.
     """
     table = spec.detector
     gain, q = 1 + table.gain_error, table.quadrature_error
     # Singular values: squares add up to (1 + g)^2 + 1, their product is (1 + g) cos q.
     total, product = gain**2 + 1, gain * math.cos(q)
     weakest = math.sqrt(max(0.0, total - math.sqrt(max(0.0, total**2 - 4 * product**2))) / 2)
+    weakest *= table.amplitude
     share = abs(table.offset_error) / weakest
     displaced = math.asin(share) / (2 * math.pi) if share < 1 else 0.5
     largest = min(0.45, weakest * math.sin(2 * math.pi * EDGE_LIMIT))
     room = max(0.0, EDGE_LIMIT - displaced) * spec.detector.counts * spec.tick
-    return EdgeSeparation(displaced, EDGE_LIMIT, largest, room / JITTER_PEAK)
+    return EdgeSeparation(displaced, EDGE_LIMIT, largest, room / JITTER_PEAK * table.amplitude)

@@ -213,7 +213,7 @@ def _edges(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     if edges.displaced > edges.limit:
         nearest = at_most(edges.largest_offset, "%")
         yield Contradiction(
-            ("detector.offset_error", "detector.gain_error", "detector.quadrature_error"),
+            ("detector.offset_error", "detector.amplitude", "detector.gain_error", "detector.quadrature_error"),
             f"such that an edge is displaced by at most {edges.limit:g} turn, here {edges.displaced:.3g}: the two "
             "edges of a cycle would meet",
             offer(
@@ -224,7 +224,7 @@ def _edges(spec: PhaseServoSpec) -> Iterator[Contradiction]:
         )
     elif spec.detector.jitter > edges.largest_jitter:
         yield Contradiction(
-            ("detector.jitter", "clock.oscillator", "detector.counts", "detector.offset_error"),
+            ("detector.jitter", "detector.amplitude", "clock.oscillator", "detector.counts", "detector.offset_error"),
             f"up to {format_quantity(edges.largest_jitter, 's')}: its peak of {JITTER_PEAK} times that and the offset "
             f"displace an edge by at most {edges.limit:g} turn of the carrier",
             offer(PhaseServoSpec, "detector.jitter", at_most(edges.largest_jitter, "s")),

@@ -94,7 +94,13 @@ class DetectorTable(Table, frozen=True):
         ge=-0.5236,
         le=0.5236,
     )
-    offset_error: Percentage = optional("offset of the comparator over the amplitude", 0.0, ge=-0.45, le=0.45)
+    amplitude: Percentage = optional(
+        "amplitude of the secondary over its nominal: a weaker one lets offset and noise displace the edges farther",
+        1.0,
+        gt=0.0,
+        le=10.0,
+    )
+    offset_error: Percentage = optional("offset of the comparator over the nominal amplitude", 0.0, ge=-0.45, le=0.45)
     jitter: Time = optional("rms displacement of an edge of the comparator by noise", 0.0, ge=0.0, le=1e-3)
     seed: int = optional("start of the random sequences of comparator and lines", 1, ge=0, le=2**62)
 
@@ -199,6 +205,16 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     def pitch(self) -> float:
         """Travel per electrical turn of the detector [m]."""
         return self.mechanics.pulley_circumference / self.detector.pitches_per_revolution
+
+    @property
+    def offset_share(self) -> float:
+        """Offset of the comparator over the true amplitude."""
+        return self.detector.offset_error / self.detector.amplitude
+
+    @property
+    def edge_jitter(self) -> float:
+        """Rms displacement of an edge by noise at the true amplitude [s]: the slope of the crossing goes with it."""
+        return self.detector.jitter / self.detector.amplitude
 
     @property
     def step(self) -> float:

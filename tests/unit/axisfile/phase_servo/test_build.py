@@ -15,7 +15,8 @@ from detent.axisfile.load import load_spec
 from detent.axisfile.phase_servo.build import build_phase_servo
 from detent.axisfile.reference import reference_rows
 from detent.control.phase_sequencer import NEVER
-from detent.sensing.phase_detector import TURN
+from detent.errors import InputError
+from detent.kernel.turn_table import TURN
 from detent.simulation.machine import phase_servo_machine
 
 pytestmark = pytest.mark.compiled
@@ -55,6 +56,7 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "detector.lag_counts": ("14", ()),
     "detector.gain_error": ("20 %", ()),
     "detector.quadrature_error": ("10 deg", ()),
+    "detector.amplitude": ("50 %", ("detector.offset_error=10 %",)),
     "detector.offset_error": ("5 %", ()),
     "detector.jitter": ("30 ns", NOISE),
     "detector.seed": ("2", NOISE),
@@ -218,3 +220,21 @@ def test_noise_and_push_count_in_base_ticks() -> None:
     p = build_phase_servo(load_spec(EXAMPLE, [*PUSH, *BURST]))
     assert (p.push.begin, p.push.end) == (60_000, 4_060_000)
     assert [p.interference.tick[k] for k in range(2)] == [16_000, 16_096]
+
+
+def test_a_weak_secondary_lets_offset_and_noise_displace_the_edges_farther() -> None:
+    faults = ["detector.jitter=20 ns", "detector.offset_error=10 %"]
+    full, weak, strong = (
+        build_phase_servo(load_spec(EXAMPLE, [*faults, f"detector.amplitude={share} %"])).detector
+        for share in (100, 50, 200)
+    )
+    assert weak.jitter == pytest.approx(2 * full.jitter)
+    assert strong.jitter == pytest.approx(full.jitter / 2)
+    # sin(displacement) = offset / amplitude
+    for detector, share in ((full, 0.1), (weak, 0.2), (strong, 0.05)):
+        assert detector.rise.value[0] / TURN * 2 * math.pi == pytest.approx(math.asin(share), rel=1e-6)
+
+
+def test_a_secondary_too_weak_for_the_offset_is_refused() -> None:
+    with pytest.raises(InputError, match=r"detector\.(offset_error|amplitude)"):
+        load_spec(EXAMPLE, ["detector.offset_error=40 %", "detector.amplitude=30 %"])
