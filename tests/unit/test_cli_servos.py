@@ -137,3 +137,10 @@ def test_wrong_input_is_one_message_and_status_2(name: str) -> None:
     assert answer.out == ""
     assert re.search(pattern, answer.err), answer.err
     assert "Traceback" not in answer.err
+
+
+def test_more_signals_than_a_picture_takes_are_in_the_vcd_file_all_the_same() -> None:
+    answer = call("timing", PHASE, "--at", "6 ms", "--for", "10 us", "--signals", "*")
+    assert answer.status == 2
+    assert "name those that matter, or look at all of them in a VCD file" in answer.err
+    assert len(load_vcd(Path("timing.vcd")).signals) > 80

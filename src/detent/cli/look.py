@@ -45,7 +45,9 @@ def timing(
     with progress_bar(quiet=as_json) as progress:
         found = axis.timing(begin, length, job=loaded, signals=names, progress=progress)
         progress(1.0, "drawing")
-        files = [found.plot(figure), found.save(vcd)]
+        # The VCD file first: it takes any number of signals, a picture does not.
+        saved = found.save(vcd)
+        files = [found.plot(figure), saved]
     if as_json:
         print_json({"signals": [s.name for s in found.waveforms.signals], "files": [str(path) for path in files]})
         return
