@@ -3,15 +3,13 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.check import CheckReport, check_spec
 from detent.axisfile.load import AxisFile, read_axis
 from detent.axisfile.methods import AnySpec
 from detent.errors import DetentError
-from detent.report.methods import report_of, summary_rows
 from detent.simulation.capture import Stretch, capture
-from detent.simulation.comparisons import AnyComparison, compare_methods
 from detent.simulation.methods import AnyJob, AnyResult, Simulated, simulated
 from detent.simulation.print_run import Progress
 from detent.simulation.recorder import Recorder, choose_leaves, make_trace
@@ -20,6 +18,10 @@ from detent.simulation.trace_files import load_trace, save_trace
 from detent.simulation.trace_store import TraceWriter
 from detent.simulation.vcd_file import save_vcd
 from detent.simulation.waveforms import Waveforms
+
+if TYPE_CHECKING:
+    # Loaded where a comparison is made: most commands make none.
+    from detent.simulation.comparisons import AnyComparison
 
 KEPT_ROWS = 100_000
 """Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
@@ -139,7 +141,7 @@ class Axis:
                 result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, memory.trace(recorder, about))
 
-    def compare(self, progress: Progress | None = None) -> tuple[AnyComparison, ...]:
+    def compare(self, progress: Progress | None = None) -> "tuple[AnyComparison, ...]":
         """Hold the method against the ways it was made to better, on this axis.
 
         Returns
@@ -148,6 +150,8 @@ class Axis:
             Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo:
             one `FeedbackComparison`.
         """
+        from detent.simulation.comparisons import compare_methods
+
         return compare_methods(self.spec, progress)
 
     def timing(
@@ -257,7 +261,7 @@ class Run:
     result: AnyResult
     trace: Trace | None
     settings: dict[str, str] = field(default_factory=dict[str, str])
-    comparisons: tuple[AnyComparison, ...] = ()
+    comparisons: "tuple[AnyComparison, ...]" = ()
 
     @property
     def done(self) -> bool:
@@ -271,6 +275,8 @@ class Run:
 
     def summary(self) -> list[tuple[str, str]]:
         """The figures a person wants first: name and text."""
+        from detent.report.methods import summary_rows
+
         return summary_rows(self.axis.spec, self.result)
 
     def to_dict(self) -> dict[str, Any]:
@@ -279,6 +285,8 @@ class Run:
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
+        from detent.report.methods import report_of
+
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.method.seed)} | self.settings
         report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings)(path)
         return Path(path)
