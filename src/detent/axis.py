@@ -84,6 +84,17 @@ class Axis:
         """
         return self.method.load(Path(path))
 
+    def _job(self, job: str | Path | AnyJob) -> AnyJob:
+        """The job itself, read if it is a file; refused if the method takes none of its kind."""
+        wanted = self.method.job
+        loaded = self.load_job(job) if isinstance(job, str | Path) else job
+        if not isinstance(loaded, wanted):
+            raise DetentError(
+                f"{self.name}: came a {type(loaded).__name__}; allowed: a {wanted.__name__}, or a file as load_job "
+                "reads it; give the axis a job of its own kind"
+            )
+        return loaded
+
     def run(
         self,
         job: str | Path | AnyJob,
@@ -118,10 +129,10 @@ class Axis:
         InputError
             The job cannot be read or does not fit the axis.
         DetentError
-            A signal is unknown, or the trace cannot be written.
+            The job is of another kind, a signal is unknown, or the trace cannot be written.
         """
         method = self.method
-        loaded = self.load_job(job) if isinstance(job, str | Path) else job
+        loaded = self._job(job)
         every = method.every if every is None else every
         if every == 0:
             return Run(self, method.run(loaded, progress=progress), None)
@@ -184,7 +195,7 @@ class Axis:
             A signal is unknown, the stretch is too long, or the run ends before it.
         """
         method = self.method
-        loaded = self.load_job(job) if isinstance(job, str | Path) else job or method.sample_job()
+        loaded = method.sample_job() if job is None else self._job(job)
         stretch = Stretch(at, duration, tuple(method.timing if signals is None else signals), self.name)
 
         def run(recorder: Any) -> AnyResult:

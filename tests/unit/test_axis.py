@@ -228,3 +228,11 @@ def test_three_drives_are_compared_on_the_drifted_machine() -> None:
     worst = np.abs(found.errors).max(axis=(1, 2))
     assert found.methods == ("power-on default", "nominal table", "identified")
     assert worst[2] < 0.03 < worst[1] < worst[0]
+
+
+def test_a_job_of_another_kind_is_refused() -> None:
+    moves = load_moves(detent.example("moves.csv"))
+    with pytest.raises(DetentError, match=r"print head: came a MoveJob; allowed: a PrintJob"):
+        detent.load(AXIS).run(moves)
+    with pytest.raises(DetentError, match=r"phase servo: came a PrintJob; allowed: a MoveJob"):
+        detent.load(detent.example("phase_servo.toml")).timing(1e-3, 1e-6, job=load_job(LETTER))

@@ -14,52 +14,53 @@ from detent.errors import DetentError
 TRACE_KINDS = ("h5", "csv", "parquet")
 
 
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FOLDER",
+        help="Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB",
+    ),
+]
+MoreSignals = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--signals",
+        metavar="NAMES",
+        help="Registers to record beside the usual, comma-separated; "
+        "patterns such as 'head.*' or 'all' too. `detent registers` lists them.",
+    ),
+]
+Every = Annotated[
+    int | None,
+    typer.Option(
+        "--every",
+        min=0,
+        max=10_000_000,
+        help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us); 0 records "
+        "nothing. Default: 10, 256, 10.",
+    ),
+]
+TraceKinds = Annotated[
+    str, typer.Option("--trace", metavar="KINDS", help="Trace files: h5, csv, parquet, comma-separated.")
+]
+Comparison = Annotated[
+    bool,
+    typer.Option("--compare/--no-compare", help="Servos: show the comparison with other methods in the report."),
+]
+
+
 @app.command()
 def run(
     file: File,
-    job: Annotated[
-        Path,
-        typer.Option(
-            "--job",
-            help=JOB_HELP,
-        ),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FOLDER",
-            help="Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB",
-        ),
-    ] = None,
+    job: Annotated[Path, typer.Option("--job", help=JOB_HELP)],
+    output: Output = None,
     overrides: Set = None,
-    signals: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--signals",
-            metavar="NAMES",
-            help="Registers to record beside the usual, comma-separated; "
-            "patterns such as 'head.*' or 'all' too. `detent registers` lists them.",
-        ),
-    ] = None,
-    every: Annotated[
-        int | None,
-        typer.Option(
-            "--every",
-            min=0,
-            max=10_000_000,
-            help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us); 0 records "
-            "nothing. Default: 10, 256, 10.",
-        ),
-    ] = None,
-    formats: Annotated[
-        str, typer.Option("--trace", metavar="KINDS", help="Trace files: h5, csv, parquet, comma-separated.")
-    ] = "h5,csv",
-    comparison: Annotated[
-        bool,
-        typer.Option("--compare/--no-compare", help="Servos: show the comparison with other methods in the report."),
-    ] = True,
+    signals: MoreSignals = None,
+    every: Every = None,
+    formats: TraceKinds = "h5,csv",
+    comparison: Comparison = True,
     *,
     as_json: Json = False,
 ) -> None:

@@ -231,6 +231,7 @@ class _Carriage:
     problems: list[FileProblem] = field(default_factory=list[FileProblem])
 
     def read(self, char: str) -> None:
+        """Take the next character."""
         self.place += 1
         category = unicodedata.category(char)
         if category in {"Mn", "Me"} and self.may_take_accent:

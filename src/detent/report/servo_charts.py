@@ -342,6 +342,7 @@ def feedback_charts(found: FeedbackComparison) -> list[Chart]:
     rows = np.searchsorted(with_filter.t - with_filter.t[0], t).clip(max=len(with_filter.t) - 1)
 
     def pair(before: Numbers, after: Numbers) -> list[Curve]:
+        """The same quantity without and with the filter."""
         return [
             Curve(label="without the filter", colour="left", width=1, step=True, y=before),
             Curve(label="with the filter", colour="speed", width=2, step=True, y=after[rows]),

@@ -157,6 +157,7 @@ def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> H
     stopping = change_method(spec, stop_always_off=False)
 
     def record(done: int, variant: Variant, disturbance: DisturbanceTable) -> HoldCase:
+        """Tell the progress and record one variant."""
         if progress is not None:
             progress(done / cases, variant[0])
         return _record(stopping, variant, disturbance)

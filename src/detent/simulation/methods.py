@@ -60,6 +60,8 @@ class Simulated:
         How registers change inside a tick.
     load : callable
         Reads a job file of the kind the method takes.
+    job : type
+        Class of the jobs that the method takes.
     run : callable
         ``run(job, recorder=, progress=)`` makes a job.
     sample_job : callable
@@ -74,6 +76,7 @@ class Simulated:
     timing: tuple[str, ...]
     clocking: Clocking
     load: Callable[[Path], AnyJob]
+    job: type[AnyJob]
     run: Callable[..., AnyResult]
     sample_job: Callable[[], AnyJob]
 
@@ -100,6 +103,7 @@ def _print_head(spec: PrintHeadSpec) -> Simulated:
         timing=PRINT_HEAD_TIMING,
         clocking=Clocking(),
         load=load_job,
+        job=PrintJob,
         run=run,
         sample_job=lambda: parse_text("detent", "one word"),
     )
@@ -132,6 +136,7 @@ def _phase_servo(spec: PhaseServoSpec) -> Simulated:
         timing=PHASE_SERVO_TIMING,
         clocking=phase_servo_clocking(spec),
         load=load,
+        job=MoveJob,
         run=_moves(spec),
         sample_job=_one_move("one move of 6 pitches", 6 * spec.pitch, 0.05),
     )
@@ -147,6 +152,7 @@ def _filtered_servo(spec: FilteredServoSpec) -> Simulated:
         timing=FILTERED_SERVO_TIMING,
         clocking=filtered_servo_clocking(),
         load=load_moves,
+        job=MoveJob,
         run=_moves(spec),
         sample_job=_one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2),
     )

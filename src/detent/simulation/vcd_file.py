@@ -182,6 +182,7 @@ class _Changes:
     values: list[int | float] = field(default_factory=list[int | float])
 
     def add(self, time: int, value: float) -> None:
+        """Note a change; of several at one moment the last holds."""
         if self.times and self.times[-1] == time:
             self.values[-1] = value
         elif not self.values or value != self.values[-1]:
