@@ -10,9 +10,10 @@ import numpy as np
 from detent.control.step_comparison import CONSTANT_FREQUENCY
 from detent.control.step_rule import FAULT, REST, deflect, start_move
 from detent.kernel.registers import Leaf
+from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap, turn_envelopes
 from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
-from detent.plant.stepper_rotor import RotorParams, lost_steps
+from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
 from detent.systems.stepper import (
     NOWHERE,
     Stepper,
@@ -30,8 +31,7 @@ MOTOR = StepperMotor(
     steps_per_turn=200,
     rotor_inertia=9.0e-7,
     holding_torque=0.06,
-    pull_out_torque=0.045,
-    corner_hz=1200.0,
+    pull_out=FirstOrderPullOut(torque=0.045, corner_hz=1200.0),
     unloaded_start_hz=900.0,
 )
 LOAD = StepperLoad(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
@@ -51,20 +51,23 @@ RAMP = default_ramp()
 COARSE_FINE = (Zone(2000, 2600, FINE_HZ), Zone(5000, 6000, FINE_HZ))
 
 
-def rotor_params(motor: StepperMotor = MOTOR, load: StepperLoad = LOAD, inertia: float | None = None) -> RotorParams:
-    """Rotor of specification 7.2; `inertia` in place of the sum of motor and load [kg m^2]."""
+def rotor_params(
+    motor: StepperMotor = MOTOR, load: StepperLoad = LOAD, inertia: float | None = None, top: float = MAX_HZ
+) -> RotorParams:
+    """Rotor of specification 7.2; `inertia` in place of the sum of motor and load [kg m^2], driven up to `top` [Hz]."""
     total = total_inertia(motor, load) if inertia is None else inertia
     teeth = motor.steps_per_turn / 4
-    return RotorParams(
+    p = RotorParams(
         dt=DT,
         teeth=teeth,
         step_angle=motor.step_angle,
         inertia=total,
         torque=motor.holding_torque,
         damping=0.4 * math.sqrt(teeth * motor.holding_torque * total),
-        corner_hz=motor.corner_hz,
         friction=load.friction_torque,
     )
+    fill_curve(p, motor.pull_out, top)
+    return p
 
 
 @dataclass
@@ -109,7 +112,7 @@ class Rig:
         load_rule(self.p, ramp, self.zones.limits, self.clock_hz, reload=reload)
         self.p.rule.literal = literal
         self.p.instant_ticks = round(DT * self.clock_hz)
-        self.p.rotor = rotor_params(motor, load, inertia)
+        self.p.rotor = rotor_params(motor, load, inertia, max(max_hz, float(ramp.hz[-1])))
         switch_on(self.r, at, motor.step_angle)
         self.seconds = 0.0
         """Time of all runs so far, up to the end of the last period [s]."""

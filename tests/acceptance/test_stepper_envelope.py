@@ -8,6 +8,7 @@ import ast
 import inspect
 import math
 import textwrap
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,7 +36,7 @@ from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUEN
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
 from detent.drive.step_timer import reload_values
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory, turn_envelopes
-from detent.planning.step_ramp import StepperMotor, start_frequency, total_inertia, travel_per_step
+from detent.planning.step_ramp import start_frequency, total_inertia, travel_per_step
 from detent.systems.stepper import advance_on_rig
 
 TOP = len(RAMP) - 1
@@ -473,7 +474,7 @@ def test_17_margin_for_the_inertia(factor, lost, reload):
 def test_17_the_factor_of_the_inertia_is_that_of_the_whole_shaft():
     inertia = total_inertia(MOTOR, LOAD)
     # The rotor falls behind where J alpha + T_fric exceeds what the rig's motor has at the end of the linear ramp.
-    peak = MOTOR.holding_torque / math.hypot(1, 3510 / MOTOR.corner_hz)
+    peak = MOTOR.holding_torque / math.hypot(1, 3510 / 1200)
     needed = A_LIN * MOTOR.step_angle * inertia
     limit = (peak - LOAD.friction_torque) / needed
     assert 10 < limit < 11
@@ -701,7 +702,7 @@ def test_29_cost_and_memory_grow_with_the_motors(plain_rule, motors):
 
 @pytest.mark.parametrize(("steps_per_turn", "travel"), [(200, 5.0e-6), (96, 10.417e-6), (360, 2.778e-6)])
 def test_30_geometry(steps_per_turn, travel):
-    motor = StepperMotor(steps_per_turn, 9.0e-7, 0.06, 0.045, 1200.0, 900.0)
+    motor = replace(MOTOR, steps_per_turn=steps_per_turn)
     assert travel_per_step(motor, LOAD) == pytest.approx(travel, abs=0.0005e-6)
     assert math.degrees(motor.step_angle) == pytest.approx(360 / steps_per_turn)
     if steps_per_turn == 200:

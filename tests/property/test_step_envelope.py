@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from tests.stepper_rig import A_LIN, LOAD, MAX_HZ, MOTOR, START_HZ, Rig, heavier, total_inertia
 
 from detent.control.step_rule import FAULT, REST
+from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp
 
@@ -44,7 +45,8 @@ def axes(draw: st.DrawFn) -> Axis:
     torque = draw(st.floats(0.02, 2.0))
     friction = draw(st.floats(0.0, 0.1)) * torque
     inertia = draw(st.floats(0.3, 3.0)) * MOTOR.rotor_inertia * torque / MOTOR.holding_torque
-    motor = StepperMotor(200, inertia, torque, 0.75 * torque, draw(st.floats(600.0, 2400.0)), 900.0)
+    pull_out = FirstOrderPullOut(0.75 * torque, draw(st.floats(600.0, 2400.0)))
+    motor = StepperMotor(200, inertia, torque, pull_out, 900.0)
     load = heavier(
         LOAD,
         spindle_inertia=draw(st.floats(0.0, 3.0)) * inertia,

@@ -7,10 +7,12 @@ which the motor starts and stops directly, and the frequency that each further s
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, isfinite, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+
+from detent.planning.pull_out import PullOut, above_zero
 
 LEAST_GAIN_HZ = 0.5
 """A ramp ends where a step gains less than this: the torque left over is used up."""
@@ -31,10 +33,8 @@ class StepperMotor:
         [kg m^2].
     holding_torque : float
         Peak of the static torque curve [N m].
-    pull_out_torque : float
-        Pull-out torque at standstill [N m].
-    corner_hz : float
-        Step frequency at which coil current, and with it the torque, has fallen to 1/sqrt 2 [Hz].
+    pull_out : callable
+        Pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`.
     unloaded_start_hz : float
         Start frequency of the bare rotor [Hz].
     """
@@ -42,29 +42,16 @@ class StepperMotor:
     steps_per_turn: int
     rotor_inertia: float
     holding_torque: float
-    pull_out_torque: float
-    corner_hz: float
+    pull_out: PullOut
     unloaded_start_hz: float
 
     def __post_init__(self) -> None:
-        _above_zero(
-            self,
-            "steps_per_turn",
-            "rotor_inertia",
-            "holding_torque",
-            "pull_out_torque",
-            "corner_hz",
-            "unloaded_start_hz",
-        )
+        above_zero(self, "steps_per_turn", "rotor_inertia", "holding_torque", "unloaded_start_hz")
 
     @property
     def step_angle(self) -> float:
         """Angle of one step [rad]."""
         return 2 * pi / self.steps_per_turn
-
-    def pull_out(self, hz: float) -> float:
-        """Pull-out torque at a step frequency [N m]: T_po0 / sqrt(1 + (f/f_c)^2)."""
-        return self.pull_out_torque / hypot(1.0, hz / self.corner_hz)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +77,7 @@ class StepperLoad:
     friction_torque: float
 
     def __post_init__(self) -> None:
-        _above_zero(self, "pitch")
+        above_zero(self, "pitch")
         for name in ("mass", "spindle_inertia", "coupling_inertia", "friction_torque"):
             value = getattr(self, name)
             if not 0 <= value < float("inf"):
@@ -100,6 +87,26 @@ class StepperLoad:
     def inertia(self) -> float:
         """All that turns with the rotor, the mass as m (pitch / 2 pi)^2 [kg m^2]."""
         return self.spindle_inertia + self.coupling_inertia + self.mass * (self.pitch / (2 * pi)) ** 2
+
+
+def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float) -> float:
+    """Frequency at which a rotor swings about a step: sqrt(teeth T_hold / J) / 2 pi, teeth a quarter of the steps.
+
+    Parameters
+    ----------
+    steps_per_turn : int
+        Full steps.
+    holding_torque : float
+        [N m].
+    inertia : float
+        Of the rotor, with its load or without [kg m^2].
+
+    Returns
+    -------
+    float
+        [Hz].
+    """
+    return sqrt(steps_per_turn / 4 * holding_torque / inertia) / (2 * pi)
 
 
 def total_inertia(motor: StepperMotor, load: StepperLoad) -> float:
@@ -245,10 +252,3 @@ def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], fl
             break
         found.append(gained)
     return StepRamp(np.array(found))
-
-
-def _above_zero(record: object, *names: str) -> None:
-    for name in names:
-        value = getattr(record, name)
-        if not (isfinite(value) and value > 0):
-            raise ValueError(f"{type(record).__name__}.{name} is {value}, must be above 0 and finite")

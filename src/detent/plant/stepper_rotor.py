@@ -2,15 +2,19 @@
 
     J th'' = T_pk(f) sin(teeth (th_cmd - th)) + B(f) (w_cmd - th') - T_fric sign(th')
 
-Coil current rises at a limited rate, so torque and damping fall with the step frequency by 1 / sqrt(1 + (f/f_c)^2).
+Coil current rises at a limited rate, so torque and damping fall with the step frequency as the pull-out torque does.
 The damping works against the field, so that it does not brake steady running. A rotor that falls out of step catches
 the field again whole tooth pitches, that is four steps, later.
 """
 
 import math
+from collections.abc import Callable
 
-from detent.kernel.registers import Registers, f8, i8, register
+from detent.kernel.registers import Registers, f8, f8_array, i8, register
 from detent.kernel.step import hot_step, step
+
+INTERVALS = 256
+"""Stretches of the torque curve; a straight line over 1/256 of the range errs by some 1e-5."""
 
 
 class RotorParams(Registers):
@@ -22,7 +26,8 @@ class RotorParams(Registers):
     inertia: f8 = register("rotor and all that turns with it", unit="kg.m2")
     torque: f8 = register("peak torque at standstill", unit="N.m")
     damping: f8 = register("damping against the field at standstill", unit="N.m.s/rad")
-    corner_hz: f8 = register("step frequency at which the torque has fallen to 1/sqrt 2", unit="Hz")
+    intervals_per_hz: f8 = register("stretches of the torque curve per step frequency", unit="1/Hz")
+    curve: f8_array = register("torque as a part of that at standstill", length=INTERVALS + 1)
     friction: f8 = register("Coulomb friction torque", unit="N.m")
 
 
@@ -38,12 +43,19 @@ class StepperRotor(Registers):
 
 
 @step
+def strength_at(p: RotorParams, hz: float) -> float:
+    """Torque at a step frequency as a part of that at standstill; beyond the curve that of its end."""
+    place = min(hz * p.intervals_per_hz, INTERVALS * 1.0)
+    k = min(int(place), INTERVALS - 1)
+    return p.curve[k] + (p.curve[k + 1] - p.curve[k]) * (place - k)
+
+
+@step
 def step_field(p: RotorParams, r: StepperRotor, direction: int, hz: float) -> None:
     """Step pulse: the field jumps by one step and goes on at the frequency of its period."""
     r.commanded += direction
     r.field_velocity = direction * hz * p.step_angle
-    ratio = hz / p.corner_hz
-    r.strength = 1.0 / math.sqrt(1.0 + ratio * ratio)
+    r.strength = strength_at(p, hz)
 
 
 @step
@@ -75,3 +87,20 @@ def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
 def lost_steps(p: RotorParams, r: StepperRotor) -> int:
     """Commanded less actual position of a rotor that has come to rest, in whole steps."""
     return math.floor(r.commanded - r.angle / p.step_angle + 0.5)
+
+
+def fill_curve(p: RotorParams, pull_out: Callable[[float], float], max_hz: float) -> None:
+    """Fill the torque curve up to the largest frequency the motor is driven at.
+
+    Parameters
+    ----------
+    p : RotorParams
+        Filled in place.
+    pull_out : callable
+        Pull-out torque [N m] at a step frequency [Hz], above 0 at standstill.
+    max_hz : float
+        Largest step frequency [Hz].
+    """
+    p.intervals_per_hz = INTERVALS / max_hz
+    standstill = pull_out(0.0)
+    p.curve[:] = [pull_out(max_hz * k / INTERVALS) / standstill for k in range(INTERVALS + 1)]

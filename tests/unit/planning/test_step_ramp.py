@@ -9,6 +9,7 @@ from detent.planning.step_ramp import (
     StepperMotor,
     acceleration_limit,
     make_ramp,
+    natural_frequency,
     start_frequency,
     total_inertia,
     travel_per_step,
@@ -85,8 +86,8 @@ def test_bad_frequencies_are_refused(start, top):
 
 
 def test_bad_figures_are_refused():
-    with pytest.raises(ValueError, match=r"StepperMotor\.corner_hz is 0"):
-        StepperMotor(200, 9e-7, 0.06, 0.045, 0, 900)
+    with pytest.raises(ValueError, match=r"StepperMotor\.holding_torque is 0"):
+        StepperMotor(200, 9e-7, 0, MOTOR.pull_out, 900)
     with pytest.raises(ValueError, match=r"StepperLoad\.pitch is -1"):
         StepperLoad(-1, 0, 0, 0, 0)
     with pytest.raises(ValueError, match=r"StepperLoad\.mass is nan"):
@@ -97,3 +98,9 @@ def test_bad_figures_are_refused():
         acceleration_limit(MOTOR, LOAD, 0)
     with pytest.raises(ValueError, match=r"safety_factor is 0\.9"):
         acceleration_limit(MOTOR, LOAD, 1, 0.9)
+
+
+def test_the_unloaded_start_frequency_of_the_default_motor_is_three_times_its_natural_one():
+    natural = natural_frequency(200, MOTOR.holding_torque, MOTOR.rotor_inertia)
+    assert natural == pytest.approx(290.6, abs=0.1)
+    assert MOTOR.unloaded_start_hz / natural == pytest.approx(3.1, abs=0.01)

@@ -3,7 +3,16 @@ import math
 import pytest
 from tests.stepper_rig import rotor_params
 
-from detent.plant.stepper_rotor import StepperRotor, hold_field, lost_steps, step_field, turn_rotor
+from detent.plant.stepper_rotor import (
+    INTERVALS,
+    StepperRotor,
+    fill_curve,
+    hold_field,
+    lost_steps,
+    step_field,
+    strength_at,
+    turn_rotor,
+)
 
 P = rotor_params()
 
@@ -37,10 +46,11 @@ def test_friction_holds_a_rotor_that_the_field_pulls_less():
 
 def test_first_instant_of_a_step_is_the_equation_of_motion():
     r = rotor()
-    step_field(P, r, 1, 400.0)
+    hz = 4000 * 26 / INTERVALS  # on a point of the torque curve
+    step_field(P, r, 1, hz)
     turn_rotor(P, r)
-    fall = 1 / math.hypot(1, 400 / 1200)
-    torque = fall * (0.06 * math.sin(math.pi / 2) + P.damping * 400 * P.step_angle)
+    fall = 1 / math.hypot(1, hz / 1200)
+    torque = fall * (0.06 * math.sin(math.pi / 2) + P.damping * hz * P.step_angle)
     assert r.velocity == pytest.approx(P.dt * (torque - 0.006) / P.inertia, rel=1e-12)
     assert r.angle == pytest.approx(P.dt * r.velocity, rel=1e-12)
     assert r.peak_lag == pytest.approx(1.0, abs=1e-5)
@@ -72,3 +82,18 @@ def test_a_rotor_beyond_half_a_tooth_falls_into_the_next():
     turn(P, r, 20_000)
     assert lost_steps(P, r) == -4
     assert r.velocity == 0.0
+
+
+@pytest.mark.parametrize("hz", [0.0, 1.0, 777.0, 1200.0, 3999.0, 4000.0])
+def test_the_torque_curve_is_that_of_the_motor(hz):
+    assert strength_at(P, hz) == pytest.approx(1 / math.hypot(1, hz / 1200), abs=3e-5)
+
+
+def test_beyond_its_end_the_torque_curve_stays():
+    assert strength_at(P, 9000.0) == strength_at(P, 4000.0)
+
+
+def test_a_torque_curve_can_have_any_form():
+    p = P.copy()
+    fill_curve(p, lambda hz: 2.0 if hz <= 500 else 0.0, 1000.0)
+    assert (strength_at(p, 250.0), strength_at(p, 750.0)) == (1.0, 0.0)
