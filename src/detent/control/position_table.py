@@ -18,7 +18,9 @@ class PositionTable(Registers):
 
     entries: i8 = register("position numbers in use, from 0", unit="count")
     angle: i8_array = register("angle", unit="count", length=POSITIONS)
-    speed: i8_array = register("speed per interrupt, with f fraction bits", unit="count/2^f", length=POSITIONS)
+    speed: i8_array = register(
+        "speed per interrupt; 0 where there is no such position", unit="count/2^f", length=POSITIONS
+    )
     policy: u1_array = register("0 shortest, 1 positive, 2 negative, 3 as commanded", unit="code", length=POSITIONS)
     tolerance: i8 = register(
         "a target this near is taken the short way, whatever its direction; below T/2", unit="count"

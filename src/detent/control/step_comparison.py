@@ -8,7 +8,7 @@ import math
 
 from detent.control.step_rule import ACCEL, CRUISE, DECEL, IDLE, REST, STEP, StepRule
 from detent.kernel.registers import Registers, f8, f8_array, i8, i8_array, register, u1
-from detent.kernel.step import step
+from detent.kernel.step import hot_step
 
 BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY, CONSTANT_FREQUENCY = 1, 2, 3
 """Conventional A, conventional B, and the naive drive."""
@@ -39,13 +39,13 @@ class Comparison(Registers):
     zone: i8 = register("stretch of the next step", unit="count")
 
 
-@step
+@hot_step
 def braking_steps(p: ComparisonParams, hz: float) -> float:
     """Steps after this one that it takes to come down to the stop frequency: (f^2 - f_stop^2) / 2a."""
     return (hz * hz - p.start_hz * p.start_hz) / (2.0 * p.acceleration) - ROUNDING
 
 
-@step
+@hot_step
 def zone_limit(p: ComparisonParams, c: Comparison, made: int) -> float:
     """Limit of the step number `made`; the stretches are passed in order."""
     while c.zone < p.zones - 1 and made >= p.edge[c.zone]:
@@ -53,7 +53,7 @@ def zone_limit(p: ComparisonParams, c: Comparison, made: int) -> float:
     return p.limit[c.zone]
 
 
-@step
+@hot_step
 def by_braking_distance(p: ComparisonParams, c: Comparison, made: int) -> float:
     """Conventional A: brake as soon as the way left is not longer than the braking distance."""
     square = c.hz * c.hz
@@ -69,7 +69,7 @@ def by_braking_distance(p: ComparisonParams, c: Comparison, made: int) -> float:
     return math.sqrt(max(square - 2.0 * p.acceleration, p.start_hz * p.start_hz))
 
 
-@step
+@hot_step
 def by_permissible_frequency(p: ComparisonParams, c: Comparison, made: int) -> float:
     """Conventional B: f_adm = sqrt(f_stop^2 + 2 a d) for the distance d to the nearer extreme, then the zone."""
     distance = min(made, p.steps - 1 - made)
@@ -77,7 +77,7 @@ def by_permissible_frequency(p: ComparisonParams, c: Comparison, made: int) -> f
     return min(admissible, zone_limit(p, c, made))
 
 
-@step
+@hot_step
 def next_compared_step(p: ComparisonParams, c: Comparison, r: StepRule) -> int:
     """Decide about the next step by another method, and make it; IDLE, or STEP with its frequency [Hz] in `word`."""
     if r.start:

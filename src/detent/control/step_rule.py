@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.registers import Registers, i1, i2, i4, i4_array, i8, register, u1, u2
-from detent.kernel.step import step
+from detent.kernel.step import hot_step
 
 Entries = NDArray[np.int16]
 
@@ -27,6 +27,9 @@ INFEASIBLE, OUT_OF_RANGE = 1, 2
 
 AT_REST = -1
 """Ramp index of a motor that stands; also the entry of a step that is not allowed."""
+
+OUTSIDE = -2
+"""In place of an entry: the motor is beyond the ends of the table."""
 
 RAMP = 2048
 LIMITS = 16
@@ -64,13 +67,13 @@ class StepRule(Registers):
     position: i8 = register("steps made, forward less backward", unit="count")
 
 
-@step
+@hot_step
 def slower(p: StepRuleParams, one: int, other: int) -> int:
     """The word of the lower frequency."""
     return max(one, other) if p.reload else min(one, other)
 
 
-@step
+@hot_step
 def entry_word(p: StepRuleParams, entry: int) -> int:
     """Permissible frequency of an entry, as a word; 0 for the sentinel."""
     if entry < 0:
@@ -78,7 +81,7 @@ def entry_word(p: StepRuleParams, entry: int) -> int:
     return slower(p, p.ramp[entry & p.index_mask], p.limit[entry >> p.zone_shift])
 
 
-@step
+@hot_step
 def compare_words(p: StepRuleParams, present: int, permissible: int) -> int:
     """-1, 0 or 1 for a present frequency below, at or above the permissible one; 0 is standstill, reload or not."""
     if present == permissible:
@@ -87,25 +90,25 @@ def compare_words(p: StepRuleParams, present: int, permissible: int) -> int:
     return 1 if faster else -1
 
 
-@step
+@hot_step
 def follow(r: StepRule, permissible: int, goal: int) -> None:
     """One index up, none or one down, towards `goal`; that must reach `permissible` when it falls.
 
     Three-way comparison and increment: with the table read, the whole cost of a step.
     """
-    if r.index < goal:
+    if r.index == goal:
+        r.relation, r.state = 0, CRUISE
+    elif r.index < goal:
         r.index += 1
         r.relation, r.state = -1, ACCEL
-    elif r.index > goal:
+    else:
         r.index -= 1
         r.relation, r.state = 1, DECEL if r.state != FAULT else FAULT
         if r.index > permissible and r.state != FAULT:
             r.state, r.cause = FAULT, INFEASIBLE
-    else:
-        r.relation, r.state = 0, CRUISE
 
 
-@step
+@hot_step
 def follow_literally(p: StepRuleParams, r: StepRule, entry: int, goal: int) -> None:
     """The claim's rule: the frequency becomes that of the entry, by however much that is."""
     r.relation = compare_words(p, r.word, entry_word(p, entry))
@@ -115,7 +118,7 @@ def follow_literally(p: StepRuleParams, r: StepRule, entry: int, goal: int) -> N
     r.index = goal
 
 
-@step
+@hot_step
 def wanted_index(r: StepRule, permissible: int) -> int:
     """Ramp index to go for: what the table allows, what the operator asks for, or rest."""
     if r.state == FAULT or r.heading != r.direction:
@@ -125,9 +128,11 @@ def wanted_index(r: StepRule, permissible: int) -> int:
     return permissible if r.active else AT_REST
 
 
-@step
-def take_inputs(r: StepRule, positions: int) -> bool:
+@hot_step
+def take_inputs(r: StepRule, entry: int) -> bool:
     """Lines of the host, read before every step; True when the motor runs or may be set running."""
+    if r.index >= 0 and not (r.reset | r.manual | r.start):  # what nearly every step finds
+        return True
     if r.reset:
         r.reset = r.start = 0
         if r.index < 0:
@@ -141,14 +146,14 @@ def take_inputs(r: StepRule, positions: int) -> bool:
     if r.state == FAULT or not (r.active or (r.manual and r.request >= 0)):
         return False
     r.direction = r.heading
-    if not 0 <= r.position < positions:
+    if entry == OUTSIDE:
         r.state, r.cause = FAULT, OUT_OF_RANGE
         r.active, r.event = 0, 1
         return False
     return True
 
 
-@step
+@hot_step
 def come_to_rest(r: StepRule, permissible: int, moved: bool) -> int:
     """No further step in this direction: turn where a reversal is due, else rest."""
     r.word = 0
@@ -167,14 +172,17 @@ def come_to_rest(r: StepRule, permissible: int, moved: bool) -> int:
     return IDLE
 
 
-@step
-def next_step(p: StepRuleParams, r: StepRule, up: Entries, down: Entries) -> int:
-    """Decide about the next step, and make it.
+@hot_step
+def next_entry(r: StepRule, up: Entries, down: Entries) -> int:
+    """Entry of the next step, read while the present one runs.
+
+    No other step of the loop takes the tables: handing an array on counts its references up and down, and four counts
+    cost more than a whole decision.
 
     Parameters
     ----------
-    p, r : StepRuleParams, StepRule
-        Parameters and state.
+    r : StepRule
+        State.
     up, down : int16 array, shape (N + 1,)
         Table of each direction by the position that a step departs from: zone number above the ramp index, negative
         where no step is allowed, as `up[N]` and `down[0]` always are.
@@ -182,13 +190,34 @@ def next_step(p: StepRuleParams, r: StepRule, up: Entries, down: Entries) -> int
     Returns
     -------
     int
+        The entry, or OUTSIDE.
+    """
+    if not 0 <= r.position < len(up):
+        return OUTSIDE
+    direction = r.heading if r.index < 0 else r.direction
+    return int(up[r.position]) if direction > 0 else int(down[r.position])
+
+
+@hot_step
+def next_step(p: StepRuleParams, r: StepRule, entry: int) -> int:
+    """Decide about the next step, and make it.
+
+    Parameters
+    ----------
+    p, r : StepRuleParams, StepRule
+        Parameters and state.
+    entry : int
+        What `next_entry` has read.
+
+    Returns
+    -------
+    int
         IDLE, STEP (its frequency stands in `word`) or PAUSE.
     """
-    if not take_inputs(r, len(up)):
+    if not take_inputs(r, entry):
         return IDLE
-    entry = AT_REST  # a motor in fault slows down whatever the table says, even beyond the travel
-    if r.state != FAULT:
-        entry = int(up[r.position] if r.direction > 0 else down[r.position])
+    if r.state == FAULT:
+        entry = AT_REST  # a motor in fault slows down whatever the table says, even beyond the travel
     permissible = entry & p.index_mask if entry >= 0 else AT_REST
     goal = wanted_index(r, permissible)
     moved = r.index >= 0

@@ -252,7 +252,7 @@ def take_position(p: PositionerParams, r: Positioner) -> None:
     if r.state != HOLD:
         refuse(r, BUSY)
         return
-    if r.number >= p.pdt.entries:
+    if r.number >= p.pdt.entries or p.pdt.speed[r.number] <= 0:
         refuse(r, NO_SUCH_POSITION)
         return
     if p.angle.form != TURN_COUNTER:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from detent.kernel.registers import Registers, i8, register, u1
-from detent.kernel.step import step
+from detent.kernel.step import hot_step
 
 
 class StepTimerParams(Registers):
@@ -23,7 +23,7 @@ class StepTimer(Registers):
     pulses: i8 = register("step pulses since power-on", unit="count")
 
 
-@step
+@hot_step
 def load_period(p: StepTimerParams, r: StepTimer, word: int) -> None:
     """Begin a period where the last one was over; a frequency costs a division, a reload value none."""
     if p.reload:
@@ -33,14 +33,14 @@ def load_period(p: StepTimerParams, r: StepTimer, word: int) -> None:
     r.expires += r.period
 
 
-@step
+@hot_step
 def pulse(r: StepTimer, direction: int) -> None:
     """Step pulse: the coil pattern moves on by one place."""
     r.phase = (r.phase + direction) & 3
     r.pulses += 1
 
 
-@step
+@hot_step
 def frequency(p: StepTimerParams, r: StepTimer) -> float:
     """Frequency of the running period [Hz]; 0 at rest."""
     return p.clock_hz / r.period if r.period > 0 else 0.0

@@ -182,6 +182,36 @@ def acceleration_limit(
     return acceleration
 
 
+def needed_torque(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Torque that the motor must give in each step of a run.
+
+    Parameters
+    ----------
+    motor, load : StepperMotor, StepperLoad
+        Motor and load.
+    hz : float64 array, shape (n,)
+        Frequencies of steps that follow one another in one direction, above 0 [Hz].
+
+    Returns
+    -------
+    float64 array, shape (n,)
+        Magnitude of J theta a + T_fric with a = (f_i^2 - f_(i-1)^2) / 2, 0 in the first step [N m]: the inverse of
+        the ramp's rule; friction helps to brake.
+    """
+    acceleration = np.diff(hz**2, prepend=hz[:1] ** 2) / 2
+    return np.abs(total_inertia(motor, load) * motor.step_angle * acceleration + load.friction_torque)
+
+
+def torque_margin(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pull-out torque over the torque needed in each step of a run, shape (n,); below 1 the rotor falls behind.
+
+    Parameters are those of `needed_torque`. A step that needs no torque has an infinite margin.
+    """
+    available = np.array([motor.pull_out(f) for f in hz.tolist()])
+    needed = needed_torque(motor, load, hz)
+    return np.divide(available, needed, out=np.full(len(hz), np.inf), where=needed > 0)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class StepRamp:
     """The frequencies of a run-up from rest, one per step.

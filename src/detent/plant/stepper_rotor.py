@@ -39,7 +39,8 @@ class StepperRotor(Registers):
     strength: f8 = register("torque as a part of that at standstill")
     angle: f8 = register("rotor angle", unit="rad")
     velocity: f8 = register("rotor velocity", unit="rad/s")
-    peak_lag: f8 = register("largest distance of the rotor from the field so far, in steps", unit="count")
+    lag: f8 = register("field less rotor, in steps", unit="count")
+    peak_lag: f8 = register("largest magnitude of that so far, in steps", unit="count")
 
 
 @step
@@ -80,7 +81,8 @@ def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
         velocity = 0.0
     r.velocity = velocity
     r.angle += p.dt * velocity
-    r.peak_lag = max(r.peak_lag, abs(r.commanded - r.angle / p.step_angle))
+    r.lag = r.commanded - r.angle / p.step_angle
+    r.peak_lag = max(r.peak_lag, abs(r.lag))
 
 
 @step

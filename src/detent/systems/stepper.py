@@ -15,11 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
-from detent.control.step_rule import IDLE, LIMITS, PAUSE, RAMP, STEP, StepRule, StepRuleParams, next_step, place_motor
+from detent.control.step_rule import (
+    AT_REST,
+    IDLE,
+    LIMITS,
+    PAUSE,
+    RAMP,
+    STEP,
+    StepRule,
+    StepRuleParams,
+    next_entry,
+    next_step,
+    place_motor,
+)
 from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
-from detent.kernel.recording import write_row
-from detent.kernel.registers import Registers, block, i8, register, u1
-from detent.kernel.step import step
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.recording import until_row, write_row
+from detent.kernel.registers import Registers, block, f8, i8, register, u1
+from detent.kernel.step import hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
 from detent.plant.stepper_rotor import RotorParams, StepperRotor, hold_field, step_field, turn_rotor
@@ -40,6 +53,7 @@ class StepperParams(Registers):
     pause: u1 = register("waiting time of a reversal, in periods of the start frequency", unit="count")
     timer: StepTimerParams = block("step timer")
     instant_ticks: i8 = register("time step of the rotor in ticks of the step timer", unit="tick")
+    tolerance: f8 = register("distance of the rotor from its field that counts as settled, in steps", unit="count")
     rotor: RotorParams = block("motor and load")
 
 
@@ -51,16 +65,18 @@ class Stepper(Registers):
     timer: StepTimer = block("step timer and phases")
     instant: i8 = register("time steps of the rotor since power-on", unit="count")
     stop_at: i8 = register("position at which the loop returns to the host", unit="count")
+    peak_hz: f8 = register("largest step frequency since the host cleared it", unit="Hz")
+    outside: i8 = register("time step in which the rotor was last outside its tolerance", unit="count")
     rotor: StepperRotor = block("motor")
 
 
-@step
-def step_once(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> int:
-    """The running period is over: decide, and begin the next one. Returns IDLE, STEP or PAUSE."""
+@hot_step
+def step_once(p: StepperParams, r: Stepper, entry: int) -> int:
+    """The running period is over: decide by the entry, and begin the next one. Returns IDLE, STEP or PAUSE."""
     if p.comparison.method:
         outcome = next_compared_step(p.comparison, r.comparison, r.rule)
     else:
-        outcome = next_step(p.rule, r.rule, up, down)
+        outcome = next_step(p.rule, r.rule, entry)
     if outcome == STEP:
         load_period(p.timer, r.timer, r.rule.word)
         pulse(r.timer, r.rule.direction)
@@ -87,7 +103,7 @@ def advance(
     p, r : StepperParams, Stepper
         Parameters and state.
     up, down : int16 array, shape (N + 1,)
-        Tables, see `control.step_rule.next_step`.
+        Tables, see `control.step_rule.next_entry`.
     steps : int
         Most steps to make.
     trace : uint8 array, shape (rows, bytes)
@@ -103,31 +119,38 @@ def advance(
         Steps made.
     """
     done = 0
-    while done < steps and r.rule.event == 0:
-        outcome = step_once(p, r, up, down)
-        if outcome == IDLE:
-            break
-        if outcome == STEP:
-            done += 1
+    running = True
+    while running and done < steps:
+        stretch = until_row(r.timer.pulses, steps - done, every)
+        motor = local_copy(r)
+        n = 0
+        running = motor.rule.event == 0
+        while running and n < stretch:
+            entry = AT_REST if p.comparison.method else next_entry(motor.rule, up, down)
+            outcome = step_once(p, motor, entry)
+            if outcome == STEP:
+                n += 1
+            running = outcome != IDLE and motor.rule.event == 0
+        copy_back(r, motor)
+        if n > 0:
             write_row(r, r.timer.pulses, trace, picks, every)
+        done += n
     return done
 
 
 @step
-def actuate(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> None:
-    """Step timer up to the present instant, and what its pulses do to the field."""
-    now = r.instant * p.instant_ticks
-    while r.timer.expires <= now:
-        if r.timer.period == 0:
-            r.timer.expires = now  # at rest time passes until a start, which takes effect at once
-        outcome = step_once(p, r, up, down)
-        if outcome == STEP:
-            step_field(p.rotor, r.rotor, r.rule.direction, frequency(p.timer, r.timer))
-        elif outcome == PAUSE:
-            hold_field(r.rotor)
-        else:
-            hold_field(r.rotor)
-            return
+def actuate(p: StepperParams, r: Stepper, entry: int, now: int) -> bool:
+    """The running period is over: the next one, and what its pulse does to the field. False at rest."""
+    if r.timer.period == 0:
+        r.timer.expires = now  # at rest time passes until a start, which takes effect at once
+    outcome = step_once(p, r, entry)
+    if outcome == STEP:
+        hz = frequency(p.timer, r.timer)
+        r.peak_hz = max(r.peak_hz, hz)
+        step_field(p.rotor, r.rotor, r.rule.direction, hz)
+    else:
+        hold_field(r.rotor)
+    return outcome != IDLE
 
 
 @step
@@ -154,9 +177,15 @@ def advance_on_rig(
     """
     done = 0
     while done < instants and r.rule.event == 0:
-        actuate(p, r, up, down)
+        now = r.instant * p.instant_ticks
+        running = True
+        while running and r.timer.expires <= now:
+            entry = AT_REST if p.comparison.method else next_entry(r.rule, up, down)
+            running = actuate(p, r, entry, now)
         turn_rotor(p.rotor, r.rotor)
         r.instant += 1
+        if abs(r.rotor.lag) > p.tolerance:
+            r.outside = r.instant
         done += 1
         write_row(r, r.instant, trace, picks, every)
     return done

@@ -17,6 +17,7 @@ from detent.control.step_rule import (
     StepRuleParams,
     compare_words,
     deflect,
+    next_entry,
     next_step,
     place_motor,
     start_move,
@@ -44,11 +45,16 @@ def motor(position: int = 0) -> StepRule:
     return r
 
 
+def decide(p: StepRuleParams, r: StepRule, up=UP, down=DOWN) -> int:
+    """Read the tables and make the next step."""
+    return next_step(p, r, next_entry(r, up, down))
+
+
 def words(p: StepRuleParams, r: StepRule, up=UP, down=DOWN, most: int = 100) -> list[int]:
     """Words of the steps up to rest; 0 for the wait of a reversal."""
     found = []
     for _ in range(most):
-        outcome = next_step(p, r, up, down)
+        outcome = decide(p, r, up, down)
         if outcome == IDLE:
             break
         found.append(r.word if outcome == STEP else 0)
@@ -58,7 +64,7 @@ def words(p: StepRuleParams, r: StepRule, up=UP, down=DOWN, most: int = 100) -> 
 def test_at_rest_nothing_happens():
     p, r = params(), motor()
     before = r.snapshot()
-    assert next_step(p, r, UP, DOWN) == IDLE
+    assert decide(p, r) == IDLE
     assert r.snapshot() == before
 
 
@@ -66,7 +72,7 @@ def test_an_automatic_move_follows_the_table_and_rests_at_the_sentinel():
     p, r = params(), motor()
     start_move(r, 1)
     states = []
-    while next_step(p, r, UP, DOWN) == STEP:
+    while decide(p, r) == STEP:
         states.append(r.state)
     assert states == [ACCEL] * 5 + [DECEL] * 4
     assert (r.state, r.position, r.index, r.word, r.active, r.event) == (REST, 9, -1, 0, 0, 1)
@@ -79,7 +85,7 @@ def test_equal_entries_are_a_cruise():
     p, r = params(), motor()
     start_move(r, 1)
     flat = np.array([0, 0, 0, -1], np.int16)
-    states = [(next_step(p, r, flat, flat), r.state) for _ in range(3)]
+    states = [(decide(p, r, flat, flat), r.state) for _ in range(3)]
     assert states == [(STEP, ACCEL), (STEP, CRUISE), (STEP, CRUISE)]
 
 
@@ -89,7 +95,7 @@ def test_turns_are_made_at_the_sentinels():
     run = [100, 200, 300, 400, 500, 400, 300, 200, 100]
     found = []
     for _ in range(40):
-        outcome = next_step(p, r, UP, DOWN)
+        outcome = decide(p, r)
         if outcome == PAUSE:
             assert (r.state, r.index, r.word) == (TURN, -1, 0)
         found.append(r.word)
@@ -120,7 +126,7 @@ def test_the_literal_rule_takes_the_entry_whatever_the_speed(reload):
     slow, fast = (1000, 200) if reload else (100, 500)
     relations = []
     found = []
-    while next_step(p, r, up, DOWN) == STEP:
+    while decide(p, r, up, DOWN) == STEP:
         found.append(r.word)
         relations.append((r.relation, r.state))
     assert found == [fast, fast, slow, fast]
@@ -143,7 +149,7 @@ def test_a_table_that_falls_too_fast_is_a_fault_and_the_motor_comes_down():
     start_move(r, 1)
     assert words(p, r, up) == []
     r.reset = 1
-    assert next_step(p, r, up, DOWN) == IDLE
+    assert decide(p, r, up, DOWN) == IDLE
     assert (r.state, r.reset, r.start) == (REST, 0, 0)
 
 
@@ -154,9 +160,9 @@ def test_in_fault_the_table_is_not_read_even_beyond_the_travel():
     assert words(p, r, up) == [100, 200, 300, 400, 300, 200, 100]
     assert (r.position, r.state, r.cause) == (7, FAULT, INFEASIBLE)
     r.reset = 1
-    assert next_step(p, r, up, up) == IDLE
+    assert decide(p, r, up, up) == IDLE
     start_move(r, -1)
-    assert next_step(p, r, up, up) == IDLE
+    assert decide(p, r, up, up) == IDLE
     assert (r.state, r.cause, r.event) == (FAULT, OUT_OF_RANGE, 1)
 
 
@@ -164,14 +170,22 @@ def test_in_fault_the_table_is_not_read_even_beyond_the_travel():
 def test_a_start_outside_the_travel_is_a_fault(position):
     p, r = params(), motor(position)
     start_move(r, 1)
-    assert next_step(p, r, UP, DOWN) == IDLE
+    assert decide(p, r) == IDLE
     assert (r.state, r.cause, r.position) == (FAULT, OUT_OF_RANGE, position)
+
+
+def test_a_motor_that_runs_beyond_its_tables_comes_down():
+    p, r = params(), motor()
+    start_move(r, 1)
+    assert words(p, r, most=4) == [100, 200, 300, 400]
+    assert words(p, r, UP[:3], DOWN[:3]) == [300, 200, 100]
+    assert (r.state, r.cause, r.position) == (FAULT, INFEASIBLE, 7)
 
 
 def test_a_start_at_the_sentinel_is_a_move_that_has_ended():
     p, r = params(), motor(9)
     start_move(r, 1)
-    assert next_step(p, r, UP, DOWN) == IDLE
+    assert decide(p, r) == IDLE
     assert (r.state, r.position, r.event, r.active) == (REST, 9, 1, 0)
 
 
@@ -245,7 +259,7 @@ def test_a_reversal_slows_down_before_the_direction_line_toggles():
     directions = []
     found = []
     for _ in range(10):
-        found.append(r.word if next_step(p, r, high, high) == STEP else 0)
+        found.append(r.word if decide(p, r, high, high) == STEP else 0)
         directions.append((r.direction, found[-1]))
     assert found[:4] == [400, 300, 200, 100]
     assert directions[3:] == [(1, 100), (-1, 0), (-1, 100), (-1, 200), (-1, 300), (-1, 400), (-1, 500)]

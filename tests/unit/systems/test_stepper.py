@@ -2,15 +2,20 @@ import numpy as np
 import pytest
 from tests.stepper_rig import CLOCK_HZ, NO_TRACE, RAMP, Rig
 
-from detent.control.step_rule import IDLE, PAUSE, STEP
+from detent.control.step_rule import IDLE, PAUSE, STEP, next_entry
 from detent.planning.step_envelope import Zone
 from detent.planning.step_ramp import StepRamp
 from detent.systems.stepper import NOWHERE, StepperParams, advance, advance_on_rig, load_rule, step_once
 
 
+def decide(rig: Rig) -> int:
+    """One decision, by the rig's tables."""
+    return step_once(rig.p, rig.r, next_entry(rig.r.rule, *rig.tables))
+
+
 def test_a_step_moves_position_pattern_and_time_together():
     rig = Rig(5).start()
-    assert step_once(rig.p, rig.r, *rig.tables) == STEP
+    assert decide(rig) == STEP
     assert (rig.position, rig.r.timer.pulses, rig.r.timer.phase) == (1, 1, 1)
     assert rig.r.timer.expires == rig.r.timer.period == CLOCK_HZ // 400
 
@@ -20,7 +25,7 @@ def test_a_course_ends_with_the_last_period():
     assert advance(rig.p, rig.r, *rig.tables, 100, *NO_TRACE) == 3
     assert rig.r.timer.expires == pytest.approx(CLOCK_HZ * (2 / 400 + 1 / 490), rel=1e-6)
     assert rig.r.timer.period == 0
-    assert step_once(rig.p, rig.r, *rig.tables) == IDLE
+    assert decide(rig) == IDLE
 
 
 @pytest.mark.parametrize("pause", [0, 1, 3])
@@ -28,7 +33,7 @@ def test_a_reversal_waits_whole_periods_of_the_start_frequency(pause):
     rig = Rig(2, pause=pause).start(turns=1)
     outcomes, times = [], []
     for _ in range(5):
-        outcomes.append(step_once(rig.p, rig.r, *rig.tables))
+        outcomes.append(decide(rig))
         times.append(rig.r.timer.expires * 400 // CLOCK_HZ)
     assert outcomes == [STEP, STEP, PAUSE, STEP, STEP]
     assert times == [1, 2, 2 + pause, 3 + pause, 4 + pause]
