@@ -4,7 +4,6 @@ Each function returns the Markdown of one page's generated part; the page itself
 docs/_build/generated.
 """
 
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -75,13 +74,15 @@ def keys_of(method: Any) -> str:
 
 
 def _tables(model: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted name and first sentence of every table of the schema."""
-    from detent.axisfile.fields import file_key, table_of
+    """Dotted name and first sentence of every table of the schema; a placeholder stands for a name of the user's."""
+    from detent.axisfile.fields import extra_of, file_key, is_named, table_of
 
     for name, field in model.model_fields.items():
         below = table_of(field)
         if below is not None:
             path = prefix + file_key(name, field)
+            if is_named(field):
+                path = f"{path}.{extra_of(field, 'name')}"
             yield path, (below.__doc__ or "").splitlines()[0]
             yield from _tables(below, path + ".")
 
@@ -128,28 +129,73 @@ SERVO_FAULTS = """## Filtered servo: faults
 
 The cause stands in the register `deviation.cause`. A phase servo knows no faults: it settles, or it is never ready.
 """
+TABLE_REFUSALS = """## Rotary table: refused starts
+
+The register `positioner.refused` counts starts that were not taken, `positioner.reason` says why the last was not.
+"""
+STEP_FAULTS = """## Stepper envelope: faults
+
+The cause stands in the register `rule.cause` of the motor. `rule.reset`, once the motor stands, leaves the fault.
+"""
 
 
 def status_codes() -> str:
-    """Bits of the status byte SB1, and causes of a servo's faults."""
-    from detent.errors import SB1_TEXT, SERVO_FAULT_TEXT
+    """Bits of the status byte SB1, and the numbers in the registers that say why something was not done."""
+    from detent.errors import SB1_TEXT, SERVO_FAULT_TEXT, STEP_FAULT_TEXT, TABLE_REFUSAL_TEXT
 
     head = "what happened; what to do"
     bits = [(code("00"), "done")] + [(code(f"{bit:02X}"), text) for bit, text in SB1_TEXT.items()]
-    causes = [(code(str(cause)), text) for cause, text in SERVO_FAULT_TEXT.items()]
-    return f"{PRINT_HEAD_STATUS}\n{table(('bit', head), bits)}\n{SERVO_FAULTS}\n{table(('cause', head), causes)}"
+    parts = [f"{PRINT_HEAD_STATUS}\n{table(('bit', head), bits)}"]
+    for heading, number, texts in (
+        (SERVO_FAULTS, "cause", SERVO_FAULT_TEXT),
+        (TABLE_REFUSALS, "reason", TABLE_REFUSAL_TEXT),
+        (STEP_FAULTS, "cause", STEP_FAULT_TEXT),
+    ):
+        rows = [(code(str(value)), text) for value, text in texts.items()]
+        parts.append(f"{heading}\n{table((number, head), rows)}")
+    return "\n".join(parts)
+
+
+DC_COLUMNS = (
+    "nominal_voltage",
+    "torque_constant",
+    "resistance",
+    "inductance",
+    "rotor_inertia",
+    "max_current",
+)
+STEPPER_COLUMNS = (
+    "frame",
+    "steps_per_turn",
+    "holding_torque",
+    "rotor_inertia",
+    "resistance",
+    "inductance",
+    "rated_current",
+    "detent_torque",
+)
 
 
 def motors() -> str:
-    """The motors of the catalogue with the source of their constants."""
-    from detent.axisfile.catalogue import MOTORS_FILE
+    """The motors of the catalogues with the source of their constants."""
+    from detent.axisfile.catalogue import DC_MOTORS, STEPPER_MOTORS
 
-    entries: list[dict[str, Any]] = tomllib.loads(MOTORS_FILE.read_text(encoding="utf-8"))["motor"]
-    keys = ("nominal_voltage", "torque_constant", "resistance", "inductance", "rotor_inertia", "max_current")
-    constants = [(code(m["name"]), *(str(m.get(key, "")) for key in keys)) for m in entries]
-    head = ("name", "nominal voltage", "torque constant", "resistance", "inductance", "rotor inertia", "max. current")
-    sources = table(("name", "source"), [(code(m["name"]), m["source"]) for m in entries])
-    return f"{table(head, constants)}\n## Where the constants come from\n\n{sources}"
+    parts = [
+        motor_section("Brush DC motors", DC_MOTORS.entries(), DC_COLUMNS),
+        motor_section("Stepper motors", STEPPER_MOTORS.entries(), STEPPER_COLUMNS),
+    ]
+    return "\n".join(parts)
+
+
+def motor_section(title: str, entries: dict[str, dict[str, Any]], columns: tuple[str, ...]) -> str:
+    """Constants of one catalogue's motors, then where each comes from."""
+    head = ("name", *(column.replace("_", " ") for column in columns))
+    constants = [(code(name), *(str(entry.get(key, "")) for key in columns)) for name, entry in entries.items()]
+    sources = [(code(name), entry["source"]) for name, entry in entries.items()]
+    return (
+        f"## {title}\n\n{table(head, constants)}\n"
+        f"### Where the constants of {title[0].lower()}{title[1:]} come from\n\n{table(('name', 'source'), sources)}"
+    )
 
 
 PAGES = {

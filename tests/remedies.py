@@ -11,7 +11,7 @@ from detent.units import format_quantity
 from tests.bad_files import Bad, check_bad_file
 
 VALUE = r'"[^"]*"|\[[^\]]*\]|[\w.+-]*\w'
-NAMED = re.compile(rf"set ([a-z_.]+) = ({VALUE})(?: and ([a-z_.]+) = ({VALUE}))?")
+NAMED = re.compile(rf"set ([a-z0-9_.]+) = ({VALUE})(?: and ([a-z0-9_.]+) = ({VALUE}))?")
 NUMBER = re.compile(r'"([\d.e+-]+) (.+)"')
 
 

@@ -31,6 +31,10 @@ KINDS: dict[str, tuple[str, str]] = {
     "H": ("an inductance", "12 mH"),
     "A": ("a current", "1.5 A"),
     "rad": ("an angle", "5 deg"),
+    "rad/s": ("an angular velocity", "60 deg/s"),
+    "rad/s^2": ("an angular acceleration", "300 deg/s^2"),
+    "N*m": ("a torque", "60 mN*m"),
+    "N*m*s/rad": ("a viscous friction coefficient of rotation", "2 mN*m*s/rad"),
     "rpm": ("a rotary speed", "3000 rpm"),
     "%": ("a percentage", "+10 %"),
 }
@@ -53,9 +57,16 @@ COMMON_UNITS: dict[str, dict[str, Fraction]] = {
     "H": {"H": Fraction(1), "mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
     "A": {"A": Fraction(1), "mA": Fraction(1, 1000)},
     "rad": {"rad": Fraction(1)},
+    "rad/s": {"rad/s": Fraction(1)},
+    "rad/s^2": {"rad/s^2": Fraction(1)},
+    "N*m": {"N*m": Fraction(1), "N*cm": Fraction(1, 100), "mN*m": Fraction(1, 1000)},
+    "N*m*s/rad": {"N*m*s/rad": Fraction(1), "mN*m*s/rad": Fraction(1, 1000)},
 }
 """Factors met in nearly every file, by target unit: with these alone a file is read without waiting for pint's import
 (0.2 s). A test holds each of them to pint's."""
+
+IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+"""Units that people read in degrees."""
 
 _NUMBER_THEN_UNIT = re.compile(
     r"\s*([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(\S.*)?", re.DOTALL
@@ -152,12 +163,27 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     """
     if unit == "%":
         return f"{value * 100:.{digits}g} %"
-    if unit == "rad":
-        return f"{math.degrees(value):.{digits}g} deg"
+    if unit in IN_DEGREES:
+        shown, name = in_degrees(value, unit)
+        return f"{shown:.{digits}g} {name}"
     if unit == "":
         return f"{value:.{digits}g}"
     scale, prefixed = _prefixed(abs(float(f"{value:.{digits}g}")), unit)
     return f"{value / scale:.{digits}g} {prefixed}"
+
+
+def in_degrees(value: float, unit: str) -> tuple[float, str]:
+    """An angle as people read it, and the unit of that: degrees, or rpm from ten turns a second.
+
+    Examples
+    --------
+    >>> in_degrees(math.pi, "rad/s"), in_degrees(200 * math.pi, "rad/s")
+    ((180.0, 'deg/s'), (6000.0, 'rpm'))
+    """
+    degrees = math.degrees(value)
+    if unit == "rad/s" and abs(degrees) >= 3600:
+        return degrees / 6, "rpm"
+    return degrees, IN_DEGREES[unit]
 
 
 def _prefixed(size: float, unit: str) -> tuple[float, str]:
@@ -166,7 +192,7 @@ def _prefixed(size: float, unit: str) -> tuple[float, str]:
         return (1.0, "kg") if size >= 1 or size == 0 else (1e-3, "g")
     if unit == "kg*m^2":
         # Rotor inertias are printed in g*cm^2 in every catalogue.
-        return (1e-7, "g*cm^2") if size else (1.0, unit)
+        return (1e-7, "g*cm^2") if 0 < size < 1e-3 else (1.0, unit)
     if size == 0 or not math.isfinite(size):
         return 1.0, unit
     largest = 0 if unit in {"m", "m/s", "m/s^2", "s"} else 6

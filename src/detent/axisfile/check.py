@@ -7,7 +7,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from detent.axisfile.fields import Table, file_key, leaf_fields
+from detent.axisfile.fields import held_leaves
 from detent.axisfile.findings import Caution, Derived
 from detent.axisfile.load import AxisFile
 from detent.axisfile.methods import METHODS
@@ -88,28 +88,10 @@ def check_spec(axis: AxisFile) -> CheckReport:
 
 def _rows(axis: AxisFile) -> Iterator[EffectiveRow]:
     """Every value in effect."""
-    for path, field in leaf_fields(type(axis.spec)):
+    for path, field, held in held_leaves(axis.spec):
         key = dotted(path)
-        if not _is_present(axis.spec, path):
-            continue
         origin = axis.origins.get(key, "default")
         if origin.startswith("line "):
             origin = f"{axis.file} {origin}"
-        value = format_value(field, _value_at(axis.spec, path))
+        value = format_value(field, held)
         yield EffectiveRow(key, value, axis.texts.get(key, ""), origin, field.description or "")
-
-
-def _is_present(spec: Table, path: tuple[str, ...]) -> bool:
-    """False for keys of an optional table that the axis does not have."""
-    return len(path) < 2 or _value_at(spec, path[:-1]) is not None
-
-
-def _value_at(spec: Table, path: tuple[str, ...]) -> object:
-    """Value of a key; None inside an absent table."""
-    value: object = spec
-    for key in path:
-        if not isinstance(value, Table):
-            return None
-        names = {file_key(name, field): name for name, field in type(value).model_fields.items()}
-        value = getattr(value, names[key])
-    return value

@@ -2,10 +2,11 @@
 
 import json
 from decimal import Decimal
+from typing import cast
 
 from pydantic.fields import FieldInfo
 
-from detent.axisfile.fields import Table, file_key, table_of, unit_of
+from detent.axisfile.fields import Table, file_key, is_named, table_of, unit_of
 from detent.axisfile.tables import AxisSpec
 
 
@@ -34,9 +35,13 @@ def _table_lines(table: Table, path: tuple[str, ...]) -> list[str]:
         key = file_key(name, field)
         if isinstance(value, Table):
             below += _table_lines(value, (*path, key))
+        elif is_named(field):
+            for own, held in cast("dict[str, Table]", value).items():
+                below += _table_lines(held, (*path, key, own))
         elif value is not None and table_of(field) is None:
             values.append(f"{key} = {_value_text(field, value)}")
-    header = ["", f"[{'.'.join(path)}]"] if path and values else []
+    # A table of the user's own is there even if it states nothing: its name says something.
+    header = ["", f"[{'.'.join(path)}]"] if path and (values or not below) else []
     return header + values + below
 
 
@@ -51,7 +56,9 @@ def _value_text(field: FieldInfo, value: object) -> str:
     if isinstance(value, float) and unit:
         number = str(Decimal(repr(value)) * 100) if unit == "%" else repr(value)
         return f'"{number} {unit}"'
+    if isinstance(value, list) and unit:
+        return f"[{', '.join(_value_text(field, one) for one in cast('list[float]', value))}]"
     if isinstance(value, str):
         # JSON's escapes are TOML's, as long as characters outside ASCII stay as they are.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)
+    return repr(cast("object", value))

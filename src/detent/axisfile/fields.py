@@ -18,6 +18,12 @@ LIST_EXAMPLE = "[20000, 20096]"
 """List of whole numbers shown for a key that has no example of its own."""
 
 
+class AnyName(str):
+    """Place in a path of the schema where the file has a name of the user's choice, as in ``[position.NUMBER]``."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """Annotation of a dimensional field: text with a unit in the file, a float of this unit inside."""
@@ -89,6 +95,52 @@ def optional(doc: str, default: object, *, derived: str = "", allowed: str = "",
     return Field(description=doc, json_schema_extra={"allowed": allowed, "derived": derived}, **constraints)
 
 
+@dataclass(frozen=True, slots=True)
+class Naming:
+    """How the user may name tables.
+
+    Attributes
+    ----------
+    placeholder : str
+        What stands for the name in the reference, such as ``"NUMBER"``.
+    pattern : str
+        Regular expression that every name matches as a whole.
+    allowed : str
+        The same in words.
+    example : str
+        A name that would do.
+    """
+
+    placeholder: str
+    pattern: str
+    allowed: str
+    example: str
+
+
+def named(doc: str, naming: Naming, **bounds: int) -> Any:
+    """Declare tables that the user names, as in ``[position.3]``; the field's type is ``dict[str, SomeTable]``.
+
+    Parameters
+    ----------
+    doc : str
+        Meaning of one of them, one sentence without a full stop.
+    naming : Naming
+        What their names may be.
+    **bounds : int
+        ``min_length`` and ``max_length``: how many there may be. Without the first there may be none.
+    """
+    extra: dict[str, Any] = {"name": naming.placeholder, "pattern": naming.pattern, "allowed": naming.allowed}
+    constraints: dict[str, Any] = dict(bounds)
+    if "min_length" not in bounds:
+        constraints["default_factory"] = dict
+    return Field(description=doc, examples=[naming.example], json_schema_extra=extra, **constraints)
+
+
+def is_named(field: FieldInfo) -> bool:
+    """True for tables that the user names."""
+    return get_origin(field.annotation) is dict
+
+
 def file_key(name: str, field: FieldInfo) -> str:
     """Key of a field as written in the file."""
     return field.alias or name
@@ -101,7 +153,7 @@ def unit_of(field: FieldInfo) -> str:
 
 
 def table_of(field: FieldInfo) -> type[Table] | None:
-    """Model of the table below a field, or None for a value."""
+    """Model of the table below a field, of each table where they are named, or None for a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
         if isinstance(candidate, type) and issubclass(candidate, Table):
             return candidate
@@ -109,13 +161,15 @@ def table_of(field: FieldInfo) -> type[Table] | None:
 
 
 def is_list(field: FieldInfo) -> bool:
-    """True for a key that holds a list of whole numbers."""
+    """True for a key that holds a list: of whole numbers, or of quantities."""
     return list in {get_origin(candidate) for candidate in (field.annotation, *get_args(field.annotation))}
 
 
 def list_example(field: FieldInfo) -> str:
     """Give an example of a list, as TOML text."""
     held: object = field.default
+    if unit_of(field):
+        return example_of(field) or f'["{describe_kind(unit_of(field))[1]}"]'
     return example_of(field) or (str(cast("list[int]", held)) if held and isinstance(held, list) else LIST_EXAMPLE)
 
 
@@ -131,14 +185,49 @@ def example_of(field: FieldInfo) -> str:
 
 
 def leaf_fields(table: type[Table], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Walk all values a table can hold, tables below it included, in the order of declaration."""
+    """Walk all values a table can hold, tables below it included, in the order of declaration.
+
+    Where the user names the tables, `AnyName` stands in the path.
+    """
     for name, field in table.model_fields.items():
         path = (*prefix, file_key(name, field))
         below = table_of(field)
         if below is None:
             yield path, field
+        elif is_named(field):
+            yield from leaf_fields(below, (*path, AnyName(extra_of(field, "name"))))
         else:
             yield from leaf_fields(below, path)
+
+
+def held_leaves(table: Table, prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo, object]]:
+    """Walk all values that a table holds, with the names the user gave; optional tables it lacks are passed over."""
+    for name, field in type(table).model_fields.items():
+        path, value = (*prefix, file_key(name, field)), cast("object", getattr(table, name))
+        if isinstance(value, Table):
+            yield from held_leaves(value, path)
+        elif is_named(field):
+            for own, below in cast("dict[str, Table]", value).items():
+                yield from held_leaves(below, (*path, own))
+        elif table_of(field) is None:
+            yield path, field, value
+
+
+def fits(pattern: tuple[str, ...], path: tuple[str, ...]) -> bool:
+    """True when a path of a file is one of those that a path of the schema stands for."""
+    return len(pattern) == len(path) and all(
+        isinstance(part, AnyName) or part == own for part, own in zip(pattern, path, strict=True)
+    )
+
+
+def named_as(pattern: tuple[str, ...], path: tuple[str, ...]) -> tuple[str, ...]:
+    """A path of the schema, with the names that a path of a file has where both are alike up to there."""
+    for k, (part, own) in enumerate(zip(pattern, path, strict=False)):
+        if isinstance(part, AnyName):
+            pattern = (*pattern[:k], own, *pattern[k + 1 :])
+        elif part != own:
+            break
+    return pattern
 
 
 def describe_allowed(field: FieldInfo) -> str:
@@ -167,15 +256,21 @@ def options_of(field: FieldInfo) -> tuple[str, ...]:
 
 def _describe_list(field: FieldInfo) -> str:
     """Say what a list may be: its numbers, an example, its length."""
-    numbers = f"a list of whole numbers {_describe_bounds(field, '')}".rstrip()
-    lengths: list[str] = []
-    for entry in _annotations_of(field):
-        if isinstance(entry, MinLen) and entry.min_length > 0:
-            lengths.append(f"at least {entry.min_length}")
-        elif isinstance(entry, MaxLen):
-            lengths.append(f"at most {entry.max_length}")
+    unit = unit_of(field)
+    kind = f"a list, each {describe_kind(unit)[0]}" if unit else "a list of whole numbers"
+    numbers = f"{kind} {_describe_bounds(field, unit)}".rstrip()
+    least, most = bounds_of_length(field)
+    lengths = [f"at least {least}"] if least else []
+    lengths += [f"at most {most}"] if most else []
     many = f", {' and '.join(lengths)} of them" if lengths else ""
     return f"{numbers}, such as {list_example(field)}{many}"
+
+
+def bounds_of_length(field: FieldInfo) -> tuple[int, int]:
+    """Least and largest number of elements of a list, or of tables that the user names; 0 where nothing is said."""
+    least = [entry.min_length for entry in _annotations_of(field) if isinstance(entry, MinLen)]
+    most = [entry.max_length for entry in _annotations_of(field) if isinstance(entry, MaxLen)]
+    return (least or [0])[0], (most or [0])[0]
 
 
 def _describe_number(field: FieldInfo) -> str:

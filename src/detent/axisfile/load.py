@@ -2,28 +2,33 @@
 
 import copy
 import difflib
-import re
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
-from detent.axisfile.catalogue import dc_motors, motor_constants
-from detent.axisfile.fields import Table, example_of, is_list, leaf_fields, options_of, table_of, unit_of
+from detent.axisfile.catalogue import Catalogue
+from detent.axisfile.fields import (
+    AnyName,
+    Table,
+    example_of,
+    held_leaves,
+    is_named,
+    leaf_fields,
+    table_of,
+)
 from detent.axisfile.findings import Contradiction
 from detent.axisfile.locate import Path
 from detent.axisfile.methods import METHODS, AnySpec, Method
-from detent.axisfile.problems import Reporter, dotted, field_at, key_path, nearest_key
+from detent.axisfile.overrides import apply_overrides, as_table, put_value
+from detent.axisfile.problems import Reporter, bad_names, dotted, field_at, key_path, nearest_key
 from detent.axisfile.source import Source, read_source
 from detent.errors import FileProblem, InputError
 
 METHOD_KEY: Path = ("axis", "method")
-
-_NUMBER = re.compile(r"[+-]?[0-9][0-9_]*(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,20 +98,22 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
         raise InputError(source.problems)
     method = _method_of(source, overrides)
     model = method.spec
-    layers = _Layers(copy.deepcopy(source.tables))
-    _apply_overrides(layers, overrides, model)
+    tables = copy.deepcopy(source.tables)
+    overridden = apply_overrides(tables, overrides, model)
+    layers = _Layers(tables, overridden.texts, problems=overridden.problems)
     reporter = Reporter(source.file, source.places, layers.overrides, model)
-    _apply_catalogue(layers, reporter, model)
+    _apply_catalogue(layers, reporter, method)
+    layers.problems += [reporter.wrong_name(path, field) for path, field in bad_names(model, layers.tables)]
     spec = _validated(layers, reporter, method, is_whole=source.is_whole)
     problems = [*source.problems, *layers.problems]
     if problems:
         raise InputError(problems)
-    return AxisFile(source.file, spec, *_origins(source, layers, model))
+    return AxisFile(source.file, spec, *_origins(source, layers, spec))
 
 
 def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
     """Method the file names; without a name, the first, so that the rest is checked all the same."""
-    name: object = _as_table(source.tables.get("axis")).get("method")
+    name: object = as_table(source.tables.get("axis")).get("method")
     parts = [text.partition("=") for text in overrides]
     stated = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == "axis.method"]
     name = stated[-1] if stated else name
@@ -128,92 +135,54 @@ def _all_methods() -> str:
     return " or ".join(f'"{known}"' for known in METHODS)
 
 
-def _apply_overrides(layers: _Layers, overrides: Sequence[str], model: type[Table]) -> None:
-    """Put the values of ``--set`` over the file's; an unknown key is a problem at once."""
-    known = dict(leaf_fields(model))
-    for text in overrides:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        path = tuple(key.split("."))
-        if not equals or not value:
-            layers.problems.append(
-                FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", "write it as in --set 'drive.supply=34 V'")
-            )
-        elif path not in known:
-            near = difflib.get_close_matches(key, [dotted(candidate) for candidate in known], n=1, cutoff=0.5)
-            remedy = f'did you mean "{near[0]}"?' if near else "`detent check` lists the keys"
-            layers.problems.append(
-                FileProblem("--set", 0, 0, key, f'the unknown key "{key}"', "a key of the axis file", remedy)
-            )
-        else:
-            _put(layers.tables, path, _override_value(known[path], value))
-            layers.overrides[path] = value
-
-
-def _override_value(field: FieldInfo, text: str) -> object:
-    """Value of an override: what the same words mean in a file, quotes being optional."""
-    if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
-        return text[1:-1]
-    if is_list(field) and text.startswith("["):
-        return _list_value(text)
-    if field.annotation is str or options_of(field):
-        return text
-    if text in {"true", "false"} and not unit_of(field):
-        return text == "true"
-    match = _NUMBER.fullmatch(text)
-    if match is None or len(text) > 40:
-        return text
-    return float(text) if match.group(1) or match.group(2) else int(text)
-
-
-def _list_value(text: str) -> object:
-    """Value of a list in an override; what is no TOML stays text, and validation refuses it."""
-    try:
-        tables = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text
-    # After a line break anything could follow.
-    return tables["value"] if len(tables) == 1 else text
-
-
-def _as_table(value: object) -> dict[str, Any]:
-    """Give the value itself if it is a table, else an empty one."""
-    return cast("dict[str, Any]", value) if isinstance(value, dict) else {}
-
-
-def _put(tables: dict[str, Any], path: Path, value: object) -> None:
-    """Set a value in nested tables; where a table is none, validation says so."""
-    for key in path[:-1]:
-        tables = _as_table(tables.setdefault(key, {}))
-    tables[path[-1]] = value
-
-
-def _apply_catalogue(layers: _Layers, reporter: Reporter, model: type[Table]) -> None:
-    """Put a catalogue motor's constants under the stated ones, where the method knows a catalogue."""
-    known = {path for path, _ in leaf_fields(model)}
-    motor = _as_table(layers.tables.get("motor"))
-    name: object = motor.get("catalogue")
-    if not name or ("motor", "catalogue") not in known:
+def _apply_catalogue(layers: _Layers, reporter: Reporter, method: Method[Any]) -> None:
+    """Put a catalogue motor's constants under the stated ones, for every motor of the file that names one."""
+    if method.catalogue is None:
         return
+    known = [path for path, _ in leaf_fields(method.spec)]
+    pattern = next(path for path in known if path[-2:] == ("motor", "catalogue"))
+    keys = {path[-1] for path in known if path[:-1] == pattern[:-1]}
+    for path in list(_paths_like(layers.tables, pattern)):
+        _apply_motor(layers, reporter, method.catalogue, path, keys)
+
+
+def _paths_like(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:
+    """Paths of the file that a path of the schema stands for, with a value."""
+    first, *rest = pattern
+    for key in tables if isinstance(first, AnyName) else [first] if first in tables else []:
+        if not rest:
+            yield (*done, key)
+        else:
+            yield from _paths_like(as_table(tables[key]), tuple(rest), (*done, key))
+
+
+def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: set[str]) -> None:
+    """One motor: `path` is that of its key ``catalogue``, `keys` are those of its table."""
+    name = _value_at(layers.tables, path)
+    if not name:
+        return
+    around = path[:-1]
     if not isinstance(name, str):
         # Validation refuses it; without the motor it names, missing constants are no news.
-        layers.doubtful.add(("motor",))
+        layers.doubtful.add(around)
         return
-    constants = motor_constants(name)
+    constants = catalogue.constants(name)
     if constants is None:
-        names = list(dc_motors())
+        names = list(catalogue.entries())
         near = difflib.get_close_matches(name.lower(), {known.lower(): known for known in names}, n=1, cutoff=0.4)
         nearest = next((known for known in names if near and known.lower() == near[0]), None)
-        remedy = f'did you mean "{nearest}"?' if nearest else "choose one of these, or state the constants in [motor]"
-        path = ("motor", "catalogue")
+        constants_there = f"choose one of these, or state the constants in [{dotted(around)}]"
+        remedy = f'did you mean "{nearest}"?' if nearest else constants_there
         layers.problems.append(
             reporter.problem(path, reporter.came(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
         )
-        layers.doubtful.add(("motor",))
+        layers.doubtful.add(around)
         return
+    motor = as_table(_value_at(layers.tables, around))
     for key, value in constants.items():
-        if key not in motor and ("motor", key) in known:
+        if key not in motor and key in keys:
             motor[key] = value
-            layers.catalogue["motor", key] = name
+            layers.catalogue[(*around, key)] = name
 
 
 def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AnySpec:
@@ -249,7 +218,7 @@ def _tell(
     problems: list[FileProblem] = []
     for path, entries in by_key.items():
         kind = entries[0]["type"]
-        follows = path[:1] in layers.doubtful or path in misspelt or not is_whole
+        follows = path[:-1] in layers.doubtful or path in misspelt or not is_whole
         # A default that is made from another key cannot be made when that key is wrong.
         if kind == "default_factory_not_called" or (kind == "missing" and follows):
             continue
@@ -300,10 +269,12 @@ def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Ta
         path = key_path(entry["loc"])
         if entry["type"] == "extra_forbidden" or not field_at(model, path).is_required():
             _drop(patched, path)
+        elif is_named(field_at(model, path)):
+            put_value(patched, path, {example_of(field_at(model, path)): {}})
         elif table_of(field_at(model, path)) is not None:
-            _put(patched, path, {})
+            put_value(patched, path, {})
         else:
-            _put(patched, path, _example_value(example_of(field_at(model, path))))
+            put_value(patched, path, _example_value(example_of(field_at(model, path))))
     return patched
 
 
@@ -314,16 +285,23 @@ def _drop(tables: dict[str, Any], path: Path) -> None:
     tables.pop(path[-1], None)
 
 
+def _value_at(tables: dict[str, Any], path: Path) -> object:
+    """Value of a key in nested tables; None where there is none."""
+    for key in path[:-1]:
+        tables = as_table(tables.get(key))
+    return tables.get(path[-1])
+
+
 def _example_value(example: str) -> object:
     """Value of an example, which is TOML."""
     return tomllib.loads(f"value = {example}")["value"]
 
 
-def _origins(source: Source, layers: _Layers, model: type[Table]) -> tuple[dict[str, str], dict[str, str]]:
+def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, str], dict[str, str]]:
     """Where each value came from, and how it was written there."""
     origins: dict[str, str] = {}
     texts: dict[str, str] = {}
-    for path, _ in leaf_fields(model):
+    for path, _, _ in held_leaves(spec):
         key = dotted(path)
         if path in layers.overrides:
             origins[key], texts[key] = "--set", layers.overrides[path]
@@ -331,5 +309,5 @@ def _origins(source: Source, layers: _Layers, model: type[Table]) -> tuple[dict[
             origins[key], texts[key] = f"line {source.places[path].line}", source.places[path].text.strip("\"'")
         elif path in layers.catalogue:
             origins[key] = f"catalogue {layers.catalogue[path]}"
-            texts[key] = str(layers.tables["motor"][path[-1]])
+            texts[key] = str(_value_at(layers.tables, path))
     return origins, texts

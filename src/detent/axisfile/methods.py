@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from detent.axisfile.catalogue import DC_MOTORS, STEPPER_MOTORS, Catalogue
 from detent.axisfile.filtered_servo.cautions import find_cautions as find_filtered_servo_cautions
 from detent.axisfile.filtered_servo.derive import derive as derive_filtered_servo
 from detent.axisfile.filtered_servo.rules import RULES as FILTERED_SERVO_RULES
@@ -20,12 +21,22 @@ from detent.axisfile.print_head.derive import derive as derive_print_head
 from detent.axisfile.print_head.rules import RULES as PRINT_HEAD_RULES
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.axisfile.print_head.schema import fill_derived as fill_print_head
+from detent.axisfile.rotary_table.cautions import find_cautions as find_rotary_table_cautions
+from detent.axisfile.rotary_table.derive import derive as derive_rotary_table
+from detent.axisfile.rotary_table.rules import RULES as ROTARY_TABLE_RULES
+from detent.axisfile.rotary_table.schema import RotaryTableSpec
+from detent.axisfile.rotary_table.schema import fill_derived as fill_rotary_table
+from detent.axisfile.stepper_envelope.cautions import find_cautions as find_stepper_envelope_cautions
+from detent.axisfile.stepper_envelope.derive import derive as derive_stepper_envelope
+from detent.axisfile.stepper_envelope.rules import RULES as STEPPER_ENVELOPE_RULES
+from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.axisfile.stepper_envelope.schema import fill_derived as fill_stepper_envelope
 from detent.axisfile.tables import AxisSpec
 from detent.kernel.registers import Registers
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
 
-AnySpec: TypeAlias = PrintHeadSpec | PhaseServoSpec | FilteredServoSpec
+AnySpec: TypeAlias = PrintHeadSpec | PhaseServoSpec | FilteredServoSpec | RotaryTableSpec | StepperEnvelopeSpec
 """What a file is loaded to: the union of the specifications of all methods."""
 
 
@@ -49,6 +60,8 @@ class Method(Generic[SpecT]):
         Derived figures, in the order they are read.
     cautions : callable
         What looks wrong with an axis that can be built.
+    catalogue : Catalogue or None
+        Motors that ``motor.catalogue`` may name.
     registers, parameters : callable
         Class of the axis's state and of its parameters. They load the compiled blocks, so they are only called where
         these are wanted.
@@ -61,6 +74,7 @@ class Method(Generic[SpecT]):
     rules: tuple[Callable[[SpecT], Iterator[Contradiction]], ...]
     derive: Callable[[SpecT], tuple[Derived, ...]]
     cautions: Callable[[SpecT], Iterator[Caution]]
+    catalogue: Catalogue | None
     registers: Callable[[], type[Registers]]
     parameters: Callable[[], type[Registers]]
 
@@ -87,6 +101,7 @@ PRINT_HEAD = Method(
     rules=PRINT_HEAD_RULES,
     derive=derive_print_head,
     cautions=find_print_head_cautions,
+    catalogue=DC_MOTORS,
     registers=_print_head_registers,
     parameters=_print_head_parameters,
 )
@@ -114,6 +129,7 @@ PHASE_SERVO = Method(
     rules=PHASE_SERVO_RULES,
     derive=derive_phase_servo,
     cautions=find_phase_servo_cautions,
+    catalogue=DC_MOTORS,
     registers=_phase_servo_registers,
     parameters=_phase_servo_parameters,
 )
@@ -141,9 +157,68 @@ FILTERED_SERVO = Method(
     rules=FILTERED_SERVO_RULES,
     derive=derive_filtered_servo,
     cautions=find_filtered_servo_cautions,
+    catalogue=DC_MOTORS,
     registers=_filtered_servo_registers,
     parameters=_filtered_servo_parameters,
 )
 
-METHODS: dict[str, Method[Any]] = {method.name: method for method in (PRINT_HEAD, PHASE_SERVO, FILTERED_SERVO)}
+
+def _rotary_table_registers() -> type[Registers]:
+    """State of a rotary table."""
+    from detent.systems.rotary_table import RotaryTable
+
+    return RotaryTable
+
+
+def _rotary_table_parameters() -> type[Registers]:
+    """Parameters of a rotary table."""
+    from detent.systems.rotary_table import RotaryTableParams
+
+    return RotaryTableParams
+
+
+ROTARY_TABLE = Method(
+    name="rotary_table",
+    title="rotary table: absolute angle of one turn, servo-controlled jog without end",
+    spec=RotaryTableSpec,
+    fill=fill_rotary_table,
+    rules=ROTARY_TABLE_RULES,
+    derive=derive_rotary_table,
+    cautions=find_rotary_table_cautions,
+    catalogue=None,
+    registers=_rotary_table_registers,
+    parameters=_rotary_table_parameters,
+)
+
+
+def _stepper_envelope_registers() -> type[Registers]:
+    """State of one motor."""
+    from detent.systems.stepper import Stepper
+
+    return Stepper
+
+
+def _stepper_envelope_parameters() -> type[Registers]:
+    """Parameters of one motor."""
+    from detent.systems.stepper import StepperParams
+
+    return StepperParams
+
+
+STEPPER_ENVELOPE = Method(
+    name="stepper_envelope",
+    title="stepper envelope: speed as a table of what is allowed, one motor or several",
+    spec=StepperEnvelopeSpec,
+    fill=fill_stepper_envelope,
+    rules=STEPPER_ENVELOPE_RULES,
+    derive=derive_stepper_envelope,
+    cautions=find_stepper_envelope_cautions,
+    catalogue=STEPPER_MOTORS,
+    registers=_stepper_envelope_registers,
+    parameters=_stepper_envelope_parameters,
+)
+
+METHODS: dict[str, Method[Any]] = {
+    method.name: method for method in (PRINT_HEAD, PHASE_SERVO, FILTERED_SERVO, ROTARY_TABLE, STEPPER_ENVELOPE)
+}
 """All methods by name; the first is the one a file without a method is checked against."""

@@ -7,7 +7,7 @@ from pydantic.fields import FieldInfo
 
 from detent.axisfile.fields import Table, unit_of
 from detent.axisfile.problems import field_at
-from detent.units import format_quantity, parse_quantity
+from detent.units import IN_DEGREES, format_quantity, in_degrees, parse_quantity
 
 BARELY = 1e-9
 """Relative distance that a value keeps from a bound it must not touch."""
@@ -21,7 +21,7 @@ def at_most(value: float, unit: str, digits: int = 4) -> str:
     value : float
         The bound in `unit`, above 0.
     unit : str
-        A unit of `units.KINDS` that is written with a prefix of powers of ten.
+        A unit of `units.KINDS` that is written with a prefix of powers of ten, or in degrees.
     digits : int
         Significant digits.
 
@@ -30,7 +30,7 @@ def at_most(value: float, unit: str, digits: int = 4) -> str:
     >>> at_most(0.407166, "m/s")
     '"407.1 mm/s"'
     """
-    return f'"{format_quantity(_rounded(value, digits, ROUND_FLOOR), unit, digits)}"'
+    return _written(value, unit, digits, ROUND_FLOOR)
 
 
 def at_least(value: float, unit: str, digits: int = 4) -> str:
@@ -41,7 +41,14 @@ def at_least(value: float, unit: str, digits: int = 4) -> str:
     >>> at_least(0.407166, "m/s")
     '"407.2 mm/s"'
     """
-    return f'"{format_quantity(_rounded(value, digits, ROUND_CEILING), unit, digits)}"'
+    return _written(value, unit, digits, ROUND_CEILING)
+
+
+def _written(value: float, unit: str, digits: int, rounding: str) -> str:
+    if unit in IN_DEGREES:
+        shown, name = in_degrees(value, unit)  # what is rounded is the number that is written
+        return f'"{_rounded(shown, digits, rounding):.{digits}g} {name}"'
+    return f'"{format_quantity(_rounded(value, digits, rounding), unit, digits)}"'
 
 
 def _rounded(value: float, digits: int, rounding: str) -> float:

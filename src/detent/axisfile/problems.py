@@ -1,21 +1,26 @@
 """What validation found, told to a person: from pydantic's errors to `FileProblem`."""
 
 import difflib
+import re
 from collections.abc import Iterator, Sequence
 from itertools import takewhile
-from typing import Any
+from typing import Any, cast
 
 from pydantic.fields import FieldInfo
 
 from detent.axisfile.fields import (
+    AnyName,
     Table,
+    bounds_of_length,
     describe_allowed,
     example_of,
     extra_of,
     file_key,
     is_list,
+    is_named,
     leaf_fields,
     list_example,
+    named_as,
     options_of,
     table_of,
     unit_of,
@@ -78,6 +83,8 @@ class Reporter:
         if error["type"] == "extra_forbidden":
             return self._unknown_key(path, error["input"])
         field = field_at(self._root, path)
+        if is_named(field) and error["type"] in {"too_short", "too_long"}:
+            return self._wrong_number(path, field, len(error["input"]))
         if error["type"] == "missing":
             return self._missing(path, field)
         if table_of(field) is not None:
@@ -97,14 +104,28 @@ class Reporter:
         if near:
             remedy = f'did you mean "{near}"?'
         elif elsewhere:
-            remedy = f"move it to [{dotted(elsewhere[0][:-1])}]"
+            remedy = f"move it to [{dotted(named_as(elsewhere[0][:-1], path))}]"
         else:
             remedy = "remove it, or look the key up with `detent check` or in the reference"
         return self.problem(path, what, f"{place}: {', '.join(keys)}", remedy)
 
+    def wrong_name(self, path: Path, field: FieldInfo) -> FileProblem:
+        """Problem of a table whose name will not do."""
+        remedy = f"rename it, as in [{dotted((*path[:-1], example_of(field)))}]"
+        return self.problem(path, f'the name "{path[-1]}"', extra_of(field, "allowed"), remedy)
+
+    def _wrong_number(self, path: Path, field: FieldInfo, came: int) -> FileProblem:
+        """Too few or too many tables that the user names."""
+        least, most = bounds_of_length(field)
+        table = dotted((*path, example_of(field)))
+        remedy = f"add [{table}] ({field.description})" if came < least else "remove some"
+        return self.problem(path, f"{came} tables", f"{least} to {most} tables such as [{table}]", remedy)
+
     def _missing(self, path: Path, field: FieldInfo) -> FileProblem:
         """Missing key or table: say what to add, and where."""
         table = table_of(field)
+        if is_named(field):
+            return self._wrong_number(path, field, 0)
         if table is not None:
             keys = [dotted(known) for known, leaf in leaf_fields(table) if leaf.is_required()]
             remedy = f"add [{dotted(path)}] with {', '.join(keys)}"
@@ -118,6 +139,11 @@ class Reporter:
     def _not_a_table(self, path: Path, value: object) -> FileProblem:
         """Report a value where a table must stand, or several tables where there is one."""
         keys = ", ".join(known_keys(self._root, path))
+        if is_named(field_at(self._root, path)):
+            table = dotted((*path, example_of(field_at(self._root, path))))
+            came = "a list" if isinstance(value, list) else self.came(path, value)
+            remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
+            return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
         if isinstance(value, list):
             remedy = f"write [{dotted(path)}] once, with single brackets: one file describes one axis"
             return self.problem(path, "a list", f"one table [{dotted(path)}]", remedy)
@@ -147,17 +173,19 @@ class Reporter:
             remedy = f"give {path[-1]} so many numbers ({field.description})"
         elif "list_type" in kinds:
             came = self.came(path, errors[0]["input"])
-            remedy = f"write whole numbers in brackets, as in {example}"
+            remedy = f"write {'quantities' if unit_of(field) else 'whole numbers'} in brackets, as in {example}"
         else:
             came = ", ".join(_wrong_elements(errors))
         if kinds & {"int_type", "int_parsing_size"}:
             remedy = f"write every element as a whole number, as in {example}"
+        elif "quantity" in kinds:
+            remedy = f"write every element as text with a unit, as in {example}"
         return self.problem(path, came, describe_allowed(field), remedy)
 
 
 def key_path(location: Sequence[str | int]) -> Path:
     """Path of the key at a location of pydantic's, which may go on into a list by a number."""
-    return tuple(str(part) for part in takewhile(lambda part: isinstance(part, str), location))
+    return tuple(str(part) for part in takewhile(lambda part: isinstance(part, str), location) if part != "[key]")
 
 
 def field_at(root: type[Table], path: Path) -> FieldInfo:
@@ -171,6 +199,10 @@ def field_at(root: type[Table], path: Path) -> FieldInfo:
     table: type[Table] | None = root
     field: FieldInfo | None = None
     for key in path:
+        if field is not None and is_named(field):
+            # One of the tables, whatever its name: a required table like any other.
+            field = FieldInfo(annotation=table, description=field.description)
+            continue
         fields = {
             file_key(name, candidate): candidate for name, candidate in (table.model_fields if table else {}).items()
         }
@@ -183,7 +215,10 @@ def field_at(root: type[Table], path: Path) -> FieldInfo:
 
 def known_keys(root: type[Table], path: Path) -> list[str]:
     """Keys a table of the schema knows."""
-    table = root if not path else table_of(field_at(root, path))
+    field = field_at(root, path) if path else None
+    if field is not None and is_named(field):
+        return [AnyName(extra_of(field, "name"))]
+    table = root if field is None else table_of(field)
     return [file_key(name, field) for name, field in table.model_fields.items()] if table else []
 
 
@@ -191,6 +226,25 @@ def nearest_key(root: type[Table], path: Path) -> str:
     """Known key that an unknown one was probably meant to be; empty when none is near."""
     near = difflib.get_close_matches(path[-1].lower(), known_keys(root, path[:-1]), n=1, cutoff=0.6)
     return near[0] if near else ""
+
+
+def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[tuple[Path, FieldInfo]]:
+    """Names of the user's own tables that will not do: their paths, each with the declaration of the tables."""
+    if not isinstance(tables, dict):
+        return
+    held = cast("dict[str, object]", tables)
+    for name, field in root.model_fields.items():
+        key = file_key(name, field)
+        below, value = table_of(field), held.get(key)
+        if below is None or not isinstance(value, dict):
+            continue
+        if not is_named(field):
+            yield from bad_names(below, cast("object", value), (*prefix, key))
+            continue
+        for own, table in cast("dict[str, object]", value).items():
+            if not re.fullmatch(extra_of(field, "pattern"), own):
+                yield (*prefix, key, own), field
+            yield from bad_names(below, table, (*prefix, key, own))
 
 
 def dotted(path: Sequence[str]) -> str:
@@ -257,4 +311,6 @@ def format_value(field: FieldInfo, value: object) -> str:
     unit = unit_of(field)
     if unit and isinstance(value, float):
         return format_quantity(value, unit)
+    if unit and isinstance(value, list):
+        return ", ".join(format_quantity(one, unit) for one in cast("list[float]", value))
     return f"{value:g}" if isinstance(value, float) else str(value)

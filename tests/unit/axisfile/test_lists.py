@@ -44,6 +44,7 @@ def faulty(monkeypatch):
         rules=(),
         derive=lambda _: (),
         cautions=lambda _: iter(()),
+        catalogue=None,
         registers=lambda: Registers,
         parameters=lambda: Registers,
     )

@@ -47,6 +47,7 @@ SLED = Method(
     ),
     derive=lambda spec: (quantity_figure("way back", spec.travel, "m", "travel"),),
     cautions=lambda spec: iter([Caution("travel", "long", "short", "it takes long", "walk")] * (spec.travel > 9)),
+    catalogue=None,
     registers=lambda: Registers,
     parameters=lambda: Registers,
 )

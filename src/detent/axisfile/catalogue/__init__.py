@@ -1,32 +1,60 @@
 """Published constants of real motors, by name, as an axis file may take them."""
 
 import tomllib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-MOTORS_FILE = Path(__file__).with_name("dc_motors.toml")
-
-MOTOR_KEYS = ("torque_constant", "back_emf_constant", "resistance", "inductance", "rotor_inertia", "max_current")
-"""Keys of an entry that stand in for keys of the same name in ``[motor]``; the others document the motor."""
-
 
 @cache
-def dc_motors() -> dict[str, dict[str, Any]]:
-    """All brush DC motors of the catalogue, by name, as they stand in the file (texts with units)."""
-    entries: list[dict[str, Any]] = tomllib.loads(MOTORS_FILE.read_text(encoding="utf-8"))["motor"]
-    return {str(entry["name"]): entry for entry in entries}
+def _entries(file: str) -> dict[str, dict[str, Any]]:
+    """All motors of a file beside this module, by name; a file is read once."""
+    text = Path(__file__).with_name(file).read_text(encoding="utf-8")
+    return {str(entry["name"]): entry for entry in tomllib.loads(text)["motor"]}
 
 
-def motor_constants(name: str) -> dict[str, str] | None:
-    """Constants of a motor as an axis file would state them, or None when the catalogue has no such motor.
+@dataclass(frozen=True)
+class Catalogue:
+    """Motors of one kind, in one TOML file of ``[[motor]]`` tables.
 
-    Examples
-    --------
-    >>> motor_constants("maxon RE 40 148867")["resistance"]
-    '0.299 ohm'
+    Attributes
+    ----------
+    file : str
+        Name of the file, beside this module.
+    keys : tuple of str
+        Keys of an entry that stand in for keys of the same name in ``[motor]``; the others document the motor.
     """
-    entry = dc_motors().get(name)
-    if entry is None:
-        return None
-    return {key: str(entry[key]) for key in MOTOR_KEYS if key in entry}
+
+    file: str
+    keys: tuple[str, ...]
+
+    def entries(self) -> dict[str, dict[str, Any]]:
+        """All motors, by name, as they stand in the file: quantities are texts with units, counts are integers."""
+        return _entries(self.file)
+
+    def constants(self, name: str) -> dict[str, str | int] | None:
+        """Constants of a motor as an axis file would state them, or None when the catalogue has no such motor.
+
+        Examples
+        --------
+        >>> STEPPER_MOTORS.constants("MotionKing 17HS4401")["steps_per_turn"]
+        200
+        """
+        entry = self.entries().get(name)
+        if entry is None:
+            return None
+        return {key: entry[key] for key in self.keys if key in entry}
+
+
+DC_MOTORS = Catalogue(
+    "dc_motors.toml",
+    ("torque_constant", "back_emf_constant", "resistance", "inductance", "rotor_inertia", "max_current"),
+)
+"""Brush DC motors."""
+
+STEPPER_MOTORS = Catalogue(
+    "stepper_motors.toml",
+    ("steps_per_turn", "holding_torque", "rotor_inertia", "resistance", "inductance", "rated_current"),
+)
+"""Two-phase stepper motors: hybrid and permanent-magnet; resistance, inductance and current of one phase."""

@@ -1,0 +1,1 @@
+"""The rotary table's part of the axis file."""

@@ -1,0 +1,1 @@
+"""The stepper envelope's part of the axis file."""
