@@ -111,6 +111,23 @@ SERVO_FAULT_TEXT: dict[int, str] = {
 """Causes of a fault of the filtered servo (control.deviation_counter)."""
 
 
+STEP_FAULT_TEXT: dict[int, str] = {
+    1: "the table of permissible speeds fell by more than one ramp step, which the motor cannot follow; it came down "
+    "its ramp and stands; build the table anew from its extremes, or edit it with move_stop",
+    2: "the position lies outside the travel; place the motor inside it again (home it)",
+}
+"""Causes of a fault of the step rule (control.step_rule)."""
+
+
+TABLE_REFUSAL_TEXT: dict[int, str] = {
+    1: "the table was still moving; start a positioning when the one before has ended or the jog has come to rest",
+    2: "the position table has no such entry; add [position.NUMBER] to the axis file, or start another number",
+    3: "the way is longer than the remaining angle can count; name a nearer angle in the position's entry, or lower "
+    "detector.fine.counts",
+}
+"""Why the positioner of a rotary table refuses a start, by its reason (control.table_positioner)."""
+
+
 def describe_sb1(code: int) -> str:
     """Say what a status byte means and what to do.
 

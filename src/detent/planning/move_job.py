@@ -10,12 +10,16 @@ import math
 import unicodedata
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from detent.errors import DetentError, FileProblem, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from _typeshed import DataclassInstance
+
+AnyMove = TypeVar("AnyMove", bound="DataclassInstance")
 
 MOST_MOVES = 100_000
 """Moves of a job at most, repeats counted: hours of any axis, and still a job that fits into a report."""
@@ -73,19 +77,32 @@ class Move:
     def __post_init__(self) -> None:
         """Refuse what no axis could do."""
         if (self.target is None) == (self.by is None):
-            raise _bad_move(self, f"target {self.target} and by {self.by}", "exactly one of target and by")
+            raise bad_move(self.number, f"target {self.target} and by {self.by}", "exactly one of target and by")
         way = self.by if self.target is None else self.target
         if way is None or not math.isfinite(way):
-            raise _bad_move(self, f"a way of {way} m", "a finite number of metres")
-        if not 0 <= self.dwell < math.inf:
-            raise _bad_move(self, f"a dwell of {self.dwell} s", "0 s or more")
+            raise bad_move(self.number, f"a way of {way} m", "a finite number of metres")
+        check_dwell(self.number, self.dwell)
         for name, value, unit in (("speed", self.speed, "m/s"), ("sample period", self.sample_period, "s")):
             if value is not None and not 0 < value < math.inf:
-                raise _bad_move(self, f"a {name} of {value} {unit}", f"more than 0 {unit}, or None for the axis's own")
+                allowed = f"more than 0 {unit}, or None for the axis's own"
+                raise bad_move(self.number, f"a {name} of {value} {unit}", allowed)
 
 
-def _bad_move(move: Move, came: str, allowed: str) -> DetentError:
-    return DetentError(f"move {move.number}: came {came}; allowed: {allowed}; do: correct the move")
+def check_dwell(number: int, dwell: float) -> None:
+    """Refuse a time that nothing can stand [s], in move `number`.
+
+    Raises
+    ------
+    DetentError
+        It is negative, or not finite.
+    """
+    if not 0 <= dwell < math.inf:
+        raise bad_move(number, f"a dwell of {dwell} s", "0 s or more")
+
+
+def bad_move(number: int, came: str, allowed: str) -> DetentError:
+    """Error about move `number`: what came, what is allowed."""
+    return DetentError(f"move {number}: came {came}; allowed: {allowed}; do: correct the move")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,21 +129,21 @@ class MoveJob:
         return len(self.moves)
 
 
-def expand_moves(file: str, rows: Sequence[tuple[Move, int]], repeat: int = 1) -> tuple[Move, ...]:
+def expand_moves(file: str, rows: Sequence[tuple[AnyMove, int]], repeat: int = 1) -> tuple[AnyMove, ...]:
     """Write out the repeats of a list, and number the moves.
 
     Parameters
     ----------
     file : str
         The file as the user named it, for messages.
-    rows : sequence of (Move, int)
+    rows : sequence of (move, int)
         Each row once, with how often it is done in succession, 1 or more; the number of these moves is ignored.
     repeat : int
         How often the whole list is done, 1 or more.
 
     Returns
     -------
-    tuple of Move
+    tuple of moves
         Numbered from 1.
 
     Raises
@@ -143,7 +160,7 @@ def expand_moves(file: str, rows: Sequence[tuple[Move, int]], repeat: int = 1) -
     count = repeat * sum(times for _, times in rows)
     if count > MOST_MOVES:
         raise too_many_moves(file, f"{count} moves, repeats counted")
-    moves: list[Move] = []
+    moves: list[AnyMove] = []
     for _ in range(repeat):
         for move, times in rows:
             moves += [replace(move, number=len(moves) + 1 + done) for done in range(times)]

@@ -1,15 +1,27 @@
 """Each method held against the ways it was made to better."""
 
+from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.axisfile.rotary_table.schema import RotaryTableSpec
+from detent.simulation.angle_comparison import AngleComparison, compare_angle
 from detent.simulation.drive_comparison import DriveComparison, compare_drives
 from detent.simulation.feedback_comparison import FeedbackComparison, compare_feedback
 from detent.simulation.hold_comparison import HoldComparison, compare_hold
 from detent.simulation.noise_comparison import NoiseComparison, compare_noise
 from detent.simulation.print_run import Progress
+from detent.simulation.step_comparisons import JerkComparison, StepComparison, compare_jerk, compare_steps
 
-AnyComparison = DriveComparison | NoiseComparison | HoldComparison | FeedbackComparison
+AnyComparison = (
+    DriveComparison
+    | NoiseComparison
+    | HoldComparison
+    | FeedbackComparison
+    | AngleComparison
+    | StepComparison
+    | JerkComparison
+)
 
 
 def compare_methods(spec: AnySpec, progress: Progress | None = None) -> tuple[AnyComparison, ...]:
@@ -19,7 +31,8 @@ def compare_methods(spec: AnySpec, progress: Progress | None = None) -> tuple[An
     -------
     tuple
         Print head: `DriveComparison`. Phase servo: `NoiseComparison`, `HoldComparison`. Filtered servo:
-        `FeedbackComparison`.
+        `FeedbackComparison`. Rotary table: `AngleComparison`. Steppers: a `StepComparison` per motor, and the
+        `JerkComparison` of the first.
 
     Raises
     ------
@@ -32,4 +45,8 @@ def compare_methods(spec: AnySpec, progress: Progress | None = None) -> tuple[An
         return (compare_drives(spec),)
     if isinstance(spec, PhaseServoSpec):
         return compare_noise(spec, progress=progress), compare_hold(spec)
-    return (compare_feedback(spec, progress=progress),)
+    if isinstance(spec, FilteredServoSpec):
+        return (compare_feedback(spec, progress=progress),)
+    if isinstance(spec, RotaryTableSpec):
+        return (compare_angle(spec, progress=progress),)
+    return (*compare_steps(spec, progress=progress), compare_jerk(spec))

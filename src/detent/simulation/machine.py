@@ -12,10 +12,12 @@ from detent.axisfile.phase_servo.build import build_phase_servo
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.axisfile.print_head.build import build_print_head
 from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.axisfile.rotary_table.build import build_rotary_table, start_turns, ticks
+from detent.axisfile.rotary_table.schema import RotaryTableSpec
 from detent.kernel.registers import Registers
 from detent.simulation.capture import Capture
 from detent.simulation.recorder import Recorder
-from detent.systems import filtered_servo, phase_servo, print_head
+from detent.systems import filtered_servo, phase_servo, print_head, rotary_table
 
 LONGEST_STRETCH = 1 << 20
 """Ticks of one call into compiled code: progress can be shown between two."""
@@ -133,3 +135,12 @@ def filtered_servo_machine(
     filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
     loop = Loop(filtered_servo.TICK, filtered_servo.advance, filtered_servo.advance_by_clocks)
     return Machine(p, r, loop, recorder)
+
+
+def rotary_table_machine(
+    spec: RotaryTableSpec, recorder: AnyRecorder | None = None
+) -> Machine[rotary_table.RotaryTableParams, rotary_table.RotaryTable]:
+    """Rotary table at power-on."""
+    p, r = build_rotary_table(spec), rotary_table.RotaryTable()
+    rotary_table.switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
+    return Machine(p, r, Loop(rotary_table.TICK, rotary_table.advance), recorder)

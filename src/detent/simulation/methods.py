@@ -9,18 +9,28 @@ from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.axisfile.rotary_table.schema import RotaryTableSpec
+from detent.axisfile.stepper_envelope.build import instant
+from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.kernel.registers import Registers
 from detent.planning.move_job import Move, MoveJob
 from detent.planning.print_job import PrintJob, load_job, parse_text
+from detent.planning.sequence_job import Jog, SequenceJob
+from detent.planning.stage_job import StageJob, StageMove
 from detent.simulation.capture import Clocking, filtered_servo_clocking, phase_servo_clocking
 from detent.simulation.machine import AnyRecorder
 from detent.simulation.move_file import load_moves
 from detent.simulation.move_run import FILTERED_SIGNALS, PHASE_SIGNALS, MoveRun, run_moves
 from detent.simulation.print_run import PrintRun, Progress, default_signals, print_job
-from detent.systems import filtered_servo, phase_servo, print_head
+from detent.simulation.sequence_file import load_sequence
+from detent.simulation.sequence_run import SEQUENCE_SIGNALS, SequenceRun, run_sequence
+from detent.simulation.stage_file import load_stage_job
+from detent.simulation.stage_machine import stage_registers
+from detent.simulation.stage_run import StageRun, run_stage, stage_signals
+from detent.systems import filtered_servo, phase_servo, print_head, rotary_table
 
-AnyJob = PrintJob | MoveJob
-AnyResult = PrintRun | MoveRun
+AnyJob = PrintJob | MoveJob | SequenceJob | StageJob
+AnyResult = PrintRun | MoveRun | SequenceRun | StageRun
 
 PRINT_HEAD_TIMING = (
     "encoder.channel_a", "encoder.channel_b", "quadrature.count", "head.state", "head.drive_cmd", "timer.pulse",
@@ -37,6 +47,14 @@ FILTERED_SERVO_TIMING = (
     "encoder.channel_a", "encoder.channel_b", "decoder.a1", "decoder.a2", "decoder.b1", "decoder.b2",
     "decoder.forward", "decoder.reverse", "generator.command", "deviation.deviation", "speed.count", "speed.word",
     "clock.left", "filter.output", "deviation.word",
+)  # fmt: skip
+ROTARY_TABLE_TIMING = (
+    "detector.fine.word", "detector.coarse.word", "detector.absolute.theta", "positioner.angle.dar",
+    "positioner.angle.flg", "positioner.angle.turn", "positioner.angle.aar", "positioner.oar",
+    "positioner.interpolator.irr", "positioner.dr", "positioner.s4", "amplifier.word", "machine.motor.velocity",
+)  # fmt: skip
+STEPPER_TIMING = (
+    "timer.pulses", "timer.phase", "timer.period", "rule.index", "rule.relation", "rule.state", "rotor.lag",
 )  # fmt: skip
 
 
@@ -87,7 +105,9 @@ def simulated(spec: AnySpec) -> Simulated:
         return _print_head(spec)
     if isinstance(spec, PhaseServoSpec):
         return _phase_servo(spec)
-    return _filtered_servo(spec)
+    if isinstance(spec, FilteredServoSpec):
+        return _filtered_servo(spec)
+    return _rotary_table(spec) if isinstance(spec, RotaryTableSpec) else _stepper_envelope(spec)
 
 
 def _print_head(spec: PrintHeadSpec) -> Simulated:
@@ -155,4 +175,57 @@ def _filtered_servo(spec: FilteredServoSpec) -> Simulated:
         job=MoveJob,
         run=_moves(spec),
         sample_job=_one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2),
+    )
+
+
+def _rotary_table(spec: RotaryTableSpec) -> Simulated:
+    def run(job: Any, recorder: AnyRecorder | None = None, progress: Progress | None = None) -> SequenceRun:
+        return run_sequence(spec, job, recorder=recorder, progress=progress)
+
+    def sample_job() -> SequenceJob:
+        return SequenceJob("a jog of 0.2 s", (Jog(row=0, direction=1, duration=0.2),), {})
+
+    return Simulated(
+        registers=rotary_table.RotaryTable,
+        tick=rotary_table.TICK,
+        every=20,
+        seed=spec.detector.seed,
+        signals=SEQUENCE_SIGNALS,
+        timing=ROTARY_TABLE_TIMING,
+        clocking=Clocking(),
+        load=load_sequence,
+        job=SequenceJob,
+        run=run,
+        sample_job=sample_job,
+    )
+
+
+def _stepper_envelope(spec: StepperEnvelopeSpec) -> Simulated:
+    names = tuple(spec.stepper)
+
+    def run(job: Any, recorder: AnyRecorder | None = None, progress: Progress | None = None) -> StageRun:
+        return run_stage(spec, job, recorder=recorder, progress=progress)
+
+    def load(path: Path) -> StageJob:
+        return load_stage_job(path, names)
+
+    def sample_job() -> StageJob:
+        ways: dict[str, float] = {}
+        for name, table in spec.stepper.items():
+            start = table.step_at(table.mechanics.start_position)
+            ways[name] = table.position_of(min(start + 200, table.steps))
+        return StageJob("one move of 200 steps", "moves", (StageMove(1, 0, targets=ways),), names, ())
+
+    return Simulated(
+        registers=stage_registers(spec),
+        tick=instant(spec),
+        every=50,
+        seed=0,
+        signals=stage_signals(spec),
+        timing=tuple(f"{name}.{signal}" for name in names for signal in STEPPER_TIMING),
+        clocking=Clocking(),
+        load=load,
+        job=StageJob,
+        run=run,
+        sample_job=sample_job,
     )

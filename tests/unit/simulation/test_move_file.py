@@ -6,7 +6,8 @@ import pytest
 
 from detent.errors import InputError
 from detent.planning.move_job import MOST_MOVES, MOST_PROBLEMS
-from detent.simulation.move_file import MAX_BYTES, load_moves
+from detent.simulation.job_text import MAX_BYTES
+from detent.simulation.move_file import load_moves
 
 EXAMPLES = files("detent") / "examples"
 INCH = 0.0254
@@ -224,7 +225,7 @@ def test_toml_with_the_list_in_one_value(write):
         ('target = "12"', "the bare number 12", 'a length such as "12 mm"', "write the unit after the number"),
         ('target = "inf mm"', '"inf mm" is not a number with a unit', "a length", "write a length"),
         ('target = "1 s"', 'the unit "s", which measures something else', "a length", "use a unit"),
-        ("target.x = 1", "a dict", "a length", "write it in quotes"),
+        ("target.x = 1", "a table", "a length", "write it in quotes"),
     ],
 )
 def test_toml_place_or_way_that_is_none(write, line, came, allowed, remedy):

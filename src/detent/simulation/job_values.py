@@ -1,0 +1,77 @@
+"""Values in job files: what all kinds of them have in common."""
+
+from detent.units import QuantityError, describe_kind, parse_quantity
+
+MAX_SHOWN = 60
+"""Characters of a value shown in a message."""
+
+
+class RefusedValueError(Exception):
+    """A value will not do; whoever reads the file adds its place.
+
+    Attributes
+    ----------
+    came : str
+        What is wrong with it; empty where the value as written says it.
+    allowed, remedy : str
+        What would be accepted, and what to do.
+    """
+
+    def __init__(self, came: str, allowed: str, remedy: str) -> None:
+        super().__init__(came, allowed, remedy)
+        self.came = came
+        self.allowed = allowed
+        self.remedy = remedy
+
+
+def short(text: str) -> str:
+    """Text as it fits into a message."""
+    shown = "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text[: MAX_SHOWN + 1])
+    return shown if len(shown) <= MAX_SHOWN else f"{shown[:MAX_SHOWN]}..."
+
+
+def read_text_quantity(key: str, value: object, unit: str, example: str = "") -> float:
+    """Read the value of a key of a TOML file: a text with a number and its unit.
+
+    Parameters
+    ----------
+    key : str
+        For messages.
+    value : object
+        As the parser gives it.
+    unit : str
+        Unit of the result, a coherent SI unit of `detent.units.KINDS`.
+    example : str, optional
+        Quantity that messages suggest; that of the unit's kind unless given.
+
+    Returns
+    -------
+    float
+        The value in `unit`, finite.
+
+    Raises
+    ------
+    RefusedValueError
+        It is no such quantity.
+    """
+    if isinstance(value, str):
+        try:
+            return parse_quantity(value, unit)
+        except QuantityError as error:
+            raise RefusedValueError(error.reason, error.allowed, error.remedy) from None
+    kind, usual = describe_kind(unit)
+    quoted = f'"{example or usual}"'
+    raise RefusedValueError("", f"{kind} such as {quoted}", f"write it in quotes with its unit: {key} = {quoted}")
+
+
+def read_whole_number(key: str, value: object) -> int:
+    """Read the value of a key of a TOML file: a whole number.
+
+    Raises
+    ------
+    RefusedValueError
+        It is none.
+    """
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
+    raise RefusedValueError("", "a whole number", f"write a whole number without quotes, as in {key} = 3")
