@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from detent.axisfile.check import CheckReport, check_spec
 from detent.axisfile.load import AxisFile, read_axis
 from detent.axisfile.methods import AnySpec
+from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.errors import DetentError
 from detent.simulation.capture import Stretch, capture
 from detent.simulation.methods import AnyJob, AnyResult, Simulated, simulated
@@ -21,6 +22,7 @@ from detent.simulation.waveforms import Waveforms
 
 if TYPE_CHECKING:
     # Loaded where a comparison is made: most commands make none.
+    from detent.report.envelope_files import EnvelopeTables
     from detent.simulation.comparisons import AnyComparison
 
 KEPT_ROWS = 100_000
@@ -75,7 +77,7 @@ class Axis:
         ----------
         path : path
             Print head: plain text or a Diablo 630 stream. Servos: a list of moves as CSV or TOML; phase servo: also a
-            line of text.
+            line of text. Rotary table: a sequence as TOML. Steppers: moves of several motors, or tiles, as CSV or TOML.
 
         Raises
         ------
@@ -159,11 +161,32 @@ class Axis:
         -------
         tuple
             Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo:
-            one `FeedbackComparison`.
+            one `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and
+            a `JerkComparison`.
         """
         from detent.simulation.comparisons import compare_methods
 
         return compare_methods(self.spec, progress)
+
+    def envelopes(self) -> "dict[str, Envelope]":
+        """Tables of permissible frequencies of each motor, between its extremes at power-on.
+
+        Returns
+        -------
+        dict of Envelope by motor
+
+        Raises
+        ------
+        DetentError
+            The axis has no steppers.
+        """
+        spec = self.spec
+        if not isinstance(spec, StepperEnvelopeSpec):
+            raise DetentError(
+                f"{self.name}: came an axis of the method {spec.axis.method}; allowed: stepper_envelope, whose motors "
+                "have a table of permissible frequencies; name an axis file of it"
+            )
+        return {name: Envelope(_envelope_tables(spec, name)) for name in spec.stepper}
 
     def timing(
         self,
@@ -204,6 +227,25 @@ class Axis:
         return Timing(capture(method.registers, method.clocking, method.tick, run, stretch))
 
 
+def _envelope_tables(spec: StepperEnvelopeSpec, name: str) -> "EnvelopeTables":
+    """Tables of one motor as its file describes it."""
+    from detent.axisfile.stepper_envelope.build import make_tables
+    from detent.report.envelope_files import EnvelopeTables
+
+    table, tables = spec.stepper[name], make_tables(spec.stepper[name])
+    return EnvelopeTables(
+        motor=name,
+        axis=spec.axis.name,
+        up=tables.up,
+        down=tables.down,
+        clock_hz=round(spec.controller.timer),
+        reload=spec.controller.words == "reload",
+        travel_per_step=table.step,
+        first_position=table.mechanics.lower_end,
+        pause=table.drive.reversal_pause,
+    )
+
+
 @dataclass(frozen=True)
 class Timing:
     """Clocked signals over a short stretch.
@@ -227,6 +269,49 @@ class Timing:
         """Write a VCD file, which GTKWave and Surfer open."""
         save_vcd(self.waveforms, path)
         return Path(path)
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Tables of one stepper.
+
+    Attributes
+    ----------
+    tables : EnvelopeTables
+        Both directions, and what firmware must know to use them.
+    """
+
+    tables: "EnvelopeTables"
+
+    def save(self, path: str | Path) -> Path:
+        """Write the tables; the suffix chooses CSV (.csv), a C99 header with the step rule (.h), or a figure.
+
+        Raises
+        ------
+        DetentError
+            The suffix is another, or the file cannot be written.
+        """
+        from detent.report.envelope_figure import plot_envelope
+        from detent.report.envelope_files import write_envelope_csv, write_envelope_header
+
+        path = Path(path)
+        writers = {".csv": write_envelope_csv, ".h": write_envelope_header}
+        writers.get(path.suffix.lower(), plot_envelope)(self.tables, path)
+        return path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data: size and memory of the tables."""
+        t = self.tables
+        return {
+            "motor": t.motor,
+            "steps": t.steps,
+            "step": t.travel_per_step,
+            "ramp": len(t.up.ramp),
+            "start_hz": float(t.up.ramp.hz[0]),
+            "top_hz": float(t.up.ramp.hz[-1]),
+            "run_up": t.up.ramp.duration,
+            "bytes": t.up.entries.nbytes + t.down.entries.nbytes + len(t.up.ramp) * t.word_bytes,
+        }
 
 
 class _Memory:
@@ -258,8 +343,8 @@ class Run:
     ----------
     axis : Axis
         The axis.
-    result : PrintRun or MoveRun
-        Figures; lines and identified constants, or moves.
+    result : PrintRun, MoveRun, SequenceRun or StageRun
+        Figures; lines and identified constants, moves, or steps of a sequence.
     trace : Trace or None
         Recorded registers over time.
     settings : dict
@@ -342,4 +427,4 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-__all__ = ["Axis", "Run", "Timing", "load", "load_trace"]
+__all__ = ["Axis", "Envelope", "Run", "Timing", "load", "load_trace"]

@@ -79,13 +79,13 @@ def registers_command(
 
 def _registers_of(method: str) -> Any:
     """Class of the state of a method, named itself or by an axis file."""
-    from detent.axisfile.load import read_axis
     from detent.axisfile.methods import METHODS
 
-    name = method
-    if name not in METHODS:
-        if not Path(method).exists():
-            allowed = ", ".join(METHODS)
-            raise DetentError(f"registers: came {method!r}; allowed: {allowed}, or an axis file; name one of these")
-        name = read_axis(Path(method)).spec.axis.method
-    return METHODS[name].registers()
+    if method in METHODS:
+        return METHODS[method].registers()
+    if not Path(method).exists():
+        allowed = ", ".join(METHODS)
+        raise DetentError(f"registers: came {method!r}; allowed: {allowed}, or an axis file; name one of these")
+    from detent.axis import load
+
+    return load(method).method.registers

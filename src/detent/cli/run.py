@@ -13,6 +13,13 @@ from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
 
+DONE_WORDS = {
+    "print_head": "Printed {job} on {axis}.",
+    "rotary_table": "{job}: every step was done on {axis}.",
+    "stepper_envelope": "{job}: every move arrived on {axis}, no step was lost.",
+}
+"""What is said of a job that was done, by method; of servos, that every move arrived."""
+
 
 Output = Annotated[
     Path | None,
@@ -38,8 +45,8 @@ Every = Annotated[
         "--every",
         min=0,
         max=10_000_000,
-        help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us); 0 records "
-        "nothing. Default: 10, 256, 10.",
+        help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us, rotary table "
+        "100 us, steppers 2 us); 0 records nothing. Default: 10, 256, 10, 20, 50.",
     ),
 ]
 TraceKinds = Annotated[
@@ -47,7 +54,9 @@ TraceKinds = Annotated[
 ]
 Comparison = Annotated[
     bool,
-    typer.Option("--compare/--no-compare", help="Servos: show the comparison with other methods in the report."),
+    typer.Option(
+        "--compare/--no-compare", help="All but print heads: show the comparison with other methods in the report."
+    ),
 ]
 
 
@@ -64,7 +73,7 @@ def run(
     *,
     as_json: Json = False,
 ) -> None:
-    """Do a job on the simulated axis, from power-on: print a text, or make a list of moves."""
+    """Do a job on the simulated axis, from power-on: print a text, make a list of moves, run a sequence."""
     from detent.axis import load
 
     kinds = _trace_kinds(formats) if every != 0 else []
@@ -128,10 +137,11 @@ def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
 
 def _print_run(done: Any, written: list[Path]) -> None:
     console = make_console()
-    result, prints = done.result, done.axis.spec.axis.method == "print_head"
+    result, method = done.result, done.axis.spec.axis.method
+    prints = method == "print_head"
     if done.done:
-        words = f"Printed {result.job.name} on" if prints else f"{result.job.name}: every move arrived on"
-        console.print(f"{words} {done.axis.name}.", style="bold green", soft_wrap=True)
+        words = DONE_WORDS.get(method, "{job}: every move arrived on {axis}.")
+        console.print(words.format(job=result.job.name, axis=done.axis.name), style="bold green", soft_wrap=True)
     else:
         words = "Not printed" if prints else "Not done"
         console.print(f"{words}: {result.failure}", style="bold red", soft_wrap=True)
@@ -141,7 +151,8 @@ def _print_run(done: Any, written: list[Path]) -> None:
         console.print(f"  warning: {text}", style="yellow", soft_wrap=True)
     notes = getattr(result.job, "notes", ())
     for note in notes[:5]:
-        console.print(f"  note: byte {note.offset}, {note.code}: {note.text}", soft_wrap=True)
+        text = note if isinstance(note, str) else f"byte {note.offset}, {note.code}: {note.text}"
+        console.print(f"  note: {text}", soft_wrap=True)
     if len(notes) > 5:
         console.print(f"  {len(notes) - 5} more notes; --json shows them all")
     for path in written:

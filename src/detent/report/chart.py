@@ -47,6 +47,8 @@ class Curve:
         Diameter [px] of rings drawn at the points, instead of a line.
     thin : int
         Rows of a long recording that are chosen for this curve's sake; 0 if it may use those of the others.
+    fill : bool
+        Tint the ground between the curve and zero.
     """
 
     label: str
@@ -58,6 +60,7 @@ class Curve:
     step: bool = False
     rings: int | None = None
     thin: int = POINTS
+    fill: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -327,6 +330,8 @@ def _series(curve: Curve, kept: Numbers | slice) -> Chart:
     series |= {name: value for name, value in look.items() if value is not None}
     if curve.step:
         series["step"] = True
+    if curve.fill:
+        series["fill"] = True
     return series | {"y": rounded(curve.y[kept], curve.digits)}
 
 

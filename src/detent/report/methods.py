@@ -1,43 +1,63 @@
 """What each control method shows: the report of a run, its summary, the comparison with its alternatives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
+from detent.axisfile.rotary_table.schema import RotaryTableSpec
+from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.report.summary import move_summary_rows
 from detent.report.summary import summary_rows as print_summary_rows
+from detent.simulation.angle_comparison import AngleComparison
 from detent.simulation.comparisons import AnyComparison
 from detent.simulation.drive_comparison import DriveComparison
 from detent.simulation.feedback_comparison import FeedbackComparison
 from detent.simulation.hold_comparison import HoldComparison
 from detent.simulation.methods import AnyResult
-from detent.simulation.move_run import MoveRun
+from detent.simulation.move_run import MoveRun, ServoSpec
 from detent.simulation.noise_comparison import NoiseComparison
 from detent.simulation.print_run import PrintRun
+from detent.simulation.sequence_run import SequenceRun
+from detent.simulation.stage_run import StageRun
+from detent.simulation.step_comparisons import JerkComparison, StepComparison
 from detent.simulation.trace import Trace
 from detent.units import format_quantity
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, heads and rows."""
 
+Comparisons = tuple[AnyComparison, ...]
+Writer = Callable[[str | Path], None]
+C = TypeVar("C")
+
 
 def summary_rows(spec: AnySpec, result: AnyResult) -> list[tuple[str, str]]:
     """The figures of a run that a person wants first."""
     if isinstance(result, PrintRun):
         return print_summary_rows(result)
-    assert not isinstance(spec, PrintHeadSpec)  # noqa: S101 - a print head never makes a list of moves
-    return move_summary_rows(spec, result)
+    if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
+        from detent.report.table_summary import sequence_summary_rows
+
+        return sequence_summary_rows(spec, result)
+    if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
+        from detent.report.stage_summary import stage_summary_rows
+
+        return stage_summary_rows(spec, result)
+    return move_summary_rows(*_servo(spec, result))
+
+
+def _servo(spec: AnySpec, result: AnyResult) -> tuple[ServoSpec, MoveRun]:
+    """A run of moves with its axis, which no other axis makes."""
+    assert isinstance(result, MoveRun)  # noqa: S101
+    assert not isinstance(spec, PrintHeadSpec | RotaryTableSpec | StepperEnvelopeSpec)  # noqa: S101
+    return spec, result
 
 
 def report_of(
-    spec: AnySpec,
-    result: AnyResult,
-    trace: Trace | None,
-    comparisons: tuple[AnyComparison, ...],
-    settings: dict[str, str],
-) -> Callable[[str | Path], None]:
+    spec: AnySpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Writer:
     """The report of a run, to be written under a path."""
     if isinstance(spec, PrintHeadSpec) and isinstance(result, PrintRun):
         from detent.report.print_page import write_report
@@ -45,36 +65,83 @@ def report_of(
 
         page = print_report(spec, result, trace, settings={"fidelity": spec.axis.fidelity} | settings)
         return lambda path: write_report(page, path)
+    if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
+        from detent.report.table_page import write_table_report
+        from detent.report.table_report import sequence_report
+
+        table = sequence_report(
+            spec, result, trace, comparison=_first(comparisons, AngleComparison), settings=settings
+        )
+        return lambda path: write_table_report(table, path)
+    if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
+        return _stage_report(spec, result, trace, comparisons, settings)
+    return _servo_report(*_servo(spec, result), trace, comparisons, settings)
+
+
+def _stage_report(
+    spec: StepperEnvelopeSpec,
+    result: StageRun,
+    trace: Trace | None,
+    comparisons: Comparisons,
+    settings: dict[str, str],
+) -> Writer:
+    from detent.report.stage_page import write_stage_report
+    from detent.report.stage_report import stage_report
+
+    steps = tuple(found for found in comparisons if isinstance(found, StepComparison))
+    data = stage_report(
+        spec, result, trace, steps=steps, jerk=_first(comparisons, JerkComparison), settings=settings
+    )
+    return lambda path: write_stage_report(data, path)
+
+
+def _servo_report(
+    spec: ServoSpec, result: MoveRun, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Writer:
     from detent.report.servo_page import write_servo_report
     from detent.report.servo_report import servo_report
 
-    assert not isinstance(spec, PrintHeadSpec)  # noqa: S101 - see above
-    assert isinstance(result, MoveRun)  # noqa: S101
     data = servo_report(
         spec,
         result,
         trace,
-        noise=next((found for found in comparisons if isinstance(found, NoiseComparison)), None),
-        hold=next((found for found in comparisons if isinstance(found, HoldComparison)), None),
-        feedback=next((found for found in comparisons if isinstance(found, FeedbackComparison)), None),
+        noise=_first(comparisons, NoiseComparison),
+        hold=_first(comparisons, HoldComparison),
+        feedback=_first(comparisons, FeedbackComparison),
         settings=settings,
     )
     return lambda path: write_servo_report(data, path)
 
 
+def _first(found: Sequence[object], kind: type[C]) -> C | None:
+    """The comparison of a kind, if there is one."""
+    return next((one for one in found if isinstance(one, kind)), None)
+
+
 def plot_comparison_of(spec: AnySpec, comparison: AnyComparison, path: Path) -> None:
     """Draw one comparison into a PNG, SVG or PDF file."""
-    from detent.report import comparison_figures, figures, print_report
-
     if isinstance(comparison, DriveComparison):
+        from detent.report import figures, print_report
+
         assert isinstance(spec, PrintHeadSpec)  # noqa: S101 - only a print head compares drives
         figures.plot_comparison(print_report.comparison_figure(comparison, spec), path)
-    elif isinstance(comparison, NoiseComparison):
-        comparison_figures.plot_noise(comparison, path)
-    elif isinstance(comparison, HoldComparison):
-        comparison_figures.plot_hold(comparison, path)
-    else:
-        comparison_figures.plot_feedback(comparison, path)
+        return
+    _plotter(comparison)(comparison, path)
+
+
+def _plotter(comparison: AnyComparison) -> Callable[[Any, Path], None]:
+    """What draws a comparison."""
+    from detent.report import comparison_figures, stage_figures, table_comparisons
+
+    plotters: dict[type, Callable[[Any, Path], None]] = {
+        NoiseComparison: comparison_figures.plot_noise,
+        HoldComparison: comparison_figures.plot_hold,
+        FeedbackComparison: comparison_figures.plot_feedback,
+        AngleComparison: table_comparisons.plot_angle,
+        StepComparison: stage_figures.plot_steps,
+        JerkComparison: stage_figures.plot_jerk,
+    }
+    return plotters[type(comparison)]
 
 
 def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
@@ -82,11 +149,17 @@ def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
     if isinstance(comparison, DriveComparison):
         assert isinstance(spec, PrintHeadSpec)  # noqa: S101 - see above
         return _drive_table(spec, comparison)
-    if isinstance(comparison, NoiseComparison):
-        return _noise_table(comparison)
-    if isinstance(comparison, HoldComparison):
-        return _hold_table(comparison)
-    return _feedback_table(comparison)
+    from detent.report import stage_figures, table_comparisons
+
+    tables: dict[type, Callable[[Any], Table]] = {
+        NoiseComparison: _noise_table,
+        HoldComparison: _hold_table,
+        FeedbackComparison: _feedback_table,
+        AngleComparison: table_comparisons.angle_table,
+        StepComparison: stage_figures.steps_table,
+        JerkComparison: stage_figures.jerk_table,
+    }
+    return tables[type(comparison)](comparison)
 
 
 def _drive_table(spec: PrintHeadSpec, found: DriveComparison) -> Table:

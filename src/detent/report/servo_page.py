@@ -27,7 +27,7 @@ from detent.report.print_charts import page_data
 from detent.report.servo_comparisons import comparison_charts, comparison_section
 from detent.report.servo_data import FilteredMove, MoveResult, PhaseMove, ServoReportData, Worst
 from detent.report.summary import in_counts, length
-from detent.report.words import GAP, arrow, bar_cell, count, duration, further, number, table
+from detent.report.words import GAP, arrow, count, duration, further, number, offset_cell, table
 
 MOST_MOVES = 500
 """Moves in the table: more than anybody reads."""
@@ -308,11 +308,5 @@ def _row(data: ServoReportData, move: MoveResult, longest: float, *, labelled: b
         number(move.ready * 1e3),
         f'<td class="n over">{settled}</td>' if late or isnan(move.settled) else settled,
         number(move.overshoot * 1e6, 2),
-        _offset_cell(move.offset * 1e6, longest * 1e6, over=abs(move.offset) > data.tolerance),
+        offset_cell(move.offset * 1e6, longest * 1e6, over=abs(move.offset) > data.tolerance),
     ]
-
-
-def _offset_cell(offset: float, longest: float, *, over: bool) -> str:
-    """A bar for the magnitude, before the figure with its sign."""
-    cell = bar_cell(abs(offset), longest, over=over)
-    return cell.replace("</span>", f"</span>{'+' if offset > 0 else '−' if offset < 0 else ''}")

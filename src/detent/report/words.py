@@ -190,6 +190,27 @@ def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
     return f'<td class="{"n over" if over else "n"}">{bar}{number(value, 2)}</td>'
 
 
+def offset_cell(offset: float, longest: float, *, over: bool = False) -> str:
+    """Make a cell of a table with a bar for a magnitude before the figure with its sign.
+
+    Parameters
+    ----------
+    offset : float
+        What it shows; NaN for nothing.
+    longest : float
+        Magnitude of the longest bar in the column, > 0.
+    over : bool
+        The value is beyond its limit.
+
+    Returns
+    -------
+    str
+        HTML, with its own attributes.
+    """
+    cell = bar_cell(abs(offset), longest, over=over)
+    return cell.replace("</span>", f"</span>{'+' if offset > 0 else '−' if offset < 0 else ''}")
+
+
 def table(heads: Sequence[tuple[str, bool]], rows: Iterable[Sequence[str]], *, tall: bool = False) -> str:
     """Make a table that scrolls within itself on a narrow screen.
 

@@ -183,7 +183,7 @@ def _rotary_table(spec: RotaryTableSpec) -> Simulated:
         return run_sequence(spec, job, recorder=recorder, progress=progress)
 
     def sample_job() -> SequenceJob:
-        return SequenceJob("a jog of 0.2 s", (Jog(row=0, direction=1, duration=0.2),), {})
+        return SequenceJob("a short jog", (Jog(direction=1, duration=max(0.2, spec.method.task_period)),), {})
 
     return Simulated(
         registers=rotary_table.RotaryTable,

@@ -13,6 +13,7 @@ from detent.report.words import (
     inches_per_second,
     micrometres,
     number,
+    offset_cell,
     table,
 )
 
@@ -87,3 +88,11 @@ def test_a_bar_is_as_long_as_its_number_is_large() -> None:
     assert bar_cell(3.0, 6.0) == '<td class="n"><span class="bar" style="width:24px"></span>3</td>'
     assert bar_cell(6.0, 6.0, over=True) == '<td class="n over"><span class="bar" style="width:48px"></span>6</td>'
     assert bar_cell(float("nan"), 6.0) == '<td class="n">–</td>'
+
+
+def test_an_offset_has_a_bar_for_its_magnitude_and_a_sign() -> None:
+    assert plain(offset_cell(3.0, 6.0)) == '<td class="n"><span class="bar" style="width:24px"></span>+3</td>'
+    over = '<td class="n over"><span class="bar" style="width:48px"></span>−6</td>'
+    assert offset_cell(-6.0, 6.0, over=True) == over
+    assert offset_cell(0.0, 6.0) == '<td class="n"><span class="bar" style="width:0px"></span>0</td>'
+    assert offset_cell(float("nan"), 6.0) == '<td class="n">–</td>'

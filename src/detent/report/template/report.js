@@ -95,6 +95,7 @@
       ctx.lineTo(bbox.left + bbox.width, at);
       ctx.stroke();
       ctx.setLineDash([]);
+      if (!label) continue;
       const right = bbox.left + bbox.width - 4 * scale;
       const width = ctx.measureText(label).width;
       ctx.fillStyle = colour("card");
@@ -112,6 +113,57 @@
     }
   };
 
+  /* As much of a text as fits into a width. */
+  const fitted = (ctx, text, width) => {
+    if (ctx.measureText(text).width <= width) return text;
+    let part = text;
+    while (part && ctx.measureText(part + "\u2026").width > width) part = part.slice(0, -1);
+    return part && part + "\u2026";
+  };
+
+  /* Lanes of bars: a strong edge where each begins, its name where there is room. */
+  const drawLanes = (u, chart) => {
+    const { ctx, bbox } = u;
+    const scale = devicePixelRatio;
+    const row = bbox.height / chart.lanes.length;
+    ctx.font = font.replace("12px", 11 * scale + "px");
+    ctx.textAlign = "left";
+    ctx.textBaseline = "middle";
+    chart.lanes.forEach((lane, index) => {
+      const top = bbox.top + (index + 0.12) * row;
+      for (const [from, to, name] of lane.bars)
+        eachSpan(u, [[from, to]], (left, width) => {
+          ctx.fillStyle = colour(lane.colour);
+          ctx.globalAlpha = 0.3;
+          ctx.fillRect(left, top, Math.max(width, scale), 0.76 * row);
+          ctx.globalAlpha = 1;
+          ctx.fillRect(left, top, Math.min(width, 3 * scale), 0.76 * row);
+          if (width < 14 * scale) return;
+          ctx.fillStyle = colour("ink");
+          ctx.fillText(fitted(ctx, name, width - 9 * scale), left + 6 * scale, top + 0.4 * row);
+        });
+    });
+  };
+
+  /* Curves that go to and fro, at places of their own. */
+  const drawLoops = (u, chart) => {
+    const { ctx } = u;
+    for (const loop of chart.loops) {
+      ctx.strokeStyle = colour(loop.colour);
+      ctx.lineWidth = loop.width * devicePixelRatio;
+      ctx.lineJoin = "round";
+      ctx.beginPath();
+      loop.x.forEach((x, index) => ctx.lineTo(u.valToPos(x, "x", true), u.valToPos(loop.y[index], "y", true)));
+      ctx.stroke();
+    }
+  };
+
+  /* What the bars under the cursor are. */
+  const barsAt = (chart, x) => {
+    const under = chart.lanes.flatMap((lane) => lane.bars.filter((bar) => bar[0] <= x && x < bar[1]));
+    return under.map((bar) => bar[3]).join(" \u00b7 ") || "\u2013";
+  };
+
   const drawOver = (chart) => (u) => {
     u.ctx.save();
     u.ctx.beginPath();
@@ -126,6 +178,8 @@
       u.ctx.lineTo(u.bbox.left + u.bbox.width, at);
       u.ctx.stroke();
     }
+    if (chart.lanes) drawLanes(u, chart);
+    if (chart.loops) drawLoops(u, chart);
     drawBandNames(u, chart);
     drawLevels(u, chart);
     drawEvents(u, chart);
@@ -136,6 +190,7 @@
     const stroke = colour(one.colour);
     const series = { label: one.label, stroke, width: one.width || 1.5, dash: one.dash, points: { show: false } };
     if (one.step) series.paths = uPlot.paths.stepped({ align: 1 });
+    if (one.fill) series.fill = stroke + "2b";
     if (one.bars !== undefined) {
       /* On both sides of the middle of a bin, or alone across it. */
       series.paths = uPlot.paths.bars({ size: [one.bars ? 0.46 : 0.92, 60], align: one.bars, gap: 0 });
@@ -158,15 +213,30 @@
     grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1, size: 4 },
   });
 
+  /* As wide as the axis of a chart with curves and its label, so that both stand above one another. */
+  const laneAxisOf = (chart) => ({
+    ...axisOf(null, 74, 26),
+    splits: () => chart.lanes.map((lane, index) => chart.lanes.length - index - 0.5),
+    values: (u) => {
+      u.ctx.font = font.replace("12px", 12 * devicePixelRatio + "px");
+      return chart.lanes.map((lane) => fitted(u.ctx, lane.label, 64 * devicePixelRatio));
+    },
+    grid: { show: false }, ticks: { show: false },
+  });
+
+  const laneSeriesOf = (chart) => ({
+    label: " ", paths: () => null, points: { show: false }, value: (u, y, series, index) => barsAt(chart, chart.x[index]),
+  });
+
   const optionsOf = (chart, holder) => ({
-    width: holder.clientWidth, height: chart.height, padding: [10, 12, 0, 0],
+    width: holder.clientWidth, height: chart.height, padding: [10, 20, 0, 0],
     scales: { x: { time: false }, y: chart.yRange ? { range: () => chart.yRange } : {} },
-    axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), axisOf(chart.yLabel, 54, 26)],
-    series: [{ label: (/\[(.*)\]/.exec(chart.xLabel) || ["", ""])[1] }].concat(chart.series.map(seriesOf)),
+    axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), chart.lanes ? laneAxisOf(chart) : axisOf(chart.yLabel, 54, 26)],
+    series: [{ label: (/\[(.*)\]/.exec(chart.xLabel) || ["", ""])[1] }].concat(chart.lanes ? laneSeriesOf(chart) : chart.series.map(seriesOf)),
     legend: { live: true, markers: { width: 0 } },
     cursor: {
       sync: chart.sync ? { key: chart.sync } : undefined, y: false, drag: { x: true, y: false },
-      points: { size: 6 },
+      points: { size: 6, show: !chart.lanes },
     },
     hooks: {
       drawClear: [drawBands(chart)], draw: [drawOver(chart)],
@@ -187,7 +257,8 @@
     if (!holder) return;
     const old = plots.get(chart.id);
     if (old) old.destroy();
-    const columns = [chart.x].concat(chart.series.map((one) => one.y));
+    holder.classList.toggle("lanes", !!chart.lanes);
+    const columns = [chart.x].concat(chart.lanes ? [chart.x.map(() => 0)] : chart.series.map((one) => one.y));
     plots.set(chart.id, new uPlot(optionsOf(chart, holder), columns, holder));
     holder.querySelectorAll(".u-legend .u-marker").forEach((marker, index) => styleMarker(marker, chart.series[index - 1]));
   };
