@@ -212,7 +212,8 @@ class _WatchedTable:
     """Controller and table with an observer beside it, who writes the records."""
 
     def __init__(self, host: TableHost, job: SequenceJob, result: SequenceRun, progress: Progress | None) -> None:
-        self._host, self._job, self._result, self._progress = host, job, result, progress
+        self._host, self._result, self._progress = host, result, progress
+        self._count = job.count
         self._state: Any = host.machine.state
         self._observer = TableObserver(host.spec, host.machine)
         self._number = self._told = 0
@@ -236,14 +237,14 @@ class _WatchedTable:
         if not failure:
             return ""
         line = f" (line {step.row})" if step.row else ""
-        return f"step {number} of {self._job.count}{line}, {record.text}: {failure}"
+        return f"step {number} of {self._count}{line}, {record.text}: {failure}"
 
     def _tell(self) -> None:
         """Tell what is being done."""
         self._told = self._host.tick
         if self._progress is not None:
-            text = f"step {self._number} of {self._job.count}, {self._host.machine.time:.0f} s"
-            self._progress((self._number - 1) / self._job.count, text)
+            text = f"step {self._number} of {self._count}, {self._host.machine.time:.0f} s"
+            self._progress((self._number - 1) / self._count, text)
 
     @property
     def _counters(self) -> tuple[int, int]:

@@ -23,6 +23,7 @@ from detent.kernel.step import hot_step, step
 from detent.plant.gearing import PHASE_PER_RADIAN, Gear, GearParams, follow, output_phase
 from detent.plant.rotary_motor import LoadTorque, RotaryMotor, RotaryMotorParams, load_torque, rotate, stand_at
 from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
+from detent.sensing.angle_gauge import AngleGauge, read_angle_gauge
 from detent.sensing.resolver_counter import Resolver, ResolverParams, count_phase
 
 Bytes = NDArray[np.uint8]
@@ -103,6 +104,7 @@ class RotaryTable(Registers):
     amplifier: VelocityAmplifier = block("D/A converter and amplifier")
     machine: Machine = block("motor and gears")
     table: u4 = register("true angle of the table at the last strobe", unit="turn/2^32")
+    gauge: AngleGauge = block("what an observer sees of the step")
 
 
 @step
@@ -116,8 +118,11 @@ def sample(p: RotaryTableParams, r: RotaryTable, turns: int, angle: float, coars
 
 
 @step
-def decide(p: RotaryTableParams, r: RotaryTable) -> None:
-    """Interrupt and task when they are due; the interrupt comes in the middle of the task."""
+def decide(p: RotaryTableParams, r: RotaryTable, velocity: float) -> None:
+    """Interrupt and task when they are due; the interrupt comes in the middle of the task. Motor at `velocity` [rad/s].
+
+    What an observer sees of the interrupt goes to the gauge.
+    """
     task = r.tick == r.clocks.task
     if task:
         r.clocks.task += p.clocks.task_ticks
@@ -126,6 +131,7 @@ def decide(p: RotaryTableParams, r: RotaryTable) -> None:
         r.clocks.interrupt += p.clocks.strobe_ticks
         interrupt(p.positioner, r.positioner, r.detector.absolute.theta)
         r.amplifier.word = r.positioner.s4
+        read_angle_gauge(r.gauge, velocity, r.positioner.dr)
     if task:
         end_pass(p.positioner, r.positioner)
 
@@ -137,7 +143,7 @@ def serve(p: RotaryTableParams, r: RotaryTable, machine: Machine) -> None:
     if r.tick == c.strobe:
         c.strobe += p.clocks.strobe_ticks
         sample(p, r, machine.motor.turns, machine.motor.angle, machine.reduction.slack, machine.gear.slack)
-    decide(p, r)
+    decide(p, r, machine.motor.velocity)
     c.wake = min(c.strobe, c.interrupt, c.task)
 
 
