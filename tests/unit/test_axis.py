@@ -51,13 +51,19 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert done.stdout.strip() == b"[]"
 
 
+JOBS = {"index_sequence.toml": "rotary_table.toml", "zoom_sequence.toml": "zoom.toml", "tiles.csv": "stage.toml"}
+"""Jobs that only an axis can read, and an axis they are for."""
+
+
 def test_examples_are_files_that_load() -> None:
     names = [path.name for path in detent.examples()]
     assert {"print_head.toml", "letter.txt", "brochure.prn"} <= set(names)
     assert names == sorted(names)
     for path in detent.examples():
         assert detent.example(path.name) == path
-        if path.suffix == ".csv" or "moves" in path.name:
+        if path.name in JOBS:
+            assert detent.load(detent.example(JOBS[path.name])).load_job(path).count
+        elif path.suffix == ".csv" or "moves" in path.name:
             assert load_moves(path).count
         else:
             assert detent.load(path).check().rows if path.suffix == ".toml" else load_job(path).lines
@@ -65,7 +71,7 @@ def test_examples_are_files_that_load() -> None:
 
 def test_an_example_that_is_not_there_is_said_with_those_that_are() -> None:
     with pytest.raises(
-        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, filtered_servo\.toml, letter\.txt, "
+        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, filtered_servo\.toml, index_"
     ):
         detent.example("robot.toml")
 
