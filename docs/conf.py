@@ -1,6 +1,6 @@
 """How Sphinx builds the documentation: Markdown through MyST, the furo theme, API pages from the docstrings.
 
-The reference tables (generate.py) and the figures of the explanation (figures.py, figures_servos.py) are made anew from
+The reference tables (generate.py) and the figures of the explanation (figures.py and figures_*.py) are made anew from
 the code.
 """
 
@@ -51,9 +51,13 @@ def setup(app: Any) -> None:
     """Make the generated parts before any page is read."""
     app.connect("autodoc-process-docstring", keep_bars)
     import figures
+    import figures_rotary
     import figures_servos
+    import figures_steppers
     import generate
 
     generate.write_all()
     figures.draw_all()
     figures_servos.draw_all()
+    figures_rotary.draw_all()
+    figures_steppers.draw_all()

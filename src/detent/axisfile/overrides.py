@@ -91,7 +91,12 @@ def _example_override(tables: dict[str, Any], known: Iterable[tuple[Path, FieldI
 
 def _keys_near(tables: dict[str, Any], known: Iterable[Path], path: Path) -> list[str]:
     """Keys that a misspelt one may have been meant to be, with its own names and with those of the file."""
-    return [dotted(key) for pattern in known for key in (*_filled(tables, pattern), named_as(pattern, path))]
+    near: list[str] = []
+    for pattern in known:
+        own = named_as(pattern, path)
+        keys = [*_filled(tables, pattern), *([] if any(isinstance(part, AnyName) for part in own) else [own])]
+        near += [dotted(key) for key in keys]
+    return near
 
 
 def _filled(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:

@@ -24,7 +24,7 @@ class EndlessAngle(Registers):
 
     dar: i8 = register("DAR: detected angle D, 0..T-1", unit="count")
     d_prev: i8 = register("D_prev: detected angle of the interrupt before", unit="count")
-    flg: u1 = register("FLG: a boundary has been crossed in this manual feed")
+    flg: u1 = register("FLG, 1: a boundary has been crossed in this manual feed")
     turn: i8 = register("n: periods to add, signed", unit="count")
     aar: i8 = register("AAR: present angle R, extended", unit="count")
     position: i8 = register("position of record: all movement since power-on added to the first angle", unit="count")

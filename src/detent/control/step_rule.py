@@ -40,8 +40,8 @@ class StepRuleParams(Registers):
 
     ramp: i4_array = register("word of each ramp index: frequency [Hz] or period [tick]", unit="count", length=RAMP)
     limit: i4_array = register("word of each zone limit: frequency [Hz] or period [tick]", unit="count", length=LIMITS)
-    index_mask: i4 = register("bits of an entry that hold the ramp index")
-    zone_shift: u1 = register("place of the zone number in an entry")
+    index_mask: i4 = register("bits of an entry that hold the ramp index", unit="code")
+    zone_shift: u1 = register("place of the zone number in an entry", unit="bit")
     reload: u1 = register("1: words are periods, a larger one is slower")
     literal: u1 = register("1: the literal rule of the claim, without a limit on the change")
 
@@ -49,7 +49,7 @@ class StepRuleParams(Registers):
 class StepRule(Registers):
     """Registers of one motor's control unit and the lines from and to the host."""
 
-    start: u1 = register("start signal of an automatic move, written by the host, cleared when taken")
+    start: u1 = register("1: start signal of an automatic move, written by the host, cleared when taken")
     heading: i1 = register("direction wanted, written by the host: 1 or -1; a running motor slows down to turn")
     turns: u2 = register("reversals at sentinels that the automatic move still has to make", unit="count")
     manual: u1 = register("1: the operator has taken over")

@@ -63,11 +63,11 @@ class PositionerParams(Registers):
 class Positioner(Registers):
     """Registers of the positioner and the lines from and to sequence controller and panel."""
 
-    plus: u1 = register("+ button, written by the host: held down to jog to larger angles")
-    minus: u1 = register("- button, written by the host")
+    plus: u1 = register("+ button, written by the host: 1 while held down, to jog to larger angles")
+    minus: u1 = register("- button, written by the host: 1 while held down")
     dial: i8 = register("speed dial, written by the host", unit="count/2^f")
     number: u1 = register("position number, written by the host", unit="code")
-    start: u1 = register("start of a positioning, written by the host, cleared when taken")
+    start: u1 = register("1: start a positioning, written by the host, cleared when taken")
     event: u1 = register("1 when the axis has come to rest in HOLD; the host clears it")
     refused: i8 = register("starts that were not taken", unit="count")
     reason: u1 = register("why the last was not: 1 busy, 2 no such position, 3 too far", unit="code")

@@ -16,7 +16,7 @@ PHASE_PER_RADIAN = TURN / (2 * math.pi)
 class GearParams(Registers):
     """Constants of one gear."""
 
-    ratio: i8 = register("motor turns per output turn, below 2^30")
+    ratio: i8 = register("motor turns per output turn, below 2^30", unit="count")
     half_backlash: f8 = register("half the backlash, at the motor", unit="rad")
     eccentricity: TurnTable = block("what the output leads its place by, against its phase")
 

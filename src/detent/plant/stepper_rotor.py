@@ -21,13 +21,13 @@ class RotorParams(Registers):
     """Motor and load of one shaft."""
 
     dt: f8 = register("time step of the integration", unit="s")
-    teeth: f8 = register("rotor teeth: periods of the torque curve per turn")
+    teeth: f8 = register("rotor teeth: periods of the torque curve per turn", unit="count")
     step_angle: f8 = register("angle of one step", unit="rad")
     inertia: f8 = register("rotor and all that turns with it", unit="kg.m2")
     torque: f8 = register("peak torque at standstill", unit="N.m")
     damping: f8 = register("damping against the field at standstill", unit="N.m.s/rad")
     intervals_per_hz: f8 = register("stretches of the torque curve per step frequency", unit="1/Hz")
-    curve: f8_array = register("torque as a part of that at standstill", length=INTERVALS + 1)
+    curve: f8_array = register("torque over that at standstill, 0 to 1", unit="1", length=INTERVALS + 1)
     friction: f8 = register("Coulomb friction torque", unit="N.m")
 
 
@@ -36,7 +36,7 @@ class StepperRotor(Registers):
 
     commanded: i8 = register("position of the field: step pulses, forward less backward", unit="count")
     field_velocity: f8 = register("velocity of the field, 0 one period after the last pulse", unit="rad/s")
-    strength: f8 = register("torque as a part of that at standstill")
+    strength: f8 = register("torque over that at standstill, 0 to 1", unit="1")
     angle: f8 = register("rotor angle", unit="rad")
     velocity: f8 = register("rotor velocity", unit="rad/s")
     lag: f8 = register("field less rotor, in steps", unit="count")

@@ -21,6 +21,8 @@ class Loop:
         Finite places and values in the units of the chart, shape (n,).
     width : float
         Width of the line [px].
+    digits : int
+        Digits of values kept after the point.
     """
 
     label: str
@@ -28,6 +30,7 @@ class Loop:
     x: Numbers
     y: Numbers
     width: float = 2.0
+    digits: int = 3
 
 
 def loop_chart(panel: Panel, x: Numbers, label: str, loops: Sequence[Loop], *, digits: int = 4) -> Chart:
@@ -57,7 +60,7 @@ def loop_chart(panel: Panel, x: Numbers, label: str, loops: Sequence[Loop], *, d
     legend = [Curve(label=loop.label, colour=loop.colour, width=loop.width, y=nothing) for loop in named.values()]
     chart["series"] += line_chart(Panel(name="", label="", curves=legend), x, label)["series"]
     chart["loops"] = [
-        {"colour": loop.colour, "width": loop.width, "x": rounded(loop.x, digits), "y": rounded(loop.y, 1)}
+        {"colour": loop.colour, "width": loop.width, "x": rounded(loop.x, digits), "y": rounded(loop.y, loop.digits)}
         for loop in loops
     ]
     return chart

@@ -1,6 +1,6 @@
 """The charts of a stage's page, as data for the script that draws them."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from detent.report.stage_data import MotorPath, MotorRuns, MoveDetail, RotorPath
 from detent.report.stage_summary import PULL_OUT_LAG, stated
 from detent.report.thin import thin_indices
 from detent.report.words import GAP, count
-from detent.simulation.step_comparisons import JerkComparison, Profile
 
 PATH_SECONDS = 30.0
 """Time that the figure of the whole job shows: more than this is a grey block on any screen."""
@@ -24,6 +23,9 @@ POINTS = 1500
 
 HEADROOM = 1.25
 """Height of a half of the figure of frequency against position over the motor's limit."""
+
+LONG_NUMBERS = 1e4
+"""Limit from which on frequencies are written in kHz [Hz]."""
 
 CROPPED = 0.35
 """Runs that lie within less than this part of the travel are drawn alone, not with all of it."""
@@ -106,30 +108,48 @@ def runs_chart(runs: MotorRuns, name: str, *, height: int = 300) -> Chart:
     """
     window = shown_window(runs)
     at, up, down = _cut(runs, window)
+    unit, per_hz, digits = ("kHz", 1e-3, 4) if runs.max_hz >= LONG_NUMBERS else ("Hz", 1.0, 1)
     permitted = [
-        Curve(label=f"permissible, {word}", colour="muted", step=True, fill=True, y=sign * hz, digits=1)
+        Curve(label=f"permissible, {word}", colour="muted", step=True, fill=True, y=sign * hz * per_hz, digits=digits)
         for word, sign, hz in (("up", 1, up), ("down", -1, down))
         if hz.any()
     ]
-    limit = limit_text(runs)
+    most, limit = runs.max_hz * per_hz, limit_text(runs)
     panel = Panel(
-        name=name, label="← down   [Hz]   up →", height=height, zero=True, span=_halves(runs, up, down),
-        levels=[(runs.max_hz, limit), (-runs.max_hz, "" if up.any() else limit)], curves=permitted,
+        name=name, label=f"← down   [{unit}]   up →", height=height, zero=True, span=_halves(most, up, down),
+        levels=[(most, limit), (-most, "" if up.any() else limit)], curves=permitted,
     )  # fmt: skip
     loops = [
-        Loop(label=f"steps made, {word}", colour=colour, x=arc.position * MM, y=arc.hz * arc.direction)
+        Loop(label=f"steps made, {word}", colour=colour, x=arc.position * MM, y=arc.hz * sign * per_hz, digits=digits)
         for word, colour, sign in (("up", "right", 1), ("down", "left", -1))
         for arc in runs.arcs
         if arc.direction == sign
     ]
     chart = loop_chart(panel, at * MM, f"position of {runs.motor} [mm]", loops)
-    return chart | {"bands": [_zone_band(runs, zone) for zone in runs.zones]}
+    return chart | {"bands": [_zone_band(runs, zone) for zone in shown_zones(runs)]}
 
 
-def _halves(runs: MotorRuns, up: Numbers, down: Numbers) -> tuple[float, float]:
+def shown_zones(runs: MotorRuns) -> list[ZoneSpan]:
+    """Zones that reach into the part of the travel that is drawn.
+
+    Parameters
+    ----------
+    runs : MotorRuns
+        The runs.
+
+    Returns
+    -------
+    list of ZoneSpan
+        As the axis file lists them.
+    """
+    low, high = shown_window(runs)
+    return [zone for zone in runs.zones if zone.begin < high and zone.end > low]
+
+
+def _halves(most: float, up: Numbers, down: Numbers) -> tuple[float, float]:
     """Ends of the vertical axis; a half in which nothing is permitted has little room."""
-    top = HEADROOM * runs.max_hz
-    return -round(top if down.any() else 0.1 * top, 1), round(top if up.any() else 0.1 * top, 1)
+    top = HEADROOM * most
+    return -round(top if down.any() else 0.1 * top, 3), round(top if up.any() else 0.1 * top, 3)
 
 
 def limit_text(runs: MotorRuns) -> str:
@@ -213,33 +233,40 @@ def detail_charts(detail: MoveDetail) -> list[Chart]:
 def _torque_charts(torques: StepTorques) -> list[Chart]:
     margin = np.where(np.isfinite(torques.margin), torques.margin, np.nan)
     kept = np.unique(np.concatenate([thin_indices(y, POINTS) for y in (margin, torques.available, torques.needed)]))
-    at = kept + 1.0
     available, needed = torques.available[kept] * MILLI, torques.needed[kept] * MILLI
-    planned = f"pull-out torque / {stated(torques.safety)}: for the ramp"
+    planned: list[list[Curve]] = [[], []]
+    if torques.safety > 1:
+        look: dict[str, Any] = {"label": f"planned with {stated(torques.safety)}", "colour": "left", "dash": (6, 4)}
+        planned = [[Curve(y=available / torques.safety, **look)], [Curve(y=np.full(len(kept), torques.safety), **look)]]
     torque = Panel(
         name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(torques.available * MILLI)),
         curves=[
             Curve(label="pull-out torque", colour="muted", width=2, fill=True, y=available),
-            Curve(label=planned, colour="left", dash=(6, 4), y=available / torques.safety),
+            *planned[0],
             Curve(label="torque needed", colour="speed", width=2, step=True, y=needed),
         ],
     )  # fmt: skip
-    safe = [] if torques.safety == 1 else [(torques.safety, f"{stated(torques.safety)}: the ramp is planned with")]
     # A margin far from 1 says nothing more than that it is far.
-    top = _top(np.clip(margin, 0, max(2.5 * float(np.nanmin(margin, initial=np.inf)), 3 * torques.safety)))
+    finite = torques.margin[np.isfinite(torques.margin)]
+    top = _top(finite.clip(0, max(2.5 * float(finite.min(initial=np.inf)), 3 * torques.safety)))
     ratio = Panel(
-        name="detail-margin", label="margin", height=240, span=(0.0, top),
-        levels=[(1.0, "1: falls behind below"), *safe],
-        curves=[Curve(label="pull-out torque / torque needed", colour="drive", width=2, step=True, y=margin[kept])],
+        name="detail-margin", label="margin", height=220, span=(0.0, top), levels=[(1.0, "1: falls behind below")],
+        curves=[
+            *planned[1],
+            Curve(label="pull-out torque / torque needed", colour="drive", width=2, step=True, y=margin[kept]),
+        ],
     )  # fmt: skip
     sync = {"sync": "torque"}
     label = "step of the move, counted from its start [step]"
-    return [line_chart(torque, at, label) | sync | {"foot": False}, line_chart(ratio, at, label) | sync]
+    return [
+        line_chart(torque, kept + 1.0, label) | sync | {"foot": False},
+        line_chart(ratio, kept + 1.0, label) | sync,
+    ]
 
 
 def _top(values: Numbers) -> float:
     """Upper end of an axis from 0, with room for a name above the curve."""
-    return round(1.15 * float(np.nanmax(values, initial=1e-3)), 3)
+    return round(1.15 * float(values.max(initial=1e-3)), 3)
 
 
 def _rotor_charts(rotor: RotorPath) -> list[Chart]:
@@ -247,6 +274,8 @@ def _rotor_charts(rotor: RotorPath) -> list[Chart]:
     timeline = Timeline(name="detail", t=rotor.t, label="time since the start signal", unit=unit, events=rotor.events)
     reach = max(float(np.abs(rotor.lag).max()), PULL_OUT_LAG)
     wrong = "from here on the field pulls the wrong way"
+    out_of_step = reach > 5 * PULL_OUT_LAG  # on this scale the bounds are one line
+    lag = Curve(label="field less rotor", colour="drive", width=2 if out_of_step else 1, y=rotor.lag, thin=POINTS)
     return time_charts(timeline, [
         Panel(name="detail-speed", label="speed [mm/s]", height=200, zero=True, curves=[
             Curve(label="rotor", colour="muted", width=1, y=rotor.velocity * MM, thin=POINTS),
@@ -254,8 +283,7 @@ def _rotor_charts(rotor: RotorPath) -> list[Chart]:
                   thin=POINTS),
         ]),
         Panel(name="detail-lag", label="lag [step]", height=220, zero=True, span=(-1.3 * reach, 1.3 * reach),
-              levels=[(PULL_OUT_LAG, wrong), (-PULL_OUT_LAG, "")],
-              curves=[Curve(label="field less rotor", colour="drive", width=1, y=rotor.lag, thin=POINTS)]),
+              levels=[] if out_of_step else [(PULL_OUT_LAG, wrong), (-PULL_OUT_LAG, "")], curves=[lag]),
     ])  # fmt: skip
 
 
@@ -270,10 +298,10 @@ def rest_charts(detail: MoveDetail) -> list[Chart]:
     Returns
     -------
     list of dict
-        One chart: lag [step] over time [ms]; none if nothing was recorded there.
+        One chart: lag [step] over time [ms]; none if nothing was recorded there, or if steps were lost.
     """
     rotor = detail.rotor
-    if rotor is None:
+    if rotor is None or detail.motion.lost:
         return []
     end = float(rotor.t[-1])
     begin = max(detail.motion.seconds - 0.4 * max(end - detail.motion.seconds, 0.01), 0.0)
@@ -291,100 +319,3 @@ def rest_charts(detail: MoveDetail) -> list[Chart]:
     return time_charts(
         Timeline(name="rest", t=rotor.t[part], label="time since the start signal", bands=[after]), [panel]
     )
-
-
-# ---- the method beside a profile of limited jerk
-
-
-def jerk_charts(found: JerkComparison) -> list[Chart]:
-    """Draw the speed of both profiles: the whole way, and its two ends magnified.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        The comparison.
-
-    Returns
-    -------
-    list of dict
-        Three charts: speed [mm/s] over time.
-    """
-    last, window = max(found.envelope.seconds, found.smooth.seconds), magnified(found)
-    parts = (("jerk-whole", 0.0, last), ("jerk-begin", 0.0, window), ("jerk-end", last - window, last))
-    top = round(1.15 * found.speed * MM, 3)
-    charts: list[Chart] = []
-    for name, begin, end in parts:
-        t = np.linspace(begin, end, 900)
-        curves = [
-            Curve(label="jerk limited", colour="left", width=2, dash=(6, 4), y=speed_at(found.smooth, t) * MM),
-            Curve(label="envelope", colour="speed", width=2, y=speed_at(found.envelope, t, step=True) * MM),
-        ]
-        panel = Panel(name=name, label="speed [mm/s]", height=200, zero=True, span=(0.0, top), curves=curves)
-        whole = name == "jerk-whole"
-        unit, scale = ("s", 1.0) if whole else ("ms", MILLI)
-        charts.append(line_chart(panel, t * scale, f"time since the start signal [{unit}]"))
-    return charts
-
-
-def magnified(found: JerkComparison) -> float:
-    """Time at both ends of the way in which the profiles differ.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        The comparison.
-
-    Returns
-    -------
-    float
-        A little more than it takes both to come up to their largest speed, at most half of the time [s].
-    """
-    half = 0.5 * max(found.envelope.seconds, found.smooth.seconds)
-    risen = [
-        float(profile.t[int(np.argmax(profile.speed >= 0.999 * profile.speed.max()))])
-        for profile in (found.envelope, found.smooth)
-    ]
-    return min(1.3 * max(risen), half)
-
-
-def speed_at(profile: Profile, t: Numbers, *, step: bool = False) -> Numbers:
-    """Speed of a profile at any moments.
-
-    Parameters
-    ----------
-    profile : Profile
-        The profile.
-    t : ndarray
-        Moments [s], shape (n,).
-    step : bool
-        Each speed holds until the next one; else it changes evenly.
-
-    Returns
-    -------
-    ndarray
-        [m/s], shape (n,); NaN after its end.
-    """
-    if step:
-        rows = (np.searchsorted(profile.t, t, side="right") - 1).clip(0)
-        speed: Numbers = profile.speed[rows]
-    else:
-        speed = np.interp(t, profile.t, profile.speed)
-    # One point more than the profile has: a curve that ends at rest.
-    after = np.searchsorted(t, profile.seconds) + 1
-    return np.where(np.arange(len(t)) < after, speed, np.nan)
-
-
-def drawn_motors(runs: Sequence[MotorRuns]) -> Sequence[MotorRuns]:
-    """Motors that have room on the page.
-
-    Parameters
-    ----------
-    runs : sequence of MotorRuns
-        All of them.
-
-    Returns
-    -------
-    sequence of MotorRuns
-        The first `MOST_MOTORS`.
-    """
-    return runs[:MOST_MOTORS]

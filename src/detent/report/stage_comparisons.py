@@ -2,11 +2,11 @@
 
 from html import escape
 
-from detent.report import stage_charts
 from detent.report.chart import Chart
 from detent.report.page import ZOOM_HINT, chart_slot, figure, section, side_by_side
 from detent.report.stage_data import StageReportData
 from detent.report.stage_figures import METHOD_COSTS, method_name
+from detent.report.stage_jerk import jerk_charts, magnified
 from detent.report.stage_summary import stated
 from detent.report.words import GAP, count, duration, number, table
 from detent.simulation.step_comparisons import Course, JerkComparison, StepComparison
@@ -35,7 +35,7 @@ def comparison_charts(data: StageReportData) -> list[Chart]:
     list of dict
         In the order of the page.
     """
-    return stage_charts.jerk_charts(data.jerk) if data.jerk else []
+    return jerk_charts(data.jerk) if data.jerk else []
 
 
 def comparison_section(data: StageReportData) -> str:
@@ -135,7 +135,7 @@ def _jerk_figure(found: JerkComparison) -> str:
         "start frequency at once; the profile begins at standstill. Near the top the envelope spares acceleration "
         "where the torque falls; of that the profile knows nothing."
     )
-    ends = f"{number(stage_charts.magnified(found) * 1e3, 2)}{GAP}ms"
+    ends = f"{number(magnified(found) * 1e3, 2)}{GAP}ms"
     content = chart_slot("jerk-whole", "Speed over time of both profiles, the whole way") + side_by_side(
         {
             f"The first {ends}": chart_slot("jerk-begin", "Speed over time at the beginning"),

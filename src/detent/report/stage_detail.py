@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.planning.stage_job import StageJog, StageMove
+from detent.planning.stage_job import Change, StageJog, StageMove
 from detent.report.data import Event, Numbers
 from detent.report.stage_data import MoveDetail, RotorPath
 from detent.report.stage_results import StageMoveResult
@@ -144,7 +144,7 @@ def _events(spec: StepperEnvelopeSpec, asked: StageMove | StageJog, motion: Moti
     if isinstance(asked, StageJog):
         events.append(Event(asked.duration, "the joystick is let go"))
     elif asked.change is not None:
-        events += _change_events(spec.stepper[name], asked, move, legs)
+        events += _change_events(spec.stepper[name], asked.change, move, legs)
     events += [
         Event(float(leg.made.t[0]) - move.begin, f"turns, {'up' if leg.direction > 0 else 'down'} from here")
         for leg in legs[1:]
@@ -160,11 +160,8 @@ def _start_text(asked: StageMove | StageJog, name: str) -> str:
     return "start signal" + (f", at the same time for {', '.join(others)}" if others else "")
 
 
-def _change_events(table: StepperTable, asked: StageMove, move: StageMoveRecord, legs: list[Leg]) -> list[Event]:
+def _change_events(table: StepperTable, change: Change, move: StageMoveRecord, legs: list[Leg]) -> list[Event]:
     """When the stop was changed, if the motor came by."""
-    change = asked.change
-    if change is None:
-        return []
     made = legs[0].made
     passed = np.flatnonzero((made.position - table.step_at(change.at)) * legs[0].direction >= 0)
     text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"

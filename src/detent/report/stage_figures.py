@@ -7,7 +7,7 @@ import numpy as np
 
 from detent.report.data import Numbers
 from detent.report.figures import COLOURS, check_figure_path, new_figure
-from detent.report.stage_charts import magnified, speed_at
+from detent.report.stage_jerk import magnified, speed_at
 from detent.report.stage_summary import stated
 from detent.report.words import count
 from detent.simulation.step_comparisons import JerkComparison, StepComparison

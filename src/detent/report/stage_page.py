@@ -102,7 +102,7 @@ def all_charts(data: StageReportData) -> list[Chart]:
         In the order of the page.
     """
     drawn = stage_charts.path_charts(data.path) if data.path else []
-    shown = stage_charts.drawn_motors(data.runs)
+    shown = data.runs[: stage_charts.MOST_MOTORS]
     drawn += [stage_charts.runs_chart(runs, f"runs-{k}") for k, runs in enumerate(shown)]
     if data.detail:
         drawn += stage_charts.detail_charts(data.detail)
@@ -140,7 +140,9 @@ def _cards(data: StageReportData) -> str:
     ]  # fmt: skip
     if figures.steps:
         first = figures.first_lost
-        below = f"of {count(figures.steps)} made" if not first else f"{_whose(data, first)} lost the first"
+        below = f"of {count(figures.steps)} made"
+        if first:
+            below = f"in the end; {_whose(data, first)} lost {count(abs(round(first.value)))} first"
         shown.append(Card("Lost steps", count(figures.all_lost), "", below, bad=first is not None))
     if figures.lag:
         below = f"{_whose(data, figures.lag)}; out of step from {number(PULL_OUT_LAG)}"
@@ -212,8 +214,10 @@ def _path_figure(data: StageReportData) -> str:
 
 
 def _envelopes(data: StageReportData) -> str:
-    shown = stage_charts.drawn_motors(data.runs)
-    return section("Speed under the envelope", *(_runs_figure(runs, k) for k, runs in enumerate(shown)))
+    shown = data.runs[: stage_charts.MOST_MOTORS]
+    left_out = len(data.runs) - len(shown)
+    more = f'<p class="hint">{further(left_out, "motor")} not drawn.</p>' if left_out > 0 else ""
+    return section("Speed under the envelope", *(_runs_figure(runs, k) for k, runs in enumerate(shown)), more)
 
 
 def _runs_figure(runs: MotorRuns, k: int) -> str:
@@ -230,13 +234,14 @@ def _runs_figure(runs: MotorRuns, k: int) -> str:
 
 def _zones_text(runs: MotorRuns) -> str:
     """Zones by name: in the figure not all have room for theirs."""
-    if not runs.zones:
+    zones = stage_charts.shown_zones(runs)
+    if not zones:
         return ""
     named = [
         f"{escape(zone.name)} ({stated(zone.begin * 1e3)} to {stated(zone.end * 1e3)}{GAP}mm)"
-        for zone in runs.zones[:MOST_ZONES]
+        for zone in zones[:MOST_ZONES]
     ]
-    more = f" and {count(len(runs.zones) - MOST_ZONES)} more" if len(runs.zones) > MOST_ZONES else ""
+    more = f" and {count(len(zones) - MOST_ZONES)} more" if len(zones) > MOST_ZONES else ""
     return f" The shaded zones have a limit of their own: {', '.join(named)}{more}."
 
 
@@ -254,7 +259,7 @@ def _detail(data: StageReportData) -> str:
     side = "up" if motion.stop > motion.start else "down"
     legs = len(detail.runs.arcs)
     turned = f", with {count(legs - 1, 'turn')} on the way" if legs > 1 else ""
-    told = f"motor {motion.motor}, {number(way * 1e3, 4)}{GAP}mm {side}{turned}"
+    told = f"motor {motion.motor}, {stated(way * 1e3)}{GAP}mm {side}{turned}"
     return section(
         f"{name}, step by step", _table_figure(detail, told), _torque_figure(detail), _rotor_figure(detail),
         _rest_figure(detail),
@@ -271,14 +276,14 @@ def _table_figure(detail: MoveDetail, told: str) -> str:
 
 
 def _torque_figure(detail: MoveDetail) -> str:
-    torques = detail.torques
-    if not torques:
+    if not detail.torques:
         return ""
+    safety = stated(detail.torques.safety)
     caption = (
         "Above: the torque that the motor can give at the frequency of each step, and what the step asks for: friction "
         "and acceleration; friction helps to brake. Below: their ratio, cut off where it is far above the least. Under "
-        "1 the rotor cannot follow. Look for: the "
-        f"least margin, ×{GAP}{number(float(torques.margin.min()))}, and where it is."
+        f"1 the rotor cannot follow; the ramp is planned with a reserve of {safety}. Look for: the least margin, "
+        f"×{GAP}{_margin(detail.motion)}, and where it is."
     )
     content = chart_slot("detail-torque", "Pull-out torque and torque needed at every step") + chart_slot(
         "detail-margin", "Torque margin at every step"
@@ -319,15 +324,18 @@ def _moves(data: StageReportData) -> str:
     if not data.moves:
         return ""
     labelled = any(move.label for move in data.moves)
+    astray = any(motion.off for move in data.moves for motion in move.motions)
     name = [("tile" if data.kind == "tiles" else "name", False)] if labelled else []
     heads = [("move", True), *name, ("start [s]", True), ("motor", False), ("from [mm]", True), ("to [mm]", True),
              ("way [mm]", False), ("time [ms]", True), ("peak [Hz]", True), ("lag [step]", True), ("margin", True),
-             ("lost [step]", True)]  # fmt: skip
-    rows = [row for move in data.moves for row in _rows(move, labelled=labelled)]
+             ("lost [step]", True), *([("off [step]", True)] if astray else [])]  # fmt: skip
+    rows = [row for move in data.moves for row in _rows(move, labelled=labelled, astray=astray)]
     caption = (
         "A row per motor that moved. Time goes from the start signal to the end of the last step; margin is pull-out "
         "torque over torque needed in the worst step."
     )
+    if astray:
+        caption += " Off: how far the rotor stood beside its place in the end, steps of earlier moves included."
     left_out = len(rows) - MOST_MOTIONS
     if left_out > 0:
         caption += f" {further(left_out, 'row')} in the JSON summary only."
@@ -336,29 +344,41 @@ def _moves(data: StageReportData) -> str:
     return section(f"{data.word.capitalize()} by {data.word}", figure(title, caption, content))
 
 
-def _rows(move: StageMoveResult, *, labelled: bool) -> list[list[str]]:
+def _rows(move: StageMoveResult, *, labelled: bool, astray: bool) -> list[list[str]]:
     """Rows of one move: its number and name stand in the first only."""
     head = [count(move.number), *([escape(move.label)] if labelled else []), f"{move.begin:.3f}"]
-    blank = ["" for _ in head]
     if not move.motions:
-        return [[*head, "none: stays", *["" for _ in range(8)]]]
-    return [[*(blank if k else head), *_cells(motion)] for k, motion in enumerate(move.motions)]
+        return [[*head, "none: stays", *["" for _ in range(8 + astray)]]]
+    blank = ["" for _ in head]
+    return [[*(blank if k else head), *_cells(motion, astray=astray)] for k, motion in enumerate(move.motions)]
 
 
-def _cells(motion: MotionResult) -> list[str]:
+def _cells(motion: MotionResult, *, astray: bool) -> list[str]:
     way = motion.stop - motion.start
-    side = "right" if way >= 0 else "left"
-    sign = "↑ up" if way >= 0 else "↓ down"
-    lost = f'<td class="n over">{number(motion.lost)}</td>' if motion.lost else "0"
-    margin = number(motion.margin) if isfinite(motion.margin) else "any"
+    side, sign = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
     return [
         escape(motion.motor),
-        f"{motion.start * 1e3:.3f}",
-        f"{motion.target * 1e3:.3f}",
-        f'<td class="nowrap"><span class="arrow {side}">{sign}</span> {number(abs(way) * 1e3, 4)}</td>',
+        _place(motion.start),
+        _place(motion.target),
+        f'<td class="nowrap"><span class="arrow {side}">{sign}</span> {stated(abs(way) * 1e3)}</td>',
         number(motion.seconds * 1e3),
         count(round(motion.peak_hz)),
-        f'<td class="n over">{number(motion.lag)}</td>' if motion.lag >= PULL_OUT_LAG else number(motion.lag),
-        f'<td class="n over">{margin}</td>' if motion.margin < 1 else margin,
-        lost,
+        _marked(number(motion.lag), wrong=motion.lag >= PULL_OUT_LAG),
+        _marked(_margin(motion), wrong=motion.margin < 1),
+        _marked(number(motion.lost), wrong=motion.lost != 0),
+        *([_marked(number(motion.off), wrong=motion.off != 0)] if astray else []),
     ]
+
+
+def _margin(motion: MotionResult) -> str:
+    """Without friction and acceleration no torque is needed."""
+    return number(motion.margin) if isfinite(motion.margin) else "any"
+
+
+def _place(position: float) -> str:
+    """In mm; a rounding error below 0 is 0."""
+    return f"{round(position * 1e3, 3) + 0.0:.3f}".replace("-", "\u2212")
+
+
+def _marked(text: str, *, wrong: bool) -> str:
+    return f'<td class="n over">{text}</td>' if wrong else text

@@ -11,7 +11,7 @@ from detent.kernel.step import step
 class CompositionParams(Registers):
     """Sizes and zeros of both words."""
 
-    ratio: i8 = register("motor turns per table turn G")
+    ratio: i8 = register("motor turns per table turn G", unit="count")
     fine: i8 = register("fine counts per motor turn F", unit="count")
     coarse: i8 = register("coarse counts per table turn", unit="count")
     fine_zero: i8 = register("fine word at table angle 0", unit="count")

@@ -18,6 +18,14 @@ def test_every_key_is_documented(row):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_limits_have_no_defaults(name):
-    limits = [row for row in reference_rows(name) if row.key.startswith("limits.")]
+    limits = [row for row in reference_rows(name) if "limits." in row.key]
     assert limits
     assert all(row.required for row in limits)
+
+
+@pytest.mark.parametrize(
+    ("method", "key"),
+    [("rotary_table", "position.NUMBER.angle"), ("stepper_envelope", "stepper.NAME.zone.ZONE.speed")],
+)
+def test_a_placeholder_stands_for_a_name_of_the_user(method, key):
+    assert key in {row.key for row in reference_rows(method)}

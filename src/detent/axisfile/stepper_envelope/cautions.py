@@ -1,7 +1,7 @@
 """What looks wrong with a stepper-envelope axis: reserves that are used up, and keys that do nothing.
 
 An open-loop motor tells nobody that it lost a step. What keeps it from that is reserve; how much is needed has been
-tried on the rotor of specification 7.2, with random motors, zones and edits (tests/property/step_cases.py). Outside
+tried on the rotor of specification 7.2, with random motors, zones and edits (tests/property/step_motors.py). Outside
 these margins an axis may still work, and a simulated run shows whether it does.
 """
 
@@ -16,14 +16,14 @@ from detent.axisfile.nearest import BARELY, at_least, at_most, either, offer, pu
 from detent.axisfile.stepper_envelope.build import pull_out, start_hz
 from detent.axisfile.stepper_envelope.derive import MotorFigures
 from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.axisfile.stepper_envelope.torque_rules import bare_start_hz, better, changed, ramp_fits
+from detent.axisfile.stepper_envelope.torque_rules import bare_start_hz, better, changed, ramp_fits, slower
 from detent.units import format_quantity, parse_quantity
 
 START_RESERVE = 1.4604
 """Start frequency over the natural one up to which no step was lost; that of 7.1."""
 
-LEAST_AT_START = 0.9
-"""Torque at the start frequency, as a part of that at standstill, down to which no step was lost."""
+LEAST_NEAR_START = 0.9
+"""Torque up to that frequency, as a part of that at standstill, down to which no step was lost; 0.95 with 7.1."""
 
 MOST_USED = 0.45
 """Share of its torque that a ramp takes, up to which no step was lost; 0.44 with 7.1."""
@@ -46,14 +46,14 @@ Look = Callable[[MotorFigures], Iterator[Caution]]
 
 
 def find_cautions(spec: StepperEnvelopeSpec) -> Iterator[Caution]:
-    """Look a stepper-envelope axis over, motor by motor."""
-    for name in spec.stepper:
-        figures = MotorFigures(spec, name)
+    """Look a stepper-envelope axis over: each motor, then what they share."""
+    motors = [MotorFigures(spec, name) for name in spec.stepper]
+    for m in motors:
         for look in _LOOKS:
-            for caution in look(figures):
-                yield Caution(
-                    f"{name}: {caution.name}", caution.value, caution.limit, caution.consequence, caution.remedy
-                )
+            for found in look(m):
+                yield Caution(f"{m.name}: {found.name}", found.value, found.limit, found.consequence, found.remedy)
+    yield from _settling(max(motors, key=_settling_time))
+    yield from _rounding(max(motors, key=lambda m: m.rounding(spec.controller.timer, spec.controller.words)))
 
 
 def _key(m: MotorFigures) -> str:
@@ -63,16 +63,21 @@ def _key(m: MotorFigures) -> str:
 # ------------------------------------------------------------------------------------------------------- lost steps
 
 
+def _safer_start(m: MotorFigures, ratio: float) -> str:
+    """Remedy for a start frequency above a multiple of the natural one."""
+    least = m.table.drive.start_safety * bare_start_hz(m.table) / (ratio * m.natural_hz)
+    return offer(StepperEnvelopeSpec, f"{_key(m)}.drive.start_safety", at_least(least, "").strip('"'))
+
+
 def _start(m: MotorFigures) -> Iterator[Caution]:
     ratio, safety = m.start_hz / m.natural_hz, m.table.drive.start_safety
     if ratio > START_RESERVE * (1 + BARELY):
-        wanted = at_least(safety * bare_start_hz(m.table) / (START_RESERVE * m.natural_hz), "").strip('"')
         yield Caution(
             "start frequency",
             f"{format_quantity(m.start_hz, 'Hz')}, {ratio:.3g} x the natural frequency of the loaded rotor",
             f"up to {START_RESERVE:.3g} x",
             "a start, a stop or a reversal may lose steps",
-            either(offer(StepperEnvelopeSpec, f"{_key(m)}.drive.start_safety", wanted), "check motor.start_frequency"),
+            either(_safer_start(m, START_RESERVE), "check motor.start_frequency"),
         )
     if safety < LEAST_SAFETY:
         yield Caution(
@@ -84,24 +89,35 @@ def _start(m: MotorFigures) -> Iterator[Caution]:
         )
 
 
-def _share_at_start(table: StepperTable) -> float:
-    """Torque at the start frequency as a part of that at standstill."""
-    curve = pull_out(table)
-    return curve(start_hz(table)) / curve(0.0)
+def _torque_near_start(m: MotorFigures) -> Iterator[Caution]:
+    swinging = START_RESERVE * m.natural_hz
 
+    def share(table: StepperTable) -> float:
+        curve = pull_out(table)
+        return min(curve(hz) for hz in (start_hz(table), swinging)) / curve(0.0)
 
-def _torque_at_start(m: MotorFigures) -> Iterator[Caution]:
-    share = _share_at_start(m.table)
-    if share < LEAST_AT_START * (1 - BARELY):
-        slower = better(
-            m.table, _key(m), "drive.start_safety", 20.0, lambda table: _share_at_start(table) >= LEAST_AT_START
-        )
+    if share(m.table) < LEAST_NEAR_START * (1 - BARELY):
+        higher = ""
+        if m.table.motor.pull_out == "winding":
+            higher = better(m.table, _key(m), "drive.supply", 1000.0, lambda table: share(table) >= LEAST_NEAR_START)
         yield Caution(
-            "torque at the start frequency",
-            f"{share:.2f} of that at standstill",
-            f"at least {LEAST_AT_START:g} of it",
-            "the current has no time to rise, and a start or a stop may lose steps",
-            either(slower, "raise drive.supply" if m.table.motor.pull_out == "winding" else ""),
+            "torque near the start frequency",
+            f"{share(m.table):.2g} of that at standstill, at {format_quantity(max(swinging, m.start_hz), 'Hz')}",
+            f"at least {LEAST_NEAR_START:g} of it up to {START_RESERVE:.3g} x the natural frequency",
+            "the current has no time to rise where the rotor swings, and a start or a stop may lose steps",
+            higher or "choose a motor of less inductance, or a heavier load",
+        )
+
+
+def _reversal(m: MotorFigures) -> Iterator[Caution]:
+    ratio = m.start_hz / m.natural_hz
+    if m.table.drive.reversal_pause == 0 and ratio > START_RESERVE / 2 * (1 + BARELY):
+        yield Caution(
+            "drive.reversal_pause",
+            f"0 with a start frequency of {ratio:.3g} x the natural one",
+            f"1 or more above {START_RESERVE / 2:.2g} x",
+            "single steps to and fro swing the rotor up until it loses steps",
+            either(put(f"{_key(m)}.drive.reversal_pause", 1), _safer_start(m, START_RESERVE / 2)),
         )
 
 
@@ -114,25 +130,22 @@ def _torque_used(m: MotorFigures) -> Iterator[Caution]:
         spec = m.spec.model_copy(update={"stepper": {**m.spec.stepper, m.name: table}})
         return MotorFigures(spec, m.name).torque_used[0] <= MOST_USED
 
-    now, names = m.table.limits.acceleration, ("limits.acceleration", "limits.speed")
-    far = (now / 1e3, m.start_hz * m.table.step)
+    gentler = better(m.table, _key(m), "limits.acceleration", m.table.limits.acceleration / 1e3, is_good)
     yield Caution(
         "torque used on the ramp",
         f"{share:.2f} of what there is, at {format_quantity(hz, 'Hz')}",
         f"up to {MOST_USED:g} of it",
         "the rotor lags far behind its field, and little more load makes it lose steps",
-        either(*(_kept(m, name, end, is_good) for name, end in zip(names, far, strict=True)))
+        either(gentler if _leaves_ramp(m, gentler) else "", slower(m.table, _key(m), is_good))
         or "choose a stronger motor or a higher supply",
     )
 
 
-def _kept(m: MotorFigures, name: str, far: float, is_good: Callable[[StepperTable], bool]) -> str:
-    """Remedy that lowers one key, if a ramp is left then."""
-    remedy = better(m.table, _key(m), name, far, is_good)
-    if not remedy:
-        return ""
-    value = parse_quantity(remedy.split('"')[1], "m/s^2" if name.endswith("acceleration") else "m/s")
-    return remedy if ramp_fits(changed(m.table, name, value)) else ""
+def _leaves_ramp(m: MotorFigures, gentler: str) -> bool:
+    """True where a remedy's acceleration still leads to the largest speed."""
+    return bool(gentler) and ramp_fits(
+        changed(m.table, "limits.acceleration", parse_quantity(gentler.split('"')[1], "m/s^2"))
+    )
 
 
 def _friction(m: MotorFigures) -> Iterator[Caution]:
@@ -140,7 +153,7 @@ def _friction(m: MotorFigures) -> Iterator[Caution]:
     if friction > most * (1 + BARELY):
         yield Caution(
             "friction",
-            f"{format_quantity(friction, 'N*m')}, {friction / m.motor.holding_torque:.2g} of the holding torque",
+            f"{format_quantity(friction, 'N*m')}, {friction / m.motor.holding_torque:.3g} of the holding torque",
             f"up to {MOST_FRICTION:g} of it, {format_quantity(most, 'N*m')}",
             "the rotor rests off its step, and falls behind at speed",
             either(put(f"{_key(m)}.mechanics.friction_torque", at_most(most, "N*m")), "choose a stronger motor"),
@@ -192,36 +205,21 @@ def _resonance(m: MotorFigures) -> Iterator[Caution]:
             )
 
 
-def _settling(m: MotorFigures) -> Iterator[Caution]:
-    controller, damping = m.spec.controller, m.damping
-    period = 1 / (m.natural_hz * math.sqrt(1 - damping**2))
-    decay = max(0.0, -math.log(controller.tolerance)) / (damping * 2 * math.pi * m.natural_hz)
-    if controller.settle_time < (period + decay) * (1 - BARELY):
-        yield Caution(
-            "controller.settle_time",
-            format_quantity(controller.settle_time, "s"),
-            f"at least {format_quantity(period + decay, 's')}, a swing of the rotor and its decay to "
-            f"{controller.tolerance:g} steps",
-            "the rotor still swings when the motor counts as at rest",
-            put("controller.settle_time", at_least(period + decay, "s")),
-        )
-
-
 def _extremes(m: MotorFigures) -> Iterator[Caution]:
     extremes, table = m.table.extremes, m.table
-    for name, end in (("start", extremes.start), ("stop", extremes.stop)):
+    fastest_zone = max((zone.speed for zone in table.zone.values()), default=0.0)
+    for end, name in {extremes.stop: "stop", extremes.start: "start"}.items():
         way = table.step_inside(extremes.turn) - table.step_inside(end)
         if way < m.shortest_way:
             peak = float(m.ramp.hz[(way - 1) // 2])
-            speed = format_quantity(peak * table.step, "m/s")
+            speed = peak * table.step
+            lower = put(f"{_key(m)}.limits.speed", at_most(speed, "m/s")) if fastest_zone < speed * (1 - 1e-3) else ""
             yield Caution(
                 f"way between extremes.{name} and extremes.turn",
                 f"{way} steps",
                 f"{m.shortest_way} or more, {format_quantity(m.shortest_way * table.step, 'm')}: two ramps",
-                f"the run reaches {speed} ({format_quantity(peak, 'Hz')}) and never limits.speed",
-                either(
-                    put(f"{_key(m)}.limits.speed", at_most(peak * table.step, "m/s")), "move the extremes farther apart"
-                ),
+                f"the run reaches {format_quantity(speed, 'm/s')}, {format_quantity(peak, 'Hz')}, never limits.speed",
+                either(lower, "move the extremes farther apart"),
             )
 
 
@@ -239,24 +237,6 @@ def _zones(m: MotorFigures) -> Iterator[Caution]:
 
 
 # --------------------------------------------------------------------------------------------------------- electronics
-
-
-def _words(m: MotorFigures) -> Iterator[Caution]:
-    clock, words = m.spec.controller.timer, m.spec.controller.words
-    error = m.rounding(clock, words)
-    if error <= MOST_ROUNDING:
-        return
-    finer = max(clock, 0.5 / MOST_ROUNDING * m.max_hz)
-    remedies = ((finer, words, put("controller.timer", at_least(finer, "Hz"))),)
-    remedies += ((clock, "reload", put("controller.words", '"reload"')),)
-    good = [text for ticks, stored, text in remedies if m.rounding(ticks, stored) <= MOST_ROUNDING]
-    yield Caution(
-        "rounding of the frequencies",
-        f"up to {format_quantity(error, '%')}, as {words} words at {format_quantity(clock, 'Hz')}",
-        f"up to {format_quantity(MOST_ROUNDING, '%')}",
-        "steps of the ramp become unequal, and take more torque than planned",
-        either(*good) or put("controller.timer", at_least(finer, "Hz")) + ' and controller.words = "reload"',
-    )
 
 
 def _current(m: MotorFigures) -> Iterator[Caution]:
@@ -324,18 +304,57 @@ def _is_stated(m: MotorFigures, name: str) -> bool:
     return value != parse_quantity(str(constant), unit_of(type(motor).model_fields[name]))
 
 
+# ------------------------------------------------------------------------------------------- what the motors share
+
+
+def _settling_time(m: MotorFigures) -> float:
+    """Time of a swing of the rotor, and of the decay of a swing of one step to the tolerance [s]."""
+    decay = max(0.0, -math.log(m.spec.controller.tolerance)) / (m.damping * 2 * math.pi * m.natural_hz)
+    return 1 / (m.natural_hz * math.sqrt(1 - m.damping**2)) + decay
+
+
+def _settling(m: MotorFigures) -> Iterator[Caution]:
+    controller, needed = m.spec.controller, _settling_time(m)
+    if controller.settle_time < needed * (1 - BARELY):
+        yield Caution(
+            f"controller.settle_time, {m.name}",
+            format_quantity(controller.settle_time, "s"),
+            f"at least {format_quantity(needed, 's')}, a swing of the rotor and its decay to {controller.tolerance:g} "
+            "steps",
+            "the rotor still swings when the motor counts as at rest",
+            put("controller.settle_time", at_least(needed, "s")),
+        )
+
+
+def _rounding(m: MotorFigures) -> Iterator[Caution]:
+    clock, words = m.spec.controller.timer, m.spec.controller.words
+    error = m.rounding(clock, words)
+    if error <= MOST_ROUNDING:
+        return
+    finer = max(clock, 0.5 / MOST_ROUNDING * m.max_hz)
+    remedies = ((finer, words, put("controller.timer", at_least(finer, "Hz"))),)
+    remedies += ((clock, "reload", put("controller.words", '"reload"')),)
+    good = [text for ticks, stored, text in remedies if m.rounding(ticks, stored) <= MOST_ROUNDING]
+    yield Caution(
+        f"rounding of the frequencies, {m.name}",
+        f"up to {format_quantity(error, '%')}, as {words} words at {format_quantity(clock, 'Hz')}",
+        f"up to {format_quantity(MOST_ROUNDING, '%')}",
+        "steps of the ramp become unequal, and take more torque than planned",
+        either(*good) or put("controller.timer", at_least(finer, "Hz")) + ' and controller.words = "reload"',
+    )
+
+
 _LOOKS: tuple[Look, ...] = (
     _start,
-    _torque_at_start,
+    _torque_near_start,
+    _reversal,
     _torque_used,
     _friction,
     _torque_safety,
     _rule,
     _resonance,
-    _settling,
     _extremes,
     _zones,
-    _words,
     _current,
     _unused,
 )

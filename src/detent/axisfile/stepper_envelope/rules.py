@@ -18,13 +18,13 @@ from detent.axisfile.stepper_envelope.torque_rules import (
     TORQUE_RULES,
     Rule,
     bare_start_hz,
-    better,
     changed,
     has_pull_out,
     is_drivable,
     keys_of,
     per_motor,
     ramp_fits,
+    slower,
 )
 from detent.planning.step_ramp import MAX_HZ, natural_frequency
 from detent.units import format_quantity
@@ -40,6 +40,16 @@ FASTEST_SWING = 0.1
 
 PLACE_DIGITS = 7
 """Digits of a place that a remedy names: a step of a micrometre in a travel of metres."""
+
+
+def _at_or_above(place: float) -> str:
+    """Short text of a place, not below it but for an error of arithmetic."""
+    return at_least(round(place, 12), "m", PLACE_DIGITS)
+
+
+def _at_or_below(place: float) -> str:
+    """Short text of a place, not above it but for an error of arithmetic."""
+    return at_most(round(place, 12), "m", PLACE_DIGITS)
 
 
 # -------------------------------------------------------------------------------------------------------------- places
@@ -83,7 +93,7 @@ def _inside(table: StepperTable, key: str, name: str, place: float) -> Iterator[
     if _is_inside(table, place) or not _is_travel(table):
         return
     lower, upper = _ends(table)
-    nearest = at_least(lower, "m", PLACE_DIGITS) if place < lower else at_most(upper, "m", PLACE_DIGITS)
+    nearest = _at_or_above(lower) if place < lower else _at_or_below(upper)
     yield Contradiction(
         keys_of(key, name, "limits.travel", "mechanics.lower_end"),
         f"on the travel, from {format_quantity(lower, 'm')} to {format_quantity(upper, 'm')}",
@@ -113,8 +123,8 @@ def _extremes_apart(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> It
     inside = all(_is_inside(table, place) for place in (extremes.start, extremes.turn, extremes.stop))
     if not inside or places[name] < turn or not _is_travel(table):
         return
-    upper = at_least(table.position_of(places[name] + 1), "m", PLACE_DIGITS)
-    lower = at_most(table.position_of(turn - 1), "m", PLACE_DIGITS)
+    upper = _at_or_above(table.position_of(places[name] + 1))
+    lower = _at_or_below(table.position_of(turn - 1))
     alone = min(places.values()) < turn
     yield Contradiction(
         keys_of(key, "extremes.turn", f"extremes.{name}", "limits.travel", "mechanics.lower_end"),
@@ -161,12 +171,14 @@ def _turned(table: StepperTable, key: str, name: str, zone: ZoneTable) -> Iterat
     begin, end = f"{key}.zone.{name}.begin", f"{key}.zone.{name}.end"
     inside = {place: _is_inside(table, place) for place in (zone.begin, zone.end)}
     if zone.end < zone.begin and all(inside.values()):
-        yield put(begin, f'"{zone.end!r} m"') + f' and {end} = "{zone.begin!r} m"'
+        lower, upper = (format_quantity(place, "m", 12) for place in (zone.end, zone.begin))
+        first = put(begin, f'"{lower}"')
+        yield f'{first} and {end} = "{upper}"'
         return
     if inside[zone.begin] and _is_inside(table, zone.begin + table.step):
-        yield put(end, at_least(zone.begin + table.step, "m", PLACE_DIGITS))
+        yield put(end, _at_or_above(zone.begin + table.step))
     if inside[zone.end] and _is_inside(table, zone.end - table.step):
-        yield put(begin, at_most(zone.end - table.step, "m", PLACE_DIGITS))
+        yield put(begin, _at_or_below(zone.end - table.step))
 
 
 @per_motor
@@ -189,7 +201,7 @@ def _zone_overlap(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iter
 def _apart(key: str, one: tuple[str, ZoneTable], other: tuple[str, ZoneTable]) -> str:
     """Remedies that end the first zone where the other begins, or begin that one where the first ends."""
     (name, zone), (later, following) = one, other
-    begin, end = at_least(zone.end, "m", PLACE_DIGITS), at_most(following.begin, "m", PLACE_DIGITS)
+    begin, end = _at_or_above(zone.end), _at_or_below(following.begin)
     return either(
         put(f"{key}.zone.{later}.begin", begin) if zone.end < following.end else "",
         put(f"{key}.zone.{name}.end", end) if zone.begin < following.begin else "",
@@ -204,7 +216,7 @@ def _zone_speed(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iterat
     start, fastest, safety = start_hz(table), table.limits.speed, f"{key}.drive.start_safety"
     slowest = start * table.step
     # Between two bounds that are as good as one there is no short number.
-    exact = f'"{fastest!r} m/s"' if slowest * (1 + 1e-3) > fastest else ""
+    exact = f'"{format_quantity(fastest, "m/s", 15)}"' if slowest * (1 + 1e-3) > fastest else ""
     for name, zone in table.zone.items():
         path, hz = f"{key}.zone.{name}.speed", table.hz(zone.speed)
         if zone.speed > fastest * (1 + BARELY):
@@ -249,8 +261,7 @@ def _slower(table: StepperTable, key: str) -> str:
     slow = changed(table, "limits.speed", bound * (1 - BARELY))
     if not is_drivable(slow) or ramp_fits(slow):
         return offer(StepperEnvelopeSpec, f"{key}.limits.speed", at_most(bound, "m/s"))
-    found = better(slow, key, "limits.speed", start_hz(slow) * table.step, ramp_fits)
-    return found or "check the units of speed and lead"
+    return slower(slow, key) or "check the units of speed and lead"
 
 
 @per_motor

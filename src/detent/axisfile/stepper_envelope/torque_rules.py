@@ -37,7 +37,7 @@ LOAD_KEYS = (
     "mechanics.travel_per_revolution", "mechanics.moving_mass", "mechanics.screw_inertia", "mechanics.coupling_inertia",
 )  # fmt: skip
 START_KEYS = (
-    "drive.start_safety", "motor.start_frequency", "motor.steps_per_turn", "motor.holding_torque",
+    "motor.start_frequency", "drive.start_safety", "motor.steps_per_turn", "motor.holding_torque",
     "motor.rotor_inertia", *LOAD_KEYS,
 )  # fmt: skip
 """What the start frequency depends on."""
@@ -51,8 +51,8 @@ RAMP_KEYS = (
 SURE_REST = 0.5
 """Distance from its step, in steps, from which a resting rotor counts as a step off."""
 
-REFINEMENTS = 24
-"""Halvings in the search for a value that would do: 1e-7 of the way."""
+REFINEMENTS = 20
+"""Halvings in the search for a value that would do: to a millionth of the way."""
 
 
 def per_motor(look: Look) -> Rule:
@@ -111,8 +111,9 @@ def _constants(spec: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iter
         yield Contradiction(
             (path, f"{key}.motor.pull_out"),
             f'stated, as pull_out = "{way}" needs it',
-            f'add {name} = "{example}" in [{key}.motor], or choose another pull_out'
-            + (", or name a motor of the catalogue that has it" if way == "winding" else ""),
+            f'add {name} = "{example}" in [{key}.motor], '
+            + ("or name a motor of the catalogue that has it, " if way == "winding" else "")
+            + "or choose another pull_out",
         )
 
 
@@ -125,7 +126,7 @@ def _curve(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iterator[Co
     frequencies, torques, way = keys_of(key, "motor.curve_frequency", "motor.curve_torque", "motor.pull_out")
     if len(hz) < 2:
         example = 'curve_frequency = ["500 Hz", "2 kHz"] and curve_torque = ["45 mN*m", "20 mN*m"]'
-        allowed = f"two or more of them where pull_out is points, here {len(hz)}"
+        allowed = f'two or more frequencies, as pull_out = "points" needs them, here {len(hz)}'
         yield Contradiction((frequencies, way), allowed, f"state the points of the curve, as {example}")
     elif len(torque) != len(hz):
         allowed = f"as many as curve_frequency has, {len(hz)}, here {len(torque)}"
@@ -162,7 +163,9 @@ def _standstill(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iterat
     if pull_out > held * (1 + BARELY):
         stated = f"{key}.motor.holding_torque"
         larger = offer(StepperEnvelopeSpec, stated, at_least(motor.holding_torque * pull_out / held, "N*m"))
-        smaller = put(f"{key}.motor.{name}", at_most(held, "N*m")) if name == "pull_out_torque" else ""
+        smaller = ""
+        if name == "pull_out_torque" and is_drivable(table) and ramp_fits(changed(table, f"motor.{name}", held)):
+            smaller = put(f"{key}.motor.{name}", at_most(held, "N*m"))
         yield Contradiction(
             (f"{key}.motor.{name}", stated, f"{key}.drive.current", f"{key}.motor.rated_current"),
             f"up to the holding torque at the current of the drive, {format_quantity(held, 'N*m')}",
@@ -178,7 +181,7 @@ def _friction_at_rest(spec: StepperEnvelopeSpec, table: StepperTable, key: str) 
     """Friction does not hold a resting rotor outside the tolerance."""
     tolerance, held, friction = spec.controller.tolerance, table.held_torque, table.mechanics.friction_torque
     most = held * math.sin(math.pi / 2 * min(tolerance, SURE_REST))
-    if friction <= most * (1 + BARELY):
+    if friction <= most * (1 + BARELY) or (is_drivable(table) and _spare(table, start_hz(table)) <= 0):
         return
     steps = math.asin(min(friction / held, 1.0)) * 2 / math.pi
     wider = put("controller.tolerance", at_least(steps, "").strip('"')) if steps < SURE_REST else ""
@@ -233,8 +236,10 @@ def nearest_good(is_good: Callable[[float], bool], bad: float, far: float) -> fl
     return far
 
 
-def better(table: StepperTable, key: str, name: str, far: float, is_good: Callable[[StepperTable], bool]) -> str:
-    """Remedy that changes one key towards `far`, as little as makes the motor good; empty if nothing does."""
+def better(
+    table: StepperTable, key: str, name: str, far: float, is_good: Callable[[StepperTable], bool] = ramp_fits
+) -> str:
+    """Remedy that changes one key of a motor towards `far`, as little as makes it good; empty if nothing does."""
     around, _, own = name.partition(".")
     now = float(getattr(getattr(table, around), own))
     found = nearest_good(lambda value: is_good(changed(table, name, value)), now, far) if far != now else None
@@ -244,6 +249,12 @@ def better(table: StepperTable, key: str, name: str, far: float, is_good: Callab
     unit = unit_of(field_at(StepperEnvelopeSpec, tuple(path.split("."))))
     text = (at_most if far < now else at_least)(found, unit)
     return offer(StepperEnvelopeSpec, path, text if unit else text.strip('"'))
+
+
+def slower(table: StepperTable, key: str, is_good: Callable[[StepperTable], bool] = ramp_fits) -> str:
+    """Remedy that lowers limits.speed, but not below the speed of a zone, or that of the start frequency."""
+    least = max(start_hz(table) * table.step, *(zone.speed for zone in table.zone.values()), 0.0)
+    return better(table, key, "limits.speed", least, is_good) if least < table.limits.speed else ""
 
 
 @per_motor
@@ -261,8 +272,8 @@ def _acceleration_at_start(_: StepperEnvelopeSpec, table: StepperTable, key: str
         f"{format_quantity(torque, 'N*m')} at {format_quantity(start, 'Hz')}, over torque_safety; nothing is left to "
         "accelerate with",
         either(
-            better(table, key, "mechanics.friction_torque", 0.0, ramp_fits),
-            better(table, key, "drive.torque_safety", 1.0, ramp_fits),
+            better(table, key, "mechanics.friction_torque", 0.0),
+            better(table, key, "drive.torque_safety", 1.0),
         )
         or "choose a stronger motor, or less load",
     )
@@ -273,22 +284,22 @@ def _ramp(_: StepperEnvelopeSpec, table: StepperTable, key: str) -> Iterator[Con
     """The ramp reaches the largest speed, and its entries have room."""
     if not is_drivable(table) or _spare(table, start_hz(table)) <= 0 or ramp_fits(table):
         return
-    steeper = better(table, key, "limits.acceleration", 1e4, ramp_fits)
-    slower = better(table, key, "limits.speed", start_hz(table) * table.step, ramp_fits)
+    steeper, lower = better(table, key, "limits.acceleration", 1e4), slower(table, key)
     if steeper:
-        names = ("limits.acceleration", *RAMP_KEYS)
-        allowed = f"such that the ramp up to limits.speed has {MAX_RAMP} entries or fewer, each {LEAST_GAIN_HZ:g} Hz"
         yield Contradiction(
-            keys_of(key, *names), f"{allowed} above the last; here {_entries(table)}", either(steeper, slower)
+            keys_of(key, "limits.acceleration", *RAMP_KEYS),
+            f"such that the ramp up to limits.speed has {MAX_RAMP} entries or fewer, each {LEAST_GAIN_HZ:g} Hz above "
+            f"the last; here {_entries(table)}",
+            either(steeper, lower),
         )
         return
-    safety = better(table, key, "drive.torque_safety", 1.0, ramp_fits)
-    supply = better(table, key, "drive.supply", 1000.0, ramp_fits) if table.motor.pull_out == "winding" else ""
+    safety = better(table, key, "drive.torque_safety", 1.0)
+    supply = better(table, key, "drive.supply", 1000.0) if table.motor.pull_out == "winding" else ""
     yield Contradiction(
         keys_of(key, "limits.speed", *RAMP_KEYS),
         f"such that the pull-out torque over torque_safety is enough for friction and for {MAX_RAMP} steps of ramp up "
         f"to it; here {_entries(table)}",
-        either(slower, safety, supply),
+        either(lower, safety, supply) or "choose a stronger motor, or less load",
     )
 
 
