@@ -1,10 +1,26 @@
 """Bad axis files: edits of a good one, and the problem each of them must give."""
 
 from dataclasses import dataclass
+from importlib.resources import files
 
 import pytest
 
 from detent.errors import InputError
+
+EXAMPLES = {
+    "print_head": "print_head",
+    "phase_servo": "phase_servo",
+    "filtered_servo": "filtered_servo",
+    "rotary_table": "rotary_table",
+    "stepper_envelope": "zoom",
+}
+"""Packaged example of each method."""
+
+
+def example_text(name):
+    """Text of a packaged example, without its head comment (line 1 is ``[axis]``)."""
+    text = files("detent").joinpath(f"examples/{name}.toml").read_text(encoding="utf-8")
+    return text[text.index("[axis]") :]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -223,10 +224,7 @@ class Rig:
 
     def record(self, until: float, names: Sequence[str], every: int = 20) -> dict[str, np.ndarray]:
         """Run and record registers every so many ticks, with `t` [s]; the row at t shows the tick before it."""
-        leaves = {leaf.path: leaf for leaf in RotaryTable.leaves()}
-        chosen = [leaves[name] for name in names]
-        picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
-        dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])
+        picks, dtype = pick(tuple(names))
         first = self.r.tick
         left = round(until / TICK) + self.START - first
         rows = np.zeros((left // every + 2, dtype.itemsize), np.uint8)
@@ -236,6 +234,15 @@ class Rig:
         index = np.arange(first // every + 1, self.r.tick // every + 1)
         table = rows[index % len(rows)].view(dtype)[:, 0]
         return {name: table[name].copy() for name in names} | {"t": (index * every - self.START) * TICK}
+
+
+@cache
+def pick(names: tuple[str, ...]) -> tuple[np.ndarray, Any]:
+    """Byte offsets of registers and the type of a row of them."""
+    leaves = {leaf.path: leaf for leaf in RotaryTable.leaves()}
+    chosen = [leaves[name] for name in names]
+    picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
+    return picks, np.dtype([(c.path, "<" + c.width.code) for c in chosen])
 
 
 class PositionerBench:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from detent.control.step_comparison import CONSTANT_FREQUENCY
 from detent.control.step_rule import FAULT, REST, deflect, start_move
 from detent.kernel.registers import Leaf
 from detent.planning.pull_out import FirstOrderPullOut
-from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
 from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
 from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
 from detent.systems.stepper import (
@@ -104,9 +105,14 @@ class Rig:
         reload: bool = False,
         literal: bool = False,
         pause: int = 0,
+        down_zones: Sequence[Zone] | None = None,
     ) -> None:
-        self.ramp, self.zones = ramp, ZoneMap(steps, max_hz, zones)
-        self.up, self.down = turn_envelopes(ramp, self.zones, 0, steps if turn is None else turn, stop)
+        turn = steps if turn is None else turn
+        other = zones if down_zones is None else down_zones
+        self.ramp, self.zones = ramp, ZoneMap(steps, max_hz, zones, [max_hz, *(zone.max_hz for zone in other)])
+        self.down_zones = ZoneMap(steps, max_hz, other, self.zones.limits)
+        self.up = StepEnvelope(ramp, self.zones, 1, 0, turn)
+        self.down = StepEnvelope(ramp, self.down_zones, -1, turn, stop)
         self.p, self.r = StepperParams(pause=pause), Stepper()
         self.clock_hz = RELOAD_CLOCK_HZ if reload else CLOCK_HZ
         load_rule(self.p, ramp, self.zones.limits, self.clock_hz, reload=reload)
@@ -116,6 +122,8 @@ class Rig:
         switch_on(self.r, at, motor.step_angle)
         self.seconds = 0.0
         """Time of all runs so far, up to the end of the last period [s]."""
+        self._every = 0
+        self._rows: list[np.ndarray] = []
 
     @property
     def position(self) -> int:
@@ -191,9 +199,9 @@ class Rig:
         self.seconds += (self.r.timer.expires - begin) / self.clock_hz
         return self
 
-    def settle(self) -> "Rig":
+    def settle(self, seconds: float = SETTLE) -> "Rig":
         """Let the rotor come to rest."""
-        self._turn(round(SETTLE / DT))
+        self._turn(round(seconds / DT))
         return self
 
     def run(self) -> "Rig":
@@ -202,8 +210,36 @@ class Rig:
 
     def _turn(self, instants: int) -> None:
         self.r.rule.event = 0
-        advance_on_rig(self.p, self.r, *self.tables, instants, *NO_TRACE)
+        if self._every:
+            self._turn_and_log(instants)
+        else:
+            advance_on_rig(self.p, self.r, *self.tables, instants, *NO_TRACE)
         self.r.rule.event = 0
+
+    def log_steps(self, fastest_hz: float) -> "Rig":
+        """From here on note every step on the rig, none of them faster than `fastest_hz`."""
+        self._every = int(self.clock_hz / fastest_hz) // self.p.instant_ticks
+        assert self._every > 0, f"{fastest_hz} Hz leave no row between two steps"
+        return self
+
+    def _turn_and_log(self, instants: int) -> None:
+        """Row by row, often enough for every step to have one."""
+        picks, dtype = pick((*COURSE, "timer.pulses"))
+        rows = np.zeros((4096, dtype.itemsize), np.uint8)
+        while instants > 0 and not self.r.rule.event:
+            first = self.r.instant // self._every + 1
+            most = min(instants, (len(rows) - 1) * self._every)
+            instants -= advance_on_rig(self.p, self.r, *self.tables, most, rows, picks, self._every)
+            written = np.arange(first, self.r.instant // self._every + 1)
+            self._rows.append(rows[written % len(rows)].view(dtype)[:, 0])
+
+    def logged(self) -> Course:
+        """Every step on the rig since `log_steps`, each one once."""
+        rows = np.concatenate(self._rows)
+        pulses, first = np.unique(rows["timer.pulses"], return_index=True)
+        first = first[pulses > 0]
+        assert len(first) == self.r.timer.pulses, "a step has no row"
+        return course_of(rows[first], self.clock_hz, self.seconds)
 
     def edit_stop(self, position: int) -> StopEdit:
         """Move the stop extreme of the running direction between two steps."""
@@ -213,30 +249,41 @@ class Rig:
 
     def course(self, most: int = 10**7) -> Course:
         """Run without the rotor until the motor rests or an event comes; one row per step."""
-        names = ["rule.position", "rule.direction", "timer.period", "rule.index", "rule.relation", "rule.state"]
-        leaves: dict[str, Leaf] = {leaf.path: leaf for leaf in Stepper.leaves()}
-        chosen = [leaves[name] for name in names]
-        picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
-        dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])
+        picks, dtype = pick(COURSE)
         rows = np.zeros((min(most, 3 * self.zones.steps + 10), dtype.itemsize), np.uint8)
         begin, first = self.r.timer.expires, self.r.timer.pulses
         self.r.rule.event = 0
         done = advance(self.p, self.r, *self.tables, min(most, len(rows)), rows, picks, 1)
         self.r.rule.event = 0
         found = rows[np.arange(first + 1, first + done + 1) % len(rows)].view(dtype)[:, 0]
-        position, direction = found["rule.position"].copy(), found["rule.direction"].astype(np.int64)
-        return Course(
-            position=position - direction,
-            direction=direction,
-            hz=self.clock_hz / found["timer.period"],
-            index=found["rule.index"].astype(np.int64),
-            relation=found["rule.relation"].astype(np.int64),
-            state=found["rule.state"].astype(np.int64),
-            seconds=(self.r.timer.expires - begin) / self.clock_hz,
-        )
+        return course_of(found, self.clock_hz, (self.r.timer.expires - begin) / self.clock_hz)
 
 
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
+COURSE = ("rule.position", "rule.direction", "timer.period", "rule.index", "rule.relation", "rule.state")
+
+
+@cache
+def pick(names: tuple[str, ...]) -> tuple[np.ndarray, Any]:
+    """Byte offsets of registers and the type of a row of them."""
+    leaves: dict[str, Leaf] = {leaf.path: leaf for leaf in Stepper.leaves()}
+    chosen = [leaves[name] for name in names]
+    picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
+    return picks, np.dtype([(c.path, "<" + c.width.code) for c in chosen])
+
+
+def course_of(rows: np.ndarray, clock_hz: int, seconds: float) -> Course:
+    """One row per step, as a course."""
+    direction = rows["rule.direction"].astype(np.int64)
+    return Course(
+        position=rows["rule.position"] - direction,
+        direction=direction,
+        hz=clock_hz / rows["timer.period"],
+        index=rows["rule.index"].astype(np.int64),
+        relation=rows["rule.relation"].astype(np.int64),
+        state=rows["rule.state"].astype(np.int64),
+        seconds=seconds,
+    )
 
 
 def heavier(load: StepperLoad, **changes: float) -> StepperLoad:

@@ -13,8 +13,10 @@ from detent.kernel.registers import Registers
 
 PAGES = [
     ROOT / "docs" / "explanation" / name
-    for name in ("one-tick.md", "print-head.md", "phase-servo.md", "filtered-servo.md")
-]
+    for name in (
+        "one-tick.md", "print-head.md", "phase-servo.md", "filtered-servo.md", "rotary-table.md", "stepper-envelope.md",
+    )
+]  # fmt: skip
 # `module.function`, `module.Class.method`, `block.register`; a file name such as `letter.txt` has a known ending.
 DOTTED = re.compile(r"[a-z_]+(\.\w+)+")
 FILE_ENDINGS = (".toml", ".txt", ".py", ".h5", ".md", ".prn", ".html")

@@ -1,11 +1,12 @@
 """The axis file for every input: text and specification are one, and no text leads to a traceback."""
 
 import math
-from importlib.resources import files
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.bad_files import EXAMPLES as EXAMPLE_OF
+from tests.bad_files import example_text
 
 from detent.axisfile.check import check_spec
 from detent.axisfile.dump import dump_spec
@@ -15,7 +16,7 @@ from detent.axisfile.source import parse_source
 from detent.errors import InputError
 from detent.units import KINDS, QuantityError, format_quantity, parse_quantity
 
-EXAMPLES = {name: files("detent").joinpath(f"examples/{name}.toml").read_text(encoding="utf-8") for name in METHODS}
+EXAMPLES = {name: example_text(EXAMPLE_OF[name]) for name in METHODS}
 GOOD = EXAMPLES["print_head"]
 
 FRAGMENTS = [
@@ -50,6 +51,16 @@ FRAGMENTS = [
     "[disturbance.lines.burst]",
     "[method]",
     "[4, 16, 1]",
+    "[stepper]",
+    "[stepper.group_a]",
+    "[stepper.group_c.motor]",
+    "[stepper.group_a.zone.near]",
+    "[position.3]",
+    "[position]",
+    '["500 Hz", "2 kHz"]',
+    "stepper = 3",
+    "[[stepper]]",
+    '"points"',
     '"8 MHz"',
     "axis.method = 3",
     "drive = 3",
@@ -151,7 +162,9 @@ def test_any_text_gives_problems(text):
 @given(
     st.sampled_from(sorted(EXAMPLES)),
     st.lists(
-        st.text(max_size=40) | st.from_regex(r"(limits|motor|drive|method|clock|detector)\.[a-z_]{2,10}=.{0,12}"),
+        st.text(max_size=40)
+        | st.from_regex(r"(limits|motor|drive|method|clock|detector)\.[a-z_]{2,10}=.{0,12}")
+        | st.from_regex(r"(stepper\.[a-z_]{1,8}\.(limits|motor|zone\.fine)|position\.[0-9])\.[a-z_]{2,10}=.{0,12}"),
         min_size=1,
         max_size=3,
     ),

@@ -1,16 +1,29 @@
 """The rotary table for every start, every number of turns, every sequence of buttons, starts and noise."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.property.numbered_cases import asked_numbers, run_numbers
+from tests.property.table_cases import DELAY_TICKS, STROBE_TICKS, TableCase, run_table
 from tests.rotary_table_rig import COUNT, FINE, KP, ONE, RATIO, PositionerBench, Rig, T
 
-from detent.control.endless_angle import EndlessAngle, EndlessAngleParams, extend, first_angle, read_angle
+from detent.control.endless_angle import FLAG, RAW, EndlessAngle, EndlessAngleParams, extend, first_angle, read_angle
 from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
-from detent.control.table_positioner import HOLD, begin_pass, end_pass
+from detent.control.table_positioner import (
+    FLAG_FIRST,
+    HOLD,
+    REMAINING_FIRST,
+    Positioner,
+    PositionerParams,
+    begin_pass,
+    end_pass,
+    interrupt,
+)
+from detent.kernel.noise import NoiseSource, uniform
 from detent.kernel.step import step
 from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
 
@@ -20,14 +33,68 @@ FASTEST = T // 2
 
 @step
 def turn_evenly(p: EndlessAngleParams, r: EndlessAngle, start: int, rate: int, interrupts: int) -> int:
-    """Feed an even rotation; returns interrupts after which record or present angle was not exact."""
+    """Feed an even rotation from `start` counts on; returns interrupts after which an angle was not exact."""
     first_angle(r, start % p.period)
+    r.position, r.turn = start, start // p.period
     wrong = 0
     for n in range(1, interrupts + 1):
         place = start + n * rate
         read_angle(p, r, place % p.period, False)
         extend(p, r, 1)
         wrong += r.position != place or r.aar != place
+    return wrong
+
+
+@step
+def turn_at_random(p: EndlessAngleParams, r: EndlessAngle, noise: NoiseSource, drift: float, interrupts: int) -> int:
+    """Feed changes of up to half a period; returns interrupts after which an angle or the crossings were not exact."""
+    first_angle(r, 0)
+    place = crossings = wrong = 0
+    half = (p.period - 1) // 2
+    for _ in range(interrupts):
+        change = min(max(math.floor((2.0 * uniform(noise) - 1.0 + drift) * p.period / 2), -half), half)
+        crossings += abs((place + change) // p.period - place // p.period)
+        place += change
+        read_angle(p, r, place % p.period, False)
+        extend(p, r, 1)
+        wrong += r.position != place or r.aar != place or r.crossings != crossings
+    return wrong
+
+
+@step
+def every_change(p: EndlessAngleParams, r: EndlessAngle, turn: int) -> int:
+    """Feed every change that is less than half a period, from every angle; returns how many were not exact."""
+    wrong = 0
+    for d in range(p.period):
+        for change in range(-((p.period - 1) // 2), (p.period + 1) // 2):
+            first_angle(r, d)
+            place = turn * p.period + d
+            r.position, r.turn, r.crossings = place, turn, 0
+            place += change
+            read_angle(p, r, place % p.period, False)
+            extend(p, r, 1)
+            crossed = place // p.period != turn
+            wrong += r.position != place or r.aar != place or r.crossings != crossed
+    return wrong
+
+
+@step
+def jog_by_hand(p: PositionerParams, r: Positioner, lag: int, base: int, interrupts: int) -> int:
+    """Jog a table that is `lag` counts behind C, its record from `base` on; returns interrupts that were not exact."""
+    begin_pass(p, r)
+    end_pass(p, r)
+    f, home = p.interpolator.fraction, r.angle.dar
+    r.angle.position = base + home
+    way = wrong = 0
+    for n in range(1, interrupts + 1):
+        counts, left = way >> f, r.interpolator.irr
+        place = home + r.z * (counts - lag)
+        interrupt(p, r, place % p.angle.period)
+        way += left - r.interpolator.irr
+        wrong += r.angle.position != base + place or r.dr != way - ((counts - lag) << f) or abs(r.angle.turn) > 2
+        if n % 10 == 0:
+            begin_pass(p, r)
+            end_pass(p, r)
     return wrong
 
 
@@ -49,6 +116,67 @@ def test_millions_of_turns(rate):
     assert turn_evenly(p, r, 777, rate, interrupts) == 0
     assert abs(r.position) > 1_000_000 * T
     assert r.position == 777 + interrupts * rate
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("rate", [FASTEST - 1, 1 - FASTEST, 123_457, -99_991])
+def test_the_last_million_turns_before_2_62_counts(rate):
+    p, r = EndlessAngleParams(period=T), EndlessAngle()
+    interrupts, end = 6_000_000, 2**62 if rate > 0 else -(2**62)
+    assert turn_evenly(p, r, end - interrupts * rate, rate, interrupts) == 0
+    assert r.position == end
+    assert r.crossings == abs(end // T - (end - interrupts * rate) // T) > 1_000_000
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("drift", [0.0, 0.6, -0.6])
+def test_millions_of_turns_to_and_fro(drift):
+    p, r, noise = EndlessAngleParams(period=T), EndlessAngle(), NoiseSource(state=11)
+    assert turn_at_random(p, r, noise, drift, 6_000_000) == 0
+    assert r.crossings > 1_000_000
+    assert abs(r.position) > (1_000_000 * T if drift else T)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("period", [2, 3, 64, 1001])
+def test_every_wrap(period):
+    p, r = EndlessAngleParams(period=period), EndlessAngle()
+    for turn in (0, 1, -1, 2**62 // period - 1, -(2**62 // period)):
+        assert every_change(p, r, turn) == 0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("lag", [0, 2047, -5])
+@pytest.mark.parametrize("z", [1, -1])
+def test_a_jog_over_a_million_turns_that_ends_2_62_counts_from_home(z, lag):
+    bench = PositionerBench(T // 3)
+    p, r = bench.p, bench.r
+    speed, interrupts = T // 25, 25_100_000
+    p.interpolator.max_speed = r.dial = speed << p.interpolator.fraction
+    p.interpolator.acceleration = speed << p.interpolator.fraction
+    r.plus, r.minus = z > 0, z < 0
+    assert jog_by_hand(p, r, lag, z * (2**62 - speed * interrupts), interrupts) == 0
+    assert abs(2**62 - z * r.angle.position) < T
+    assert r.rollovers > 1_000_000
+    assert r.angle.crossings > 1_000_000
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("turns", [1, -1, 10**6, 2**62 // T - 10, -(2**62) // T + 10])
+def test_nothing_depends_on_how_many_turns_the_table_has_made(turns):
+    def jogged(turns):
+        rig = Rig(359.0, noise=2.0, seed=5)
+        rig.r.machine.motor.turns += turns * RATIO
+        rig.angle.position += turns * T
+        rig.press(1).run_until(2.0).release().run_until(2.5).press(-1).run_until(6.0)
+        return rig
+
+    there, here = jogged(turns), jogged(0)
+    assert there.angle.position - here.angle.position == turns * T
+    assert there.angle.crossings == here.angle.crossings >= 2
+    there.angle.position = here.angle.position
+    there.r.machine.motor.turns -= turns * RATIO
+    assert bytes(there.r) == bytes(here.r)
 
 
 @given(
@@ -216,3 +344,39 @@ def test_from_any_state_no_tick_exceeds_the_limits(velocity, oar, irr, word, sta
         assert 0 <= rig.angle.dar < T
         assert 0 <= rig.r.machine.motor.angle < 6.283185307179587
         assert rig.r.detector.fine.word < FINE
+
+
+# ------------------------------------------------------------------------------------------------------ numbered cases
+
+
+@pytest.mark.compiled
+def test_two_thousand_numbered_tables():
+    met = run_numbers(run_table, range(2000))
+    assert met["crossings"] > 2000
+    assert min(met["rollovers"], met["jogs"], met["moves"]) > 300
+
+
+@pytest.mark.long
+def test_as_many_numbered_tables_as_asked_for():
+    numbers = asked_numbers()
+    assert run_numbers(run_table, numbers)["cases"] == len(numbers) > 0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("form", "least"),
+    [({"form": FLAG}, 20), ({"form": RAW}, 100), ({"update": FLAG_FIRST}, 20), ({"update": REMAINING_FIRST}, 20)],
+)
+def test_the_judge_sees_the_jumps_of_what_is_not_robust(form, least):
+    jumps = 0
+    for number in range(300):
+        case = TableCase(number, **form)
+        if "update" in form:  # an interrupt in the middle of every pass
+            case.rig.r.clocks.task += DELAY_TICKS - case.rig.r.clocks.task % STROBE_TICKS
+            case.late = False
+        try:
+            case.run()
+            case.judge()
+        except AssertionError as error:
+            jumps += "jumps" in str(error) or "dR" in str(error)
+    assert jumps >= least

@@ -1,67 +1,63 @@
 """The stepper envelope for every motor, load, zone map, extreme and edit.
 
-The tables and the rule hold for any ramp. That no step is lost on the rig needs what specification 7.1 states as its
-reserve: a pull-out torque of 3/4 of the holding torque and a safety factor of 2 on it, friction up to a tenth of the
-holding torque, and a start frequency up to 1.46 times the natural frequency of rotor and field (400 Hz with the
-defaults). Motors are drawn inside that reserve.
+Hypothesis looks for edge cases and shrinks what it finds; thousands of numbered cases run through the rest. Motors are
+drawn inside the margin that `step_motors` states.
 """
 
-import math
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from tests.stepper_rig import A_LIN, LOAD, MAX_HZ, MOTOR, START_HZ, Rig, heavier, total_inertia
+from tests.property.numbered_cases import asked_numbers, run_numbers
+from tests.property.step_cases import (
+    PEAK_LAG,
+    StepCase,
+    assert_feasible,
+    judge_steps,
+    run_case,
+    speed_limits,
+    tables_of,
+)
+from tests.property.step_motors import START, Axis, is_inside_margin, spare_acceleration
+from tests.stepper_rig import A_LIN, LOAD, MAX_HZ, MOTOR, RAMP, Rig, heavier
 
 from detent.control.step_rule import FAULT, REST
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
-from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp
+from detent.planning.step_ramp import StepperMotor, acceleration_limit, make_ramp, natural_frequency
 
 MOST = 700
 """Steps of a travel."""
-
-NATURAL_HZ = math.sqrt(50 * MOTOR.holding_torque / total_inertia(MOTOR, LOAD)) / (2 * math.pi)
-START_RESERVE = START_HZ / NATURAL_HZ
-PEAK_LAG = 2.0
-"""Steps at which the torque curve falls back: a rotor that stays inside has lost nothing."""
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A motor inside the reserve, its load and its ramp."""
-
-    motor: StepperMotor
-    load: StepperLoad
-    ramp: StepRamp
 
 
 @st.composite
 def axes(draw: st.DrawFn) -> Axis:
     """Any size of motor: torque, inertia, current rise, friction, load."""
     torque = draw(st.floats(0.02, 2.0))
-    friction = draw(st.floats(0.0, 0.1)) * torque
     inertia = draw(st.floats(0.3, 3.0)) * MOTOR.rotor_inertia * torque / MOTOR.holding_torque
-    pull_out = FirstOrderPullOut(0.75 * torque, draw(st.floats(600.0, 2400.0)))
-    motor = StepperMotor(200, inertia, torque, pull_out, 900.0)
     load = heavier(
         LOAD,
         spindle_inertia=draw(st.floats(0.0, 3.0)) * inertia,
         coupling_inertia=0.0,
-        friction_torque=friction,
+        friction_torque=draw(st.floats(0.0, 0.1)) * torque,
         mass=0.0,
     )
-    natural = math.sqrt(50 * torque / total_inertia(motor, load)) / (2 * math.pi)
-    start = draw(st.floats(0.3, START_RESERVE)) * natural
+    natural = natural_frequency(200, torque, inertia + load.inertia)
+    pull_out = FirstOrderPullOut(0.75 * torque, draw(st.floats(3.1, 12.0)) * natural)
+    motor = StepperMotor(200, inertia, torque, pull_out, 900.0)
+    start = draw(st.floats(0.3, START)) * natural
     top = start * draw(st.floats(1.0, 12.0))
-    acceleration = acceleration_limit(motor, load, draw(st.floats(0.1, 1.5)) * A_LIN)
+    spare = spare_acceleration(motor, load, top)
+    assume(spare > 0)
+    acceleration = acceleration_limit(motor, load, draw(st.floats(0.05, 1.5)) * spare)
     assume(acceleration(start) > 0)
     ramp = make_ramp(start, top, acceleration)
     assume(len(ramp) <= MAX_RAMP)
-    return Axis(motor, load, ramp)
+    assume(is_inside_margin(motor, load, ramp))
+    return Axis(motor, load, ramp, natural, top)
 
 
 @st.composite
@@ -72,35 +68,6 @@ def zone_lists(draw: st.DrawFn, steps: int, top: float) -> tuple[Zone, ...]:
     if draw(st.booleans()):
         places = list(pairwise(edges))[:4]
     return tuple(Zone(begin, end, max(1.0, top * draw(st.floats(0.02, 1.1)))) for begin, end in places)
-
-
-def speed_limits(zones: ZoneMap) -> np.ndarray:
-    """Limit of every step, shape (N,) [Hz]."""
-    limit = np.full(zones.steps, zones.max_hz)
-    for zone in zones.zones:
-        limit[zone.begin : zone.end] = zone.max_hz
-    return limit
-
-
-def assert_feasible(table: StepEnvelope) -> None:
-    """No entry above its limit; on the way no index rises or falls by more than one; the first and last are 0."""
-    along = slice(None, None, table.direction)
-    index, hz = table.indices()[along], table.permissible_hz()[along]
-    limit = speed_limits(table.zones)[along]
-    n = table.steps
-    start = table.start if table.direction > 0 else n - table.start
-    stop = table.stop if table.direction > 0 else n - table.stop
-    assert (hz <= np.minimum(limit, table.ramp.hz[-1])).all()
-    if start < stop:
-        run = index[start:stop]
-        assert run[0] == run[-1] == 0
-    if stop < n:
-        assert index[stop] == -1
-    # Beyond the extremes too, for whoever starts there: from behind the start, and from the stop to the travel's end.
-    for run in (index[:stop], index[stop + 1 :]):
-        assert (run >= 0).all()
-        assert np.abs(np.diff(run)).max(initial=0) <= 1
-        assert run[-1:].tolist() in ([], [0])
 
 
 @settings(max_examples=300, derandomize=True)
@@ -136,7 +103,7 @@ def make_rig(draw: st.DataObject, axis: Axis, steps: int, zones: tuple[Zone, ...
         motor=axis.motor,
         load=axis.load,
         reload=draw.draw(st.booleans(), label="reload"),
-        pause=draw.draw(st.integers(0, 1), label="pause"),
+        pause=draw.draw(st.integers(int(axis.must_wait), 1), label="pause"),
     )
 
 
@@ -182,6 +149,79 @@ def test_no_step_is_lost_and_every_stop_is_on_its_place(data):
 @pytest.mark.long
 def test_no_step_is_lost_and_every_stop_is_on_its_place_two_thousand_times(data):
     run_once(data, data.draw(axes()))
+
+
+# ------------------------------------------------------------------------------------------------------ numbered cases
+
+KINDS = (
+    "FirstOrderPullOut",
+    "WindingPullOut",
+    "MeasuredPullOut",
+    "reload",
+    "overrun",
+    "inwards",
+    "outwards",
+    "inwards braking",
+    "outwards braking",
+    "edit at rest",
+    "start moved on the way",
+    "turned about at speed",
+    "let go",
+)
+
+
+def test_the_default_motor_lies_inside_the_margin_and_not_far_inside():
+    assert is_inside_margin(MOTOR, LOAD, RAMP)
+    assert not is_inside_margin(MOTOR, heavier(LOAD, friction_torque=0.0061), RAMP)
+    assert not is_inside_margin(MOTOR, heavier(LOAD, spindle_inertia=1.5e-7), RAMP)
+    assert not is_inside_margin(MOTOR, LOAD, make_ramp(410, MAX_HZ, acceleration_limit(MOTOR, LOAD, A_LIN)))
+    assert not is_inside_margin(replace(MOTOR, pull_out=FirstOrderPullOut(0.045, 800.0)), LOAD, RAMP)
+
+
+@pytest.mark.compiled
+def test_two_thousand_numbered_steppers():
+    met = run_numbers(run_case, range(2000))
+    assert met["legs"] > 2000
+    assert {kind: met[kind] for kind in KINDS if met[kind] < 50} == {}
+
+
+@pytest.mark.long
+def test_as_many_numbered_steppers_as_asked_for():
+    numbers = asked_numbers()
+    assert run_numbers(run_case, numbers)["cases"] == len(numbers) > 0
+
+
+@pytest.mark.compiled
+def test_the_judge_sees_what_is_lost_four_times_as_fast():
+    lost = 0
+    for number in range(100):
+        case = StepCase(number)
+        case.rig.p.instant_ticks *= 4
+        try:
+            case.run()
+        except AssertionError as error:
+            lost += "lost" in str(error) or "lagged" in str(error)
+    assert lost > 40
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("field", "change", "fault"),
+    [
+        ("hz", lambda hz: hz * 1.001, "faster than its zone"),
+        ("index", lambda index: index + 1, "at speed"),
+        ("index", lambda index: 2 * index, "more than one"),
+        ("position", lambda position: position + 1, "leaves the travel"),
+        ("state", lambda state: np.where(state == state[0], FAULT, state), "a fault"),
+    ],
+)
+def test_the_judge_sees_a_step_that_is_not_allowed(field, change, fault):
+    rig = Rig(100, [Zone(30, 50, 700.0)]).log_steps(MAX_HZ)
+    rig.start().run()
+    course, tables = rig.logged(), [tables_of(rig)]
+    judge_steps(rig, course, [0, 100], tables)
+    with pytest.raises(AssertionError, match=fault):
+        judge_steps(rig, replace(course, **{field: change(getattr(course, field))}), [0, 100], tables)
 
 
 @settings(max_examples=200, derandomize=True)

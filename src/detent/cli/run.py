@@ -46,7 +46,7 @@ Every = Annotated[
         min=0,
         max=10_000_000,
         help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us, rotary table "
-        "100 us, steppers 2 us); 0 records nothing. Default: 10, 256, 10, 20, 50.",
+        "100 us, steppers 2 us); 0 records nothing. Default: 10, 256, 10, 20, 100.",
     ),
 ]
 TraceKinds = Annotated[

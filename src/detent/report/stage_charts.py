@@ -236,7 +236,11 @@ def _torque_charts(torques: StepTorques) -> list[Chart]:
     available, needed = torques.available[kept] * MILLI, torques.needed[kept] * MILLI
     planned: list[list[Curve]] = [[], []]
     if torques.safety > 1:
-        look: dict[str, Any] = {"label": f"planned with {stated(torques.safety)}", "colour": "left", "dash": (6, 4)}
+        look: dict[str, Any] = {
+            "label": f"planned with a reserve of {stated(torques.safety)}",
+            "colour": "left",
+            "dash": (6, 4),
+        }
         planned = [[Curve(y=available / torques.safety, **look)], [Curve(y=np.full(len(kept), torques.safety), **look)]]
     torque = Panel(
         name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(torques.available * MILLI)),

@@ -219,7 +219,7 @@ def _stepper_envelope(spec: StepperEnvelopeSpec) -> Simulated:
     return Simulated(
         registers=stage_registers(spec),
         tick=instant(spec),
-        every=50,
+        every=100,
         seed=0,
         signals=stage_signals(spec),
         timing=tuple(f"{name}.{signal}" for name in names for signal in STEPPER_TIMING),

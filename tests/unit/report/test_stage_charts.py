@@ -121,12 +121,12 @@ def test_torque_is_drawn_over_the_steps_of_the_move() -> None:
     assert torque["x"] == margin["x"] == [1.0, 2.0, 3.0]
     assert curves_of(torque) == {
         "pull-out torque": [40.0, 15.0, 40.0],
-        "planned with 2": [20.0, 7.5, 20.0],
+        "planned with a reserve of 2": [20.0, 7.5, 20.0],
         "torque needed": [10.0, 6.0, 0.0],
     }
     # A step that needs nothing has no margin that could be drawn.
     assert curves_of(margin) == {
-        "planned with 2": [2.0, 2.0, 2.0],
+        "planned with a reserve of 2": [2.0, 2.0, 2.0],
         "pull-out torque / torque needed": [4.0, 2.5, None],
     }
     assert [level["y"] for level in margin["levels"]] == [1.0]

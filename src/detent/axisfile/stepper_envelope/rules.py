@@ -259,9 +259,9 @@ def _slower(table: StepperTable, key: str) -> str:
     """Remedy for a speed that is far too large: the largest that words and torque allow."""
     bound = MAX_HZ * table.step
     slow = changed(table, "limits.speed", bound * (1 - BARELY))
-    if not is_drivable(slow) or ramp_fits(slow):
-        return offer(StepperEnvelopeSpec, f"{key}.limits.speed", at_most(bound, "m/s"))
-    return slower(slow, key) or "check the units of speed and lead"
+    fitting = not is_drivable(slow) or ramp_fits(slow)
+    found = offer(StepperEnvelopeSpec, f"{key}.limits.speed", at_most(bound, "m/s")) if fitting else slower(slow, key)
+    return found or "check the units of speed and lead"
 
 
 @per_motor

@@ -284,6 +284,13 @@ def test_a_zone_between_two_others_in_one_step_leaves_it_to_the_slowest():
     ]
 
 
+def test_a_zone_shorter_than_a_step_yields_to_a_slower_one_in_it():
+    up, _ = zones_of(
+        ("near", {"begin": "15.0005 mm", "end": "15.002 mm", "speed": "9 mm/s"}), ("far", {"begin": "15.002 mm"})
+    )
+    assert [(zone.begin, zone.end) for zone in up] == [(3000, 6000)]
+
+
 def test_as_many_zones_as_may_be_have_room_for_their_limits():
     texts = [
         f"{A}.zone.z{k}.{key}={value}"

@@ -101,6 +101,12 @@ def test_a_travel_that_is_no_whole_number_of_steps_says_how_long_it_is(load_text
     assert (row.value, row.text) == (8000, "8000 steps, 40 mm")
 
 
+def test_indices_of_a_long_ramp_need_more_than_eight_bits(load_text, good_text):
+    rows = rows_of(load_text(good_text, f"{A}.limits.acceleration=0.1 m/s^2"), "group_a")
+    assert rows["ramp"].value > 255
+    assert rows["memory of the tables"].text == "32000 bytes"
+
+
 def test_electrical_figures_are_those_of_a_known_winding(load_text, good_text, stage_text):
     assert not [name for name in rows_of(load_text(good_text), "group_a") if "winding" in name or "current" in name]
     rows = rows_of(load_text(stage_text, f"{X}.drive.bridge_resistance=1.3 ohm", f"{X}.drive.current=800 mA"), "x")

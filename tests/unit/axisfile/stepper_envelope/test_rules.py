@@ -390,6 +390,15 @@ ZONES = [
         remedy=f'set {A}.zone.near.begin = "12.995 mm"',
     ),
     given(
+        "zone with both ends off the travel",
+        "zone.near.begin=50 mm",
+        "zone.near.end=45 mm",
+        key="zone.near.end",
+        came="45 mm",
+        allowed="above the zone's begin, 50 mm",
+        remedy="correct begin and end",
+    ),
+    given(
         "zone that ends off the travel",
         "zone.far.end=41 mm",
         key="zone.far.end",
@@ -536,6 +545,12 @@ def test_the_slowest_step_is_one_a_second(stage_text, load_text):
     (problem,) = caught.value.problems
     assert problem.remedy == f'set {X}.limits.speed = "5 um/s"'
     load_text(stage_text, f"{X}.limits.speed=5 um/s")
+
+
+def test_the_fastest_step_of_a_motor_of_unknown_torque_is_that_of_the_words(good_text, load_text):
+    with pytest.raises(InputError) as caught:
+        load_text(good_text, f"{A}.{POINTS}", f"{A}.limits.speed=1 m/s")
+    assert caught.value.problems[0].remedy == f'set {A}.limits.speed = "327.6 mm/s"'
 
 
 def test_each_motor_has_its_own_problems(good_text, load_text):
