@@ -226,7 +226,7 @@ class StepEnvelope:
         return max(end - begin, 0)
 
     def move_start(self, position: int) -> int:
-        """Move the start extreme; the motor must not be running towards it.
+        """Move the start extreme; a motor that runs must be at least its ramp index away from the new place.
 
         Parameters
         ----------

@@ -256,7 +256,8 @@ def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], fl
     Returns
     -------
     StepRamp
-        At least one entry. It ends below `max_hz` where a step gains less than 0.5 Hz.
+        At least one entry. It ends below `max_hz` where a step gains less than 0.5 Hz, or where the frequency after it
+        could not be held.
 
     Raises
     ------
@@ -278,7 +279,9 @@ def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], fl
         predicted = sqrt(max(square + 2 * acceleration(hz), 0.0))
         square += 2 * acceleration(min(max_hz, (hz + predicted) / 2))
         gained = min(max_hz, sqrt(max(square, 0.0)))
-        if gained - hz < LEAST_GAIN_HZ and gained < max_hz:
+        # A measured curve may end, or the motor's own voltage take the torque away, within one step.
+        spent = gained - hz < LEAST_GAIN_HZ and gained < max_hz
+        if spent or acceleration(gained) < 0:
             break
         found.append(gained)
     return StepRamp(np.array(found))

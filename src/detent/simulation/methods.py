@@ -212,7 +212,7 @@ def _stepper_envelope(spec: StepperEnvelopeSpec) -> Simulated:
     def sample_job() -> StageJob:
         ways: dict[str, float] = {}
         for name, table in spec.stepper.items():
-            start = table.step_at(table.mechanics.start_position)
+            start = table.step_inside(table.mechanics.start_position)
             ways[name] = table.position_of(min(start + 200, table.steps))
         return StageJob("one move of 200 steps", "moves", (StageMove(1, 0, targets=ways),), names, ())
 

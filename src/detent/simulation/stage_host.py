@@ -63,8 +63,8 @@ class StageHost:
             motor = self.stage.motors[name]
             goal = move.targets[name] if name in move.targets else self.goal[name] + move.by[name]
             self.goal[name] = goal
-            turn = None if move.turn is None else motor.table.step_at(move.turn)
-            leg = Leg(motor.position, motor.table.step_at(goal), turn)
+            turn = None if move.turn is None else motor.table.step_inside(move.turn)
+            leg = Leg(motor.position, motor.table.step_inside(goal), turn)
             if leg.steps:
                 found[name] = leg
         return found
@@ -121,7 +121,7 @@ class StageHost:
         if over:  # the stop it was given lay behind the nearest possible one: come back to it
             (name,) = over
             motor = self.stage.motors[name]
-            back = {name: Leg(motor.position, motor.table.step_at(self.goal[name]))}
+            back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
             if back[name].steps:
                 self.start(back)
                 self.wait(back)
@@ -131,7 +131,7 @@ class StageHost:
         """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
         motor = self.stage.motors[name]
         rule = motor.r.rule
-        motor.r.stop_at = motor.table.step_at(at)
+        motor.r.stop_at = motor.table.step_inside(at)
         late = self.stage.wait_for([name], 1.0 + 2.0 * motor.table.steps / self._slowest(name))
         motor.r.stop_at = NOWHERE
         if late or motor.resting:
@@ -139,7 +139,7 @@ class StageHost:
             return False
         rule.event = 0
         ahead, behind = _tables(motor, rule.direction)
-        edit = ahead.move_stop(motor.table.step_at(to), rule.position, rule.index)
+        edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
         behind.move_start(edit.stop)
         self.goal[name] = to
         return edit.overrun
@@ -212,7 +212,9 @@ def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[FileProb
 
 
 def _place_problems(table: StepperTable, where: tuple[str, int, str], place: float) -> Iterator[FileProblem]:
-    if math.isnan(place) or 0 <= table.step_at(place) <= table.steps:
+    # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.
+    end = max(table.steps * table.step, table.limits.travel) + table.step / 2
+    if math.isnan(place) or -table.step / 2 <= place - table.mechanics.lower_end <= end:
         return
     lower, upper = format_quantity(table.mechanics.lower_end, "m"), format_quantity(table.upper_end, "m")
     nearest = lower if place < table.mechanics.lower_end else upper

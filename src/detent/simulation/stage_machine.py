@@ -55,7 +55,7 @@ class StageMotor:
         self.p = build_stepper(spec, name, self.tables)
         # ctypes gives every register its type at run time only.
         self.r: Any = Stepper()
-        switch_on(self.r, self.table.step_at(self.table.mechanics.start_position), self.p.rotor.step_angle)
+        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.rotor.step_angle)
         self.rows, self.picks = _NO_ROWS
         self.rested = 0.0
         """When its last step was over [s], at the last event."""

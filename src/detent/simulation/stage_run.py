@@ -254,7 +254,7 @@ def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, o
         "stop": motor.place,
         "settled": r.outside * host.stage.tick,
         "steps": pulses,
-        "missed": table.step_at(host.goal[name]) - motor.position,
+        "missed": table.step_inside(host.goal[name]) - motor.position,
         "lost": lost,
         "rest_lag": float(r.rotor.lag),
         "peak_lag": float(r.rotor.peak_lag),

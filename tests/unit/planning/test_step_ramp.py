@@ -1,9 +1,11 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.stepper_rig import LOAD, MOTOR, heavier
+from tests.stepper_rig import LOAD, MOTOR, Rig, heavier
 
+from detent.planning.pull_out import MeasuredPullOut
 from detent.planning.step_ramp import (
     StepperLoad,
     StepperMotor,
@@ -98,6 +100,16 @@ def test_bad_figures_are_refused():
         acceleration_limit(MOTOR, LOAD, 0)
     with pytest.raises(ValueError, match=r"safety_factor is 0\.9"):
         acceleration_limit(MOTOR, LOAD, 1, 0.9)
+
+
+def test_a_ramp_ends_where_the_torque_does_even_within_a_step():
+    """Acceleration is taken at the middle of a step: the ramp once climbed past the end of a measured curve."""
+    hz = [0.0, 500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0]
+    ends = replace(MOTOR, pull_out=MeasuredPullOut(hz, [MOTOR.pull_out(f) for f in hz]))
+    ramp = make_ramp(400.0, 4000.0, acceleration_limit(ends, LOAD, 40_000.0))
+    assert 2980 < ramp.hz[-1] <= 3000
+    rig = Rig(2000, ramp=ramp, motor=ends).start().run()
+    assert rig.lost == 0
 
 
 def test_the_unloaded_start_frequency_of_the_default_motor_is_three_times_its_natural_one():

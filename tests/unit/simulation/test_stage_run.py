@@ -206,3 +206,15 @@ def test_progress_is_told(spec):
     moves = (StageMove(1, 1, by={"group_a": 0.1 * MM}), StageMove(2, 2, by={"group_a": 0.1 * MM}))
     run_stage(spec, job(*moves), progress=lambda share, _: told.append(share))
     assert told == [0.5, 1.0]
+
+
+def test_the_end_of_a_travel_that_is_no_whole_number_of_steps_is_its_last_step(spec):
+    """A target at limits.travel was refused where the last whole step lies before it."""
+    table = spec.stepper["group_b"]
+    limits = table.limits.model_copy(update={"travel": 30 * MM + 4e-6})
+    odd = spec.model_copy(update={"stepper": spec.stepper | {"group_b": table.model_copy(update={"limits": limits})}})
+    run = run_stage(odd, job(StageMove(1, 1, targets={"group_b": 30 * MM + 4e-6})))
+    assert run.done, run.failure
+    assert run.moves[0].motors["group_b"].stop == pytest.approx(30 * MM)
+    with pytest.raises(InputError, match=r"30\.02 mm"):
+        run_stage(odd, job(StageMove(1, 1, targets={"group_b": 30.02 * MM})))
