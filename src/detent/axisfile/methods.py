@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from detent.axisfile.catalogue import DC_MOTORS, STEPPER_MOTORS, Catalogue
@@ -79,18 +80,13 @@ class Method(Generic[SpecT]):
     parameters: Callable[[], type[Registers]]
 
 
-def _print_head_registers() -> type[Registers]:
-    """State of the print head."""
-    from detent.systems.print_head import PrintHead
+def _system(module: str, name: str) -> Callable[[], type[Registers]]:
+    """What loads a class of a system when it is called."""
 
-    return PrintHead
+    def load() -> type[Registers]:
+        return getattr(import_module(f"detent.systems.{module}"), name)
 
-
-def _print_head_parameters() -> type[Registers]:
-    """Parameters of the print head."""
-    from detent.systems.print_head import PrintHeadParams
-
-    return PrintHeadParams
+    return load
 
 
 PRINT_HEAD = Method(
@@ -102,23 +98,9 @@ PRINT_HEAD = Method(
     derive=derive_print_head,
     cautions=find_print_head_cautions,
     catalogue=DC_MOTORS,
-    registers=_print_head_registers,
-    parameters=_print_head_parameters,
+    registers=_system("print_head", "PrintHead"),
+    parameters=_system("print_head", "PrintHeadParams"),
 )
-
-
-def _phase_servo_registers() -> type[Registers]:
-    """State of the phase servo."""
-    from detent.systems.phase_servo import PhaseServo
-
-    return PhaseServo
-
-
-def _phase_servo_parameters() -> type[Registers]:
-    """Parameters of the phase servo."""
-    from detent.systems.phase_servo import PhaseServoParams
-
-    return PhaseServoParams
 
 
 PHASE_SERVO = Method(
@@ -130,23 +112,9 @@ PHASE_SERVO = Method(
     derive=derive_phase_servo,
     cautions=find_phase_servo_cautions,
     catalogue=DC_MOTORS,
-    registers=_phase_servo_registers,
-    parameters=_phase_servo_parameters,
+    registers=_system("phase_servo", "PhaseServo"),
+    parameters=_system("phase_servo", "PhaseServoParams"),
 )
-
-
-def _filtered_servo_registers() -> type[Registers]:
-    """State of the filtered servo."""
-    from detent.systems.filtered_servo import FilteredServo
-
-    return FilteredServo
-
-
-def _filtered_servo_parameters() -> type[Registers]:
-    """Parameters of the filtered servo."""
-    from detent.systems.filtered_servo import FilteredServoParams
-
-    return FilteredServoParams
 
 
 FILTERED_SERVO = Method(
@@ -158,23 +126,9 @@ FILTERED_SERVO = Method(
     derive=derive_filtered_servo,
     cautions=find_filtered_servo_cautions,
     catalogue=DC_MOTORS,
-    registers=_filtered_servo_registers,
-    parameters=_filtered_servo_parameters,
+    registers=_system("filtered_servo", "FilteredServo"),
+    parameters=_system("filtered_servo", "FilteredServoParams"),
 )
-
-
-def _rotary_table_registers() -> type[Registers]:
-    """State of a rotary table."""
-    from detent.systems.rotary_table import RotaryTable
-
-    return RotaryTable
-
-
-def _rotary_table_parameters() -> type[Registers]:
-    """Parameters of a rotary table."""
-    from detent.systems.rotary_table import RotaryTableParams
-
-    return RotaryTableParams
 
 
 ROTARY_TABLE = Method(
@@ -186,23 +140,9 @@ ROTARY_TABLE = Method(
     derive=derive_rotary_table,
     cautions=find_rotary_table_cautions,
     catalogue=None,
-    registers=_rotary_table_registers,
-    parameters=_rotary_table_parameters,
+    registers=_system("rotary_table", "RotaryTable"),
+    parameters=_system("rotary_table", "RotaryTableParams"),
 )
-
-
-def _stepper_envelope_registers() -> type[Registers]:
-    """State of one motor."""
-    from detent.systems.stepper import Stepper
-
-    return Stepper
-
-
-def _stepper_envelope_parameters() -> type[Registers]:
-    """Parameters of one motor."""
-    from detent.systems.stepper import StepperParams
-
-    return StepperParams
 
 
 STEPPER_ENVELOPE = Method(
@@ -214,8 +154,8 @@ STEPPER_ENVELOPE = Method(
     derive=derive_stepper_envelope,
     cautions=find_stepper_envelope_cautions,
     catalogue=STEPPER_MOTORS,
-    registers=_stepper_envelope_registers,
-    parameters=_stepper_envelope_parameters,
+    registers=_system("stepper", "Stepper"),
+    parameters=_system("stepper", "StepperParams"),
 )
 
 METHODS: dict[str, Method[Any]] = {
