@@ -36,9 +36,7 @@ def envelope(
     chosen = {motor: found[motor]} if motor else found
     folder = output or Path("envelope") / file.stem
     _make_folder(folder)
-    written = {
-        name: [tables.save(folder / f"{name}.{kind}") for kind in KINDS] for name, tables in chosen.items()
-    }
+    written = {name: [tables.save(folder / f"{name}.{kind}") for kind in KINDS] for name, tables in chosen.items()}
     if as_json:
         print_json({name: chosen[name].to_dict() | {"files": [str(f) for f in written[name]]} for name in chosen})
         return

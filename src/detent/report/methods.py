@@ -69,9 +69,7 @@ def report_of(
         from detent.report.table_page import write_table_report
         from detent.report.table_report import sequence_report
 
-        table = sequence_report(
-            spec, result, trace, comparison=_first(comparisons, AngleComparison), settings=settings
-        )
+        table = sequence_report(spec, result, trace, comparison=_first(comparisons, AngleComparison), settings=settings)
         return lambda path: write_table_report(table, path)
     if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
         return _stage_report(spec, result, trace, comparisons, settings)
@@ -89,9 +87,7 @@ def _stage_report(
     from detent.report.stage_report import stage_report
 
     steps = tuple(found for found in comparisons if isinstance(found, StepComparison))
-    data = stage_report(
-        spec, result, trace, steps=steps, jerk=_first(comparisons, JerkComparison), settings=settings
-    )
+    data = stage_report(spec, result, trace, steps=steps, jerk=_first(comparisons, JerkComparison), settings=settings)
     return lambda path: write_stage_report(data, path)
 
 
