@@ -1,0 +1,143 @@
+"""Position and velocity loop of a servo axis, sampled: cascade (P over P or PI) or position PID, with feed-forward.
+
+    cascade   velocity demand = K_p e + w v_ref, limited;   u = K_v e_v + I + FF,   I' = K_i e_v
+    PID       u = K_p e + I + K_d filtered(w v_ref - v_meas) + FF,                  I' = K_i e
+
+e = ref - meas throughout; e_v is the velocity demand less the measured velocity; w is the share of the reference's
+velocity that is fed forward (in the PID: 0 the derivative acts on the measurement, 1 on the error). FF is what the
+plant needs to follow: acceleration, viscous and Coulomb friction, weight.
+
+The command is limited, and the integral then does not wind up: it does not integrate what would drive the command
+further beyond its limit (clamping). Back-calculation would need one more time constant, which
+nobody measures, and discharges an integral that holds a weight as soon as a fast move touches the limit.
+
+References
+----------
+Astrom, Hagglund: Advanced PID Control (2006), sections 3.3 (derivative filter), 3.5 (windup, conditional integration).
+Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feed-forward).
+"""
+
+import math
+
+from detent.kernel.registers import Registers, block, f8, register, u1
+from detent.kernel.step import step
+
+
+class VelocityLoopParams(Registers):
+    """Gains of the cascade."""
+
+    position_gain: f8 = register("velocity demand per position error", unit="1/s")
+    max_velocity: f8 = register("limit of the velocity demand", unit="m/s")
+    velocity_gain: f8 = register("command per velocity error", unit="V.s/m")
+    integral_gain: f8 = register("command per velocity error and time; 0: P, not PI", unit="V/m")
+
+
+class PidParams(Registers):
+    """Gains of the position PID."""
+
+    proportional: f8 = register("command per position error", unit="V/m")
+    integral: f8 = register("command per position error and time", unit="V/(m.s)")
+    derivative: f8 = register("command per velocity error", unit="V.s/m")
+    smoothing: f8 = register("part of a new velocity error that is taken over at a sample; 1: no filter", unit="1")
+
+
+class FeedForwardParams(Registers):
+    """Command that the reference needs, by the model of the plant."""
+
+    velocity: f8 = register("share of the reference's velocity in the velocity demand", unit="1")
+    acceleration: f8 = register("command per acceleration", unit="V.s2/m")
+    viscous: f8 = register("command per velocity", unit="V.s/m")
+    coulomb_positive: f8 = register("command against Coulomb friction moving in the positive direction", unit="V")
+    coulomb_negative: f8 = register("command against Coulomb friction moving in the negative direction", unit="V")
+    dead_band: f8 = register("velocity up to which there is none against Coulomb friction", unit="m/s")
+    weight: f8 = register("command that holds the weight", unit="V")
+    pendulum: f8 = register("command that holds a hanging load at a quarter turn", unit="V")
+
+
+class CascadeLawParams(Registers):
+    """Constants of the law; its command is in volts, or in whatever the amplifier takes."""
+
+    period: f8 = register("time between two samples", unit="s")
+    position_pid: u1 = register("0 cascade, 1 position PID")
+    cascade: VelocityLoopParams = block("position P over velocity P or PI")
+    pid: PidParams = block("position PID")
+    feed_forward: FeedForwardParams = block("feed-forward")
+    max_command: f8 = register("limit of the command", unit="V")
+
+
+class CascadeReference(Registers):
+    """What the axis should do at this sample."""
+
+    position: f8 = register("position", unit="m")
+    velocity: f8 = register("velocity", unit="m/s")
+    acceleration: f8 = register("acceleration", unit="m/s2")
+
+
+class CascadeLaw(Registers):
+    """What the law has computed at the last sample."""
+
+    position_error: f8 = register("reference less measured position", unit="m")
+    velocity_error: f8 = register("velocity demand less measured velocity; in the PID as filtered", unit="m/s")
+    integral: f8 = register("integral part of the command", unit="V")
+    feed_forward: f8 = register("feed-forward part of the command", unit="V")
+    command: f8 = register("command", unit="V")
+    limited: u1 = register("1 while the command is at its limit")
+
+
+@step
+def coulomb_part(p: FeedForwardParams, velocity: float) -> float:
+    """Command against Coulomb friction at a velocity of the reference [V]."""
+    if velocity > p.dead_band:
+        return p.coulomb_positive
+    return -p.coulomb_negative if velocity < -p.dead_band else 0.0
+
+
+@step
+def feed_forward(p: FeedForwardParams, ref: CascadeReference) -> float:
+    """Command that the plant needs to follow the reference [V]."""
+    weight = p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * math.sin(ref.position)
+    moving = p.viscous * ref.velocity + coulomb_part(p, ref.velocity)
+    return p.acceleration * ref.acceleration + moving + weight
+
+
+@step
+def limit_command(p: CascadeLawParams, r: CascadeLaw, rest: float, increment: float) -> None:
+    """Command of the integral, its `increment` [V] and the `rest` [V], without windup."""
+    command = rest + r.integral + increment
+    r.limited = 1 if abs(command) > p.max_command else 0
+    if command > p.max_command:
+        increment = min(increment, max(p.max_command - rest - r.integral, 0.0))
+    elif command < -p.max_command:
+        increment = max(increment, min(-p.max_command - rest - r.integral, 0.0))
+    r.integral += increment
+    r.command = min(max(command, -p.max_command), p.max_command)
+
+
+@step
+def control_cascade(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float) -> None:
+    """Cascade: the velocity loop at a demand [m/s] and a measured velocity [m/s]."""
+    g = p.cascade
+    r.velocity_error = min(max(demand, -g.max_velocity), g.max_velocity) - velocity
+    rest = g.velocity_gain * r.velocity_error + r.feed_forward
+    limit_command(p, r, rest, g.integral_gain * p.period * r.velocity_error)
+
+
+@step
+def control_pid(p: CascadeLawParams, r: CascadeLaw, demand: float, velocity: float) -> None:
+    """Position PID; `demand` is the velocity that its derivative does not act against [m/s]."""
+    g = p.pid
+    r.velocity_error += g.smoothing * (demand - velocity - r.velocity_error)
+    rest = g.proportional * r.position_error + g.derivative * r.velocity_error + r.feed_forward
+    limit_command(p, r, rest, g.integral * p.period * r.position_error)
+
+
+@step
+def control(p: CascadeLawParams, r: CascadeLaw, ref: CascadeReference, position: float, velocity: float) -> None:
+    """One sample, from measured position [m] and velocity [m/s] to the command."""
+    r.position_error = ref.position - position
+    r.feed_forward = feed_forward(p.feed_forward, ref)
+    fed = p.feed_forward.velocity * ref.velocity
+    if p.position_pid:
+        control_pid(p, r, fed, velocity)
+    else:
+        control_cascade(p, r, p.cascade.position_gain * r.position_error + fed, velocity)

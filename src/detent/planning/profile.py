@@ -1,0 +1,345 @@
+"""What an axis should do, sample by sample: moves of limited speed, acceleration and jerk, or a recording.
+
+A move from rest to rest is time-optimal within its limits, worked out by ruckig (MIT licence); with an infinite jerk it
+is a trapezoid. It begins at a sample; its end, which mostly lies between two, is reached at the next.
+
+References
+----------
+Berscheid, Kroeger: Jerk-limited Real-time Trajectory Generation with Arbitrary Target States. RSS 2021.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from detent.errors import DetentError
+from detent.planning.move_job import MoveJob
+
+Numbers = NDArray[np.float64]
+
+MOST_SAMPLES = 10_000_000
+"""Samples of a profile at most: nearly three hours at 1 kHz, 240 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """What a move may do.
+
+    Attributes
+    ----------
+    speed : float
+        [m/s], above 0 and finite.
+    acceleration : float
+        [m/s^2], above 0 and finite.
+    jerk : float
+        [m/s^3], above 0; infinite for a trapezoid of the speed.
+
+    Raises
+    ------
+    DetentError
+        A limit is outside what is said above.
+    """
+
+    speed: float
+    acceleration: float
+    jerk: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Refuse what no axis could do."""
+        for name, unit in (("speed", "m/s"), ("acceleration", "m/s^2")):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise DetentError(f"limit of a move: {name} {value} {unit}, must be above 0 and finite")
+        if not self.jerk > 0.0:
+            raise DetentError(f"limit of a move: jerk {self.jerk} m/s^3, must be above 0; infinite for a trapezoid")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """A reference, one entry per sample.
+
+    Attributes
+    ----------
+    period : float
+        Time between two samples [s].
+    position, velocity, acceleration : ndarray
+        [m], [m/s], [m/s^2], shape (samples,), contiguous float64.
+    """
+
+    period: float
+    position: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return len(self.position)
+
+    @property
+    def t(self) -> Numbers:
+        """Time of each sample [s]."""
+        return np.arange(self.count, dtype=np.float64) * self.period
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMove:
+    """Where a move of a job lies in its profile.
+
+    Attributes
+    ----------
+    number : int
+        Of the move in the job, from 1.
+    start, target : float
+        [m].
+    begin : int
+        Sample at which it begins.
+    end : int
+        First sample at which the reference stands at the target.
+    until : int
+        First sample behind its dwell; here the next move begins.
+    """
+
+    number: int
+    start: float
+    target: float
+    begin: int
+    end: int
+    until: int
+
+
+def plan_move(start: float, target: float, limits: MotionLimits, period: float) -> Profile:
+    """Time-optimal move from rest to rest.
+
+    Parameters
+    ----------
+    start, target : float
+        [m], finite.
+    limits : MotionLimits
+        What the move may do.
+    period : float
+        Time between two samples [s], above 0.
+
+    Returns
+    -------
+    Profile
+        From the sample at which the move begins, at `start` with the first acceleration of the move, to the first one
+        at rest at `target`; a single sample where these are equal.
+
+    Raises
+    ------
+    DetentError
+        Start or target is not finite, the period not above 0, the profile too long, or ruckig finds none.
+
+    Examples
+    --------
+    >>> move = plan_move(0.0, 0.1, MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0), period=1e-3)
+    >>> move.count, float(move.position[-1]), float(move.velocity.max())
+    (351, 0.1, 0.5)
+    """
+    _check_place(start, target, period)
+    if start == target:
+        return _rest(target, 1, period)
+    sections = _sections(start, target, limits)
+    samples = _whole_samples(float(sections.t[-1]), period) + 1
+    t = np.arange(samples - 1) * period
+    k = np.searchsorted(sections.t, t, side="right") - 1
+    s = t - sections.t[k]
+    p, v, a, j = sections.p[k], sections.v[k], sections.a[k], sections.j[k]
+    position = p + s * (v + s * (a / 2.0 + s * j / 6.0))
+    velocity = v + s * (a + s * j / 2.0)
+    end = _rest(target, 1, period)
+    return Profile(
+        period,
+        np.append(position, end.position),
+        np.append(velocity, end.velocity),
+        np.append(a + s * j, end.acceleration),
+    )
+
+
+def plan_job(
+    job: MoveJob, start: float, limits: MotionLimits, period: float
+) -> tuple[Profile, tuple[PlannedMove, ...]]:
+    """Moves of a job one after the other, with their dwells.
+
+    Parameters
+    ----------
+    job : MoveJob
+        Moves to places or by ways; a speed of a move takes the place of that in `limits`.
+    start : float
+        Where the axis stands [m].
+    limits : MotionLimits
+        What the moves may do.
+    period : float
+        Time between two samples [s], above 0.
+
+    Returns
+    -------
+    (Profile, tuple of PlannedMove)
+        The whole reference, and where each move lies in it. Dwells are rounded up to whole samples, counted from the
+        end of the reference's move.
+
+    Raises
+    ------
+    DetentError
+        A move asks for a sample period of its own, the profile is too long, or a move cannot be planned.
+    """
+    parts: list[Profile] = []
+    planned: list[PlannedMove] = []
+    place, begin = start, 0
+    for move in job.moves:
+        if move.sample_period is not None:
+            raise DetentError(
+                f"move {move.number}: came a sample period of {move.sample_period:g} s; allowed: none, the loops of "
+                "this axis have a fixed one; do: leave it out"
+            )
+        target = place + (move.by or 0.0) if move.target is None else move.target
+        own = limits if move.speed is None else MotionLimits(move.speed, limits.acceleration, limits.jerk)
+        part = plan_move(place, target, own, period)
+        wait = _whole_samples(move.dwell, period)
+        end = begin + part.count - 1
+        # The sample at which a move ends is the one at which the next begins.
+        until = end + wait
+        _check_length(until)
+        parts += [_without_end(part), _rest(target, wait, period)]
+        planned.append(PlannedMove(move.number, place, target, begin, end, until))
+        place, begin = target, until
+    parts.append(_rest(place, 1, period))
+    return _join(parts, period), tuple(planned)
+
+
+def profile_of_recording(
+    t: Numbers, position: Numbers, period: float, velocity: Numbers | None = None, acceleration: Numbers | None = None
+) -> Profile:
+    """Reference from recorded samples.
+
+    Positions between the samples, and the derivatives that were not recorded, come from the cubic spline through them.
+    Steps of a coarse encoder become peaks of the acceleration: filter such a recording first, or leave the
+    feed-forward of the acceleration out.
+
+    Parameters
+    ----------
+    t : ndarray
+        Time [s], shape (n,), strictly increasing, n >= 2; the profile begins at ``t[0]``.
+    position : ndarray
+        [m], shape (n,), finite.
+    period : float
+        Time between two samples of the profile [s], above 0.
+    velocity, acceleration : ndarray, optional
+        As recorded [m/s], [m/s^2], shape (n,), finite.
+
+    Returns
+    -------
+    Profile
+        To the last sample not behind ``t[-1]``.
+
+    Raises
+    ------
+    DetentError
+        Shapes differ, a value is not finite, the time does not increase, or the profile is too long.
+    """
+    _check_recording(t, position, velocity, acceleration)
+    _check_place(0.0, 0.0, period)
+    # A rounded time of the last sample must not lose it.
+    samples = math.floor((t[-1] - t[0]) / period + 1e-6) + 1
+    _check_length(samples)
+    at = np.minimum(t[0] + np.arange(samples, dtype=np.float64) * period, t[-1])
+    q, dq, ddq = _spline(t, position, at)
+    if velocity is not None:
+        dq, ddq, _ = _spline(t, velocity, at)
+    if acceleration is not None:
+        ddq, _, _ = _spline(t, acceleration, at)
+    return Profile(period, q, dq, ddq)
+
+
+def _spline(t: Numbers, values: Numbers, at: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Cubic spline through recorded values: itself and its first two derivatives, at other times."""
+    spline: Any = CubicSpline(t, values)  # scipy states no types
+    value, first, second = (np.ascontiguousarray(spline(at, order), np.float64) for order in range(3))
+    return value, first, second
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sections:
+    """Stretches of constant jerk: their begins, and the end."""
+
+    t: Numbers
+    p: Numbers
+    v: Numbers
+    a: Numbers
+    j: Numbers
+
+
+def _sections(start: float, target: float, limits: MotionLimits) -> _Sections:
+    ruckig: Any = import_module("ruckig")  # it states no types
+    asked, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
+    asked.current_position, asked.target_position = [start], [target]
+    asked.max_velocity, asked.max_acceleration = [limits.speed], [limits.acceleration]
+    asked.max_jerk = [limits.jerk]
+    try:
+        ruckig.Ruckig(1).calculate(asked, found)
+    except ruckig.RuckigError as error:
+        raise DetentError(
+            f"no profile from {start:g} m to {target:g} m within {limits.speed:g} m/s, {limits.acceleration:g} m/s^2 "
+            f"and {limits.jerk:g} m/s^3; look at the limits of the axis"
+        ) from error
+    one = found.profiles[0][0]
+    begins = np.concatenate([[0.0], np.cumsum(one.t)])
+    # ruckig states the acceleration of a trapezoid as that at its begin, with no jerk.
+    return _Sections(begins, *(np.append(x, x[-1])[:8] for x in (one.p, one.v, one.a, one.j)))
+
+
+def _whole_samples(duration: float, period: float) -> int:
+    """Samples until a duration is over; one is not added for a rounding error."""
+    samples = duration / period
+    if samples > MOST_SAMPLES:
+        raise _too_long(samples)
+    return math.ceil(samples - 1e-9)
+
+
+def _check_length(samples: int) -> None:
+    if samples > MOST_SAMPLES:
+        raise _too_long(samples)
+
+
+def _too_long(samples: float) -> DetentError:
+    return DetentError(f"a profile of {samples:.4g} samples, must be {MOST_SAMPLES} or fewer; cut it, or sample slower")
+
+
+def _check_place(start: float, target: float, period: float) -> None:
+    if not (math.isfinite(start) and math.isfinite(target)):
+        raise DetentError(f"a move from {start} m to {target} m, must be finite")
+    if not 0.0 < period < math.inf:
+        raise DetentError(f"a profile with a period of {period} s, must be above 0 and finite")
+
+
+def _check_recording(t: Numbers, *signals: Numbers | None) -> None:
+    present = [t, *(s for s in signals if s is not None)]
+    if t.ndim != 1 or len(t) < 2 or any(s.shape != t.shape for s in present):
+        shapes = ", ".join(str(s.shape) for s in present)
+        raise DetentError(f"a recording of shapes {shapes}, must all be (n,) with n 2 or more")
+    if not all(np.isfinite(s).all() for s in present):
+        raise DetentError("a recording with values that are not finite; import it with detent.identify first")
+    if not (np.diff(t) > 0.0).all():
+        raise DetentError("a recording whose time does not increase strictly; import it with detent.identify first")
+
+
+def _rest(position: float, samples: int, period: float) -> Profile:
+    return Profile(period, np.full(samples, position), np.zeros(samples), np.zeros(samples))
+
+
+def _without_end(part: Profile) -> Profile:
+    return Profile(part.period, part.position[:-1], part.velocity[:-1], part.acceleration[:-1])
+
+
+def _join(parts: Sequence[Profile], period: float) -> Profile:
+    def joined(name: str) -> Numbers:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    return Profile(period, joined("position"), joined("velocity"), joined("acceleration"))

@@ -1,0 +1,272 @@
+"""Motor and load on a compliant coupling with backlash, each with its friction; or both as one mass.
+
+    m1 dv1/dt = F(u, i, v1) - f1(v1) - C                        motor
+    m2 dv2/dt = C - f2(v2) - W - P sin(q2) + F_ext              load
+    C = k (q1 - q2 -+ b) + d (v1 - v2)                          coupling, in contact; 0 within the gap of +-b
+
+A stiffness of 0 means a rigid coupling: masses and frictions add up, and motor and load have one position. Everything
+is in the coordinate of the axis. Units are those of a linear axis; a rotary one has rad for m, N.m for N and kg.m^2
+for kg.
+
+`flow` is one Runge-Kutta step within a regime: a direction of each mass or its standstill, contact or not. How a tick
+is made of them stands in `plant.two_mass_motion`.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.kernel.registers import Registers, block, f8, i1, register
+from detent.kernel.step import hot_step
+from detent.plant.dc_winding import WindingParams, current_rate, motor_force
+from detent.plant.stribeck import StribeckFriction, friction_force, holding_force, is_dry
+
+State = tuple[float, float, float, float, float]
+"""Current [A], position [m] and velocity [m/s] of the motor, of the load."""
+
+
+class MassParams(Registers):
+    """One of the two masses."""
+
+    mass: f8 = register("all that moves at this end of the coupling", unit="kg")
+    friction: StribeckFriction = block("its friction")
+
+
+class TwoMassParams(Registers):
+    """Constants of motor, coupling and load."""
+
+    period: f8 = register("time of one tick", unit="s")
+    winding: WindingParams = block("winding of the motor")
+    motor: MassParams = block("motor")
+    load: MassParams = block("load")
+    stiffness: f8 = register("stiffness of the coupling; 0: rigid", unit="N/m")
+    damping: f8 = register("damping of the coupling", unit="N.s/m")
+    half_gap: f8 = register("half the backlash", unit="m")
+    weight: f8 = register("weight of the load along the axis, positive pulls in the negative direction", unit="N")
+    pendulum: f8 = register("weight of a load that hangs at position 0 of a rotary axis, m g l", unit="N.m")
+
+
+class Mass(Registers):
+    """State of one mass."""
+
+    position: f8 = register("position", unit="m")
+    velocity: f8 = register("velocity", unit="m/s")
+    sense: i1 = register("direction that friction acts against in this tick: 1, -1, 0 held")
+
+
+class TwoMass(Registers):
+    """State of motor, coupling and load."""
+
+    effort: f8 = register("what the source puts out in this tick: voltage, or force", unit="V, N")
+    external: f8 = register("force on the load from outside in this tick, positive pushes in its direction", unit="N")
+    current: f8 = register("motor current, positive drives in the positive direction", unit="A")
+    motor: Mass = block("motor")
+    load: Mass = block("load")
+    side: i1 = register("flank in contact, where there is backlash: 1 drives the load in its direction, -1, 0 none")
+
+
+@hot_step
+def load_weight(p: TwoMassParams, position: float) -> float:
+    """Weight against the positive direction at a position of the load [N]."""
+    return p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * math.sin(position)
+
+
+@hot_step
+def coupling_force(p: TwoMassParams, side: int, twist: float, slip: float) -> float:
+    """Force of the coupling on the load [N]; motor less load are `twist` [m] and `slip` [m/s]. A flank only pushes."""
+    if p.half_gap == 0.0:
+        return p.stiffness * twist + p.damping * slip
+    if side == 0:
+        return 0.0
+    force = p.stiffness * (twist - side * p.half_gap) + p.damping * slip
+    return force if force * side > 0.0 else 0.0
+
+
+@hot_step
+def held_sense(band_positive: float, band_negative: float, push: float) -> int:
+    """Direction in which `push` [N] breaks a mass loose from friction that holds up to the bands [N]; 0 in none."""
+    if push > band_positive:
+        return 1
+    return -1 if push < -band_negative else 0
+
+
+@hot_step
+def mass_sense(p: StribeckFriction, velocity: float, push: float) -> int:
+    """Direction of a mass, or in which the force `push` [N] sets it in motion; 0 while its friction holds it."""
+    if velocity != 0.0:
+        return 1 if velocity > 0.0 else -1
+    if not is_dry(p):
+        return 1
+    return held_sense(holding_force(p.positive), holding_force(p.negative), push - p.offset)
+
+
+@hot_step
+def find_rigid_sense(p: TwoMassParams, r: TwoMass) -> None:
+    """Direction of the one mass in this regime."""
+    m, first, second = r.motor, p.motor.friction, p.load.friction
+    if m.velocity != 0.0:
+        m.sense = 1 if m.velocity > 0.0 else -1
+        return
+    if not (is_dry(first) or is_dry(second)):
+        m.sense = 1
+        return
+    push = motor_force(p.winding, r.effort, r.current, 0.0) + r.external - load_weight(p, m.position)
+    m.sense = held_sense(
+        holding_force(first.positive) + holding_force(second.positive),
+        holding_force(first.negative) + holding_force(second.negative),
+        push - first.offset - second.offset,
+    )
+
+
+@hot_step
+def find_senses(p: TwoMassParams, r: TwoMass) -> None:
+    """Directions of the masses in this regime."""
+    m, n = r.motor, r.load
+    if p.stiffness == 0.0:
+        find_rigid_sense(p, r)
+        n.sense = m.sense
+        return
+    force = coupling_force(p, r.side, m.position - n.position, m.velocity - n.velocity)
+    push = motor_force(p.winding, r.effort, r.current, m.velocity) - force
+    m.sense = mass_sense(p.motor.friction, m.velocity, push)
+    n.sense = mass_sense(p.load.friction, n.velocity, force + r.external - load_weight(p, n.position))
+
+
+@hot_step
+def rigid_acceleration(
+    p: TwoMassParams, r: TwoMass, sense: int, current: float, position: float, velocity: float
+) -> float:
+    """Acceleration of motor and load as one mass [m/s^2]."""
+    if sense == 0:
+        return 0.0
+    drive = motor_force(p.winding, r.effort, current, velocity) + r.external - load_weight(p, position)
+    friction = friction_force(p.motor.friction, sense, velocity) + friction_force(p.load.friction, sense, velocity)
+    return (drive - friction) / (p.motor.mass + p.load.mass)
+
+
+@hot_step
+def flow_rigid(p: TwoMassParams, r: TwoMass, h: float) -> State:
+    """State of a rigid axis after `h` [s] in this regime, one Runge-Kutta step."""
+    i, q, v, sense = r.current, r.motor.position, r.motor.velocity, r.motor.sense
+    half = 0.5 * h
+    a1, c1 = rigid_acceleration(p, r, sense, i, q, v), current_rate(p.winding, r.effort, i, v)
+    i2, q2, v2 = i + half * c1, q + half * v, v + half * a1
+    a2, c2 = rigid_acceleration(p, r, sense, i2, q2, v2), current_rate(p.winding, r.effort, i2, v2)
+    i3, q3, v3 = i + half * c2, q + half * v2, v + half * a2
+    a3, c3 = rigid_acceleration(p, r, sense, i3, q3, v3), current_rate(p.winding, r.effort, i3, v3)
+    i4, q4, v4 = i + h * c3, q + h * v3, v + h * a3
+    a4, c4 = rigid_acceleration(p, r, sense, i4, q4, v4), current_rate(p.winding, r.effort, i4, v4)
+    sixth = h / 6.0
+    i += sixth * (c1 + 2.0 * (c2 + c3) + c4)
+    q += sixth * (v + 2.0 * (v2 + v3) + v4)
+    v += sixth * (a1 + 2.0 * (a2 + a3) + a4)
+    return i, q, v, q, v
+
+
+@hot_step
+def accelerations(
+    p: TwoMassParams, r: TwoMass, current: float, q1: float, v1: float, q2: float, v2: float
+) -> tuple[float, float]:
+    """Accelerations of motor and load on their coupling [m/s^2]."""
+    force = coupling_force(p, r.side, q1 - q2, v1 - v2)
+    a1 = a2 = 0.0
+    if r.motor.sense != 0:
+        drive = motor_force(p.winding, r.effort, current, v1)
+        a1 = (drive - force - friction_force(p.motor.friction, r.motor.sense, v1)) / p.motor.mass
+    if r.load.sense != 0:
+        drive = force + r.external - load_weight(p, q2)
+        a2 = (drive - friction_force(p.load.friction, r.load.sense, v2)) / p.load.mass
+    return a1, a2
+
+
+@hot_step
+def flow_coupled(p: TwoMassParams, r: TwoMass, h: float) -> State:
+    """State of motor and load after `h` [s] in this regime, one Runge-Kutta step."""
+    i, x, v, y, w = r.current, r.motor.position, r.motor.velocity, r.load.position, r.load.velocity
+    half = 0.5 * h
+    a1, b1 = accelerations(p, r, i, x, v, y, w)
+    c1 = current_rate(p.winding, r.effort, i, v)
+    i2, v2, w2 = i + half * c1, v + half * a1, w + half * b1
+    a2, b2 = accelerations(p, r, i2, x + half * v, v2, y + half * w, w2)
+    c2 = current_rate(p.winding, r.effort, i2, v2)
+    i3, v3, w3 = i + half * c2, v + half * a2, w + half * b2
+    a3, b3 = accelerations(p, r, i3, x + half * v2, v3, y + half * w2, w3)
+    c3 = current_rate(p.winding, r.effort, i3, v3)
+    i4, v4, w4 = i + h * c3, v + h * a3, w + h * b3
+    a4, b4 = accelerations(p, r, i4, x + h * v3, v4, y + h * w3, w4)
+    c4 = current_rate(p.winding, r.effort, i4, v4)
+    sixth = h / 6.0
+    i += sixth * (c1 + 2.0 * (c2 + c3) + c4)
+    x += sixth * (v + 2.0 * (v2 + v3) + v4)
+    y += sixth * (w + 2.0 * (w2 + w3) + w4)
+    v += sixth * (a1 + 2.0 * (a2 + a3) + a4)
+    w += sixth * (b1 + 2.0 * (b2 + b3) + b4)
+    return i, x, v, y, w
+
+
+@hot_step
+def flow(p: TwoMassParams, r: TwoMass, h: float) -> State:
+    """State after `h` [s] in this regime; `r` stays as it is."""
+    return flow_rigid(p, r, h) if p.stiffness == 0.0 else flow_coupled(p, r, h)
+
+
+def stand_masses(r: TwoMass, position: float) -> None:
+    """At rest without current, motor and load at `position` [m]: no strain, and in the middle of the backlash."""
+    r.motor.position = r.load.position = position
+    r.motor.velocity = r.load.velocity = r.current = 0.0
+    r.side = 0
+
+
+def fastest_rate(p: TwoMassParams) -> float:
+    """Largest magnitude of the eigenvalues of motor, coupling and load [1/s].
+
+    Times the tick it should be 1 at most: a swing of that rate then loses 0.7 % of its amplitude per radian.
+
+    Parameters
+    ----------
+    p : TwoMassParams
+        Constants; `period` does not matter.
+
+    Returns
+    -------
+    float
+        [1/s]. Linearised at the stiffest place: flanks in contact, pendulum hanging down, the steepest friction.
+    """
+    w = p.winding
+    drags = [_steepest(m.friction) for m in (p.motor, p.load)]
+    at_once = bool(w.used) and w.inductance == 0.0
+    if at_once:
+        drags[0] += w.force_constant * w.emf_constant / w.resistance
+    one_mass = p.stiffness == 0.0
+    a = _rigid_matrix(p, sum(drags)) if one_mass else _coupled_matrix(p, drags)
+    if w.used and not at_once:
+        a[0, 0], a[0, 2] = -w.resistance / w.inductance, -w.emf_constant / w.inductance
+        a[2, 0] = w.force_constant / (p.motor.mass + p.load.mass if one_mass else p.motor.mass)
+    return float(np.max(np.abs(np.linalg.eigvals(a))))
+
+
+def _rigid_matrix(p: TwoMassParams, drag: float) -> NDArray[np.float64]:
+    """Rates of current, position and velocity; those of the current are still 0."""
+    mass = p.motor.mass + p.load.mass
+    return np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -p.pendulum / mass, -drag / mass]])
+
+
+def _coupled_matrix(p: TwoMassParams, drags: list[float]) -> NDArray[np.float64]:
+    """Rates of current, position and velocity of the motor and of the load; those of the current are still 0."""
+    a = np.zeros((5, 5))
+    a[1, 2] = a[3, 4] = 1.0
+    k, d = p.stiffness, p.damping
+    a[2, 1:] = np.array([-k, -d - drags[0], k, d]) / p.motor.mass
+    a[4, 1:] = np.array([k, d, -k - p.pendulum, -d - drags[1]]) / p.load.mass
+    return a
+
+
+def _steepest(p: StribeckFriction) -> float:
+    """Largest slope of the friction of both directions, its falling part included [N.s/m]."""
+    slopes = [0.0]
+    for d in (p.positive, p.negative):
+        # The curve falls steepest at vs / sqrt(2).
+        falls = (d.static - d.coulomb) * math.sqrt(2.0 / math.e) / d.stribeck if d.stribeck > 0.0 else 0.0
+        slopes.append(max(d.viscous, falls - d.viscous))
+    return max(slopes)

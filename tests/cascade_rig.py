@@ -1,0 +1,112 @@
+"""A cascade axis on the bench: a linear axis of 2 kg driven by a force, recorded tick by tick."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from detent.planning.profile import Profile
+from detent.plant.stribeck import StribeckFriction
+from detent.systems.cascade import (
+    Cascade,
+    CascadeParams,
+    advance,
+    advance_along,
+    advance_driven,
+    fill_clocks,
+    switch_on,
+)
+
+NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
+
+TICK = 50e-6
+SAMPLE_TICKS = 20
+T_SAMPLE = TICK * SAMPLE_TICKS
+"""Period of the loops [s]."""
+MASS = 2.0
+"""Motor and load together [kg]."""
+STIFFNESS, DAMPING = 2e5, 20.0
+"""Of the coupling, where there is one: masses of 0.8 kg and 1.2 kg swing at 103 Hz."""
+
+
+def set_friction(friction: StribeckFriction, **values: float) -> None:
+    """Set constants of both directions (coulomb, static, stribeck, viscous), or the offset."""
+    for name, value in values.items():
+        if name == "offset":
+            friction.offset = value
+        else:
+            setattr(friction.positive, name, value)
+            setattr(friction.negative, name, value)
+
+
+def unlimited_params() -> CascadeParams:
+    """A rigid mass without friction, ideal sensors and a source of 1 N/V without a limit; no gains yet."""
+    p = CascadeParams()
+    p.machine.motor.mass, p.machine.load.mass = 0.4 * MASS, 0.6 * MASS
+    p.machine.winding.max_current = math.inf
+    p.source.gain, p.source.limit = 1.0, math.inf
+    p.law.max_command = p.law.cascade.max_velocity = math.inf
+    p.law.pid.smoothing = 1.0
+    for sensor in (p.motor_sensor, p.load_sensor):
+        sensor.span, sensor.smoothing = 1, 1.0
+    fill_clocks(p, TICK, SAMPLE_TICKS)
+    return p
+
+
+def make_params(*, coupled: bool = False, gap: float = 0.0) -> CascadeParams:
+    """The same with the gains of a position loop of 10 Hz over a velocity loop of 40 Hz."""
+    p = unlimited_params()
+    p.law.cascade.position_gain = 2 * math.pi * 10
+    p.law.cascade.velocity_gain = 2 * math.pi * 40 * MASS
+    if coupled:
+        p.machine.stiffness, p.machine.damping, p.machine.half_gap = STIFFNESS, DAMPING, gap / 2
+    return p
+
+
+class Rig:
+    """The axis after power-on at a position [m]."""
+
+    def __init__(self, p: CascadeParams, position: float = 0.0) -> None:
+        self.p = p
+        self.r = Cascade()
+        switch_on(p, self.r, position)
+
+    @property
+    def x(self) -> float:
+        """Position of the load [m]."""
+        return self.r.machine.load.position
+
+    def run(self, ticks: int) -> "Rig":
+        """Let ticks pass."""
+        assert advance(self.p, self.r, ticks, *NO_TRACE) == ticks
+        return self
+
+    def drive(self, command: Sequence[float] | np.ndarray, ticks: int) -> "Rig":
+        """Let ticks pass under commands from the host, one per sample."""
+        values = np.asarray(command, np.float64)
+        assert advance_driven(self.p, self.r, values, ticks, *NO_TRACE) == ticks
+        return self
+
+    def record(self, ticks: int, names: Sequence[str], every: int = 1, **along: Any) -> dict[str, np.ndarray]:
+        """Run and record registers every so many ticks (values at the end of a tick), with `t` [s] since power-on.
+
+        `along` is a `profile` to follow or a `command` per sample; without, the reference stands.
+        """
+        leaves = {leaf.path: leaf for leaf in Cascade.leaves()}
+        chosen = [leaves[name] for name in names]
+        picks = np.concatenate([np.arange(c.offset, c.offset + c.width.size) for c in chosen]).astype(np.int64)
+        dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])
+        first = self.r.tick
+        rows = np.zeros((ticks // every + 2, dtype.itemsize), np.uint8)
+        if "profile" in along:
+            ref: Profile = along["profile"]
+            advance_along(self.p, self.r, ref.position, ref.velocity, ref.acceleration, ticks, rows, picks, every)
+        elif "command" in along:
+            advance_driven(self.p, self.r, np.asarray(along["command"], np.float64), ticks, rows, picks, every)
+        else:
+            advance(self.p, self.r, ticks, rows, picks, every)
+        index = np.arange(first // every + 1, self.r.tick // every + 1)
+        table = rows[index % len(rows)].view(dtype)[:, 0]
+        t = index * every * self.p.machine.period
+        return {name: table[name].copy() for name in names} | {"t": t}
