@@ -102,6 +102,7 @@ def test_bad_figures_are_refused():
         acceleration_limit(MOTOR, LOAD, 1, 0.9)
 
 
+@pytest.mark.compiled
 def test_a_ramp_ends_where_the_torque_does_even_within_a_step():
     """Acceleration is taken at the middle of a step: the ramp once climbed past the end of a measured curve."""
     hz = [0.0, 500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0]

@@ -8,6 +8,8 @@ from detent.control.step_rule import start_move
 from detent.simulation.recorder import Recorder
 from detent.simulation.stage_machine import Stage, stage_registers
 
+pytestmark = pytest.mark.compiled
+
 ZOOM = next(path for path in examples() if path.name == "zoom.toml")
 SIGNALS = ["group_a.rule.position", "group_a.rotor.lag", "group_b.rule.position", "group_b.timer.period"]
 

@@ -13,6 +13,8 @@ from detent.planning.stage_job import Change, StageJob, StageJog, StageMove
 from detent.simulation.stage_host import Leg, StageHost
 from detent.simulation.stage_run import run_stage, stage_signals
 
+pytestmark = pytest.mark.compiled
+
 MM = 1e-3
 ZOOM = next(path for path in examples() if path.name == "zoom.toml")
 

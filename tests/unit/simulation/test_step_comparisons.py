@@ -6,6 +6,8 @@ from detent.axisfile.load import read_axis
 from detent.errors import DetentError
 from detent.simulation.step_comparisons import compare_jerk, compare_steps
 
+pytestmark = pytest.mark.compiled
+
 ZOOM = next(path for path in examples() if path.name == "zoom.toml")
 
 
