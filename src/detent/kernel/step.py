@@ -56,7 +56,30 @@ class _PackageCacheImpl(CompileResultCacheImpl):
 
 
 class _PackageCache(FunctionCache):
+    """Keeps what is compiled for registers of the package.
+
+    An index names the types of all it holds, and cannot be read at all where one of them cannot be imported: machine
+    code for the registers of somebody's own script stays with the process that made it.
+    """
+
     _impl_class = _PackageCacheImpl
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was kept for these types; None if nothing was, or if it is not kept."""
+        kept: Any = super()
+        return kept.load_overload(sig, target_context) if _is_of_the_package(sig) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled for these types."""
+        kept: Any = super()
+        if _is_of_the_package(sig):
+            kept.save_overload(sig, data)
+
+
+def _is_of_the_package(signature: Any) -> bool:
+    """True when all registers among the types of a call are declared by the package."""
+    kinds = getattr(signature, "args", signature)
+    return all(kind.registers.__module__.startswith("detent.") for kind in kinds if hasattr(kind, "registers"))
 
 
 def step(function: F) -> F:

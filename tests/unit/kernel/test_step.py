@@ -1,3 +1,8 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numba
 import pytest
 
@@ -6,6 +11,7 @@ from detent.control.feed_forward import steady_drive
 from detent.kernel.registers import Registers, f8, i8, register
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import settle_contacts
+from detent.plant.two_mass import TwoMass
 
 compiled_only = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="about compiled code; NUMBA_DISABLE_JIT is set")
 
@@ -50,6 +56,45 @@ def test_compilation_options_are_those_of_the_house():
         assert options["nogil"] is True
         assert bool(options.get("forceinline")) is inline
         assert not options.get("fastmath")  # strict floating point: every machine gives the same bits
+
+
+SCRIPT = """
+import numpy as np
+from detent.kernel.recording import write_row
+from detent.kernel.registers import Registers, i8, register
+
+class Own(Registers):
+    count: i8 = register("pulses", unit="count")
+
+rows, picks = np.zeros((2, 8), np.uint8), np.arange(8)
+write_row(Own(count=7), 1, rows, picks, 1)
+print(rows[1, 0])
+"""
+
+
+@compiled_only
+def test_registers_of_a_script_stay_out_of_the_cache(tmp_path):
+    """An index that named a class of a script could be read by no process that cannot import it: commands crashed."""
+    (tmp_path / "own_axis.py").write_text(SCRIPT, encoding="utf-8")
+    package = Path(step_module.__file__).parents[2]
+    environment = os.environ | {
+        "DETENT_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(package)]),
+    }
+    run = subprocess.run(
+        [sys.executable, "-c", "import own_axis"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert run.stdout == "7\n", run.stderr
+    assert not any(b"own_axis" in index.read_bytes() for index in (tmp_path / "cache").rglob("*.nbi"))
+
+
+@compiled_only
+def test_registers_of_the_package_are_kept():
+    kinds = (numba.typeof(TwoMass()), numba.int64)
+    assert step_module._is_of_the_package(kinds)
+    assert not step_module._is_of_the_package((numba.typeof(Ratio()),))
+    # What numba hands over may be a signature with its return type.
+    assert step_module._is_of_the_package(numba.none(*kinds))
 
 
 @compiled_only
