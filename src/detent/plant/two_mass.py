@@ -4,6 +4,9 @@
     m2 dv2/dt = C - f2(v2) - W - P sin(q2) + F_ext              load
     C = k (q1 - q2 -+ b) + d (v1 - v2)                          coupling, in contact; 0 within the gap of +-b
 
+A transmission that passes the motor's force F on loses a share of it as friction, l |F| against the motion, which adds
+to that of the motor.
+
 A stiffness of 0 means a rigid coupling: masses and frictions add up, and motor and load have one position. Everything
 is in the coordinate of the axis. Units are those of a linear axis; a rotary one has rad for m, N.m for N and kg.m^2
 for kg.
@@ -45,6 +48,7 @@ class TwoMassParams(Registers):
     half_gap: f8 = register("half the backlash", unit="m")
     weight: f8 = register("weight of the load along the axis, positive pulls in the negative direction", unit="N")
     pendulum: f8 = register("weight of a load that hangs at position 0 of a rotary axis, m g l", unit="N.m")
+    loss: f8 = register("friction of the transmission per force of the motor that it passes on", unit="1")
 
 
 class Mass(Registers):
@@ -92,13 +96,16 @@ def held_sense(band_positive: float, band_negative: float, push: float) -> int:
 
 
 @hot_step
-def mass_sense(p: StribeckFriction, velocity: float, push: float) -> int:
-    """Direction of a mass, or in which the force `push` [N] sets it in motion; 0 while its friction holds it."""
+def mass_sense(p: StribeckFriction, velocity: float, push: float, lost: float) -> int:
+    """Direction of a mass, or in which the force `push` [N] sets it in motion against its friction and `lost` [N].
+
+    0 while they hold it.
+    """
     if velocity != 0.0:
         return 1 if velocity > 0.0 else -1
-    if not is_dry(p):
+    if not is_dry(p) and lost == 0.0:
         return 1
-    return held_sense(holding_force(p.positive), holding_force(p.negative), push - p.offset)
+    return held_sense(holding_force(p.positive) + lost, holding_force(p.negative) + lost, push - p.offset)
 
 
 @hot_step
@@ -108,13 +115,14 @@ def find_rigid_sense(p: TwoMassParams, r: TwoMass) -> None:
     if m.velocity != 0.0:
         m.sense = 1 if m.velocity > 0.0 else -1
         return
-    if not (is_dry(first) or is_dry(second)):
+    if not (is_dry(first) or is_dry(second) or p.loss > 0.0):
         m.sense = 1
         return
-    push = motor_force(p.winding, r.effort, r.current, 0.0) + r.external - load_weight(p, m.position)
+    drive = motor_force(p.winding, r.effort, r.current, 0.0)
+    push, lost = drive + r.external - load_weight(p, m.position), p.loss * abs(drive)
     m.sense = held_sense(
-        holding_force(first.positive) + holding_force(second.positive),
-        holding_force(first.negative) + holding_force(second.negative),
+        holding_force(first.positive) + holding_force(second.positive) + lost,
+        holding_force(first.negative) + holding_force(second.negative) + lost,
         push - first.offset - second.offset,
     )
 
@@ -129,8 +137,8 @@ def find_senses(p: TwoMassParams, r: TwoMass) -> None:
         return
     force = coupling_force(p, r.side, m.position - n.position, m.velocity - n.velocity)
     push = motor_force(p.winding, r.effort, r.current, m.velocity) - force
-    m.sense = mass_sense(p.motor.friction, m.velocity, push)
-    n.sense = mass_sense(p.load.friction, n.velocity, force + r.external - load_weight(p, n.position))
+    m.sense = mass_sense(p.motor.friction, m.velocity, push, p.loss * abs(push + force))
+    n.sense = mass_sense(p.load.friction, n.velocity, force + r.external - load_weight(p, n.position), 0.0)
 
 
 @hot_step
@@ -140,9 +148,10 @@ def rigid_acceleration(
     """Acceleration of motor and load as one mass [m/s^2]."""
     if sense == 0:
         return 0.0
-    drive = motor_force(p.winding, r.effort, current, velocity) + r.external - load_weight(p, position)
+    drive = motor_force(p.winding, r.effort, current, velocity)
     friction = friction_force(p.motor.friction, sense, velocity) + friction_force(p.load.friction, sense, velocity)
-    return (drive - friction) / (p.motor.mass + p.load.mass)
+    push = drive - sense * p.loss * abs(drive) + r.external - load_weight(p, position)
+    return (push - friction) / (p.motor.mass + p.load.mass)
 
 
 @hot_step
@@ -173,6 +182,7 @@ def accelerations(
     a1 = a2 = 0.0
     if r.motor.sense != 0:
         drive = motor_force(p.winding, r.effort, current, v1)
+        drive -= r.motor.sense * p.loss * abs(drive)
         a1 = (drive - force - friction_force(p.motor.friction, r.motor.sense, v1)) / p.motor.mass
     if r.load.sense != 0:
         drive = force + r.external - load_weight(p, q2)

@@ -63,7 +63,7 @@ def left_of_regime(p: TwoMassParams, r: TwoMass, event: int, after: State) -> fl
         return gap_left(p, r.side, after[1] - after[3])
     if event == LOAD_REVERSES:
         return after[4] * r.load.sense if p.stiffness > 0.0 and is_dry(p.load.friction) else 0.0
-    dry = is_dry(p.motor.friction) or (p.stiffness == 0.0 and is_dry(p.load.friction))
+    dry = p.loss > 0.0 or is_dry(p.motor.friction) or (p.stiffness == 0.0 and is_dry(p.load.friction))
     return after[2] * r.motor.sense if dry else 0.0
 
 

@@ -237,3 +237,32 @@ def test_more_events_than_a_tick_has_pieces_end_in_a_state_that_is_possible():
         move_masses(p, r)
         assert np.isfinite(state(r)).all()
         assert r.side in {-1, 0, 1}
+
+
+# -- loss of the transmission ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_transmission_loses_a_share_of_the_force_driving_and_adds_it_braking(sign):
+    p = machine(loss=0.25)
+    driven = run(p, moving(sign * 1.0, effort=sign * 8.0), 1)
+    braked = run(p, moving(sign * 1.0, effort=-sign * 8.0), 1)
+    assert sign * driven.load.velocity - 1.0 == pytest.approx(0.75 * 8.0 / M * H, rel=1e-9)
+    assert sign * braked.load.velocity - 1.0 == pytest.approx(-1.25 * 8.0 / M * H, rel=1e-9)
+    free = run(p, moving(sign * 1.0), 1)
+    assert free.load.velocity == sign * 1.0
+
+
+@pytest.mark.parametrize("coupling", [machine, coupled], ids=["rigid", "coupled"])
+@pytest.mark.parametrize(("force", "holds"), [(9.0, True), (14.0, True), (15.5, False), (5.5, False)])
+def test_a_lossy_transmission_holds_a_weight_over_a_band_of_forces(coupling, force, holds):
+    """It holds while ``|F - W| <= Fc + l F``: from 6 to 15 N, for the weight of 9 N, 1.5 N and a loss of a quarter."""
+    p = coupling(loss=0.25, weight=9.0)
+    set_friction(p.motor.friction, coulomb=1.5)
+    r = moving(effort=force)
+    if coupling is coupled:
+        r.motor.position = 9.0 / K
+    run(p, r, 200)
+    assert (r.motor.velocity == 0.0) == holds
+    if not holds:
+        assert r.motor.velocity * (force - 9.0) > 0.0
