@@ -13,6 +13,7 @@ EXAMPLES = {
     "filtered_servo": "filtered_servo",
     "rotary_table": "rotary_table",
     "stepper_envelope": "zoom",
+    "cascade": "cascade",
 }
 """Packaged example of each method."""
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from detent.axisfile.cascade.schema import CascadeSpec
 from detent.axisfile.check import CheckReport, check_spec
 from detent.axisfile.load import AxisFile, read_axis
 from detent.axisfile.methods import AnySpec
@@ -21,9 +22,11 @@ from detent.simulation.vcd_file import save_vcd
 from detent.simulation.waveforms import Waveforms
 
 if TYPE_CHECKING:
-    # Loaded where a comparison is made: most commands make none.
+    # Loaded where a comparison is made, or a recording replayed: most commands do neither.
     from detent.report.envelope_files import EnvelopeTables
+    from detent.report.identified import Identified, Method
     from detent.simulation.comparisons import AnyComparison
+    from detent.simulation.replay_job import ReplayJob
 
 KEPT_ROWS = 100_000
 """Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
@@ -76,8 +79,9 @@ class Axis:
         Parameters
         ----------
         path : path
-            Print head: plain text or a Diablo 630 stream. Servos: a list of moves as CSV or TOML; phase servo: also a
-            line of text. Rotary table: a sequence as TOML. Steppers: moves of several motors, or tiles, as CSV or TOML.
+            Print head: plain text or a Diablo 630 stream. Servos, cascade axes: a list of moves as CSV or TOML; phase
+            servo: also a line of text. Rotary table: a sequence as TOML. Steppers: moves of several motors, or tiles,
+            as CSV or TOML.
 
         Raises
         ------
@@ -91,11 +95,53 @@ class Axis:
         wanted = self.method.job
         loaded = self.load_job(job) if isinstance(job, str | Path) else job
         if not isinstance(loaded, wanted):
+            names = " or ".join(kind.__name__ for kind in (wanted if isinstance(wanted, tuple) else (wanted,)))
             raise DetentError(
-                f"{self.name}: came a {type(loaded).__name__}; allowed: a {wanted.__name__}, or a file as load_job "
+                f"{self.name}: came a {type(loaded).__name__}; allowed: a {names}, or a file as load_job "
                 "reads it; give the axis a job of its own kind"
             )
         return loaded
+
+    def load_recording(
+        self, path: str | Path, mapping: str | Path | None = None, columns: Sequence[str] = ()
+    ) -> "ReplayJob":
+        """Read a recording of a machine, to be replayed on this axis by `run`.
+
+        Parameters
+        ----------
+        path : path
+            CSV, HDF5, Parquet, MATLAB, NPZ or JSON.
+        mapping : path, optional
+            Mapping file (TOML): what its columns are; what neither it nor `columns` says is guessed.
+        columns : sequence of str
+            The same in short: ``"force=vir [35.15 N]"``.
+
+        Returns
+        -------
+        ReplayJob
+            Its `notes` tell what was found wrong with the log, and what was guessed.
+
+        Raises
+        ------
+        InputError
+            The log or the mapping cannot be read, or says something wrong.
+        DetentError
+            The axis is no cascade axis, or the log does not fit it.
+        """
+        from detent.identify.read_log import read_log
+        from detent.simulation.replay_job import make_replay_job
+
+        spec = self.spec
+        if not isinstance(spec, CascadeSpec):
+            raise DetentError(
+                f"{self.name}: came an axis of the method {spec.axis.method}; allowed: cascade, whose loops follow any "
+                "reference; name an axis file of it"
+            )
+        log = read_log(path, mapping, columns)
+        signals = {role: (values, log.units[role]) for role, values in log.signals.items()}
+        notes = [str(finding) for finding in log.findings]
+        notes += [f"guessed: {'; '.join(log.guesses)}"] if log.guesses else []
+        return make_replay_job(spec, log.name, log.t, signals, notes)
 
     def run(
         self,
@@ -111,7 +157,7 @@ class Axis:
         Parameters
         ----------
         job : path or job
-            A file as of `load_job`, or what that returned.
+            A file as of `load_job`, or what that or `load_recording` returned.
         signals : sequence of str, optional
             Registers to record; "all" for every one. Default: what the report needs.
         every : int, optional
@@ -162,7 +208,7 @@ class Axis:
         tuple
             Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo:
             one `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and
-            a `JerkComparison`.
+            a `JerkComparison`. Cascade: one `ProfileComparison`.
         """
         from detent.simulation.comparisons import compare_methods
 
@@ -343,8 +389,8 @@ class Run:
     ----------
     axis : Axis
         The axis.
-    result : PrintRun, MoveRun, SequenceRun or StageRun
-        Figures; lines and identified constants, moves, or steps of a sequence.
+    result : PrintRun, MoveRun, SequenceRun, StageRun, CascadeRun or ReplayRun
+        Figures; lines and identified constants, moves, steps of a sequence, or a recording beside its simulation.
     trace : Trace or None
         Recorded registers over time.
     settings : dict
@@ -427,4 +473,51 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-__all__ = ["Axis", "Envelope", "Run", "Timing", "load", "load_trace"]
+def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
+    logs: str | Path | Sequence[str | Path],
+    *,
+    mapping: str | Path | None = None,
+    columns: Sequence[str] = (),
+    effort: str | None = None,
+    method: "Method" = "regression",
+    axis: str | Path | None = None,
+    progress: Progress | None = None,
+) -> "Identified":
+    """Identify an axis from recordings of it.
+
+    Parameters
+    ----------
+    logs : path or sequence of path
+        CSV, HDF5, Parquet, MATLAB, NPZ or JSON.
+    mapping : path, optional
+        Mapping file (TOML): what the columns are; what neither it nor `columns` says is guessed.
+    columns : sequence of str
+        The same in short: ``"force=vir [35.15 N]"``.
+    effort : str, optional
+        What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
+    method : str
+        "regression", or "output error", which fits the simulation to the recordings too.
+    axis : path, optional
+        Cascade axis file that the constants are held against, and put into by `Identified.save`.
+    progress : callable, optional
+        ``progress(share, text)``.
+
+    Returns
+    -------
+    Identified
+        Also when nothing is trusted: see `Identified.verdict` and `Identified.refusals`.
+
+    Raises
+    ------
+    InputError
+        A log, the mapping or the axis file cannot be read, or a log holds no position or nothing that drives the axis.
+    DetentError
+        The axis file is of another method.
+    """
+    from detent.report.identified import identify_logs
+
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    return identify_logs(paths, mapping, columns, effort, method=method, axis=axis, progress=progress)
+
+
+__all__ = ["Axis", "Envelope", "Run", "Timing", "identify_axis", "load", "load_trace"]

@@ -18,23 +18,35 @@ KINDS: dict[str, tuple[str, str]] = {
     "m": ("a length", "12 mm"),
     "m/s": ("a velocity", "600 mm/s"),
     "m/s^2": ("an acceleration", "10 m/s^2"),
+    "m/s^3": ("a jerk", "200 m/s^3"),
     "s": ("a time", "5 ms"),
     "Hz": ("a frequency", "20 kHz"),
     "kg": ("a mass", "1.1 kg"),
     "kg*m^2": ("a moment of inertia", "260 g*cm^2"),
     "N": ("a force", "7.5 N"),
     "N*s/m": ("a viscous friction coefficient", "0.4 N*s/m"),
+    "N/m": ("a stiffness", "20 N/um"),
+    "N/V": ("a force per voltage", "35 N/V"),
     "N*m/A": ("a torque constant", "0.241 N*m/A"),
     "V": ("a voltage", "38 V"),
-    "V*s/rad": ("a back-EMF constant", "25.2 V/krpm"),
+    "V*s/rad": ("a voltage per angular velocity", "25.2 V/krpm"),
+    "V*s/m": ("a voltage per velocity", "240 V*s/m"),
+    "V/m": ("a voltage per length", "5 V/mm"),
+    "V/rad": ("a voltage per angle", "2 V/deg"),
+    "V/(m*s)": ("a voltage per length and time", "50 V/(mm*s)"),
+    "V/(rad*s)": ("a voltage per angle and time", "20 V/(deg*s)"),
     "ohm": ("a resistance", "12 ohm"),
     "H": ("an inductance", "12 mH"),
     "A": ("a current", "1.5 A"),
+    "A/V": ("a current per voltage", "2 A/V"),
     "rad": ("an angle", "5 deg"),
     "rad/s": ("an angular velocity", "60 deg/s"),
     "rad/s^2": ("an angular acceleration", "300 deg/s^2"),
+    "rad/s^3": ("an angular jerk", "5000 deg/s^3"),
     "N*m": ("a torque", "60 mN*m"),
     "N*m*s/rad": ("a viscous friction coefficient of rotation", "2 mN*m*s/rad"),
+    "N*m/rad": ("a torsional stiffness", "300 N*m/rad"),
+    "N*m/V": ("a torque per voltage", "0.2 N*m/V"),
     "rpm": ("a rotary speed", "3000 rpm"),
     "%": ("a percentage", "+10 %"),
 }
@@ -44,28 +56,40 @@ COMMON_UNITS: dict[str, dict[str, Fraction]] = {
     "m": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
     "m/s": {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
     "m/s^2": {"m/s^2": Fraction(1), "mm/s^2": Fraction(1, 1000)},
+    "m/s^3": {"m/s^3": Fraction(1)},
     "Hz": {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)},
     "s": {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
     "kg": {"kg": Fraction(1), "g": Fraction(1, 1000)},
     "kg*m^2": {"kg*m^2": Fraction(1), "g*cm^2": Fraction(1, 10**7)},
     "N": {"N": Fraction(1)},
     "N*s/m": {"N*s/m": Fraction(1)},
+    "N/m": {"N/m": Fraction(1), "N/mm": Fraction(1000), "N/um": Fraction(10**6)},
+    "N/V": {"N/V": Fraction(1)},
     "N*m/A": {"N*m/A": Fraction(1), "mN*m/A": Fraction(1, 1000)},
     "V": {"V": Fraction(1)},
     "V*s/rad": {"V*s/rad": Fraction(1)},
+    "V*s/m": {"V*s/m": Fraction(1)},
+    "V/m": {"V/m": Fraction(1), "V/mm": Fraction(1000)},
+    "V/rad": {"V/rad": Fraction(1)},
+    "V/(m*s)": {"V/(m*s)": Fraction(1)},
+    "V/(rad*s)": {"V/(rad*s)": Fraction(1)},
     "ohm": {"ohm": Fraction(1)},
     "H": {"H": Fraction(1), "mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
     "A": {"A": Fraction(1), "mA": Fraction(1, 1000)},
+    "A/V": {"A/V": Fraction(1)},
     "rad": {"rad": Fraction(1)},
     "rad/s": {"rad/s": Fraction(1)},
     "rad/s^2": {"rad/s^2": Fraction(1)},
+    "rad/s^3": {"rad/s^3": Fraction(1)},
     "N*m": {"N*m": Fraction(1), "N*cm": Fraction(1, 100), "mN*m": Fraction(1, 1000)},
     "N*m*s/rad": {"N*m*s/rad": Fraction(1), "mN*m*s/rad": Fraction(1, 1000)},
+    "N*m/rad": {"N*m/rad": Fraction(1)},
+    "N*m/V": {"N*m/V": Fraction(1)},
 }
 """Factors met in nearly every file, by target unit: with these alone a file is read without waiting for pint's import
 (0.2 s). A test holds each of them to pint's."""
 
-IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2"}
+IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}
 """Units that people read in degrees."""
 
 _NUMBER_THEN_UNIT = re.compile(
@@ -195,7 +219,7 @@ def _prefixed(size: float, unit: str) -> tuple[float, str]:
         return (1e-7, "g*cm^2") if 0 < size < 1e-3 else (1.0, unit)
     if size == 0 or not math.isfinite(size):
         return 1.0, unit
-    largest = 0 if unit in {"m", "m/s", "m/s^2", "s"} else 6
+    largest = 0 if unit in {"m", "m/s", "m/s^2", "m/s^3", "s"} else 6
     exponent = max(-9, min(largest, 3 * math.floor(math.log10(size) / 3)))
     prefix = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}[exponent]
     return 10.0**exponent, prefix + unit

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from tests.bad_files import example_text
 from tests.remedies import alternatives
 
+from detent.axisfile.cascade.build import build_cascade
 from detent.axisfile.check import check_spec
 from detent.axisfile.dump import dump_spec
 from detent.axisfile.fields import AnyName, is_list, leaf_fields, options_of, unit_of
@@ -42,11 +43,17 @@ BUILD = {
     "rotary_table": lambda spec: [build_rotary_table(spec)],
     "zoom": build_motors,
     "stage": build_motors,
+    "cascade": lambda spec: [build_cascade(spec)],
+    "turntable": lambda spec: [build_cascade(spec)],
 }
 """By example: its registers of parameters."""
 TEXT = {name: example_text(name) for name in BUILD}
 TEXT["stage"] += '[stepper.y.zone.edge]\nbegin = "-40 mm"\nend = "-38 mm"\nspeed = "5 mm/s"\n'
+TEXT["cascade"] += '[load_encoder]\nresolution = "1 um"\n'
 METHOD = dict.fromkeys(BUILD, "stepper_envelope") | {name: name for name in BUILD if name in METHODS}
+METHOD["turntable"] = "cascade"
+ROTARY = {"turntable"}
+"""Examples of an axis that turns, of a method that knows both motions."""
 NAMES = {
     "rotary_table": {"NUMBER": "2"},
     "zoom": {"NAME": "group_a", "ZONE": "near"},
@@ -112,14 +119,19 @@ def named_path(name, path):
     return tuple(NAMES[name][part] if isinstance(part, AnyName) else part for part in path)
 
 
-HELD = {"axis.name", "axis.method", "disturbance.push.force", "disturbance.push.at"}
+HELD = {"axis.name", "axis.method", "axis.motion", "disturbance.push.force", "disturbance.push.at"}
 ASIDE = ("disturbance.push", LOAD, BURST)
 """Tables that are there as a whole or not at all."""
 
 
+def model_of(name):
+    method = METHODS[METHOD[name]]
+    return method.rotary if name in ROTARY else method.spec
+
+
 def overrides_of(name):
     """Overrides of a few keys of a method's packaged example."""
-    leaves = {dotted(named_path(name, path)): field for path, field in leaf_fields(METHODS[METHOD[name]].spec)}
+    leaves = {dotted(named_path(name, path)): field for path, field in leaf_fields(model_of(name))}
     tried = [key for key in leaves if key not in HELD and not key.startswith(ASIDE) and not key.endswith("catalogue")]
     some = st.lists(st.sampled_from(tried), min_size=0, max_size=6, unique=True)
     return some.flatmap(

@@ -51,7 +51,10 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert done.stdout.strip() == b"[]"
 
 
-JOBS = {"index_sequence.toml": "rotary_table.toml", "zoom_sequence.toml": "zoom.toml", "tiles.csv": "stage.toml"}
+JOBS = {
+    "index_sequence.toml": "rotary_table.toml", "zoom_sequence.toml": "zoom.toml", "tiles.csv": "stage.toml",
+    "turn_moves.csv": "turntable.toml",
+}  # fmt: skip
 """Jobs that only an axis can read, and an axis they are for."""
 
 
@@ -71,7 +74,8 @@ def test_examples_are_files_that_load() -> None:
 
 def test_an_example_that_is_not_there_is_said_with_those_that_are() -> None:
     with pytest.raises(
-        DetentError, match=r"example 'robot\.toml': .* choose one of brochure\.prn, filtered_servo\.toml, index_"
+        DetentError,
+        match=r"example 'robot\.toml': .* choose one of brochure\.prn, cascade\.toml, filtered_servo\.toml, index_",
     ):
         detent.example("robot.toml")
 

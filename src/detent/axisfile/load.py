@@ -19,6 +19,7 @@ from detent.axisfile.fields import (
     is_named,
     leaf_fields,
     table_of,
+    unit_of,
 )
 from detent.axisfile.findings import Contradiction
 from detent.axisfile.locate import Path
@@ -27,8 +28,10 @@ from detent.axisfile.overrides import apply_overrides, as_table, put_value
 from detent.axisfile.problems import Reporter, bad_names, dotted, field_at, key_path, nearest_key
 from detent.axisfile.source import Source, read_source
 from detent.errors import FileProblem, InputError
+from detent.units import QuantityError, parse_quantity
 
 METHOD_KEY: Path = ("axis", "method")
+MOTION_KEY: Path = ("axis", "motion")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,15 +115,14 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
 
 
 def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
-    """Method the file names; without a name, the first, so that the rest is checked all the same."""
-    name: object = as_table(source.tables.get("axis")).get("method")
-    parts = [text.partition("=") for text in overrides]
-    stated = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == "axis.method"]
-    name = stated[-1] if stated else name
+    """Method the file names, for its motion; without a name, the first, so that the rest is checked all the same."""
+    name, stated = _stated(source, overrides, METHOD_KEY)
     if not isinstance(name, str):
         return next(iter(METHODS.values()))
     if name in METHODS:
-        return METHODS[name]
+        method = METHODS[name]
+        turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
+        return replace(method, spec=method.rotary) if turns else method
     near = difflib.get_close_matches(name.lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
     remedy = f'did you mean "{near[0]}"?' if near else f'write method = "{next(iter(METHODS))}"'
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
@@ -128,6 +130,13 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
     # Nothing else can be said: another method would have other keys.
     problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
+
+
+def _stated(source: Source, overrides: Sequence[str], path: Path) -> tuple[object, bool]:
+    """Value of a key that decides how the others are read, and whether an override gives it."""
+    parts = [text.partition("=") for text in overrides]
+    values = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == dotted(path)]
+    return (values[-1], True) if values else (_value_at(source.tables, path), False)
 
 
 def _all_methods() -> str:
@@ -196,7 +205,7 @@ def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_w
         except ValidationError as error:
             found: list[dict[str, Any]] = [dict(entry) for entry in error.errors(include_url=False)]
             if round_number == 0:
-                layers.problems += _tell(found, layers, reporter, method.spec, is_whole=is_whole)
+                layers.problems += _tell(found, layers, reporter, method, is_whole=is_whole)
             layers.doubtful |= {key_path(entry["loc"]) for entry in found}
             tables = _patched(tables, found, method.spec)
         else:
@@ -207,14 +216,14 @@ def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_w
 
 
 def _tell(
-    found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, model: type[Table], *, is_whole: bool
+    found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool
 ) -> list[FileProblem]:
     """Problems of one validation, without those that only follow from others."""
     by_key: dict[Path, list[dict[str, Any]]] = {}
     for entry in found:
         by_key.setdefault(key_path(entry["loc"]), []).append(entry)
     unknown = [path for path, entries in by_key.items() if entries[0]["type"] == "extra_forbidden"]
-    misspelt = {(*path[:-1], nearest_key(model, path)) for path in unknown}
+    misspelt = {(*path[:-1], nearest_key(method.spec, path)) for path in unknown}
     problems: list[FileProblem] = []
     for path, entries in by_key.items():
         kind = entries[0]["type"]
@@ -223,9 +232,24 @@ def _tell(
         if kind == "default_factory_not_called" or (kind == "missing" and follows):
             continue
         problem = reporter.from_errors(entries)
+        if kind == "quantity":
+            problem = replace(problem, remedy=problem.remedy + _other_motion(method, path, entries[0]["input"]))
         # The model knows the one method it was made for; a file may name any.
         problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
     return problems
+
+
+def _other_motion(method: Method[Any], path: Path, value: object) -> str:
+    """What to add to a remedy where a quantity would do for an axis of the other motion; empty where it would not."""
+    if method.rotary is None or not isinstance(value, str):
+        return ""
+    turns = method.spec is method.rotary
+    other = METHODS[method.name].spec if turns else method.rotary
+    try:
+        parse_quantity(value, unit_of(field_at(other, path)))
+    except QuantityError:
+        return ""
+    return f', or set axis.motion = "{"linear" if turns else "rotary"}"'
 
 
 def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> list[FileProblem]:

@@ -5,6 +5,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from detent.axisfile.cascade.cautions import find_cautions as find_cascade_cautions
+from detent.axisfile.cascade.derive import derive as derive_cascade
+from detent.axisfile.cascade.rules import RULES as CASCADE_RULES
+from detent.axisfile.cascade.schema import CascadeSpec
+from detent.axisfile.cascade.schema import fill_derived as fill_cascade
 from detent.axisfile.catalogue import DC_MOTORS, STEPPER_MOTORS, Catalogue
 from detent.axisfile.filtered_servo.cautions import find_cautions as find_filtered_servo_cautions
 from detent.axisfile.filtered_servo.derive import derive as derive_filtered_servo
@@ -12,6 +17,7 @@ from detent.axisfile.filtered_servo.rules import RULES as FILTERED_SERVO_RULES
 from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.filtered_servo.schema import fill_derived as fill_filtered_servo
 from detent.axisfile.findings import Caution, Contradiction, Derived
+from detent.axisfile.motion import rotary_model
 from detent.axisfile.phase_servo.cautions import find_cautions as find_phase_servo_cautions
 from detent.axisfile.phase_servo.derive import derive as derive_phase_servo
 from detent.axisfile.phase_servo.rules import RULES as PHASE_SERVO_RULES
@@ -37,7 +43,9 @@ from detent.kernel.registers import Registers
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
 
-AnySpec: TypeAlias = PrintHeadSpec | PhaseServoSpec | FilteredServoSpec | RotaryTableSpec | StepperEnvelopeSpec
+AnySpec: TypeAlias = (
+    PrintHeadSpec | PhaseServoSpec | FilteredServoSpec | RotaryTableSpec | StepperEnvelopeSpec | CascadeSpec
+)
 """What a file is loaded to: the union of the specifications of all methods."""
 
 
@@ -66,6 +74,8 @@ class Method(Generic[SpecT]):
     registers, parameters : callable
         Class of the axis's state and of its parameters. They load the compiled blocks, so they are only called where
         these are wanted.
+    rotary : type of AxisSpec or None
+        Model of the whole file where ``axis.motion = "rotary"``; None where the method has no such key.
     """
 
     name: str
@@ -78,6 +88,7 @@ class Method(Generic[SpecT]):
     catalogue: Catalogue | None
     registers: Callable[[], type[Registers]]
     parameters: Callable[[], type[Registers]]
+    rotary: type[SpecT] | None = None
 
 
 def _system(module: str, name: str) -> Callable[[], type[Registers]]:
@@ -158,7 +169,22 @@ STEPPER_ENVELOPE = Method(
     parameters=_system("stepper", "StepperParams"),
 )
 
+
+CASCADE = Method(
+    name="cascade",
+    title="cascade: position over velocity loop, linear or rotary, as servo drives have it",
+    spec=CascadeSpec,
+    fill=fill_cascade,
+    rules=CASCADE_RULES,
+    derive=derive_cascade,
+    cautions=find_cascade_cautions,
+    catalogue=DC_MOTORS,
+    registers=_system("cascade", "Cascade"),
+    parameters=_system("cascade", "CascadeParams"),
+    rotary=rotary_model(CascadeSpec),
+)
+
 METHODS: dict[str, Method[Any]] = {
-    method.name: method for method in (PRINT_HEAD, PHASE_SERVO, FILTERED_SERVO, ROTARY_TABLE, STEPPER_ENVELOPE)
+    method.name: method for method in (PRINT_HEAD, PHASE_SERVO, FILTERED_SERVO, ROTARY_TABLE, STEPPER_ENVELOPE, CASCADE)
 }
 """All methods by name; the first is the one a file without a method is checked against."""

@@ -1,4 +1,4 @@
-"""`detent run`: a job on the simulated axis."""
+"""`detent run`: a job on the simulated axis, or a recording replayed on it."""
 
 import shlex
 import sys
@@ -17,8 +17,32 @@ DONE_WORDS = {
     "print_head": "Printed {job} on {axis}.",
     "rotary_table": "{job}: every step was done on {axis}.",
     "stepper_envelope": "{job}: every move arrived on {axis}, no step was lost.",
+    "cascade": "{job}: every move was in position on {axis}.",
+    "replay": "{job}: replayed on {axis}.",
 }
 """What is said of a job that was done, by method; of servos, that every move arrived."""
+
+Replay = Annotated[
+    Path | None,
+    typer.Option(
+        "--replay",
+        metavar="LOG",
+        help="Cascade axis, in place of a job: a recording of the machine (.csv, .h5, .parquet, .mat, .npz, .jsonl). "
+        "Its reference is followed, or its effort drives the axis; recording and simulation are compared.",
+    ),
+]
+Mapping = Annotated[
+    Path | None, typer.Option("--map", metavar="FILE", help="With --replay: mapping file (TOML), what the columns are.")
+]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="ROLE=COLUMN",
+        help="With --replay: what a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, "
+        "reference, velocity, force, torque, current, voltage, command, position_load; what is not said is guessed.",
+    ),
+]
 
 
 Output = Annotated[
@@ -46,7 +70,8 @@ Every = Annotated[
         min=0,
         max=10_000_000,
         help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us, rotary table "
-        "100 us, steppers 2 us); 0 records nothing. Default: 10, 256, 10, 20, 100.",
+        "100 us, steppers 2 us, cascade as its file has it); 0 records nothing. Default: 10, 256, 10, 20, 100, one "
+        "sample.",
     ),
 ]
 TraceKinds = Annotated[
@@ -63,7 +88,10 @@ Comparison = Annotated[
 @app.command()
 def run(
     file: File,
-    job: Annotated[Path, typer.Option("--job", help=JOB_HELP)],
+    job: Annotated[Path | None, typer.Option("--job", help=JOB_HELP)] = None,
+    replay: Replay = None,
+    mapping: Mapping = None,
+    columns: Columns = None,
     output: Output = None,
     overrides: Set = None,
     signals: MoreSignals = None,
@@ -73,13 +101,14 @@ def run(
     *,
     as_json: Json = False,
 ) -> None:
-    """Do a job on the simulated axis, from power-on: print a text, make a list of moves, run a sequence."""
+    """Do a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
     from detent.axis import load
 
     kinds = _trace_kinds(formats) if every != 0 else []
     axis = load(file, overrides or [])
-    loaded = axis.load_job(job)
-    folder = output or Path("runs") / f"{file.stem}-{job.stem}"
+    source = _source(job, replay, mapping, columns or [])
+    loaded = axis.load_job(source) if replay is None else axis.load_recording(source, mapping, columns or [])
+    folder = output or Path("runs") / f"{file.stem}-{source.stem}"
     wanted = [*axis.method.signals, *split_names(signals)]
     axis.check_signals(wanted)
     _make_folder(folder)
@@ -88,7 +117,7 @@ def run(
         store = folder / "trace.h5" if kinds else None
         done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
-        if comparison and axis.spec.axis.method != "print_head":
+        if comparison and replay is None and axis.spec.axis.method != "print_head":
             done.comparisons = axis.compare(progress)
         progress(1.0, "writing the report")
         written = [done.report(folder / "report.html"), *_convert_trace(folder, kinds)]
@@ -98,6 +127,21 @@ def run(
         _print_run(done, written)
     if not done.done:
         raise typer.Exit(NOT_DONE)
+
+
+def _source(job: Path | None, replay: Path | None, mapping: Path | None, columns: list[str]) -> Path:
+    """The file that says what the axis does: a job or a recording."""
+    if job is not None and replay is not None:
+        raise DetentError("run: came --job and --replay; allowed: one of them; leave one out")
+    if replay is None and (mapping is not None or columns):
+        raise DetentError(
+            "run: came --map or --column without --replay; allowed: beside --replay, whose columns they name; leave "
+            "them out, or name a recording"
+        )
+    found = job or replay
+    if found is None:
+        raise DetentError("run: came neither --job nor --replay; allowed: one of them; name a job: --job moves.csv")
+    return found
 
 
 def _trace_kinds(formats: str) -> list[str]:
@@ -140,7 +184,8 @@ def _print_run(done: Any, written: list[Path]) -> None:
     result, method = done.result, done.axis.spec.axis.method
     prints = method == "print_head"
     if done.done:
-        words = DONE_WORDS.get(method, "{job}: every move arrived on {axis}.")
+        kind = "replay" if getattr(result.job, "kind", "") == "replay" else method
+        words = DONE_WORDS.get(kind, "{job}: every move arrived on {axis}.")
         console.print(words.format(job=result.job.name, axis=done.axis.name), style="bold green", soft_wrap=True)
     else:
         words = "Not printed" if prints else "Not done"

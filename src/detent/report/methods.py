@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from detent.axisfile.cascade.schema import CascadeSpec
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.axisfile.rotary_table.schema import RotaryTableSpec
@@ -11,6 +12,9 @@ from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.report.summary import move_summary_rows
 from detent.report.summary import summary_rows as print_summary_rows
 from detent.simulation.angle_comparison import AngleComparison
+from detent.simulation.cascade_comparison import ProfileComparison
+from detent.simulation.cascade_replay import ReplayRun
+from detent.simulation.cascade_run import CascadeRun
 from detent.simulation.comparisons import AnyComparison
 from detent.simulation.drive_comparison import DriveComparison
 from detent.simulation.feedback_comparison import FeedbackComparison
@@ -45,13 +49,24 @@ def summary_rows(spec: AnySpec, result: AnyResult) -> list[tuple[str, str]]:
         from detent.report.stage_summary import stage_summary_rows
 
         return stage_summary_rows(spec, result)
+    if isinstance(spec, CascadeSpec):
+        return _cascade_summary(spec, result)
     return move_summary_rows(*_servo(spec, result))
+
+
+def _cascade_summary(spec: CascadeSpec, result: AnyResult) -> list[tuple[str, str]]:
+    from detent.report.cascade_report import cascade_summary_rows, replay_summary_rows
+
+    if isinstance(result, ReplayRun):
+        return replay_summary_rows(spec, result)
+    assert isinstance(result, CascadeRun)  # noqa: S101 - a cascade axis makes no other run
+    return cascade_summary_rows(spec, result)
 
 
 def _servo(spec: AnySpec, result: AnyResult) -> tuple[ServoSpec, MoveRun]:
     """A run of moves with its axis, which no other axis makes."""
     assert isinstance(result, MoveRun)  # noqa: S101
-    assert not isinstance(spec, PrintHeadSpec | RotaryTableSpec | StepperEnvelopeSpec)  # noqa: S101
+    assert not isinstance(spec, PrintHeadSpec | RotaryTableSpec | StepperEnvelopeSpec | CascadeSpec)  # noqa: S101
     return spec, result
 
 
@@ -73,7 +88,25 @@ def report_of(
         return lambda path: write_table_report(table, path)
     if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
         return _stage_report(spec, result, trace, comparisons, settings)
+    if isinstance(spec, CascadeSpec):
+        return _cascade_report(spec, result, trace, comparisons, settings)
     return _servo_report(*_servo(spec, result), trace, comparisons, settings)
+
+
+def _cascade_report(
+    spec: CascadeSpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Writer:
+    from detent.report.cascade_page import write_cascade_report
+    from detent.report.cascade_replay_page import write_replay_report
+    from detent.report.cascade_report import cascade_report, replay_report
+
+    if isinstance(result, ReplayRun):
+        replay = replay_report(spec, result, settings=settings)
+        return lambda path: write_replay_report(replay, path)
+    assert isinstance(result, CascadeRun)  # noqa: S101 - see above
+    found = _first(comparisons, ProfileComparison)
+    data = cascade_report(spec, result, trace, comparison=found, settings=settings)
+    return lambda path: write_cascade_report(data, path)
 
 
 def _stage_report(
@@ -127,7 +160,7 @@ def plot_comparison_of(spec: AnySpec, comparison: AnyComparison, path: Path) -> 
 
 def _plotter(comparison: AnyComparison) -> Callable[[Any, Path], None]:
     """What draws a comparison."""
-    from detent.report import comparison_figures, stage_figures, table_comparisons
+    from detent.report import cascade_comparisons, comparison_figures, stage_figures, table_comparisons
 
     plotters: dict[type, Callable[[Any, Path], None]] = {
         NoiseComparison: comparison_figures.plot_noise,
@@ -136,6 +169,7 @@ def _plotter(comparison: AnyComparison) -> Callable[[Any, Path], None]:
         AngleComparison: table_comparisons.plot_angle,
         StepComparison: stage_figures.plot_steps,
         JerkComparison: stage_figures.plot_jerk,
+        ProfileComparison: cascade_comparisons.plot_profiles,
     }
     return plotters[type(comparison)]
 
@@ -145,7 +179,7 @@ def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
     if isinstance(comparison, DriveComparison):
         assert isinstance(spec, PrintHeadSpec)  # noqa: S101 - see above
         return _drive_table(spec, comparison)
-    from detent.report import stage_figures, table_comparisons
+    from detent.report import cascade_comparisons, stage_figures, table_comparisons
 
     tables: dict[type, Callable[[Any], Table]] = {
         NoiseComparison: _noise_table,
@@ -154,6 +188,7 @@ def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
         AngleComparison: table_comparisons.angle_table,
         StepComparison: stage_figures.steps_table,
         JerkComparison: stage_figures.jerk_table,
+        ProfileComparison: cascade_comparisons.profiles_table,
     }
     return tables[type(comparison)](comparison)
 

@@ -1,11 +1,13 @@
 """Each method held against the ways it was made to better."""
 
+from detent.axisfile.cascade.schema import CascadeSpec
 from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.axisfile.rotary_table.schema import RotaryTableSpec
 from detent.simulation.angle_comparison import AngleComparison, compare_angle
+from detent.simulation.cascade_comparison import ProfileComparison, compare_profiles
 from detent.simulation.drive_comparison import DriveComparison, compare_drives
 from detent.simulation.feedback_comparison import FeedbackComparison, compare_feedback
 from detent.simulation.hold_comparison import HoldComparison, compare_hold
@@ -21,6 +23,7 @@ AnyComparison = (
     | AngleComparison
     | StepComparison
     | JerkComparison
+    | ProfileComparison
 )
 
 
@@ -32,7 +35,7 @@ def compare_methods(spec: AnySpec, progress: Progress | None = None) -> tuple[An
     tuple
         Print head: `DriveComparison`. Phase servo: `NoiseComparison`, `HoldComparison`. Filtered servo:
         `FeedbackComparison`. Rotary table: `AngleComparison`. Steppers: a `StepComparison` per motor, and the
-        `JerkComparison` of the first.
+        `JerkComparison` of the first. Cascade: `ProfileComparison`.
 
     Raises
     ------
@@ -49,4 +52,6 @@ def compare_methods(spec: AnySpec, progress: Progress | None = None) -> tuple[An
         return (compare_feedback(spec, progress=progress),)
     if isinstance(spec, RotaryTableSpec):
         return (compare_angle(spec, progress=progress),)
+    if isinstance(spec, CascadeSpec):
+        return (compare_profiles(spec, progress=progress),)
     return (*compare_steps(spec, progress=progress), compare_jerk(spec))

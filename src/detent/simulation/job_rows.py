@@ -6,7 +6,7 @@ from detent.errors import FileProblem, InputError
 from detent.planning.move_job import MOST_MOVES, MOST_PROBLEMS, AnyMove, expand_moves, too_many_moves
 from detent.simulation.job_values import RefusedValueError
 
-EXAMPLE_UNITS = {"m": "mm", "s": "ms", "m/s": "mm/s"}
+EXAMPLE_UNITS = {"m": "mm", "s": "ms", "m/s": "mm/s", "rad": "deg", "rad/s": "deg/s"}
 """Unit that messages suggest, by the unit behind the border."""
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from detent.axisfile.cascade.build import build_cascade
+from detent.axisfile.cascade.schema import CascadeSpec
 from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.axisfile.methods import AnySpec
 from detent.axisfile.phase_servo.schema import PhaseServoSpec
@@ -18,6 +20,9 @@ from detent.planning.print_job import PrintJob, load_job, parse_text
 from detent.planning.sequence_job import Jog, SequenceJob
 from detent.planning.stage_job import StageJob, StageMove
 from detent.simulation.capture import Clocking, filtered_servo_clocking, phase_servo_clocking
+from detent.simulation.cascade_host import cascade_registers
+from detent.simulation.cascade_replay import ReplayJob, ReplayRun, run_cascade_replay
+from detent.simulation.cascade_run import CASCADE_SIGNALS, CascadeRun, run_cascade_moves
 from detent.simulation.machine import AnyRecorder
 from detent.simulation.move_file import load_moves
 from detent.simulation.move_run import FILTERED_SIGNALS, PHASE_SIGNALS, MoveRun, run_moves
@@ -29,8 +34,8 @@ from detent.simulation.stage_machine import stage_registers
 from detent.simulation.stage_run import StageRun, run_stage, stage_signals
 from detent.systems import filtered_servo, phase_servo, print_head, rotary_table
 
-AnyJob = PrintJob | MoveJob | SequenceJob | StageJob
-AnyResult = PrintRun | MoveRun | SequenceRun | StageRun
+AnyJob = PrintJob | MoveJob | SequenceJob | StageJob | ReplayJob
+AnyResult = PrintRun | MoveRun | SequenceRun | StageRun | CascadeRun | ReplayRun
 
 PRINT_HEAD_TIMING = (
     "encoder.channel_a", "encoder.channel_b", "quadrature.count", "head.state", "head.drive_cmd", "timer.pulse",
@@ -56,6 +61,11 @@ ROTARY_TABLE_TIMING = (
 STEPPER_TIMING = (
     "timer.pulses", "timer.phase", "timer.period", "rule.index", "rule.relation", "rule.state", "rotor.lag",
 )  # fmt: skip
+CASCADE_TIMING = (
+    "wake", "reference.position", "motor_sensor.count", "motor_sensor.velocity", "law.position_error", "law.command",
+    "law.limited", "source.output", "machine.motor.position", "machine.motor.sense", "machine.load.position",
+    "machine.side",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +88,8 @@ class Simulated:
         How registers change inside a tick.
     load : callable
         Reads a job file of the kind the method takes.
-    job : type
-        Class of the jobs that the method takes.
+    job : type, or tuple of types
+        Class of the jobs that the method takes; the first is that of the files that `load` reads.
     run : callable
         ``run(job, recorder=, progress=)`` makes a job.
     sample_job : callable
@@ -94,7 +104,7 @@ class Simulated:
     timing: tuple[str, ...]
     clocking: Clocking
     load: Callable[[Path], AnyJob]
-    job: type[AnyJob]
+    job: type[AnyJob] | tuple[type[AnyJob], ...]
     run: Callable[..., AnyResult]
     sample_job: Callable[[], AnyJob]
 
@@ -107,6 +117,8 @@ def simulated(spec: AnySpec) -> Simulated:
         return _phase_servo(spec)
     if isinstance(spec, FilteredServoSpec):
         return _filtered_servo(spec)
+    if isinstance(spec, CascadeSpec):
+        return _cascade(spec)
     return _rotary_table(spec) if isinstance(spec, RotaryTableSpec) else _stepper_envelope(spec)
 
 
@@ -228,4 +240,33 @@ def _stepper_envelope(spec: StepperEnvelopeSpec) -> Simulated:
         job=StageJob,
         run=run,
         sample_job=sample_job,
+    )
+
+
+def _cascade(spec: CascadeSpec) -> Simulated:
+    p = build_cascade(spec)
+
+    def run(job: Any, recorder: AnyRecorder | None = None, progress: Progress | None = None) -> CascadeRun | ReplayRun:
+        if isinstance(job, ReplayJob):
+            return run_cascade_replay(spec, job, recorder=recorder, progress=progress)
+        return run_cascade_moves(spec, job, recorder=recorder, progress=progress)
+
+    def load(path: Path) -> MoveJob:
+        return load_moves(path, rotary=spec.axis.motion == "rotary")
+
+    # To where there is more room.
+    way = 0.02 * spec.limits.travel
+    middle = spec.limits.lowest + 0.5 * spec.limits.travel
+    return Simulated(
+        registers=cascade_registers(spec),
+        tick=p.machine.period,
+        every=p.sample_ticks,
+        seed=0,
+        signals=CASCADE_SIGNALS,
+        timing=CASCADE_TIMING,
+        clocking=Clocking(),
+        load=load,
+        job=(MoveJob, ReplayJob),
+        run=run,
+        sample_job=_one_move("one move", way if spec.mechanics.start_position < middle else -way, 0.05),
     )

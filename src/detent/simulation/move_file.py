@@ -7,6 +7,7 @@ from detent.errors import InputError
 from detent.planning.move_job import MoveJob, text_job
 from detent.simulation.job_text import decode_utf8, read_data
 from detent.simulation.move_csv import parse_move_csv
+from detent.simulation.move_rows import ROTARY_UNITS, UNITS
 from detent.simulation.move_toml import parse_move_toml
 
 _KINDS = (".csv", ".toml", ".txt")
@@ -14,7 +15,12 @@ _WHAT_A_JOB_IS = "a list of moves (.csv or .toml) or a text (.txt)"
 
 
 def load_moves(
-    path: str | PathLike[str], *, pitch: float | None = None, left_margin: float = 0.0, hammer_time: float = 0.0
+    path: str | PathLike[str],
+    *,
+    pitch: float | None = None,
+    left_margin: float = 0.0,
+    hammer_time: float = 0.0,
+    rotary: bool = False,
 ) -> MoveJob:
     """Read the job of a servo axis; the ending of the name says what it is.
 
@@ -28,6 +34,8 @@ def load_moves(
         Position of a text's first column [m].
     hammer_time : float
         Time the axis stands at each character of a text [s].
+    rotary : bool
+        The axis turns: places and ways are angles, the job has them in rad.
 
     Returns
     -------
@@ -41,11 +49,11 @@ def load_moves(
     """
     file = Path(path)
     data = read_data(file, _KINDS, _WHAT_A_JOB_IS)
-    ending = file.suffix.lower()
+    ending, units = file.suffix.lower(), ROTARY_UNITS if rotary else UNITS
     if ending == ".csv":
-        return parse_move_csv(str(file), decode_utf8(file, data))
+        return parse_move_csv(str(file), decode_utf8(file, data), units)
     if ending == ".toml":
-        return parse_move_toml(str(file), decode_utf8(file, data))
+        return parse_move_toml(str(file), decode_utf8(file, data), units)
     if pitch is None:
         remedy = "name a list of moves; a text is for an axis that has a character pitch"
         raise InputError.of_file(

@@ -11,11 +11,14 @@ from detent.units import QuantityError, parse_quantity
 UNITS = {"target": "m", "by": "m", "dwell": "s", "repeat": "", "speed": "m/s", "sample_period": "s"}
 """Unit of each key of a row, behind the border; empty for a count."""
 
+ROTARY_UNITS = UNITS | {"target": "rad", "by": "rad", "speed": "rad/s"}
+"""The same for an axis that turns."""
+
 ONE_WAY = "exactly one of target (a place) and by (a way from the place before)"
 """What each row must say."""
 
 
-def read_quantity(key: str, text: str) -> float:
+def read_quantity(key: str, text: str, units: Mapping[str, str] = UNITS) -> float:
     """Read a number with its unit as the value of a key, in SI units.
 
     Raises
@@ -24,13 +27,13 @@ def read_quantity(key: str, text: str) -> float:
         It is no such quantity, or outside what the key allows.
     """
     try:
-        value = parse_quantity(text, UNITS[key])
+        value = parse_quantity(text, units[key])
     except QuantityError as error:
         raise RefusedValueError(error.reason, error.allowed, error.remedy) from None
-    return check_quantity(key, value)
+    return check_quantity(key, value, units)
 
 
-def check_quantity(key: str, value: float) -> float:
+def check_quantity(key: str, value: float, units: Mapping[str, str] = UNITS) -> float:
     """Check the value of a key, in SI units.
 
     Raises
@@ -41,7 +44,7 @@ def check_quantity(key: str, value: float) -> float:
     if key == "dwell":
         return check_dwell(value)
     if key in {"speed", "sample_period"} and value <= 0:
-        unit = EXAMPLE_UNITS[UNITS[key]]
+        unit = EXAMPLE_UNITS[units[key]]
         raise RefusedValueError("", f"more than 0 {unit}", "raise it, or leave it out for the axis's own")
     return value
 

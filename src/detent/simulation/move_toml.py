@@ -1,6 +1,6 @@
 """Files of moves as TOML: a `[[move]]` table each, quantities with their units."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from detent.planning.move_job import Move, MoveJob
@@ -10,7 +10,7 @@ from detent.simulation.job_values import RefusedValueError, read_text_quantity, 
 from detent.simulation.move_rows import ONE_WAY, UNITS, add_move, check_quantity, to_job
 
 
-def parse_move_toml(file: str, text: str) -> MoveJob:
+def parse_move_toml(file: str, text: str, units: Mapping[str, str] = UNITS) -> MoveJob:
     """Read a file of moves from TOML.
 
     Each ``[[move]]`` has ``target`` or ``by``, and where wanted ``dwell``, ``repeat``, ``speed`` and ``sample_period``.
@@ -22,6 +22,8 @@ def parse_move_toml(file: str, text: str) -> MoveJob:
         The file as the user named it.
     text : str
         Its text.
+    units : mapping of str to str
+        Unit of each key: `UNITS`, or `ROTARY_UNITS`.
 
     Returns
     -------
@@ -35,11 +37,11 @@ def parse_move_toml(file: str, text: str) -> MoveJob:
     """
     rows = JobRows[Move](file)
     tables = JobTables(file, text, ("move",), rows.problems)
-    repeat = read_repeat(tables, UNITS)
+    repeat = read_repeat(tables, units)
     for index, move in enumerate(tables.tables("move")):
         if rows.is_over:
             break
-        _read_move(tables, rows, index, move)
+        _read_move(tables, rows, index, move, units)
     return to_job(rows, repeat)
 
 
@@ -57,30 +59,33 @@ def read_repeat(tables: JobTables, keys: Iterable[str]) -> int:
     return repeat
 
 
-def _read_move(tables: JobTables, rows: JobRows[Move], index: int, move: dict[str, Any]) -> None:
+def _read_move(
+    tables: JobTables, rows: JobRows[Move], index: int, move: dict[str, Any], units: Mapping[str, str]
+) -> None:
     """Read one move."""
     values: dict[str, float] = {}
     known = len(rows.problems)
     for key, value in move.items():
         try:
-            values[key] = _read_value(key, value)
+            values[key] = _read_value(key, value, units)
         except RefusedValueError as error:
             tables.refuse("move", index, key, value, error)
     ways = {"target", "by"} & set(move)
     if len(ways) == 2:
         tables.refuse("move", index, "by", None, RefusedValueError("target and by", ONE_WAY, "remove one of the two"))
     elif not ways and tables.is_whole:
-        error = RefusedValueError("neither target nor by", ONE_WAY, 'add target = "12 mm" or by = "1 mm"')
+        unit = EXAMPLE_UNITS[units["target"]]
+        error = RefusedValueError("neither target nor by", ONE_WAY, f'add target = "12 {unit}" or by = "1 {unit}"')
         tables.refuse("move", index, "", None, error)
     if ways and len(rows.problems) == known:
         add_move(rows, tables.line("move", index), values)
 
 
-def _read_value(key: str, value: object) -> float:
+def _read_value(key: str, value: object, units: Mapping[str, str]) -> float:
     """Read one value of a move."""
-    if key not in UNITS:
-        raise unknown_key(key, UNITS, "in [[move]]")
-    if not UNITS[key]:
+    if key not in units:
+        raise unknown_key(key, units, "in [[move]]")
+    if not units[key]:
         return check_count(read_whole_number(key, value))
-    unit = UNITS[key]
-    return check_quantity(key, read_text_quantity(key, value, unit, f"12 {EXAMPLE_UNITS[unit]}"))
+    unit = units[key]
+    return check_quantity(key, read_text_quantity(key, value, unit, f"12 {EXAMPLE_UNITS[unit]}"), units)

@@ -58,7 +58,7 @@ QUANTITIES = [
         "13:1",
         "motor.back_emf_constant",
         "1 V/Hz",
-        "a back-EMF constant",
+        "a voltage per angular velocity",
         "rpm",
     ),
     added(

@@ -399,3 +399,30 @@ def test_example_of_a_slide_stays_on_it():
 def test_example_says_in_its_first_line_what_it_is(name):
     first = (EXAMPLES / name).read_text(encoding="utf-8").splitlines()[0]
     assert first.startswith("# Moves of a ")
+
+
+# -- axes that turn -----------------------------------------------------------------------------------------
+
+
+def test_places_ways_and_speeds_of_an_axis_that_turns_are_angles(write):
+    table = load_moves(write("t.csv", "target [deg],by [turn],speed [rpm]\n180,,\n,0.25,60\n"), rotary=True)
+    tables = load_moves(
+        write("t.toml", '[[move]]\ntarget = "180 deg"\n[[move]]\nby = "0.25 turn"\nspeed = "60 rpm"\n'), rotary=True
+    )
+    for job in (table, tables):
+        (first, second) = job.moves
+        assert first.target == pytest.approx(3.14159265)
+        assert (second.by, second.speed) == pytest.approx((1.57079633, 6.28318531))
+
+
+def test_messages_about_an_axis_that_turns_suggest_degrees(write):
+    (problem,) = refusal(write("a.csv", "target [mm]\n1\n"), rotary=True)
+    assert problem.remedy == "write target [deg]"
+    (problem,) = refusal(write("b.csv", "dwell [ms]\n1\n"), rotary=True)
+    assert problem.remedy == "add a column target [deg] or by [deg]"
+    (problem,) = refusal(write("c.toml", '[[move]]\ndwell = "1 ms"\n'), rotary=True)
+    assert problem.remedy == 'add target = "12 deg" or by = "1 deg"'
+    (problem,) = refusal(write("d.toml", "[[move]]\ntarget = 3\n"), rotary=True)
+    assert '"12 deg"' in problem.remedy
+    (problem,) = refusal(write("e.csv", "target [deg],speed [deg/s]\n1,-2\n"), rotary=True)
+    assert "deg/s" in problem.allowed

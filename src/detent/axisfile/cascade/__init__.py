@@ -1,0 +1,1 @@
+"""The cascade axis's part of the axis file."""

@@ -1,0 +1,172 @@
+"""One schema for an axis that slides and for one that turns."""
+
+import math
+
+import pytest
+from pydantic import Field, ValidationError
+from tests.bad_files import example_text
+
+from detent.axisfile.dump import dump_spec
+from detent.axisfile.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of
+from detent.axisfile.methods import CASCADE
+from detent.axisfile.motion import ROTARY_UNITS, rotary_model, unit_in
+from detent.axisfile.quantities import Force, Length, Time
+from detent.errors import InputError
+from detent.units import KINDS, parse_quantity
+
+
+class InnerTable(Table, frozen=True):
+    """Below."""
+
+    force: Force = required("a force", '"3 N"', ge=0.0, le=10.0)
+
+
+class PlainTable(Table, frozen=True):
+    """Nothing that moves."""
+
+    wait: Time = optional("a time", 1.0, gt=0.0)
+
+
+class OuterTable(Table, frozen=True):
+    """Above."""
+
+    way: Length = optional("a way", 0.5, gt=0.0, le=2.0)
+    gap: Length | None = optional("a gap", None, ge=0.0, le=1.0)
+    half: Length = optional("half the way", lambda data: data["way"] / 2, derived="half the way")
+    inner: InnerTable
+    maybe: InnerTable | None = None
+    plain: PlainTable = Field(default_factory=PlainTable)
+
+    @property
+    def double(self) -> float:
+        """Twice the way."""
+        return 2 * self.way
+
+
+ROTARY = rotary_model(OuterTable)
+TURN = {"way": "90 deg", "gap": "18 deg", "inner": {"force": "2 N*m"}, "maybe": {"force": "40 mN*m"}}
+
+
+def test_every_unit_exchanged_has_a_name_and_a_partner_of_another_kind():
+    for linear, rotary in ROTARY_UNITS.items():
+        assert linear in KINDS
+        assert rotary in KINDS
+        assert KINDS[linear][0] != KINDS[rotary][0]
+        # The same power of the length is left: what "m" is measured in is now "rad".
+        assert rotary not in ROTARY_UNITS
+
+
+def test_values_are_read_in_the_units_of_the_motion():
+    table = ROTARY.model_validate(TURN)
+    assert (table.way, table.half) == (math.pi / 2, math.pi / 4)
+    assert table.gap == parse_quantity("18 deg", "rad")
+    assert (table.inner.force, table.maybe.force) == (2.0, 0.04)
+    assert table.plain.wait == 1.0
+    assert table.double == math.pi
+    assert isinstance(table, OuterTable)
+    assert OuterTable.model_validate({"inner": {"force": "2 N"}}).inner.force == 2.0
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("way",), "1 m"),
+        (("gap",), "1 mm"),
+        (("inner", "force"), "2 N"),
+        (("maybe", "force"), "2 N"),
+        (("way",), "3 rad"),
+        (("gap",), "-1 deg"),
+        (("inner", "force"), "11 N*m"),
+        (("inner", "power"), "1 W"),
+    ],
+)
+def test_bounds_and_unknown_keys_are_those_of_the_model(path, value):
+    tables = {**TURN, "inner": dict(TURN["inner"]), "maybe": dict(TURN["maybe"])}
+    (tables if len(path) == 1 else tables[path[0]])[path[-1]] = value
+    with pytest.raises(ValidationError) as caught:
+        ROTARY.model_validate(tables)
+    # A default that is made from a wrong key cannot be made either.
+    (found,) = {error["loc"] for error in caught.value.errors() if error["type"] != "default_factory_not_called"}
+    assert found == path
+
+
+def test_a_rotary_table_changes_no_more_than_a_linear_one():
+    table = ROTARY.model_validate(TURN)
+    with pytest.raises(ValidationError):
+        table.way = 1.0
+    with pytest.raises(ValidationError):
+        ROTARY.model_validate({**TURN, "way": 1.0})
+
+
+def test_a_table_without_lengths_stays_itself():
+    assert rotary_model(PlainTable) is PlainTable
+    assert rotary_model(OuterTable) is ROTARY
+    assert ROTARY.__doc__ == OuterTable.__doc__
+
+
+def test_only_units_and_examples_differ():
+    linear, rotary = dict(leaf_fields(CASCADE.spec)), dict(leaf_fields(CASCADE.rotary))
+    assert list(linear) == list(rotary)
+    changed = 0
+    for path, field in linear.items():
+        other = rotary[path]
+        assert unit_of(other) == unit_in("rotary", unit_of(field))
+        assert other.is_required() == field.is_required()
+        assert other.description == field.description
+        assert (other.default, other.default_factory) == (field.default, field.default_factory)
+        if unit_of(field) in ROTARY_UNITS:
+            changed += 1
+            assert describe_allowed(other) != describe_allowed(field)
+        else:
+            assert describe_allowed(other) == describe_allowed(field)
+        for example in other.examples or []:
+            assert not unit_of(other) or math.isfinite(parse_quantity(example.strip('"'), unit_of(other)))
+    assert changed > 30
+
+
+def test_the_dump_of_a_rotary_axis_is_one_again(load_text):
+    axis = load_text(example_text("turntable"))
+    text = dump_spec(axis.spec)
+    assert 'speed = "3.141592653589793 rad/s"' in text
+    assert 'stiffness = "900.0 N*m/rad"' in text
+    assert load_text(text).spec == axis.spec
+
+
+def problems(load_text, text, *overrides):
+    with pytest.raises(InputError) as caught:
+        load_text(text, *overrides)
+    return caught.value.problems
+
+
+def test_a_quantity_of_the_other_motion_is_refused_where_it_stands(load_text):
+    text = example_text("turntable").replace('speed = "180 deg/s"', 'speed = "0.5 m/s"')
+    (problem,) = problems(load_text, text)
+    assert str(problem).startswith("axis.toml:9:1 limits.speed")
+    assert problem.came == '"0.5 m/s"'
+    assert problem.allowed.startswith("an angular velocity above 0 deg/s")
+    assert problem.remedy == 'use a unit of the same dimension as in "60 deg/s", or set axis.motion = "linear"'
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "right"), [("cascade", "rotary", "linear"), ("turntable", "linear", "rotary")]
+)
+def test_a_wrong_motion_says_so_at_every_quantity(load_text, name, wrong, right):
+    found = problems(load_text, example_text(name), f"axis.motion={wrong}")
+    assert len(found) > 15
+    assert all(problem.remedy.endswith(f', or set axis.motion = "{right}"') for problem in found)
+
+
+@pytest.mark.parametrize("value", ["3 kg", "3", "fast"])
+def test_a_quantity_of_no_motion_does_not_blame_the_motion(load_text, value):
+    (problem,) = problems(load_text, example_text("cascade"), f"limits.speed={value}")
+    assert "motion" not in problem.remedy
+
+
+def test_an_unknown_motion_is_refused(load_text):
+    (problem,) = problems(load_text, example_text("cascade"), "axis.motion=round")
+    assert (problem.key, problem.allowed) == ("axis.motion", '"linear" or "rotary"')
+
+
+def test_other_methods_know_no_motion(load_text):
+    (problem,) = problems(load_text, example_text("print_head"), "axis.motion=rotary")
+    assert problem.came == 'the unknown key "axis.motion"'
