@@ -1,0 +1,151 @@
+"""Standard errors of a regression whose residuals are coloured and of uneven size.
+
+The covariance of the constants needs the long-run variance of the scores, instrument times residual, row by row in
+their order of time. It is estimated by projecting the scores on the lowest cosines of the record (equal-weighted
+cosines): each projection is one independent look at the variance near frequency zero, so their mean has as many degrees
+of freedom as there are cosines, and Student's distribution with these gives intervals that hold in small samples, where
+those of a Newey-West sum are too short.
+
+References
+----------
+Lazarus, Lewis, Stock, Watson: HAR inference: recommendations for practice. Journal of Business and Economic Statistics
+36 (2018): number of cosines 0.41 n^(2/3), critical values of Student's distribution.
+Mueller: HAC corrections for strongly autocorrelated time series. Same journal 32 (2014).
+"""
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+
+SHARE = 0.3
+"""Cosines per independent residual, at most: beyond these the long-run variance would be read where it has fallen."""
+
+
+def independent_rows(residual: Numbers) -> float:
+    """How many independent residuals are worth as much as these, by the correlation of neighbours.
+
+    Parameters
+    ----------
+    residual : float64 array, shape (n,)
+        Rows in their order of time.
+
+    Returns
+    -------
+    float
+        ``n (1 - r) / (1 + r)`` with the correlation `r` of neighbours within 0 and 0.99, corrected for its bias of
+        ``1 / n``.
+    """
+    n, r = len(residual), neighbour_correlation(residual)
+    return n * (1.0 - r) / (1.0 + r)
+
+
+def neighbour_correlation(residual: Numbers) -> float:
+    """Correlation of neighbours, within 0 and 0.99, corrected for its bias of ``1 / n``."""
+    power = float(residual @ residual)
+    correlation = float(residual[1:] @ residual[:-1]) / power + 1.0 / len(residual) if power > 0.0 else 0.0
+    return min(max(correlation, 0.0), 0.99)
+
+
+def fallen_density(correlation: float, rows: int, cosines: int) -> float:
+    """Mean spectral density over the cosines, in parts of that at frequency zero, of a first-order process.
+
+    Its density falls as ``1 / (1 + x^2)`` with ``x = w sqrt(r) / (1 - r)``, `w` the angle per row.
+
+    Examples
+    --------
+    >>> round(fallen_density(0.9, 1000, 16), 3), fallen_density(0.0, 1000, 41)
+    (0.933, 1.0)
+    """
+    x = np.pi * cosines / rows * np.sqrt(correlation) / (1.0 - correlation)
+    return float(np.arctan(x) / x) if x > 0.0 else 1.0
+
+
+def count_cosines(rows: int, independent: float) -> int:
+    """Cosines, and degrees of freedom: 0.41 n^(2/3), fewer where residuals are strongly coloured, at least 4.
+
+    Examples
+    --------
+    >>> count_cosines(1000, 1000), count_cosines(1000, 50), count_cosines(10, 10)
+    (41, 15, 4)
+    """
+    return max(4, min(round(0.41 * rows ** (2.0 / 3.0)), round(SHARE * independent)))
+
+
+def long_run_variance(scores: Numbers, cosines: int) -> Numbers:
+    """Long-run covariance of rows in their order of time.
+
+    Parameters
+    ----------
+    scores : float64 array, shape (n, k)
+        Rows with a mean of 0.
+    cosines : int
+        Cosines to project on, from 1 to n.
+
+    Returns
+    -------
+    float64 array, shape (k, k)
+        Covariance of the sum of the rows, divided by n.
+    """
+    transform: Any = import_module("scipy.fft")  # it states no types
+    projected: Numbers = transform.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    return projected.T @ projected / len(projected)
+
+
+def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Numbers | None = None) -> tuple[Numbers, int]:
+    """Covariance of the constants of a regression with coloured residuals.
+
+    Parameters
+    ----------
+    columns : float64 array, shape (n, k)
+        What multiplies the constants, rows in their order of time.
+    residual : float64 array, shape (n,)
+        Measured less fitted.
+    instruments : float64 array, shape (n, k), optional
+        Of an instrumental-variable fit; the columns themselves by default, which is least squares.
+
+    Returns
+    -------
+    (float64 array, shape (k, k), int)
+        Covariance, and the degrees of freedom behind it.
+    """
+    n, k = columns.shape
+    chosen = columns if instruments is None else instruments
+    size, length = _sizes(columns), _sizes(chosen)
+    independent = independent_rows(residual)
+    degrees = count_cosines(n, independent)
+    scores = chosen / length * residual[:, None]
+    few = independent / max(independent - k, 2.0)
+    fallen = fallen_density(neighbour_correlation(residual), n, min(degrees, n))
+    inverse = np.asarray(np.linalg.pinv((chosen / length).T @ (columns / size)), np.float64)
+    found = [
+        inverse @ (n * few * variance) @ inverse.T
+        for variance in (long_run_variance(scores, min(degrees, n)) / fallen, _lagged_variance(scores, n / independent))
+    ]
+    least, other = (np.maximum(np.diag(v), 0.0) for v in found)
+    grow = np.sqrt(np.where(least > 0.0, np.maximum(other, least) / np.where(least > 0.0, least, 1.0), 1.0))
+    return found[0] * np.outer(grow, grow) / np.outer(size, size), degrees
+
+
+def _sizes(columns: Numbers) -> Numbers:
+    """Lengths of columns; 1 for one of zeros."""
+    length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
+    return np.where(length > 0.0, length, 1.0)
+
+
+def _lagged_variance(scores: Numbers, memory: float) -> Numbers:
+    """Long-run covariance by weighted lags, far enough for residuals of a memory of so many rows (Newey, West 1987).
+
+    It and the projections err independently; the larger of both does not leave an interval too short by chance.
+    """
+    n = len(scores)
+    lags = min(max(4, round(3.0 * memory)), n - 1)
+    total = scores.T @ scores
+    for lag in range(1, lags + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        total = total + (1.0 - lag / (lags + 1.0)) * (product + product.T)
+    return total / n

@@ -1,0 +1,152 @@
+"""A smooth window that turns equations of motion into sums over samples: no derivative of a measurement is taken.
+
+Both sides of ``F = M q'' + f(q')`` are multiplied with a window ``w`` and integrated; by parts, the derivatives pass
+from the measured position to the window, ``int w q'' = int w'' q``, where they are exact. A window is
+
+    w(s) = (1 - s^2)^4,    -1 < s < 1
+
+and zero outside: three derivatives vanish at its ends, so that sums over samples equal integrals far beyond the noise
+of any measurement. The effort stands between two samples; its integral is exact.
+
+References
+----------
+Shinbrot: On the analysis of linear and nonlinear systems. Trans. ASME 79 (1957), the method of modulating functions.
+Messenger, Bortz: Weak SINDy: Galerkin-based data-driven model selection. Multiscale Model. Simul. 19 (2021).
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+Rows = NDArray[np.intp]
+"""Numbers of samples."""
+
+_SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
+_SQUARED = _SHAPE**2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kernel:
+    """Weights of the samples around a place.
+
+    Attributes
+    ----------
+    half : int
+        Samples to each side; the weights have ``2 half + 1`` entries.
+    step : float
+        Time between two samples [s].
+    value, first, second, third : float64 array, shape (2 half + 1,)
+        Sums of these times a signal are the weighted mean of the signal [1], of its first [1/s], second [1/s^2] and
+        third derivative [1/s^3].
+    """
+
+    half: int
+    step: float
+    value: Numbers
+    first: Numbers
+    second: Numbers
+    third: Numbers
+
+    @property
+    def corner_hz(self) -> float:
+        """Frequency at which the mean of a signal is about 0.7 of its amplitude [Hz]."""
+        return 0.40 / (self.half * self.step)
+
+    def held(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
+        """Mean of a signal that stands from each sample to the next, seen `late` samples later, around samples `rows`.
+
+        Returns
+        -------
+        float64 array, shape (len(rows),)
+        """
+        return _sums(signal, _held_weights(self.half, late), rows)
+
+    def held_slope(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
+        """Mean of the first derivative of such a signal [1/s], around samples `rows`."""
+        return _sums(signal, _held_slopes(self.half, late), rows) / self.step
+
+    def mean(self, signal: Numbers, rows: Rows) -> Numbers:
+        """Mean of a signal between whose samples straight lines run, around samples `rows`."""
+        return _sums(signal, self.value, rows)
+
+    def velocity(self, position: Numbers, rows: Rows) -> Numbers:
+        """Mean of the first derivative around samples `rows`."""
+        return _sums(position, self.first, rows)
+
+    def acceleration(self, position: Numbers, rows: Rows) -> Numbers:
+        """Mean of the second derivative around samples `rows`."""
+        return _sums(position, self.second, rows)
+
+    def jerk(self, position: Numbers, rows: Rows) -> Numbers:
+        """Mean of the third derivative around samples `rows`."""
+        return _sums(position, self.third, rows)
+
+    def velocities(self, position: Numbers) -> Numbers:
+        """Mean of the first derivative around every sample; wrong for `half` samples at both ends."""
+        half = self.half
+        padded = np.concatenate([np.full(half, position[0]), position, np.full(half, position[-1])])
+        return np.convolve(padded, self.first[::-1], mode="valid")
+
+
+def make_kernel(half: int, step: float) -> Kernel:
+    """Weights of a window of some samples.
+
+    Parameters
+    ----------
+    half : int
+        Samples to each side, 4 or more.
+    step : float
+        Time between two samples [s].
+    """
+    s = np.arange(-half, half + 1) / half
+    area = float(np.sum(_SHAPE(s)))
+    slope = half * step
+    value = _SHAPE(s) / area
+    first = -_SHAPE.deriv(1)(s) / (area * slope)
+    second = _SHAPE.deriv(2)(s) / (area * slope**2)
+    third = -_SHAPE.deriv(3)(s) / (area * slope**3)
+    # Sums are no integrals: these make straight lines, parabolas and cubics come out exactly.
+    t = np.asarray(np.arange(-half, half + 1) * step, np.float64)
+    return Kernel(
+        half,
+        step,
+        value,
+        first / float(first @ t),
+        (second - second.mean()) * (2.0 / float((second - second.mean()) @ (t * t))),
+        _exact_third(third, t),
+    )
+
+
+def _exact_third(weights: Numbers, t: Numbers) -> Numbers:
+    """Weights that give 0 for a straight line and 6 for a cubic."""
+    straight = weights - t * float(weights @ t) / float(t @ t)
+    return straight * (6.0 / float(straight @ t**3))
+
+
+@cache
+def _held_weights(half: int, late: float) -> Numbers:
+    """Integral of the window over each sample's stretch, `late` samples after it began."""
+    reach = half + 1 + int(np.ceil(abs(late)))
+    edges = (np.arange(-reach, reach + 2) + late) / half
+    rise = _SHAPE.integ()
+    weights = np.diff(rise(np.clip(edges, -1.0, 1.0)))
+    return weights / weights.sum()
+
+
+@cache
+def _held_slopes(half: int, late: float) -> Numbers:
+    """The same of the derivative: the window's change over each stretch, per sample."""
+    reach = half + 1 + int(np.ceil(abs(late)))
+    edges = np.clip((np.arange(-reach, reach + 2) + late) / half, -1.0, 1.0)
+    area = float(_SHAPE.integ()(1.0) - _SHAPE.integ()(-1.0)) * half
+    return -np.diff(_SHAPE(edges)) / area
+
+
+def _sums(signal: Numbers, weights: Numbers, rows: Rows) -> Numbers:
+    """Weighted sum around each of some samples; the signal keeps its end values beyond its ends."""
+    half = len(weights) // 2
+    padded = np.concatenate([np.full(half, signal[0]), signal, np.full(half, signal[-1])])
+    return np.lib.stride_tricks.sliding_window_view(padded, len(weights))[rows] @ weights
