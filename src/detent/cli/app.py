@@ -61,8 +61,9 @@ Signals = Annotated[
 
 
 JOB_HELP = (
-    "What the axis does. Print head: plain text or a Diablo 630 stream. Servos: a list of moves (.csv, .toml); "
-    "phase servo: text (.txt) too. Rotary table: a sequence (.toml). Steppers: moves or tiles (.csv, .toml)."
+    "What the axis does. Print head: plain text or a Diablo 630 stream. Servos and cascade axes: a list of moves "
+    "(.csv, .toml); phase servo: text (.txt) too. Rotary table: a sequence (.toml). Steppers: moves or tiles "
+    "(.csv, .toml)."
 )
 Job = Annotated[
     Path | None,

@@ -1,0 +1,298 @@
+"""`detent identify`: from recordings to constants with limits, and a verdict."""
+
+import shlex
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from detent.cli.app import NOT_DONE, Json, app
+from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
+from detent.errors import DetentError
+
+if TYPE_CHECKING:
+    from detent.identify.identification import Method
+    from detent.report.identified import Identified
+
+METHODS = {"regression": "regression", "output-error": "output error"}
+"""Words of --method, and what the identification calls them."""
+
+COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
+
+MOST_LINES = 6
+"""Logs, findings and refusals shown; --json and the report have them all."""
+
+Mapping = Annotated[
+    Path | None, typer.Option("--map", metavar="FILE", help="Mapping file (TOML): what the columns of the logs are.")
+]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="ROLE=COLUMN",
+        help="What a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, reference, "
+        "velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, and told.",
+    ),
+]
+Effort = Annotated[
+    str | None,
+    typer.Option(
+        "--effort",
+        metavar="ROLE",
+        help="What drives the axis: force, torque, current, voltage or command. Default: the first that a log holds.",
+    ),
+]
+How = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        metavar="WORD",
+        help="regression: equations of motion, in a second; output-error: the simulation fitted to the recording too.",
+    ),
+]
+AxisOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--axis",
+        metavar="FILE",
+        help="Cascade axis file: constants it states outside of the intervals are named, --write puts the identified "
+        "ones into it, --job keeps its limits.",
+    ),
+]
+Write = Annotated[
+    Path | None,
+    typer.Option("--write", metavar="FILE", help="Write an axis file (TOML): a new one, or that of --axis, changed."),
+]
+JobFile = Annotated[
+    Path | None,
+    typer.Option("--job", metavar="FILE", help="Write a list of moves (TOML) that shows what the logs do not."),
+]
+ReportFile = Annotated[
+    Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one self-contained HTML file.")
+]
+
+
+@app.command()
+def identify(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG...",
+            help="Recordings of one axis (.csv, .h5, .parquet, .mat, .npz, .jsonl).",
+            show_default=False,
+        ),
+    ],
+    mapping: Mapping = None,
+    columns: Columns = None,
+    effort: Effort = None,
+    method: How = "regression",
+    axis: AxisOption = None,
+    write: Write = None,
+    job: JobFile = None,
+    report: ReportFile = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Find an axis's mass, friction and delay in recordings, each with its limits; refuse what they do not tell.
+
+    Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 the input
+    cannot be read.
+    """
+    from detent.report.identified import identify_logs
+
+    _check_outputs(axis, write, job, report)
+    chosen = cast("Method", _method(method))
+    reading = _reading(mapping, columns or [])
+    say_if_cold()
+    with progress_bar(quiet=as_json) as progress:
+        done = identify_logs(
+            logs, mapping, columns or [], effort, method=chosen, axis=axis, progress=progress, reading=reading
+        )
+        outside = done.contrasts()
+        progress(0.97, "writing")
+        files = _write(done, write, job, report)
+    if as_json:
+        names, reasons = [str(path) for path in files.written], [str(error) for error in files.errors]
+        print_json(done.to_dict() | {"files": names, "not_written": reasons})
+    else:
+        _print(done, [str(one) for one in outside], files, asked=job is not None)
+    if done.verdict != "trusted" or files.errors:
+        raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in files.errors)]))
+
+
+def _method(word: str) -> str:
+    if word not in METHODS:
+        raise DetentError(f"--method: came {word!r}; allowed: {' or '.join(METHODS)}; choose one of these")
+    return METHODS[word]
+
+
+def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
+    """Refuse what could not be written, before the work is done."""
+    for option, path, ending in zip(
+        ("--write", "--job", "--report"), targets, (".toml", ".toml", ".html"), strict=True
+    ):
+        if path is None:
+            continue
+        if path.suffix.lower() != ending:
+            raise DetentError(f"{option} {path}: came another ending; allowed: {ending}; name the file so")
+        if not path.parent.is_dir():
+            raise DetentError(f"{option} {path}: there is no folder {path.parent}; make it first, or choose another")
+        if path.is_dir():
+            raise DetentError(f"{option} {path}: came a folder; allowed: a file; choose another name")
+    write, job, _ = targets
+    if job is not None and job in (write, axis):
+        raise DetentError(f"--job {job}: came the name of the axis file; allowed: a file of its own; choose another")
+
+
+def _reading(mapping: Path | None, columns: list[str]) -> str:
+    """Options that read the logs in the same way once more."""
+    options = ["--map", str(mapping)] if mapping is not None else []
+    for column in columns:
+        options += ["--column", column]
+    return shlex.join(options)
+
+
+@dataclass
+class _Files:
+    """Files that were written, and why others were not: what was found is shown all the same."""
+
+    written: list[Path] = field(default_factory=list[Path])
+    errors: list[DetentError] = field(default_factory=list[DetentError])
+
+
+def _write(done: "Identified", axis: Path | None, job: Path | None, report: Path | None) -> _Files:
+    """Write what was asked for."""
+    files = _Files()
+    for path, save in ((axis, done.save), (job, done.save_job), (report, done.report)):
+        if path is None:
+            continue
+        try:
+            files.written.append(save(path))
+        except DetentError as error:
+            files.errors.append(error)
+    return files
+
+
+# ---- what a person reads
+
+
+def _print(done: "Identified", outside: list[str], files: _Files, *, asked: bool) -> None:
+    found = done.found
+    console = make_console()
+    console.print(_verdict_line(done), style=COLOURS[done.verdict], soft_wrap=True)
+    _print_refusals(console, done)
+    for text in outside:
+        console.print(f"  not as the axis file: {text}", style="yellow", soft_wrap=True)
+    console.print()
+    _print_logs(console, found)
+    if found.estimates:
+        _print_constants(done)
+        _print_ladder(found)
+    if found.horizons:
+        _print_horizons(found)
+    for error in files.errors:
+        console.print(f"not written: {error}", style="bold red", soft_wrap=True)
+    for path in files.written:
+        console.print(f"written: {path}", soft_wrap=True)
+    if done.refusals and not asked:
+        console.print("--job FILE writes moves that show what is missing", soft_wrap=True)
+
+
+def _verdict_line(done: "Identified") -> str:
+    from detent.report.words import count
+
+    found = done.found
+    logs = " and ".join([log.name for log in found.logs[:2]]) if len(found.logs) < 3 else f"{len(found.logs)} logs"
+    number = len(found.estimates)
+    if done.verdict == "trusted":
+        return f"Trusted: {count(number, 'constant')} of {logs}."
+    if done.verdict == "refused":
+        return f"Refused: nothing in {logs} is trusted."
+    names = [one.name for one in found.estimates if one not in found.trusted]
+    are = "are" if len(names) > 1 else "is"
+    return f"Partly trusted: {number - len(names)} of {number} constants of {logs}; {', '.join(names)} {are} not."
+
+
+def _print_refusals(console: Any, done: "Identified") -> None:
+    """What is wrong and what to do about it, the same advice once; what concerns everything comes first."""
+    ordered = sorted(done.refusals, key=lambda refusal: bool(refusal.constants))
+    if any(not refusal.constants for refusal in ordered):
+        ordered = [refusal for refusal in ordered if not refusal.constants]
+    advice: dict[str, list[str]] = {}
+    for refusal in ordered:
+        advice.setdefault(refusal.record, []).append(f"{refusal.subject}: {refusal.text}")
+    for record, texts in list(advice.items())[:MOST_LINES]:
+        for text in dict.fromkeys(texts):
+            console.print(f"  {text}", soft_wrap=True)
+        console.print(f"    -> {record}", style="bold", soft_wrap=True)
+    left = len(advice) - MOST_LINES
+    if left > 0:
+        console.print(f"  {left} more; --json shows them all")
+
+
+def _print_logs(console: Any, found: Any) -> None:
+    """What each log holds, what was wrong with it, what was guessed."""
+    from detent.report.words import count, duration, number
+
+    for log, run in zip(found.logs[:MOST_LINES], found.runs, strict=False):
+        held = f"{count(len(log), 'sample')}, {duration(float(log.t[-1] - log.t[0]))} at {number(1 / run.step, 3)} Hz"
+        console.print(f"{log.name}: {held}; driven by its {run.effort_name} [{run.effort_unit}]", soft_wrap=True)
+        for finding in log.findings[:MOST_LINES]:
+            style = None if finding.severity == "note" else "yellow"
+            console.print(f"  {finding}", style=style, soft_wrap=True)
+        if len(log.findings) > MOST_LINES:
+            console.print(f"  {len(log.findings) - MOST_LINES} more findings; --json shows them all")
+        if log.guesses:
+            console.print(f"  guessed: {'; '.join(log.guesses)}", style="dim", soft_wrap=True)
+    if len(found.logs) > MOST_LINES:
+        console.print(f"{len(found.logs) - MOST_LINES} more logs; --json shows them all")
+    if found.notes:
+        console.print(f"  {'; '.join(found.notes)}", style="dim", soft_wrap=True)
+    console.print()
+
+
+def _print_constants(done: "Identified") -> None:
+    from detent.report.identify_words import is_known, written
+
+    rows: list[tuple[str, ...]] = []
+    for one in done.found.estimates:
+        text = written(one)
+        known = is_known(one)
+        scale = 1e3 if one.unit == "s" else 1.0
+        limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
+        trust = "yes" if one in done.found.trusted else "no"
+        value = f"{text.value} ± {text.half}" if known else "not told by the data"
+        rows.append((one.name, value, limits, text.unit, trust))
+    by = done.found.estimates[0].method
+    title = f"Constants, by {by}" if done.trusted else f"What came out by {by}; nothing of it is trusted"
+    print_table(title, ("", "value", "95 % interval", "unit", "trusted"), rows)
+
+
+def _print_ladder(found: Any) -> None:
+    """One line a model."""
+    rows: list[tuple[str, ...]] = []
+    for climb in found.climbs:
+        gain = "" if climb.gain != climb.gain else f"{climb.gain:+.1f}"
+        why = "" if climb.possible else "; friction falls towards standstill"
+        taken = "model" if climb.rung is found.rung else "taken" if climb.taken else f"no{why}"
+        rows.append((climb.rung.name, f"{climb.error:.2%}", gain, taken, climb.rung.text))
+    heads = ("", "error", "gain", "", "")
+    print_table("Models: error of the effort in stretches not seen, gain in standard errors", heads, rows)
+
+
+def _print_horizons(found: Any) -> None:
+    """How far off the simulation is."""
+    from detent.report.identify_words import Ways
+
+    ways = Ways(found.runs[0].position_unit)
+    rows: list[tuple[str, ...]] = []
+    for one in found.horizons:
+        texts = (ways.error(float(value)) for value in (one.rms, one.largest, one.moved))
+        rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else ""))
+    title = "Simulated: the last quarter, not fitted"
+    print_table(title, ("over", "rms error", "largest", "way", "error/way"), rows, right=True)
+    loop = found.closed_loop
+    if loop is not None:
+        told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"
+        make_console().print(f"The same under the loops that the log shows: {told}", soft_wrap=True)
