@@ -20,7 +20,7 @@ release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 version = release
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "explanation/trust-table.md"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False  # types of other packages are named in signatures, and their inventories need a network
 
@@ -51,6 +51,7 @@ def setup(app: Any) -> None:
     """Make the generated parts before any page is read."""
     app.connect("autodoc-process-docstring", keep_bars)
     import figures
+    import figures_cascade
     import figures_rotary
     import figures_servos
     import figures_steppers
@@ -61,3 +62,4 @@ def setup(app: Any) -> None:
     figures_servos.draw_all()
     figures_rotary.draw_all()
     figures_steppers.draw_all()
+    figures_cascade.draw_all()

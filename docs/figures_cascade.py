@@ -1,0 +1,92 @@
+"""The figures of the cascade axis: each is drawn from runs of the simulation when the documentation is built.
+
+Called by conf.py; they are drawn again when this file, figures.py or the package has changed.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, picture
+
+LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
+
+
+def slide(*overrides: str) -> Any:
+    """The example axis."""
+    import detent
+
+    return detent.load(detent.example("cascade.toml"), overrides)
+
+
+def one_move(axis: Any, target: float, *, dwell: float = 0.0, signals: tuple[str, ...] = ()) -> Any:
+    """A move of the example to a place [m], with a row per sample."""
+    from detent.planning.move_job import Move, MoveJob
+
+    names = signals or ("reference.position", "machine.load.position", "law.position_error", "law.command")
+    return axis.run(MoveJob("move", "moves", (Move(1, 0, target=target, dwell=dwell),)), signals=names)
+
+
+def feed_forward() -> None:
+    """Following error of one move with more and more feed-forward."""
+    shares: tuple[tuple[str, tuple[str, ...]], ...] = (
+        ("none", ("velocity", "acceleration", "viscous", "coulomb")),
+        ("velocity", ("acceleration", "viscous", "coulomb")),
+        ("velocity, acceleration", ("viscous", "coulomb")),
+        ("all of it", ()),
+    )
+    with picture("feed-forward.svg", 2, 4.6) as (coarse, fine):
+        for (name, off), colour in zip(shares, (GREY, ORANGE, GREEN, BLUE), strict=True):
+            run = one_move(slide(*(f"method.feed_forward.{key}=0" for key in off)), 0.27)
+            part = run.trace.between(run.result.moves[0].begin, run.result.moves[0].end)
+            t, error = 1e3 * (part.time - part.time[0]), part["law.position_error"]
+            coarse.plot(t, 1e3 * error, color=colour, linewidth=1.5, label=name)
+            fine.plot(t, 1e6 * error, color=colour, linewidth=1.2)
+        coarse.set_ylabel("following error\n[mm]")
+        coarse.legend(**LEGEND, ncols=4)
+        fine.set_ylim(-220, 220)
+        fine.set_ylabel("the same,\nmagnified [µm]")
+        fine.set_xlabel("time since the move began [ms]")
+
+
+def profiles() -> None:
+    """A move in four ways, as `detent compare` draws it."""
+    from detent.report.cascade_comparisons import plot_profiles
+
+    plot_profiles(slide().compare()[0], FOLDER / "profiles.svg")
+
+
+def which_encoder() -> None:
+    """Load and motor at the end of a move across backlash, with the position loop on either encoder."""
+    import detent
+
+    with picture("which-encoder.svg", 2, 4.4) as areas:
+        for area, where in zip(areas, ("motor", "load"), strict=True):
+            axis = detent.load(
+                detent.example("turntable.toml"),
+                [f'method.feedback.position="{where}"', "mechanics.coupling.backlash=0.1 deg",
+                 "method.in_position=0.2 deg", "disturbance.push.force=-0.4 N*m", "disturbance.push.at=0 s",
+                 "disturbance.push.duration=60 s"],
+            )  # fmt: skip
+            signals = ("reference.position", "machine.motor.position", "machine.load.position")
+            run = one_move(axis, np.radians(45), dwell=0.6, signals=signals)
+            begin = run.result.moves[0].arrived - 0.25
+            part = run.trace.between(begin, run.result.moves[0].end)
+            t = part.time - run.result.moves[0].arrived
+            for name, colour, text in (("motor", GREY, "motor"), ("load", BLUE, "table")):
+                off = np.degrees(part[f"machine.{name}.position"]) - 45
+                area.plot(1e3 * t, off, color=colour, linewidth=1.6, label=text)
+            area.axhline(0, color="black", linewidth=0.8)
+            area.set_ylim(-0.3, 0.3)
+            area.set_ylabel("off the target\n[deg]")
+            area.set_title(f"position loop on the encoder of the {where}", fontsize=9, loc="right")
+        areas[0].legend(**LEGEND, ncols=2)
+        areas[-1].set_xlabel("time since the reference ended [ms]")
+
+
+FIGURES = (feed_forward, profiles, which_encoder)
+
+
+def draw_all() -> None:
+    """Draw every figure of this file."""
+    draw_stale(FIGURES, Path(__file__))
