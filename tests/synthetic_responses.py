@@ -1,0 +1,75 @@
+"""Frequency responses of two masses whose constants are known: computed with noise, or recorded from a cascade axis."""
+
+import numpy as np
+
+from detent.identify.average_periods import noise_parts
+from detent.identify.excitation_signals import Limits, make_multisine
+from detent.identify.frequency_response import FrequencyResponse, response_deviation
+from detent.identify.two_mass_response import TwoMassModel, modes_of, respond_sampled
+from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
+
+
+def random_axis(rng):
+    """Parameters of `respond_sampled` for a random axis, and what a fit should find."""
+    mass, ratio, fz = rng.uniform(0.5, 10), np.exp(rng.uniform(-1.5, 1.5)), rng.uniform(20, 60)
+    damping_zero = np.exp(rng.uniform(np.log(0.005), np.log(0.08)))
+    m2, omega = ratio / (1 + ratio), 2 * np.pi * fz
+    d = 2 * damping_zero * omega * m2 * rng.uniform(0.2, 0.9)
+    b1, b2 = rng.uniform(0.5, 8), 2 * damping_zero * omega * m2 - d
+    delay = rng.uniform(0, 3e-3)
+    parameters = np.array([np.log(ratio), np.log(omega), d, b1, b2, -np.log(mass), delay])
+    modes = modes_of(parameters)
+    truth = {
+        "antiresonance": fz,
+        "antiresonance.damping": damping_zero,
+        "resonance": modes.omega_pole / (2 * np.pi),
+        "resonance.damping": modes.damping_pole,
+        "mass_ratio": ratio,
+        "viscous": b1 + b2,
+        "gain": 1 / mass,
+        "delay": delay,
+        "mass.total": mass,
+        "mass.motor": mass * (1 - m2),
+        "mass.load": mass * m2,
+        "stiffness": mass * m2 * omega**2,
+        "damping": mass * d,
+    }
+    return parameters, truth
+
+
+def noisy_responses(seed, *, periods=8, lines=60, noise=0.02, kept=8.0):
+    """Responses of motor and load of a random axis, their truth and the hold.
+
+    As average_periods makes them: every period has noise of the sensors, and a disturbance that both encoders see.
+    """
+    rng = np.random.default_rng(seed)
+    parameters, truth = random_axis(rng)
+    frequency = np.linspace(2.0, 2.5 * truth["resonance"], lines)
+    hold = 1 / (kept * truth["resonance"])
+    exact = respond_sampled(TwoMassModel(2), parameters, frequency, hold)
+    white = rng.normal(size=(3, periods, lines)) + 1j * rng.normal(size=(3, periods, lines))
+    level = 10 * noise * np.abs(exact[0]).min()
+    found = []
+    for answer, own in zip(exact, white[:2], strict=True):
+        values = answer * (1 + 3 * noise * white[2]) + level * own
+        mean = values.mean(axis=0)
+        scatter = np.sum(np.abs(values - mean) ** 2, axis=0) / (periods - 1)
+        power = np.abs(mean) ** 2
+        flat, slope = noise_parts(scatter, power, max(8, -(-40 // (periods - 1))))
+        coherence = 1 / (1 + flat / power + slope)
+        deviation = response_deviation(coherence, periods)
+        found.append(FrequencyResponse(frequency, mean, coherence, deviation, periods, 0.0, "made", "N", "m"))
+    return found, truth, hold
+
+
+def record_cascade(seed, *, delay=2, coulomb=0.0, resolution=0.0, coupled=True, periods=8, band=(1.0, 200.0)):
+    """A multisine of 20 N into a cascade axis without its loops: times, effort, both positions."""
+    made = make_multisine(band, 1.0, T_SAMPLE, Limits(20.0), periods=periods, seed=seed)
+    p = make_params(coupled=coupled)
+    p.source.delay = delay
+    p.motor_sensor.resolution = p.load_sensor.resolution = resolution
+    set_friction(p.machine.motor.friction, viscous=3.0)
+    set_friction(p.machine.load.friction, viscous=5.0, coulomb=coulomb, static=coulomb)
+    names = ["source.command", "motor_sensor.position", "load_sensor.position"]
+    rows = Rig(p).record(len(made.t) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=made.values)
+    return rows["t"], *(rows[name] for name in names)
