@@ -13,8 +13,8 @@ from detent.plant.dc_winding import flowing_current
 from detent.plant.stribeck import is_dry
 from detent.plant.two_mass import State, TwoMass, TwoMassParams, find_senses, flow
 
-MOTOR_REVERSES, LOAD_REVERSES, FLANK = 1, 2, 3
-"""What ends a regime."""
+MOTOR_REVERSES, LOAD_REVERSES, POSITIVE_FLANK, NEGATIVE_FLANK = 1, 2, 3, 4
+"""What ends a regime; at a flank that is met or left."""
 
 PIECES = 8
 """Regimes in one tick at most; what is left of it then runs to its end in the last one."""
@@ -25,10 +25,21 @@ ROOT_STEPS = 40
 
 @hot_step
 def gap_left(p: TwoMassParams, side: int, twist: float) -> float:
-    """Way until the flanks meet, or until those in contact part [m]; below 0 it has been passed."""
+    """Way until a flank is met, or until those in contact part [m]; below 0 it has been passed."""
     if p.half_gap == 0.0:
         return 1.0
     return p.half_gap - abs(twist) if side == 0 else twist * side - p.half_gap
+
+
+@step
+def flank_left(p: TwoMassParams, side: int, flank: int, twist: float) -> float:
+    """Way until this flank, 1 or -1, is met or left [m]; below 0 it has been passed.
+
+    Each flank is an event of its own: within one tick the axis may leave one and meet the other.
+    """
+    if side == -flank or p.half_gap == 0.0:
+        return 1.0
+    return p.half_gap - twist * flank if side == 0 else twist * flank - p.half_gap
 
 
 @hot_step
@@ -59,8 +70,8 @@ def flow_piece(p: TwoMassParams, r: TwoMass, h: float) -> State:
 @step
 def left_of_regime(p: TwoMassParams, r: TwoMass, event: int, after: State) -> float:
     """What falls below 0 when `event` ends the regime of `r`: a speed [m/s] or a way [m]."""
-    if event == FLANK:
-        return gap_left(p, r.side, after[1] - after[3])
+    if event == POSITIVE_FLANK or event == NEGATIVE_FLANK:
+        return flank_left(p, r.side, 1 if event == POSITIVE_FLANK else -1, after[1] - after[3])
     if event == LOAD_REVERSES:
         return after[4] * r.load.sense if p.stiffness > 0.0 and is_dry(p.load.friction) else 0.0
     dry = p.loss > 0.0 or is_dry(p.motor.friction) or (p.stiffness == 0.0 and is_dry(p.load.friction))
@@ -71,7 +82,7 @@ def left_of_regime(p: TwoMassParams, r: TwoMass, event: int, after: State) -> fl
 def first_event(p: TwoMassParams, r: TwoMass, before: State, after: State) -> int:
     """What ends the regime first on the way from `before` to `after`, as straight lines show it; 0 nothing."""
     first, least = 0, 2.0
-    for event in range(MOTOR_REVERSES, FLANK + 1):
+    for event in range(MOTOR_REVERSES, NEGATIVE_FLANK + 1):
         end = left_of_regime(p, r, event, after)
         if end < 0.0:
             begin = max(left_of_regime(p, r, event, before), 0.0)
@@ -109,18 +120,14 @@ def time_of_event(p: TwoMassParams, r: TwoMass, event: int, before: State, h: fl
 @step
 def end_regime(p: TwoMassParams, r: TwoMass, event: int) -> None:
     """What the event leaves: a mass at rest, or another flank."""
-    if event == FLANK:
-        r.side = touching_side(r) if r.side == 0 else 0
+    if event == POSITIVE_FLANK:
+        r.side = 1 - r.side
+    if event == NEGATIVE_FLANK:
+        r.side = -1 - r.side
     if event == MOTOR_REVERSES:
         r.motor.velocity = 0.0
     if event == LOAD_REVERSES or p.stiffness == 0.0:
         r.load.velocity = 0.0
-
-
-@step
-def touching_side(r: TwoMass) -> int:
-    """Flank on whose side of the gap's middle the motor is."""
-    return 1 if r.motor.position >= r.load.position else -1
 
 
 @step
@@ -145,7 +152,7 @@ def move_in_pieces(p: TwoMassParams, r: TwoMass) -> None:
             accept(p, r, after)
             return
         moment = time_of_event(p, r, event, before, left)
-        if moment == 0.0 and event != FLANK:
+        if moment == 0.0 and event <= LOAD_REVERSES:
             hold(p, r, event)
             break
         accept(p, r, flow_piece(p, r, moment))
@@ -160,10 +167,13 @@ def finish(p: TwoMassParams, r: TwoMass, left: float) -> None:
     after = flow_piece(p, r, left)
     motor_turned = left_of_regime(p, r, MOTOR_REVERSES, after) < 0.0
     load_turned = left_of_regime(p, r, LOAD_REVERSES, after) < 0.0
-    met = left_of_regime(p, r, FLANK, after) < 0.0
+    positive_passed = left_of_regime(p, r, POSITIVE_FLANK, after) < 0.0
+    negative_passed = left_of_regime(p, r, NEGATIVE_FLANK, after) < 0.0
     accept(p, r, after)
-    if met:
-        end_regime(p, r, FLANK)
+    if positive_passed:
+        end_regime(p, r, POSITIVE_FLANK)
+    if negative_passed:
+        end_regime(p, r, NEGATIVE_FLANK)
     if motor_turned:
         end_regime(p, r, MOTOR_REVERSES)
     if load_turned:

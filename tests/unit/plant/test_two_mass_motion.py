@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 from tests.cascade_rig import set_friction
-from tests.two_mass_rig import M1, H, K, M, coupled, machine, motor, moving, run, state
+from tests.two_mass_rig import M1, H, K, M, coupled, energy, machine, motor, moving, run, state
 
-from detent.plant.two_mass import TwoMass, TwoMassParams
+from detent.plant.two_mass import TwoMass, TwoMassParams, fastest_rate
 from detent.plant.two_mass_motion import move_masses
 
 # -- friction ----------------------------------------------------------------------------------------------------------
@@ -194,6 +194,25 @@ def test_flanks_push_but_do_not_pull():
     run(p, r, 3)
     assert r.load.velocity >= 0.0
     assert r.side == 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_tick_that_leaves_one_flank_and_meets_the_other_ends_in_contact(sign):
+    """Found by the property that energy never grows: both flanks were one event, and the tick went through the second.
+
+    Out after 0.5 %, on the other flank after 91 % of the tick.
+    """
+    p = coupled(period=1.0, half_gap=1e-4, damping=0.0)
+    p.period = 0.25 / fastest_rate(p)
+    slip = sign * 1.1 * 2.0 * p.half_gap / p.period
+    r = moving()
+    r.motor.position, r.motor.velocity, r.side = -sign * (p.half_gap + 0.01 * p.half_gap), slip, -sign
+    begin = energy(p, r)
+    move_masses(p, r)
+    twist = r.motor.position - r.load.position
+    assert r.side == sign
+    assert twist * sign > p.half_gap
+    assert energy(p, r) == pytest.approx(begin, rel=1e-6)
 
 
 # -- integration -------------------------------------------------------------------------------------------------------
