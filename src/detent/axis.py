@@ -156,7 +156,7 @@ class Axis:
 
         Parameters
         ----------
-        job : path or job
+        job : path or job object
             A file as of `load_job`, or what that or `load_recording` returned.
         signals : sequence of str, optional
             Registers to record; "all" for every one. Default: what the report needs.
@@ -249,7 +249,7 @@ class Axis:
         ----------
         at, duration : float
             Begin, since power-on, and length [s].
-        job : path or job, optional
+        job : path or job object, optional
             What the axis does meanwhile; a short move or word of its own by default.
         signals : sequence of str, optional
             Registers; a choice of the method's by default.

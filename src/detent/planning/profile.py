@@ -147,7 +147,8 @@ def plan_move(start: float, target: float, limits: MotionLimits, period: float) 
     if start == target:
         return _rest(target, 1, period)
     sections = _sections(start, target, limits)
-    samples = _whole_samples(float(sections.t[-1]), period) + 1
+    # ruckig takes no time for a way of a rounding error; the move still begins at its start.
+    samples = max(_whole_samples(float(sections.t[-1]), period), 1) + 1
     t = np.arange(samples - 1) * period
     k = np.searchsorted(sections.t, t, side="right") - 1
     s = t - sections.t[k]

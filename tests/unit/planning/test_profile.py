@@ -189,3 +189,9 @@ def test_recorded_derivatives_are_used():
 def test_recordings_that_are_none_are_refused(t, q, text):
     with pytest.raises(DetentError, match=text):
         profile_of_recording(np.array(t), np.array(q), T)
+
+
+def test_a_way_of_a_rounding_error_begins_at_its_start():
+    move = plan_move(0.0, 1.0581191106155033e-12, MotionLimits(1.0, 1.0, 19062.0), 1e-3)
+    assert move.position.tolist() == [0.0, 1.0581191106155033e-12]
+    assert move.velocity.tolist() == [0.0, 0.0]
