@@ -149,6 +149,8 @@ def test_rotated_columns(folder, seed, shift, part):
     if part:
         first = at(part[0], 0, len(rows) - 30)
         last = first + at(part[1], 20, len(rows) - first)
+    # A first row of zeros reads the same rotated and not.
+    assume(first != 1)
     # What only rises where the time should be could be a clock that is coarse.
     in_place_of_time = recording.columns[list(recording.columns)[-shift]][first:last]
     assume(np.mean(np.diff(in_place_of_time) < 0) > 0.15)

@@ -21,7 +21,6 @@ _HOLE = 3
 _EVEN = 0.5
 """A clock's step is within this share of the usual one."""
 
-_BY_CHANCE = 2
 _ROUNDING = 0.02
 _MOSTLY, _HALF, _MANY, _FEW = 0.9, 0.5, 0.1, 0.02
 _WHOLE = 0.95
@@ -104,9 +103,9 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
     where = np.zeros(len(clock), dtype=np.bool_)
     if not step:
         return where
-    own, usual = np.diff(clock), _usual_step(clock)
+    own, theirs, usual = np.diff(clock), np.diff(column), _usual_step(clock)
     with np.errstate(invalid="ignore"):
-        runs = np.abs(np.diff(column) - step) <= _EVEN * step
+        runs = np.abs(theirs - step) <= _EVEN * step
         own_runs = (np.abs(own - usual) <= _EVEN * usual) | (np.abs(own - step) <= _EVEN * step)
         if is_partial:  # where the clock runs in most rows, it is known how evenly
             away = np.abs(own[own_runs] - usual)
@@ -114,7 +113,7 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
     better = fill_holes(runs, _HOLE)
     edges = np.flatnonzero(np.diff(np.r_[0, better.astype(np.int8), 0]))
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        first, last = _edges(runs[begin:end], own_runs[begin:end]) if is_partial else (0, end - begin)
+        first, last = _edges(_missed(theirs[begin:end], step), _missed(own[begin:end], step))
         first, last = begin + first, begin + last
         steps = own[first:last]
         back, is_even = np.sum(steps < 0) / max(len(steps), 1), np.sum(own_runs[first:last]) >= _HALF * len(steps)
@@ -125,25 +124,27 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
     return where
 
 
-def _edges(runs: NDArray[np.bool_], own_runs: NDArray[np.bool_]) -> tuple[int, int]:
-    """Where a stretch really begins and ends: a column may run evenly by chance where the clock is in its place.
+def _edges(theirs: Values, ours: Values) -> tuple[int, int]:
+    """First step of a stretch that is rotated, and the one behind its last.
 
-    At the ends the clock must not run in its own place; one step or two at which it seems to are by chance, too, if
-    they follow without a hole.
+    A column may run evenly by chance where the clock is in its place. So both ends are cut where the least is missed:
+    by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
+
+    Parameters
+    ----------
+    theirs, ours : float64 array, shape (n,)
+        By what share of a clock's step each step of the column, and of the clock, misses it.
     """
-    evident = np.flatnonzero(runs & ~own_runs)
-    if not len(evident):
-        return 0, 0
-    first, last = int(evident[0]), int(evident[-1]) + 1
-    first -= _follow(runs[:first][::-1])
-    last += _follow(runs[last:])
-    return first, last
+    n, cut = len(theirs), 1.0 - np.minimum(theirs, ours)
+    inside, outside = np.r_[0.0, np.cumsum(theirs)], np.r_[0.0, np.cumsum(ours), float(ours.sum())]
+    last = n - int(np.argmin((inside + np.r_[cut, 0.0] + outside[n] - outside[1:])[::-1]))
+    before = np.r_[0.0, outside[:last] + cut[:last]]
+    return int(np.argmin(before - inside[: last + 1])), last
 
 
-def _follow(runs: NDArray[np.bool_]) -> int:
-    """How many steps follow without a hole, where they are few."""
-    count = len(runs) if runs.all() else int(np.argmin(runs))
-    return count if count <= _BY_CHANCE else 0
+def _missed(steps: Values, step: float) -> Values:
+    """By what share of a clock's step each of its steps misses it, 1 at most."""
+    return np.nan_to_num(np.minimum(np.abs(steps - step) / step, 1.0), nan=1.0)
 
 
 def _head(table: RawTable, matrix: Values, clock: int, shift: int) -> BrokenRow | None:

@@ -51,6 +51,19 @@ def test_some_rows_rotated(first, last):
     assert table.findings[0].rows == ((first + 1, last),)
 
 
+@pytest.mark.parametrize(("first", "last"), [(0, 150), (40, N), (30, 170)])
+def test_a_column_that_goes_on_like_the_clock_by_chance_ends_where_the_clock_is_back(first, last):
+    """Found by a property: three rows behind the rotated ones were rotated, too, as the reference rose like a clock."""
+    true = MATRIX.copy()
+    for outside in (slice(max(first - 4, 0), first), slice(last, last + 4)):
+        true[outside, 1] = 5.0 + 130.0 * np.arange(len(true[outside]))
+    broken = true.copy()
+    broken[first:last] = np.roll(broken[first:last], 1, axis=1)
+    table, matrix = mended(broken)
+    assert (matrix == true).all()
+    assert table.findings[0].rows == ((first + 1, last),)
+
+
 def test_the_clock_need_not_be_first():
     names = ["x", "t", "u"]
     true = MATRIX[:, [1, 0, 2]]
