@@ -254,12 +254,37 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
     if not is_bent(names):
         return x, residual, z
+    slope, tool = (_bend_slope(parts, names, theta, bend, ideal=ideal) for ideal in (False, z is not x))
+    return np.column_stack([x, slope]), residual, np.column_stack([z, tool])
 
-    def slope(*, ideal: bool) -> Numbers:
-        more, less = (make_columns(parts, names, bend * f, ideal=ideal) @ theta for f in (1.05, 0.95))
-        return (more - less) / (0.1 * bend)
 
-    return np.column_stack([x, slope(ideal=False)]), residual, np.column_stack([z, slope(ideal=z is not x)])
+def _bend_slope(
+    parts: Sequence[Prepared], names: Sequence[str], theta: Numbers, bend: float, *, ideal: bool
+) -> Numbers:
+    """Change of the effort with the bend, shape (m,)."""
+    more, less = (make_columns(parts, names, bend * f, ideal=ideal) @ theta for f in (1.05, 0.95))
+    return (more - less) / (0.1 * bend)
+
+
+def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
+    """By how much the bend misses what the instruments say of it, to first order.
+
+    Parameters
+    ----------
+    parts : sequence of Prepared
+        The runs of the fit.
+    fit : Fit
+        By instruments, of a model with a bend.
+
+    Returns
+    -------
+    float
+        To be added to `fit.bend`.
+    """
+    names, theta, bend = fit.model, fit.linear, fit.bend
+    columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
+    x, _, z = _with_bend(parts, names, theta, bend, columns, fit.residual, tools)
+    return float(solve(z, x, fit.residual)[-1])
 
 
 def column_sizes(columns: Numbers) -> Numbers:

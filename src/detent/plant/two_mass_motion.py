@@ -70,7 +70,7 @@ def flow_piece(p: TwoMassParams, r: TwoMass, h: float) -> State:
 @step
 def left_of_regime(p: TwoMassParams, r: TwoMass, event: int, after: State) -> float:
     """What falls below 0 when `event` ends the regime of `r`: a speed [m/s] or a way [m]."""
-    if event == POSITIVE_FLANK or event == NEGATIVE_FLANK:
+    if event >= POSITIVE_FLANK:
         return flank_left(p, r.side, 1 if event == POSITIVE_FLANK else -1, after[1] - after[3])
     if event == LOAD_REVERSES:
         return after[4] * r.load.sense if p.stiffness > 0.0 and is_dry(p.load.friction) else 0.0
