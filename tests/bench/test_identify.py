@@ -39,7 +39,7 @@ def start() -> Constants:
     names = ("mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
     more = ("static.positive", "static.negative", "stribeck", "delay")
     values = np.array([16.0, 7.0, 11.0, 50.0, 75.0, 9.0, 13.0, 0.01, 0.0])
-    return Constants((*names, *more), values, np.diag((0.1 * values) ** 2 + 1e-12), 10, "made")
+    return Constants((*names, *more), values, np.diag((0.1 * values) ** 2 + 1e-12), np.full(len(values), 10.0), "made")
 
 
 def test_identifying_a_log_of_25_seconds(benchmark):

@@ -6,10 +6,15 @@ cosines): each projection is one independent look at the variance near frequency
 of freedom as there are cosines, and Student's distribution with these gives intervals that hold in small samples, where
 those of a Newey-West sum are too short.
 
+A variance is known no better than by the residuals that count for it. Where the instrument of a constant is large in
+few rows, as a jerk is, few residuals carry its error, and the degrees of freedom of that constant are fewer.
+
 References
 ----------
 Lazarus, Lewis, Stock, Watson: HAR inference: recommendations for practice. Journal of Business and Economic Statistics
 36 (2018): number of cosines 0.41 n^(2/3), critical values of Student's distribution.
+Satterthwaite: An approximate distribution of estimates of variance components. Biometrics Bulletin 2 (1946).
+Stock, Watson: Introduction to Econometrics, section 15.4: weighted lags, 0.75 n^(1/3) of them.
 Mueller: HAC corrections for strongly autocorrelated time series. Same journal 32 (2014).
 """
 
@@ -131,6 +136,32 @@ def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Number
     return found[0] * np.outer(grow, grow) / np.outer(size, size), degrees
 
 
+def carried_degrees(columns: Numbers, residual: Numbers, instruments: Numbers, cosines: int) -> Numbers:
+    """Degrees of freedom behind the variance of each constant.
+
+    Parameters
+    ----------
+    columns, residual, instruments
+        As for `coloured_covariance`.
+    cosines : int
+        Those of the covariance.
+
+    Returns
+    -------
+    float64 array, shape (k,)
+        1 or more, and the cosines at most. A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum
+        h^4`` degrees (Satterthwaite), times ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their
+        squares are correlated by its square.
+    """
+    size, length = _sizes(columns), _sizes(instruments)
+    tools = instruments / length
+    weight = (tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size)), np.float64).T) ** 2
+    total, squares = weight.sum(axis=0), (weight**2).sum(axis=0)
+    r = neighbour_correlation(residual) ** 2
+    carried = np.where(squares > 0.0, total**2 / np.where(squares > 0.0, squares, 1.0), 1.0) * (1.0 - r) / (1.0 + r)
+    return np.clip(carried, 1.0, float(cosines))
+
+
 def _sizes(columns: Numbers) -> Numbers:
     """Lengths of columns; 1 for one of zeros."""
     length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
@@ -143,7 +174,7 @@ def _lagged_variance(scores: Numbers, memory: float) -> Numbers:
     It and the projections err independently; the larger of both does not leave an interval too short by chance.
     """
     n = len(scores)
-    lags = min(max(4, round(3.0 * memory)), n - 1)
+    lags = min(round(max(4.0, 0.75 * n ** (1.0 / 3.0), 3.0 * memory)), n - 1)
     total = scores.T @ scores
     for lag in range(1, lags + 1):
         product = scores[lag:].T @ scores[:-lag]

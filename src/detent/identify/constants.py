@@ -49,8 +49,8 @@ class Constants:
         In SI units.
     covariance : float64 array, shape (k, k)
         Of their errors.
-    degrees : int
-        Degrees of freedom behind it.
+    degrees : float64 array, shape (k,)
+        Degrees of freedom behind the variance of each.
     method : str
         How they were found.
     delay_is_told : bool
@@ -60,7 +60,7 @@ class Constants:
     names: tuple[str, ...]
     values: Numbers
     covariance: Numbers
-    degrees: int
+    degrees: Numbers
     method: str
     delay_is_told: bool = True
 
@@ -90,10 +90,10 @@ class Constants:
 
         Without instruments the delay is none of them: in a loop it hides in the answer of the effort to the noise.
         """
-        told = zip(self.names, self.values, self.errors, strict=True)
+        told = zip(self.names, self.values.tolist(), self.errors.tolist(), self.degrees.tolist(), strict=True)
         return tuple(
-            estimate(name, float(value), run.unit(name), float(error), self.method, self.degrees)
-            for name, value, error in told
+            estimate(name, value, run.unit(name), error, self.method, degrees)
+            for name, value, error, degrees in told
             if name != "delay" or self.delay_is_told
         )
 
@@ -112,22 +112,23 @@ def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
     -------
     Constants
     """
-    names, values, covariance = _sums_of(fit)
+    names, values, covariance, degrees = _sums_of(fit)
     if rivals:
         covariance = covariance + np.diag(_spread(names, values, rivals))
     method = "instrumental variables" if fit.by_instruments else "least squares"
-    return Constants(names, values, covariance, fit.degrees, method, fit.by_instruments)
+    return Constants(names, values, covariance, degrees, method, fit.by_instruments)
 
 
-def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers]:
-    """Names, values and covariance of the constants that a model has."""
+def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers, Numbers]:
+    """Names, values, covariance and degrees of freedom of the constants that a model has; a sum has the fewest."""
     wanted = [name for name, sums in _SUMS.items() if _has(fit, name, sums)]
     weights = np.zeros((len(wanted), len(fit.values)))
     for row, name in enumerate(wanted):
         for term, sign in _SUMS[name].items():
             if term in fit.names:
                 weights[row, fit.names.index(term)] = sign
-    return tuple(wanted), weights @ fit.values, weights @ fit.covariance @ weights.T
+    degrees = np.where(weights != 0.0, fit.degrees, np.inf).min(axis=1)
+    return tuple(wanted), weights @ fit.values, weights @ fit.covariance @ weights.T, degrees
 
 
 def _has(fit: Fit, name: str, sums: dict[str, float]) -> bool:
@@ -140,7 +141,7 @@ def _spread(names: Sequence[str], values: Numbers, rivals: Sequence[Fit]) -> Num
     """Mean square of what the rivals say otherwise; a constant that a rival does not have counts as its own value."""
     squares = np.zeros(len(values))
     for rival in rivals:
-        theirs, found, _ = _sums_of(rival)
+        theirs, found, *_ = _sums_of(rival)
         known = dict(zip(theirs, found.tolist(), strict=True))
         squares += np.array([(known.get(n, v) - v) ** 2 for n, v in zip(names, values.tolist(), strict=True)])
     return squares / len(rivals)

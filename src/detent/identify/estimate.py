@@ -5,6 +5,7 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 LEVEL = 0.95
 """Share of intervals that hold the true value."""
@@ -83,3 +84,8 @@ def quantile(degrees: float) -> float:
     stats: Any = import_module("scipy.stats")  # it states no types
     upper = 0.5 * (1.0 + LEVEL)
     return float(stats.norm.ppf(upper) if np.isinf(degrees) else stats.t.ppf(upper, max(degrees, 1.0)))
+
+
+def quantiles(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Reach of each interval in standard errors, shape (k,) as the degrees of freedom."""
+    return np.array([quantile(d) for d in degrees.tolist()], np.float64)

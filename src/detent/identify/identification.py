@@ -11,7 +11,7 @@ from detent.errors import InputError
 from detent.identify.closed_loop import ClosedLoop, simulate_closed_loop
 from detent.identify.constants import Constants, constants_of
 from detent.identify.equations import LOSS
-from detent.identify.estimate import Estimate, quantile
+from detent.identify.estimate import Estimate, quantiles
 from detent.identify.free_run import Horizon, simulate_horizons
 from detent.identify.kernel import make_kernel
 from detent.identify.ladder import RUNGS, Climb, Rung, best_bend, chosen_rung, climb, extended
@@ -335,7 +335,7 @@ def _is_told(fit: Fit) -> bool:
 
     A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
     """
-    reach = quantile(fit.degrees) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    reach = quantiles(fit.degrees) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     if not reach[-1] < WIDEST_BEND * fit.bend:
         return False
     excess = [k for k, name in enumerate(fit.names) if name.startswith("excess")]

@@ -130,7 +130,7 @@ def fit_output_error(
     duration : float
         Length of a stretch [s].
     report : callable, optional
-        Is told the share of the most rounds that is done.
+        Is told the share that is done, of the most rounds that both passes may take.
 
     Returns
     -------
@@ -150,12 +150,23 @@ def fit_output_error(
         )
     search = _Search(names, start, stretches)
     before = search.residual(search.begin)
-    rough = search.minimise(search.begin, report)
+    rough = search.minimise(search.begin, _part_of(report, 0.0, 0.5))
     # What an error of a start does depends on the constants: once more with those found.
     search.look_at_starts(rough.x)
-    found = search.minimise(rough.x, report)
+    found = search.minimise(rough.x, _part_of(report, 0.5, 1.0))
     constants = search.constants_at(found.x, found.jac, found.fun)
     return OutputErrorFit(constants, _rms(found.fun), _rms(before), len(stretches), search.count)
+
+
+def _part_of(report: Report | None, begin: float, end: float) -> Report | None:
+    """What tells the share that is done of a part of the work."""
+    if report is None:
+        return None
+
+    def tell(share: float) -> None:
+        report(begin + share * (end - begin))
+
+    return tell
 
 
 class _Search:
@@ -183,7 +194,7 @@ class _Search:
     def _constants(self, x: Numbers) -> Constants:
         values = np.append(self._back @ (x * self._scale), self._start.value("delay"))
         k = len(values)
-        return Constants((*self.names, "delay"), values, np.zeros((k, k)), 1, "output error")
+        return Constants((*self.names, "delay"), values, np.zeros((k, k)), np.ones(k), "output error")
 
     def _remover(self, x: Numbers, s: Stretch) -> Numbers:
         """What an error of the start does to a stretch: position and velocity, orthonormal columns."""
@@ -213,6 +224,7 @@ class _Search:
         rounds = 0
 
         def jacobian(at: Numbers) -> Numbers:
+            """Change of the residuals with each constant, by differences."""
             nonlocal rounds
             rounds += 1
             if report is not None:
@@ -265,7 +277,7 @@ class _Search:
             (*self.names, "delay"),
             self._constants(x).values,
             covariance,
-            degrees,
+            np.full(len(covariance), float(degrees)),
             "output error",
             self._start.delay_is_told,
         )

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.coloured import coloured_covariance
+from detent.identify.coloured import carried_degrees, coloured_covariance
 from detent.identify.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
 from detent.identify.kernel import Kernel
 from detent.identify.run import Run
@@ -66,8 +66,8 @@ class Fit:
         Their constants.
     covariance : float64 array, shape (k, k)
         Of these.
-    degrees : int
-        Degrees of freedom behind it.
+    degrees : float64 array, shape (k,)
+        Degrees of freedom behind the variance of each.
     residual, effort : float64 array, shape (m,)
         Measured less fitted effort, and the effort, window by window.
     model : tuple of str
@@ -83,7 +83,7 @@ class Fit:
     names: tuple[str, ...]
     values: Numbers
     covariance: Numbers
-    degrees: int
+    degrees: Numbers
     residual: Numbers
     effort: Numbers
     model: tuple[str, ...]
@@ -197,7 +197,8 @@ def fit_equations(
         y = make_effort(parts, late)
         x, z = _with_delay(parts, _known(names, theta), late, columns, ideal)
     residual = y - columns @ theta
-    covariance, degrees = coloured_covariance(*_with_bend(parts, names, theta, bend, x, residual, z))
+    x, _, z = _with_bend(parts, names, theta, bend, x, residual, z)
+    covariance, cosines = coloured_covariance(x, residual, z)
     absent = np.flatnonzero(~x.any(axis=0))
     covariance[absent, absent] = (UNKNOWN * float(np.abs(y).max())) ** 2
     singular = np.linalg.svd(columns / column_sizes(columns), compute_uv=False)
@@ -206,7 +207,7 @@ def fit_equations(
         (*terms_of(names), "delay", *bends),
         np.concatenate([theta, [late], [bend] if bends else []]),
         covariance,
-        degrees,
+        carried_degrees(x, residual, z, cosines),
         residual,
         y,
         tuple(names),

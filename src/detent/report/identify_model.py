@@ -60,7 +60,8 @@ def friction_limits(constants: Constants, velocity: Numbers) -> Numbers:
         slopes.append((more - less) / (2e-3 * error) if error > 0.0 else np.zeros(len(velocity)))
     slope = np.array(slopes)
     variance = np.einsum("in,ij,jn->n", slope, constants.covariance, slope)
-    return quantile(constants.degrees) * np.sqrt(np.maximum(variance, 0.0))
+    degrees = float(constants.degrees[slope.any(axis=1)].min(initial=np.inf))
+    return quantile(degrees) * np.sqrt(np.maximum(variance, 0.0))
 
 
 def respond(constants: Constants, frequency: Numbers) -> Numbers | None:

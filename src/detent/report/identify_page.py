@@ -212,6 +212,7 @@ def _settings(data: IdentifyReportData) -> dict[str, str]:
         told = {"recordings": ", ".join(log.name for log in found.logs)}
     if found.fit is not None:
         told["method"] = "; ".join(found.notes)
-        told["degrees of freedom"] = f"{found.fit.degrees} behind each interval"
+        degrees = found.fit.degrees.tolist()
+        told["degrees of freedom"] = f"{min(degrees):.0f} to {max(degrees):.0f} behind an interval"
         told["condition number"] = number(found.fit.condition)
     return told

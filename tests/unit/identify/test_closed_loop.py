@@ -23,7 +23,7 @@ def recorded(number: int) -> tuple[Run, Constants]:
         reference=c["position ref [m]"], resolution=a.resolution, noise=0.4 * a.resolution,
     )  # fmt: skip
     values = np.array([case.truth[name] for name in NAMES])
-    return run, Constants(NAMES, values, np.zeros((6, 6)), 10, "true")
+    return run, Constants(NAMES, values, np.zeros((6, 6)), np.full(6, 10.0), "true")
 
 
 def halves(run: Run) -> tuple[list[Run], list[Run]]:
@@ -45,7 +45,9 @@ def test_true_constants_follow_as_the_axis_did(number: int):
 
 def test_wrong_constants_show_in_the_effort():
     run, true = recorded(6)
-    wrong = Constants(NAMES, true.values * np.array([1.0, 2.0, 2.0, 1.0, 1.0, 1.0]), true.covariance, 10, "wrong")
+    wrong = Constants(
+        NAMES, true.values * np.array([1.0, 2.0, 2.0, 1.0, 1.0, 1.0]), true.covariance, true.degrees, "wrong"
+    )
     right, off = (simulate_closed_loop(c, *halves(run)) for c in (true, wrong))
     assert right is not None
     assert off is not None

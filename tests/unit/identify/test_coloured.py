@@ -6,13 +6,14 @@ from scipy.signal import lfilter
 from tests.identify_rig import binomial_bounds
 
 from detent.identify.coloured import (
+    carried_degrees,
     coloured_covariance,
     count_cosines,
     fallen_density,
     independent_rows,
     long_run_variance,
 )
-from detent.identify.estimate import quantile
+from detent.identify.estimate import quantile, quantiles
 
 
 def autoregressive(rng, shape, memory):
@@ -125,3 +126,38 @@ def test_a_column_of_zeros_does_no_harm_to_the_others():
     alone, _ = coloured_covariance(column, noise)
     assert np.isfinite(both).all()
     assert both[0, 0] == pytest.approx(alone[0, 0], rel=0.02)
+
+
+def test_the_same_weight_in_all_rows_leaves_the_degrees_of_the_cosines():
+    ones, white = np.ones((4000, 1)), autoregressive(np.random.default_rng(6), (4000,), 0.0)
+    assert carried_degrees(ones, white, ones, 40).tolist() == [40.0]
+
+
+def test_degrees_are_those_of_the_rows_that_carry_a_constant():
+    """Three rows out of a thousand carry the second constant, thirty the third; a column of zeros has one degree."""
+    columns = np.column_stack([np.ones(1000), np.zeros(1000), np.zeros(1000), np.zeros(1000)])
+    columns[[100, 400, 800], 1] = 1.0, -1.0, 1.0
+    columns[20::33, 2] = np.resize([1.0, -1.0], 30)
+    white = np.random.default_rng(6).standard_normal(1000)
+    found = carried_degrees(columns, white, columns, 40)
+    assert found == pytest.approx([40.0, 3.0, 30.0, 1.0], rel=0.05)
+    coloured = autoregressive(np.random.default_rng(6), (1000,), 0.8)
+    assert carried_degrees(columns, coloured, columns, 40)[2] == pytest.approx(30 * 0.36 / 1.64, rel=0.2)
+
+
+def test_intervals_hold_for_a_constant_that_few_rows_carry():
+    """As a jerk that is large in few windows: with the degrees of the cosines alone they are too short."""
+    rng = np.random.default_rng(7)
+    columns = np.column_stack([np.sin(np.linspace(0.0, 40.0, 800)), np.zeros(800)])
+    columns[rng.choice(800, 8, replace=False), 1] = 1.0
+    held, short = [], []
+    for noise in rng.standard_normal((1000, 800)):
+        theta = np.linalg.pinv(columns) @ noise
+        residual = noise - columns @ theta
+        covariance, cosines = coloured_covariance(columns, residual)
+        error = np.sqrt(np.diag(covariance))
+        held.append(np.abs(theta) < quantiles(carried_degrees(columns, residual, columns, cosines)) * error)
+        short.append(np.abs(theta) < quantile(cosines) * error)
+    low, _ = binomial_bounds(1000, doubt=1e-3)
+    assert np.mean(held, axis=0).min() > low
+    assert np.mean(short, axis=0)[1] < low

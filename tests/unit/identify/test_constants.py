@@ -1,5 +1,7 @@
 """Constants of each direction from whatever model was fitted, with the errors that belong to them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,8 +23,10 @@ def fit_of(model, values, covariance=None, *, by_instruments=False):
     if any(name.startswith("excess") for name in model):
         names, values = [*names, "stribeck"], [*values, 0.03]
     covariance = covariance_of(len(values)) if covariance is None else covariance
+    degrees = np.full(len(values), 12.0)
     return Fit(
-        tuple(names), np.array(values), covariance, 12, np.zeros(5), np.ones(5), tuple(model), 10, 2.0, by_instruments
+        *(tuple(names), np.array(values), covariance, degrees, np.zeros(5), np.ones(5), tuple(model), 10, 2.0),
+        by_instruments=by_instruments,
     )
 
 
@@ -138,6 +142,13 @@ def test_estimates_carry_units_degrees_and_method():
     assert found["mass"].method == "instrumental variables"
 
 
+def test_a_sum_is_known_no_better_than_the_least_known_of_its_terms():
+    fit = replace(fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4)), degrees=np.array([9.0, 30.0, 20.0, 3.0]))
+    found = constants_of(fit)
+    assert found.names == ("mass", "coulomb.positive", "coulomb.negative", "delay")
+    assert found.degrees.tolist() == [9.0, 20.0, 20.0, 3.0]
+
+
 def test_the_delay_of_least_squares_is_no_estimate():
     """It is what fits best, and the simulation uses it; but in a loop nobody knows its error."""
     run = Run("r", 1e-3, np.zeros(3), np.zeros(3), np.ones(3, bool))
@@ -149,7 +160,7 @@ def test_the_delay_of_least_squares_is_no_estimate():
 def test_where_a_pendulum_hangs():
     def pendulum(sine, cosine):
         names = ("pendulum", "pendulum.across")
-        return hanging_position(Constants(names, np.array([sine, cosine]), np.eye(2), 5, ""))
+        return hanging_position(Constants(names, np.array([sine, cosine]), np.eye(2), np.full(2, 5.0), ""))
 
     for angle in (-2.0, 0.0, 0.7, 3.0):
         # m g l sin(q - angle) = m g l (cos(angle) sin q - sin(angle) cos q)

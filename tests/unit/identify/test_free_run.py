@@ -26,7 +26,9 @@ TRUTH = {
 
 def constants(**changed):
     values = TRUTH | {name.replace("_", "."): value for name, value in changed.items()}
-    return Constants(tuple(values), np.array(list(values.values())), 1e-6 * np.eye(len(values)), 20, "made")
+    return Constants(
+        tuple(values), np.array(list(values.values())), 1e-6 * np.eye(len(values)), np.full(len(values), 20.0), "made"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +120,7 @@ def test_a_pendulum_swings_about_where_it_hangs():
     inertia, weight, hangs = 0.5, 20.0, 0.3
     names = ("mass", "pendulum", "pendulum.across")
     values = np.array([inertia, weight * np.cos(hangs), -weight * np.sin(hangs)])
-    plant = Plant(Constants(names, values, np.eye(3), 5, ""), STEP)
+    plant = Plant(Constants(names, values, np.eye(3), np.full(3, 5.0), ""), STEP)
     period = 2 * np.pi * np.sqrt(inertia / weight)
     samples = round(3 * period / STEP) + 1
     made = plant.run(np.zeros(10), 0, samples, hangs + 0.05, 0.0)
@@ -139,7 +141,7 @@ def test_static_friction_holds_until_it_breaks():
         (*loose.names, "static.positive", "static.negative", "stribeck"),
         np.array([*loose.values, 3.2, 3.2, 0.01]),
         np.eye(len(loose.names) + 3),
-        20,
+        np.full(len(loose.names) + 3, 20.0),
         "made",
     )
     push = np.full(200, 2.6)

@@ -228,7 +228,7 @@ def test_steady_speeds_alone_say_little_about_the_mass():
 
 def with_refusals(*refusals):
     names = ("mass", "coulomb.positive")
-    constants = Constants(names, np.array([2.0, 1.0]), 1e-4 * np.eye(2), 10, "")
+    constants = Constants(names, np.array([2.0, 1.0]), 1e-4 * np.eye(2), np.full(2, 10.0), "")
     run = Recorder(seconds=1.0).run()
     return Identification((), (run,), constants, constants.estimates(run), (), None, (), refusals)
 

@@ -18,7 +18,7 @@ TRUE = np.array([2.0, 1.5, 0.9, 3.0, 4.0, 0.0])
 
 
 def constants(values: np.ndarray, names: tuple[str, ...] = NAMES) -> Constants:
-    return Constants(names, values, np.diag((0.1 * np.abs(values) + 1e-9) ** 2), 10, "made")
+    return Constants(names, values, np.diag((0.1 * np.abs(values) + 1e-9) ** 2), np.full(len(values), 10.0), "made")
 
 
 def driven(seconds: float, seed: int = 1, noise: float = 2e-5, names=NAMES, true=TRUE) -> Run:
@@ -44,6 +44,7 @@ def test_what_it_is_told_on_the_way_ends_at_one():
     told: list[float] = []
     fit_output_error([driven(10.0)], constants(1.1 * TRUE), report=told.append)
     assert told[-1] == 1.0
+    assert told == sorted(told)
     assert all(0.0 < share <= 1.0 for share in told)
 
 

@@ -79,7 +79,13 @@ def four_constants(run):
         "viscous.positive": fitted["viscous"],
         "viscous.negative": fitted["viscous"],
     }
-    return Constants(tuple(values), np.array(list(values.values())), np.eye(len(values)), 10, "four constants")
+    return Constants(
+        tuple(values),
+        np.array(list(values.values())),
+        np.eye(len(values)),
+        np.full(len(values), 10.0),
+        "four constants",
+    )
 
 
 def free_run_error(constants, run, begin):

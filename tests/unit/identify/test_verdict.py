@@ -159,7 +159,9 @@ GOOD = {
 def look_at(**changed):
     values = GOOD | {name.replace("_", "."): pair for name, pair in changed.items()}
     errors = np.array([error for _, error in values.values()])
-    found = Constants(tuple(values), np.array([v for v, _ in values.values()]), np.diag(errors**2), 10**6, "")
+    found = Constants(
+        tuple(values), np.array([v for v, _ in values.values()]), np.diag(errors**2), np.full(len(errors), 1e6), ""
+    )
     return look_at_constants(RUN, found, PARTS)
 
 
@@ -228,7 +230,7 @@ def test_a_constant_of_which_nothing_is_known_has_no_figures():
 def test_without_instruments_there_is_no_delay_to_look_at():
     names = [name for name in GOOD if name != "delay"]
     values, errors = np.array([GOOD[n] for n in names]).T
-    found = Constants(tuple(names), values, np.diag(errors**2), 10**6, "")
+    found = Constants(tuple(names), values, np.diag(errors**2), np.full(len(errors), 1e6), "")
     assert look_at_constants(RUN, found, PARTS) == []
 
 

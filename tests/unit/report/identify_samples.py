@@ -65,7 +65,7 @@ def constants() -> Constants:
         "viscous.negative": 4.0, "static.positive": 13.0, "static.negative": 9.0, "delay": 1e-3, "stribeck": 0.01,
     }  # fmt: skip
     numbers = np.array(list(values.values()))
-    return Constants(tuple(values), numbers, np.diag((0.01 * numbers) ** 2), 1000, "by hand")
+    return Constants(tuple(values), numbers, np.diag((0.01 * numbers) ** 2), np.full(len(numbers), 1000.0), "by hand")
 
 
 def rigid(lines: int = 40, coherence: float = 1.0, rough: float = 0.0) -> FrequencyResponse:

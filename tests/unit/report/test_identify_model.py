@@ -34,7 +34,7 @@ def test_limits_come_from_the_covariance() -> None:
     covariance[1, 1], covariance[3, 3], covariance[1, 3], covariance[3, 1] = 0.04, 0.01, -0.018, -0.018
     v = np.array([0.5, 1.0, 2.0, -1.0])
     found = friction_limits(replace(c, covariance=covariance), v)
-    expected = quantile(c.degrees) * np.sqrt(0.04 + 2 * v * -0.018 + 0.01 * v**2)
+    expected = quantile(1000.0) * np.sqrt(0.04 + 2 * v * -0.018 + 0.01 * v**2)
     assert found[:3] == pytest.approx(expected[:3], rel=1e-6)
     assert found[3] == 0.0
 
