@@ -46,13 +46,13 @@ def test_identifying_a_log_of_25_seconds(benchmark):
     """What limits it: the windows of the whole log, which every rung and every stretch use; the simulation test."""
     log = made_log()
     run = make_run(log)
-    parts, by_instruments = choose_windows([run])
+    parts = choose_windows([run])
     kernel = make_kernel(round(WINDOW / STEP), STEP)
     found = identify([log])
     assert found.verdict == "trusted"
 
     def regression() -> int:
-        fit_equations(parts, RUNGS[1].terms, by_instruments=by_instruments)
+        fit_equations(parts, RUNGS[1].terms)
         return 1
 
     def windows() -> int:

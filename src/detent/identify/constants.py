@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.estimate import Estimate, estimate
-from detent.identify.regression import Fit
+from detent.identify.regression import Fit, Instruments
 from detent.identify.run import Run
 
 Numbers = NDArray[np.float64]
@@ -35,6 +35,14 @@ _SUMS: dict[str, dict[str, float]] = {
     "delay": {"delay": 1.0},
 }
 """Constants as sums of those of the terms; a force that does not turn round is part of both Coulomb constants."""
+
+
+METHODS: dict[Instruments, str] = {
+    "reference": "instrumental variables",
+    "position": "instrumental variables of wider windows",
+    "none": "least squares",
+}
+"""How the constants of a fit were found, by what its instruments are made of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +96,7 @@ class Constants:
     def estimates(self, run: Run) -> tuple[Estimate, ...]:
         """Each with its interval, in the units of a run.
 
-        Without instruments the delay is none of them: in a loop it hides in the answer of the effort to the noise.
+        Without a reference the delay is none of them: in a loop it hides in the answer of the effort to the noise.
         """
         told = zip(self.names, self.values.tolist(), self.errors.tolist(), self.degrees.tolist(), strict=True)
         return tuple(
@@ -115,8 +123,7 @@ def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
     names, values, covariance, degrees = _sums_of(fit)
     if rivals:
         covariance = covariance + np.diag(_spread(names, values, rivals))
-    method = "instrumental variables" if fit.by_instruments else "least squares"
-    return Constants(names, values, covariance, degrees, method, fit.by_instruments)
+    return Constants(names, values, covariance, degrees, METHODS[fit.instruments], fit.instruments == "reference")
 
 
 def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers, Numbers]:

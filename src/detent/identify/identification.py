@@ -14,10 +14,10 @@ from detent.identify.equations import LOSS
 from detent.identify.estimate import Estimate, quantiles
 from detent.identify.free_run import Horizon, simulate_horizons
 from detent.identify.kernel import make_kernel
-from detent.identify.ladder import RUNGS, Climb, Rung, best_bend, chosen_rung, climb, extended
+from detent.identify.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung
 from detent.identify.log import Log
 from detent.identify.output_error import STRETCH, fit_output_error
-from detent.identify.regression import Fit, Prepared, fit_equations, prepare
+from detent.identify.regression import Fit, Instruments, Prepared, prepare
 from detent.identify.residuals import Residuals, residuals_of
 from detent.identify.run import Run, make_run
 from detent.identify.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
@@ -33,17 +33,23 @@ WINDOW = 0.02
 WIDEST = 0.12
 """Half of the widest window [s]."""
 
-NOISE_SHARE = {True: 0.1, False: 0.002}
-"""Share of the noise in the square of the acceleration, at most: with instruments, and with least squares."""
+NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "none": 0.002}
+"""Share of the noise in the square of the acceleration, at most, by what instruments are made of."""
 
-LIKENESS = 0.6
-"""Cosine between velocities, and between accelerations, of reference and axis, from which on it is an instrument."""
+LIKENESS: dict[Instruments, float] = {"reference": 0.6, "position": 0.95}
+"""Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken."""
 
 WIDEST_BEND = 0.5
 """Half of the interval of a Stribeck velocity or a loss over its value, at most."""
 
 HELD_OUT = 0.25
 """Last part of a log that the simulation is tested on."""
+
+_WAYS: dict[Instruments, str] = {
+    "reference": "references as instruments",
+    "position": "wider windows as instruments: no reference that the axis follows closely",
+    "none": "least squares: no reference that the axis follows closely, and motion too quick for wider windows",
+}
 
 TURN = 0.5
 """Range of an angle from which on a weight may show [rad]."""
@@ -170,13 +176,13 @@ def identify(
     runs = tuple(make_run(log, effort) for log in logs)
     _check_alike(runs)
     refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]
-    parts, by_instruments = choose_windows(runs)
+    parts = choose_windows(runs)
     refusals += look_at_motion(runs, parts)
     if sum(len(p.motion.rows) for p in parts) < 5 * len(RUNGS[-1].terms):
         if not refusals:
             refusals.append(Refusal("too short", "hardly any window without standstill", "record longer moves"))
         return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
-    found = _fit_all(parts, runs, by_instruments=by_instruments, report=report)
+    found = _fit_all(parts, runs, report)
     constants = constants_of(found.fit, found.rivals)
     if method == "output error" and constants.value("mass") > 0.0:
         constants = _refine(runs, constants, "output error", report)
@@ -184,13 +190,13 @@ def identify(
     horizons: tuple[Horizon, ...] = ()
     seen = closed = None
     if constants.value("mass") > 0.0:
-        seen, horizons, closed = _test_simulation(runs, found, method, by_instruments=by_instruments, report=report)
+        seen, horizons, closed = _test_simulation(runs, found, method, report)
     refusals += look_at_prediction(found.climbs, horizons, refusals)
     kernel = parts[0].motion.kernel
     notes = (
         f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
         f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {len(found.fit.residual)} of them",
-        "references as instruments" if by_instruments else "least squares: no reference that the axis follows closely",
+        _WAYS[parts[0].instruments],
     )
     return Identification(
         tuple(logs),
@@ -251,24 +257,28 @@ class _Found:
     rivals: tuple[Fit, ...]
 
 
-def choose_windows(runs: Sequence[Run]) -> tuple[list[Prepared], bool]:
-    """Windows, and whether the references can be instruments: all there, and each followed closely."""
-    if all(run.reference is not None for run in runs):
-        parts = prepare_all(runs, by_instruments=True)
+def choose_windows(runs: Sequence[Run]) -> list[Prepared]:
+    """Windows with their instruments: the first of references, wider windows and none that is near the motion.
+
+    Instruments that say little of the motion leave a bias smaller than the scatter that they bring.
+    """
+    ways: list[Instruments] = ["reference"] if all(run.reference is not None for run in runs) else []
+    for way in (*ways, "position"):
+        parts = prepare_all(runs, way)
         if all(_follows(p) for p in parts):
-            return parts, True
-    return prepare_all(runs, by_instruments=False), False
+            return parts
+    return prepare_all(runs, "none")
 
 
 def _follows(part: Prepared) -> bool:
-    """True where velocity and acceleration of the reference are those of the axis for the most part."""
-    if part.ideal is None or not len(part.motion.rows):
+    """True where velocity and acceleration of the instruments are those of the axis for the most part."""
+    if not len(part.motion.rows):
         return False
     pairs = (
         (part.motion.velocity, part.ideal.velocity),
         (part.motion.acceleration, part.ideal.acceleration),
     )
-    return all(_cosine(*pair) > LIKENESS for pair in pairs)
+    return all(_cosine(*pair) > LIKENESS[part.instruments] for pair in pairs)
 
 
 def _cosine(a: Numbers, b: Numbers) -> float:
@@ -277,12 +287,13 @@ def _cosine(a: Numbers, b: Numbers) -> float:
     return float(a @ b) / size if size > 0.0 else 0.0
 
 
-def prepare_all(runs: Sequence[Run], *, by_instruments: bool) -> list[Prepared]:
+def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
     """Windows wide enough that noise does not matter, the same for all runs."""
     half = WINDOW
     while True:
-        parts = [prepare(run, make_kernel(max(5, round(half / run.step)), run.step)) for run in runs]
-        if half >= WIDEST or _noise_share(parts) < NOISE_SHARE[by_instruments]:
+        kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
+        parts = [prepare(run, kernel, instruments) for run, kernel in zip(runs, kernels, strict=True)]
+        if half >= WIDEST or _noise_share(parts) < NOISE_SHARE[instruments]:
             return parts
         half *= 1.4
 
@@ -296,13 +307,13 @@ def _noise_share(parts: Sequence[Prepared]) -> float:
     return noise / power if power > 0.0 else 0.0
 
 
-def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run], *, by_instruments: bool) -> tuple[Rung, ...]:
+def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
     """The ladder of these runs: an axis that turns may lift a weight, and lose force where it does."""
     if not runs[0].is_rotary or max(float(np.ptp(run.position)) for run in runs) < TURN:
         return RUNGS
     plain = RUNGS[1]
     weights = [plain, *(extended(plain, terms) for terms in (("pendulum",), ("pendulum", "pendulum.across")))]
-    lifts = climb(parts, weights, by_instruments=by_instruments)
+    lifts = climb(parts, weights)
     extra = chosen_rung(lifts).terms[len(plain.terms) :]
     if not extra:
         return RUNGS
@@ -314,18 +325,15 @@ def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run], *, by_instruments
     return (*ladder, lossy)
 
 
-def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], *, by_instruments: bool, report: Report | None) -> _Found:
+def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report | None) -> _Found:
     """Climb the ladder, then fit the chosen model and those as good."""
-    tell = _teller(report, "ladder")
-    climbs = climb(
-        parts, _rungs_for(parts, runs, by_instruments=by_instruments), by_instruments=by_instruments, report=tell
-    )
+    climbs = climb(parts, _rungs_for(parts, runs), _teller(report, "ladder"))
     chosen = next(c for c in reversed(climbs) if c.taken)
-    fits = {c.rung.name: _fit(parts, c.rung, by_instruments=by_instruments) for c in climbs if _is_rival(c, chosen)}
+    fits = {c.rung.name: fit_rung(parts, c.rung) for c in climbs if _is_rival(c, chosen)}
     if chosen.rung.is_bent and not _is_told(fits[chosen.rung.name]):
         climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
         chosen = next(c for c in reversed(climbs) if c.taken)
-        fits.setdefault(chosen.rung.name, _fit(parts, chosen.rung, by_instruments=by_instruments))
+        fits.setdefault(chosen.rung.name, fit_rung(parts, chosen.rung))
     fit = fits.pop(chosen.rung.name)
     return _Found(climbs, fit, tuple(fits.values()))
 
@@ -352,23 +360,17 @@ def _is_rival(c: Climb, chosen: Climb) -> bool:
     return bool(worse.mean() < worse.std(ddof=1) / np.sqrt(len(worse)))
 
 
-def _fit(parts: Sequence[Prepared], rung: Rung, *, by_instruments: bool) -> Fit:
-    bend = best_bend(parts, rung.terms, by_instruments=by_instruments) if rung.is_bent else 1.0
-    return fit_equations(parts, rung.terms, bend, by_instruments=by_instruments)
-
-
 def _test_simulation(
-    runs: Sequence[Run], found: _Found, method: Method, *, by_instruments: bool, report: Report | None
+    runs: Sequence[Run], found: _Found, method: Method, report: Report | None
 ) -> tuple[Constants | None, tuple[Horizon, ...], ClosedLoop | None]:
     """Constants from the first part of each log, simulated along the last."""
     cuts = [round((1.0 - HELD_OUT) * len(run.position)) for run in runs]
     seen = [run.part(0, cut) for run, cut in zip(runs, cuts, strict=True)]
     unseen = [run.part(cut, len(run.position)) for run, cut in zip(runs, cuts, strict=True)]
-    parts = prepare_all(seen, by_instruments=by_instruments)
+    parts = prepare_all(seen, found.fit.instruments)
     if sum(len(p.motion.rows) for p in parts) < 3 * len(found.fit.names):
         return None, (), None
-    fit = fit_equations(parts, found.fit.model, found.fit.bend, by_instruments=by_instruments)
-    constants = constants_of(fit)
+    constants = constants_of(fit_rung(parts, chosen_rung(found.climbs)))
     if constants.value("mass") <= 0.0:
         return None, (), None
     if method == "output error":

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.equations import LOSS, is_bent, terms_of
-from detent.identify.regression import Prepared, bend_correction, fit_equations, make_columns, make_effort, solve
+from detent.identify.regression import Fit, Prepared, bend_correction, fit_equations, make_columns, make_effort, solve
 
 Numbers = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def stribeck_speeds(parts: Sequence[Prepared]) -> Numbers:
     return np.geomspace(min(max(low, 0.02 * top), 0.2 * top), 0.4 * top, SPEEDS)
 
 
-def best_bend(parts: Sequence[Prepared], names: Sequence[str], *, by_instruments: bool) -> float:
+def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> float:
     """Stribeck velocity, or share lost: that with the smallest residual, from there on what the instruments say.
 
     The smallest residual alone answers to the noise in the columns: intervals around it held the truth in 86 % of the
@@ -128,11 +128,11 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str], *, by_instruments
     """
     tried = LOSSES if LOSS in names else stribeck_speeds(parts)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
-    effort = make_effort(parts, fit_equations(parts, plain, by_instruments=by_instruments).delay)
+    effort = make_effort(parts, fit_equations(parts, plain).delay)
 
     def miss(bend: float) -> float:
-        columns = make_columns(parts, names, bend)
-        ideal = make_columns(parts, names, bend, ideal=True) if by_instruments else columns
+        """Sum of the squared residuals."""
+        columns, ideal = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
         residual = effort - columns @ solve(ideal, columns, effort)
         return float(residual @ residual)
 
@@ -141,14 +141,14 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str], *, by_instruments
     optimize: Any = import_module("scipy.optimize")  # it states no types
     limits = {"xatol": 1e-4 * float(around[1])}
     found = float(optimize.minimize_scalar(miss, bounds=tuple(around), method="bounded", options=limits).x)
-    return _refined_bend(parts, names, found, tried) if by_instruments else found
+    return _refined_bend(parts, names, found, tried)
 
 
 def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float, tried: Numbers) -> float:
     """The bend at which the instruments ask for no other; the start where there is none within the range tried."""
     bend = start
     for _ in range(ROUNDS):
-        correction = bend_correction(parts, fit_equations(parts, names, bend, by_instruments=True))
+        correction = bend_correction(parts, fit_equations(parts, names, bend))
         if abs(correction) < 1e-3 * bend:
             return bend
         bend += float(np.clip(correction, -0.3 * bend, 0.3 * bend))
@@ -160,8 +160,6 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
 def climb(
     parts: Sequence[Prepared],
     rungs: Sequence[Rung] = RUNGS,
-    *,
-    by_instruments: bool = False,
     report: Report | None = None,
 ) -> tuple[Climb, ...]:
     """Hold every rung to stretches it did not see.
@@ -172,8 +170,6 @@ def climb(
         Runs by one window.
     rungs : sequence of Rung
         From the simplest up.
-    by_instruments : bool
-        Fit by instruments.
     report : callable, optional
         Is told the share that is done.
 
@@ -185,7 +181,7 @@ def climb(
     climbs: list[Climb] = []
     best: Climb | None = None
     for k, rung in enumerate(rungs):
-        squares, power, possible = _held_out(parts, rung, by_instruments=by_instruments)
+        squares, power, possible = _held_out(parts, rung)
         gain = np.nan
         if best is not None:
             better = best.stretches - squares
@@ -201,6 +197,11 @@ def climb(
 def chosen_rung(climbs: Sequence[Climb]) -> Rung:
     """The last rung that was taken."""
     return next(c.rung for c in reversed(climbs) if c.taken)
+
+
+def fit_rung(parts: Sequence[Prepared], rung: Rung) -> Fit:
+    """Fit the model of a rung, its Stribeck velocity or loss included."""
+    return fit_equations(parts, rung.terms, best_bend(parts, rung.terms) if rung.is_bent else 1.0)
 
 
 Mask = NDArray[np.bool_]
@@ -236,15 +237,13 @@ def hold_out(parts: Sequence[Prepared], count: int = STRETCHES) -> list[tuple[Ma
     return masks
 
 
-def _held_out(parts: Sequence[Prepared], rung: Rung, *, by_instruments: bool) -> tuple[Numbers, float, bool]:
+def _held_out(parts: Sequence[Prepared], rung: Rung) -> tuple[Numbers, float, bool]:
     """Mean squares of the prediction of each stretch, the mean square of the effort, and whether friction rises.
 
     Friction that falls towards standstill is no Stribeck friction, whatever it fits.
     """
-    bend = best_bend(parts, rung.terms, by_instruments=by_instruments) if rung.is_bent else 1.0
-    whole = fit_equations(parts, rung.terms, bend, by_instruments=by_instruments)
-    columns = make_columns(parts, rung.terms, bend)
-    ideal = make_columns(parts, rung.terms, bend, ideal=True) if by_instruments else columns
+    whole = fit_rung(parts, rung)
+    columns, ideal = (make_columns(parts, rung.terms, whole.bend, ideal=ideal) for ideal in (False, True))
     squares: list[float] = []
     for inside, apart in hold_out(parts):
         theta = solve(ideal[apart], columns[apart], whole.effort[apart])

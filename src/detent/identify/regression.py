@@ -5,7 +5,9 @@ The moment at which the effort acts is one of the constants: an effort that acts
 
 Measured positions appear on the side of the columns, with their noise; and in a closed loop the effort answers to that
 noise. Least squares are then biased. The reference, where it was recorded, knows nothing of either: columns made of it
-are instruments, ``theta = (Z' X)^-1 Z' y``, and the bias is gone.
+are instruments, ``theta = (Z' X)^-1 Z' y``, and the bias is gone. Where there is none, columns of the measured position
+by wider windows take its place: windows that are wider by 2.5 share hardly any noise with the narrower ones, of whose
+second derivative they hold some 1 %.
 
 References
 ----------
@@ -16,16 +18,24 @@ Control Systems Technology 22 (2014).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.coloured import carried_degrees, coloured_covariance
 from detent.identify.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
-from detent.identify.kernel import Kernel
+from detent.identify.kernel import Kernel, make_kernel
 from detent.identify.run import Run
 
 Numbers = NDArray[np.float64]
+Instruments = Literal["reference", "position", "none"]
+
+WIDER = 2.5
+"""Width of the windows that are instruments where there is no reference, in those of the columns."""
+
+ENDS = 0.1
+"""Share of a run that half of such a window takes at most: rows closer to the ends are lost."""
 
 ROUNDS = 8
 """Rounds in which the delay of the effort is found, at most."""
@@ -44,13 +54,17 @@ class Prepared:
     run : Run
     motion : Motion
         Of the measured position.
-    ideal : Motion or None
-        Of the reference, as late as the axis follows it.
+    ideal : Motion
+        What instruments are made of: the motion of the reference, as late as the axis follows it; that of the position
+        by wider windows; or `motion` itself, which is least squares.
+    instruments : str
+        Which of these: "reference", "position" or "none".
     """
 
     run: Run
     motion: Motion
-    ideal: Motion | None
+    ideal: Motion
+    instruments: Instruments
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +90,8 @@ class Fit:
         Samples of the window to each side.
     condition : float
         Condition number of the columns at unit length.
-    by_instruments : bool
-        False for least squares.
+    instruments : str
+        What they are made of: "reference", "position", or "none" for least squares.
     """
 
     names: tuple[str, ...]
@@ -89,7 +103,7 @@ class Fit:
     model: tuple[str, ...]
     half: int
     condition: float
-    by_instruments: bool
+    instruments: Instruments
 
     @property
     def delay(self) -> float:
@@ -111,7 +125,7 @@ class Fit:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
 
-def prepare(run: Run, kernel: Kernel) -> Prepared:
+def prepare(run: Run, kernel: Kernel, instruments: Instruments) -> Prepared:
     """Make the windows of a run.
 
     Parameters
@@ -119,13 +133,19 @@ def prepare(run: Run, kernel: Kernel) -> Prepared:
     run : Run
     kernel : Kernel
         The window.
+    instruments : str
+        As of `Prepared`; "reference" for a run that has one.
     """
-    rows = usable_rows(run, kernel)
-    motion = make_motion(run.position, run.effort, kernel, rows)
-    ideal = None
-    if run.reference is not None:
+    rows, n = usable_rows(run, kernel), len(run.position)
+    wide = make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
+    if instruments == "position":
+        rows = rows[(rows > wide.half) & (rows < n - wide.half)]
+    motion = ideal = make_motion(run.position, run.effort, kernel, rows)
+    if instruments == "reference" and run.reference is not None:
         ideal = make_motion(_delayed(run.reference, lag_of(run)), run.effort, kernel, rows)
-    return Prepared(run, motion, ideal)
+    if instruments == "position":
+        ideal = make_motion(run.position, run.effort, wide, rows)
+    return Prepared(run, motion, ideal, instruments)
 
 
 def lag_of(run: Run) -> int:
@@ -145,7 +165,7 @@ def _delayed(values: Numbers, lag: int) -> Numbers:
 
 def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *, ideal: bool = False) -> Numbers:
     """Columns of a model over all windows, shape (m, k)."""
-    motions = [p.ideal if ideal and p.ideal is not None else p.motion for p in parts]
+    motions = [p.ideal if ideal else p.motion for p in parts]
     return np.concatenate([model_columns(m, names, bend) for m in motions])
 
 
@@ -159,7 +179,6 @@ def fit_equations(
     names: Sequence[str],
     bend: float = 1.0,
     *,
-    by_instruments: bool = False,
     delay: float | None = None,
 ) -> Fit:
     """Fit a model to runs.
@@ -167,13 +186,11 @@ def fit_equations(
     Parameters
     ----------
     parts : sequence of Prepared
-        Runs by windows of the same duration.
+        Runs by windows of the same duration, with the same instruments.
     names : sequence of str
         Terms of `equations.TERMS`, the mass first, and `equations.LOSS`.
     bend : float
         Stribeck velocity [m/s] or share lost, where the model has one.
-    by_instruments : bool
-        Use the references as instruments; every run must have one.
     delay : float, optional
         Known delay of the effort [s]; found by default.
 
@@ -182,7 +199,7 @@ def fit_equations(
     Fit
     """
     columns = make_columns(parts, names, bend)
-    ideal = make_columns(parts, names, bend, ideal=True) if by_instruments else columns
+    ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
     late, step = delay or 0.0, parts[0].run.step
     theta = solve(ideal, columns, make_effort(parts, late))
     y = make_effort(parts, late)
@@ -213,7 +230,7 @@ def fit_equations(
         tuple(names),
         parts[0].motion.kernel.half,
         float(singular[0] / max(singular[-1], 1e-300)),
-        by_instruments,
+        parts[0].instruments,
     )
 
 
@@ -234,11 +251,11 @@ def _with_delay(
 
 
 def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Numbers:
-    """What the reference says of the effort's derivative, once mass and viscous friction are roughly known."""
+    """What the instruments say of the effort's derivative, once mass and viscous friction are roughly known."""
     viscous = max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
     made: list[Numbers] = []
     for p in parts:
-        m = p.ideal or p.motion
+        m = p.ideal
         made.append((known["mass"] or 1.0) * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration)
     return np.concatenate(made)
 

@@ -243,7 +243,7 @@ def windows_of(found: Identification) -> tuple[Windows, ...]:
     fit = found.fit
     if fit is None:
         return ()
-    motions = [p.motion for p in prepare_all(found.runs, by_instruments=fit.by_instruments)]
+    motions = [p.motion for p in prepare_all(found.runs, fit.instruments)]
     ends = np.cumsum([len(motion.rows) for motion in motions])
     return tuple(
         _windows(fit, run, motion, slice(int(end) - len(motion.rows), int(end)))

@@ -17,7 +17,7 @@ def covariance_of(count):
     return root @ root.T
 
 
-def fit_of(model, values, covariance=None, *, by_instruments=False):
+def fit_of(model, values, covariance=None, *, instruments="position"):
     """A fit of a model with a delay of 2 ms, and a Stribeck velocity of 0.03 m/s where it has one."""
     names, values = [*model, "delay"], [*values, 0.002]
     if any(name.startswith("excess") for name in model):
@@ -26,7 +26,7 @@ def fit_of(model, values, covariance=None, *, by_instruments=False):
     degrees = np.full(len(values), 12.0)
     return Fit(
         *(tuple(names), np.array(values), covariance, degrees, np.zeros(5), np.ones(5), tuple(model), 10, 2.0),
-        by_instruments=by_instruments,
+        instruments=instruments,
     )
 
 
@@ -93,8 +93,10 @@ def test_a_model_without_low_speed_friction_has_none():
 
 def test_the_method_is_named():
     fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4))
+    assert constants_of(fit).method == "instrumental variables of wider windows"
+    fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4), instruments="none")
     assert constants_of(fit).method == "least squares"
-    fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4), by_instruments=True)
+    fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4), instruments="reference")
     assert constants_of(fit).method == "instrumental variables"
 
 
@@ -128,7 +130,7 @@ def test_correlations_are_those_of_the_errors():
 
 def test_estimates_carry_units_degrees_and_method():
     covariance = np.diag([0.01, 0.04, 0.0, 1e-6])
-    fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4), covariance, by_instruments=True)
+    fit = fit_of(("mass", "coulomb", "offset"), (2.0, 1.5, -0.4), covariance, instruments="reference")
     run = Run("r", 1e-3, np.zeros(3), np.zeros(3), np.ones(3, bool), "torque", "N*m", "rad")
     found = {e.name: e for e in constants_of(fit).estimates(run)}
     assert {name: e.unit for name, e in found.items()} == {

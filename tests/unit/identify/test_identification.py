@@ -90,11 +90,11 @@ def test_plain_data_says_all(found):
     assert plain["refusals"] == []
 
 
-def test_without_a_reference_it_is_least_squares():
+def test_without_a_reference_wider_windows_are_instruments():
     found = identify([RECORDER.log(with_reference=False)])
     assert found.verdict == "trusted"
-    assert {e.method for e in found.estimates} == {"least squares"}
-    assert found.notes[-1] == "least squares: no reference that the axis follows closely"
+    assert {e.method for e in found.estimates} == {"instrumental variables of wider windows"}
+    assert found.notes[-1] == "wider windows as instruments: no reference that the axis follows closely"
     assert values_of(found) == pytest.approx(TRUTH, rel=0.02)
     # What fits best is used by the simulation, but nobody knows its error.
     assert found.constants.value("delay") == pytest.approx(0.004, abs=1e-3)
@@ -103,7 +103,16 @@ def test_without_a_reference_it_is_least_squares():
 def test_a_reference_that_the_axis_does_not_follow_is_no_instrument():
     log = RECORDER.log()
     still = changed(log, reference=np.zeros(len(log.t)))
-    assert {e.method for e in identify([still]).estimates} == {"least squares"}
+    assert {e.method for e in identify([still]).estimates} == {"instrumental variables of wider windows"}
+
+
+def test_motion_too_quick_for_wider_windows_is_fitted_by_least_squares():
+    """Turning round thrice a second, sampled at 25 Hz: windows of a second see hardly any of it."""
+    step = 0.04
+    recorder = Recorder(step=step, seconds=40.0, force_noise=0.05)
+    found = identify([recorder.log(with_reference=False)])
+    assert {e.method for e in found.estimates} == {"least squares"}
+    assert found.notes[-1].startswith("least squares: no reference that the axis follows closely, and motion too quick")
 
 
 def test_several_logs_are_one_identification(found):

@@ -74,9 +74,9 @@ def test_a_servo_with_a_pendulum_loses_a_share_of_its_torque(lifted: Identificat
 def test_gains_of_100_and_200_predict_400(servos: dict[bool, list[Path]], lifted: Identification):
     """At most 0.8 times the error of a Coulomb-viscous model, which has had the same fit by simulation."""
     unseen = [make_run(read_log(path, options=SERVO_COLUMNS)) for path in servos[True]]
-    parts, by_instruments = choose_windows(lifted.runs)
+    parts = choose_windows(lifted.runs)
     plain = extended(RUNGS[1], ("pendulum",))
-    start = constants_of(fit_equations(parts, plain.terms, by_instruments=by_instruments))
+    start = constants_of(fit_equations(parts, plain.terms))
     viscous = fit_output_error(lifted.runs, start, 1.5).constants
     assert lifted.constants is not None
     ours, theirs = (rms(errors_over_two_seconds(c, unseen)) for c in (lifted.constants, viscous))

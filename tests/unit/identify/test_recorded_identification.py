@@ -101,8 +101,8 @@ def test_it_runs_the_rest_of_the_record_better_than_four_constants(found):
     run = found.runs[0]
     cut = round(SEEN * len(run.position))
     seen = run.part(0, cut)
-    parts, by_instruments = choose_windows([seen])
-    ours = constants_of(fit_equations(parts, found.fit.model, found.fit.bend, by_instruments=by_instruments))
+    parts = choose_windows([seen])
+    ours = constants_of(fit_equations(parts, found.fit.model, found.fit.bend))
     rms, worst = free_run_error(ours, run, cut)
     their_rms, their_worst = free_run_error(four_constants(seen), run, cut)
     way = 1e3 * float(np.ptp(run.position[cut:]))

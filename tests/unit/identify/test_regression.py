@@ -16,20 +16,28 @@ NAMES = tuple(TRUTH)
 HALF = 10
 
 
-def parts_of(*runs, half=HALF):
-    return [prepare(run, make_kernel(half, run.step)) for run in runs]
+WAYS = ("none", "position", "reference")
+"""What instruments are made of."""
 
 
-@pytest.mark.parametrize("by_instruments", [False, True])
+def parts_of(*runs, half=HALF, way="reference"):
+    return [prepare(run, make_kernel(half, run.step), way) for run in runs]
+
+
+def fit_by(way, *runs, names=NAMES, half=HALF):
+    return fit_equations(parts_of(*runs, half=half, way=way), names)
+
+
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("delay", [0.0, 0.0037, -0.001])
-def test_constants_and_delay_come_back(by_instruments, delay):
+def test_constants_and_delay_come_back(way, delay):
     run = Recorder(delay=delay, force_noise=0.0).run()
-    fit = fit_equations(parts_of(run), NAMES, by_instruments=by_instruments)
+    fit = fit_by(way, run)
     assert dict(zip(NAMES, fit.values.tolist(), strict=False)) == pytest.approx(TRUTH, rel=1e-4)
     assert fit.delay == pytest.approx(delay, abs=5e-6)
     assert fit.value("mass") == fit.values[0]
     assert fit.value("spring") == 0.0
-    assert fit.by_instruments is by_instruments
+    assert fit.instruments == way
 
 
 def test_a_known_delay_is_kept():
@@ -50,11 +58,10 @@ def test_several_runs_are_one_fit():
     assert together.covariance[0, 0] < 0.6 * alone.covariance[0, 0]
 
 
-@pytest.mark.parametrize("by_instruments", [False, True])
-def test_errors_scatter_as_the_covariance_says(by_instruments):
-    parts = [parts_of(Recorder(seed=seed, force_noise=0.3).run()) for seed in range(40)]
-    fits = [fit_equations(p, NAMES, by_instruments=by_instruments) for p in parts]
-    count = len(NAMES) + by_instruments  # the delay by instruments only
+@pytest.mark.parametrize("way", WAYS)
+def test_errors_scatter_as_the_covariance_says(way):
+    fits = [fit_by(way, Recorder(seed=seed, force_noise=0.3).run()) for seed in range(40)]
+    count = len(NAMES) + (way == "reference")  # the delay by references only
     scatter = np.std([fit.values[:count] for fit in fits], axis=0, ddof=1)
     said = np.median([np.sqrt(np.diag(fit.covariance))[:count] for fit in fits], axis=0)
     assert said == pytest.approx(scatter, rel=0.45)
@@ -81,25 +88,31 @@ def closed_loop(seed, noise=2e-4, step=2e-3, seconds=12.0):
     return Run("loop", step, measured, force, np.ones(n, bool), reference=wanted, noise=noise)
 
 
-def test_the_reference_takes_away_the_bias_of_a_closed_loop():
+NOISES = {"reference": 2e-4, "position": 1e-5}
+"""Noise at which the windows of these tests are used with such instruments [m]."""
+
+
+@pytest.mark.parametrize("way", NOISES)
+def test_instruments_take_away_the_bias_of_a_closed_loop(way):
     """Noise of the sensor goes through the controller into the force: least squares follow it, instruments do not."""
-    found = {True: [], False: []}
+    found = {"none": [], way: []}
     for seed in range(12):
-        parts = parts_of(closed_loop(seed), half=8)
-        for by_instruments, values in found.items():
-            values.append(fit_equations(parts, ("mass", "viscous"), by_instruments=by_instruments).values[:2])
+        for by, values in found.items():
+            loop = closed_loop(seed, NOISES[way])
+            values.append(fit_by(by, loop, names=("mass", "viscous"), half=8).values[:2])
     truth = np.array([2.0, 5.0])
-    errors = {way: np.mean(values, axis=0) - truth for way, values in found.items()}
-    scatter = {way: np.std(values, axis=0, ddof=1) / np.sqrt(12) for way, values in found.items()}
-    assert (np.abs(errors[True]) < 4 * scatter[True]).all()
-    assert abs(errors[False][0]) > 10 * scatter[False][0]
-    assert abs(errors[True][0]) < 0.1 * abs(errors[False][0])
+    errors = {by: np.mean(values, axis=0) - truth for by, values in found.items()}
+    scatter = {by: np.std(values, axis=0, ddof=1) / np.sqrt(12) for by, values in found.items()}
+    assert (np.abs(errors[way]) < 4 * scatter[way]).all()
+    assert abs(errors["none"][0]) > 10 * scatter["none"][0]
+    assert abs(errors[way][0]) < 0.1 * abs(errors["none"][0])
 
 
-def test_limits_by_instruments_hold_in_a_closed_loop():
+@pytest.mark.parametrize("way", NOISES)
+def test_limits_by_instruments_hold_in_a_closed_loop(way):
     held = []
     for seed in range(12):
-        fit = fit_equations(parts_of(closed_loop(seed), half=8), ("mass", "viscous"), by_instruments=True)
+        fit = fit_by(way, closed_loop(seed, NOISES[way]), names=("mass", "viscous"), half=8)
         held.append(np.abs(fit.values[:2] - [2.0, 5.0]) < 3.0 * np.sqrt(np.diag(fit.covariance)[:2]))
     assert np.mean(held) > 0.9
 
@@ -162,7 +175,7 @@ def test_a_transmission_that_loses_force():
     lossy = replace(run, effort=run.effort / (1.0 - share * np.sign(run.effort * v)))
     parts = parts_of(lossy)
     names = (*NAMES, LOSS)
-    assert best_bend(parts, names, by_instruments=False) == pytest.approx(share, abs=0.01)
+    assert best_bend(parts, names) == pytest.approx(share, abs=0.01)
     fit = fit_equations(parts, names, share)
     assert fit.names == (*NAMES, "delay", "loss")
     assert (fit.bend, fit.value("loss")) == (share, share)

@@ -17,7 +17,7 @@ RUN = Recorder(seconds=6.0).run()
 
 
 def prepared(run):
-    return prepare(run, make_kernel(10, run.step))
+    return prepare(run, make_kernel(10, run.step), "none" if run.reference is None else "reference")
 
 
 PARTS = [prepared(RUN)]
