@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from detent.axis import Axis, Envelope, Run, Timing, identify_axis, load, load_trace
+    from detent.axis import Axis, Envelope, Run, Timing, load, load_trace
+    from detent.report.identified import identify_axis
 
 __version__ = "0.1.0"
 
@@ -30,10 +31,14 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """The API loads when it is first used, so that `import detent` and `detent --help` stay quick."""
-    if name in ("Axis", "Envelope", "Run", "Timing", "identify_axis", "load", "load_trace"):
+    if name in ("Axis", "Envelope", "Run", "Timing", "load", "load_trace"):
         from detent import axis
 
         return getattr(axis, name)
+    if name == "identify_axis":
+        from detent.report.identified import identify_axis
+
+        return identify_axis
     raise AttributeError(f"module 'detent' has no attribute {name!r}; it has {', '.join(__all__)}")
 
 

@@ -24,7 +24,6 @@ from detent.simulation.waveforms import Waveforms
 if TYPE_CHECKING:
     # Loaded where a comparison is made, or a recording replayed: most commands do neither.
     from detent.report.envelope_files import EnvelopeTables
-    from detent.report.identified import Identified, Method
     from detent.simulation.comparisons import AnyComparison
     from detent.simulation.replay_job import ReplayJob
 
@@ -473,51 +472,4 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
-    logs: str | Path | Sequence[str | Path],
-    *,
-    mapping: str | Path | None = None,
-    columns: Sequence[str] = (),
-    effort: str | None = None,
-    method: "Method" = "regression",
-    axis: str | Path | None = None,
-    progress: Progress | None = None,
-) -> "Identified":
-    """Identify an axis from recordings of it.
-
-    Parameters
-    ----------
-    logs : path or sequence of path
-        CSV, HDF5, Parquet, MATLAB, NPZ or JSON.
-    mapping : path, optional
-        Mapping file (TOML): what the columns are; what neither it nor `columns` says is guessed.
-    columns : sequence of str
-        The same in short: ``"force=vir [35.15 N]"``.
-    effort : str, optional
-        What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
-    method : str
-        "regression", or "output error", which fits the simulation to the recordings too.
-    axis : path, optional
-        Cascade axis file that the constants are held against, and put into by `Identified.save`.
-    progress : callable, optional
-        ``progress(share, text)``.
-
-    Returns
-    -------
-    Identified
-        Also when nothing is trusted: see `Identified.verdict` and `Identified.refusals`.
-
-    Raises
-    ------
-    InputError
-        A log, the mapping or the axis file cannot be read, or a log holds no position or nothing that drives the axis.
-    DetentError
-        The axis file is of another method.
-    """
-    from detent.report.identified import identify_logs
-
-    paths = [logs] if isinstance(logs, str | Path) else list(logs)
-    return identify_logs(paths, mapping, columns, effort, method=method, axis=axis, progress=progress)
-
-
-__all__ = ["Axis", "Envelope", "Run", "Timing", "identify_axis", "load", "load_trace"]
+__all__ = ["Axis", "Envelope", "Run", "Timing", "load", "load_trace"]

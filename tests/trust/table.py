@@ -168,11 +168,10 @@ truth, at most 2 % of the bad logs are accepted, at most 5 % of the good ones re
 LATER = """
 ## The same logs without the reference
 
-Without a reference there are no instruments, and constants come from least squares. In a closed loop these are
-biased: the noise of the encoder is in the columns and, through the controller, in the force. The bias is small, but so
-are the intervals, which hold the truth less often than they say. The delay is not given at all. A position in a wrong
-unit is accepted: no other signal of such a log knows the way, and an axis of that mass may exist. So record the
-reference. No test asserts the figures of this section.
+Without a reference the motion seen through wider windows takes its place; it shares a little noise with the narrower
+ones, so that a small bias is left, and intervals hold the truth a little less often. The delay is not given at all. A
+position in a wrong unit is accepted: no other signal of such a log knows the way, and an axis of that mass may exist.
+So record the reference. No test asserts the figures of this section.
 
 """
 

@@ -99,15 +99,22 @@ def identify(
     Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 the input
     cannot be read.
     """
-    from detent.report.identified import identify_logs
+    from detent.report.identified import identify_axis
 
     _check_outputs(axis, write, job, report)
     chosen = cast("Method", _method(method))
     reading = _reading(mapping, columns or [])
     say_if_cold()
     with progress_bar(quiet=as_json) as progress:
-        done = identify_logs(
-            logs, mapping, columns or [], effort, method=chosen, axis=axis, progress=progress, reading=reading
+        done = identify_axis(
+            logs,
+            mapping=mapping,
+            columns=columns or [],
+            effort=effort,
+            method=chosen,
+            axis=axis,
+            progress=progress,
+            reading=reading,
         )
         outside = done.contrasts()
         progress(0.97, "writing")

@@ -147,6 +147,7 @@ def _guess_separator(lines: Sequence[str]) -> str:
     """Separator that leaves the most cells of one width that are numbers."""
 
     def score(separator: str) -> tuple[float, int]:
+        """Rows whose cells are numbers, and how many cells they have."""
         rows = list(split_lines(lines, separator))
         width = _width(rows)
         fractions = [_share(cells) for cells in rows if len(cells) == width]

@@ -15,9 +15,7 @@ from detent.identify.draft import Draft
 from detent.identify.log import Action, Kind, Severity, Values
 from detent.identify.stamps import stretches
 from detent.identify.windows import parabolas
-
-EFFORTS = ("force", "torque", "current", "voltage", "command")
-"""Signals that drive an axis, in the order of how directly they do."""
+from detent.simulation.replay_job import EFFORTS
 
 EXPLAINED = 0.3
 """Share of the variance of an effort that the motion must explain before its sign is judged."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.log import Values
@@ -123,14 +124,7 @@ def make_multisine(  # noqa: PLR0913 - what a multisine has
     if rows < 2:
         raise DetentError(f"excitation: came a period of {period:g} s; allowed: two samples of {step:g} s or more")
     length = rows * step
-    numbers = np.arange(1, (rows + 1) // 2)
-    inside = (numbers >= band[0] * length * (1 - 1e-9)) & (numbers <= band[1] * length * (1 + 1e-9))
-    numbers = numbers[inside & (numbers % 2 == 1)] if odd else numbers[inside]
-    if not len(numbers):
-        raise DetentError(
-            f"excitation: came a band from {band[0]:g} to {band[1]:g} Hz with lines {1 / length:g} Hz apart; allowed: "
-            "a band that holds a line; make the period longer"
-        )
+    numbers = _lines_within(band, rows, length, odd=odd)
     count = len(numbers)
     order = np.arange(1, count + 1)
     phases = -np.pi * order * (order - 1) / count if seed is None else _random_phases(seed, count)
@@ -148,6 +142,19 @@ def make_multisine(  # noqa: PLR0913 - what a multisine has
     return Excitation(
         step * np.arange(rows * periods, dtype=np.float64), np.tile(once, periods), numbers / length, length, text
     )
+
+
+def _lines_within(band: tuple[float, float], rows: int, length: float, *, odd: bool) -> NDArray[np.int64]:
+    """Numbers of the lines of a period [s] that lie in a band [Hz]."""
+    numbers = np.arange(1, (rows + 1) // 2)
+    inside = (numbers >= band[0] * length * (1 - 1e-9)) & (numbers <= band[1] * length * (1 + 1e-9))
+    numbers = numbers[inside & (numbers % 2 == 1)] if odd else numbers[inside]
+    if not len(numbers):
+        raise DetentError(
+            f"excitation: came a band from {band[0]:g} to {band[1]:g} Hz with lines {1 / length:g} Hz apart; allowed: "
+            "a band that holds a line; make the period longer"
+        )
+    return numbers
 
 
 def make_chirp(

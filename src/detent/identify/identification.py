@@ -158,7 +158,7 @@ def identify(
     logs : sequence of Log
         Runs of one axis, as `read_log` gives them.
     effort : str, optional
-        Which signal drives the axis; by default the first of `run.EFFORTS` that the logs hold.
+        Which signal drives the axis; by default the first of `replay_job.EFFORTS` that the logs hold.
     method : str
         "regression" of the equation of motion; or "output error", which goes on from there by simulation.
     report : callable, optional
@@ -192,12 +192,6 @@ def identify(
     if constants.value("mass") > 0.0:
         seen, horizons, closed = _test_simulation(runs, found, method, report)
     refusals += look_at_prediction(found.climbs, horizons, refusals)
-    kernel = parts[0].motion.kernel
-    notes = (
-        f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
-        f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {len(found.fit.residual)} of them",
-        _WAYS[parts[0].instruments],
-    )
     return Identification(
         tuple(logs),
         runs,
@@ -209,7 +203,17 @@ def identify(
         tuple(refusals),
         seen,
         closed,
-        notes,
+        _notes_of(runs, parts),
+    )
+
+
+def _notes_of(runs: Sequence[Run], parts: Sequence[Prepared]) -> tuple[str, ...]:
+    """What was chosen on the way."""
+    kernel, windows = parts[0].motion.kernel, sum(len(p.motion.rows) for p in parts)
+    return (
+        f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
+        f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {windows} of them",
+        _WAYS[parts[0].instruments],
     )
 
 

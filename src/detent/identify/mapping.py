@@ -212,6 +212,7 @@ def _word_of(words: Mapping[str, str]) -> Callable[[str, object], str]:
     """A reader of one of some words, or of the sign it stands for."""
 
     def read(key: str, value: object) -> str:
+        """What the word stands for."""
         if isinstance(value, str) and (value in words or value in words.values()):
             return words.get(value, value)
         allowed = ", ".join(words)

@@ -10,11 +10,11 @@ from dataclasses import replace
 from detent.errors import DetentError
 from detent.identify.average_periods import average_periods
 from detent.identify.average_windows import FEWEST_ROWS, average_windows
-from detent.identify.effort import EFFORTS
 from detent.identify.excitation_period import cut_periods
 from detent.identify.frequency_response import FrequencyResponse
 from detent.identify.log import Log, Values
 from detent.identify.stamps import stretches
+from detent.simulation.replay_job import EFFORTS
 
 
 def measure_response(

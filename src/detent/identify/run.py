@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.identify.log import Kind, Log
+from detent.simulation.replay_job import EFFORTS
 
 Numbers = NDArray[np.float64]
-
-EFFORTS = ("force", "torque", "current", "voltage", "command")
-"""What may drive an axis, the nearest to its mechanics first."""
 
 GAP = 1.5
 """Time between two samples, in periods, from which on something is missing between them."""

@@ -246,6 +246,7 @@ def _scatter_between(columns: Values, effort: Values, pooled: Values, degrees: f
     free = len(effort) - 2
 
     def excess(between: float) -> float:
+        """Weighted squares of the residuals beyond what their errors explain."""
         size = pooled + between**2
         residual = effort - columns @ (_pull(columns, size) @ effort)
         return float(residual @ (residual / size)) - free

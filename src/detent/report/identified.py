@@ -121,8 +121,9 @@ class Identified:
         return cascade_spec(self.axis, self.axis_name) if self.axis else None
 
 
-def identify_logs(  # noqa: PLR0913 - the options of the command
-    paths: Sequence[str | Path],
+def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
+    logs: str | Path | Sequence[str | Path],
+    *,
     mapping: str | Path | None = None,
     columns: Sequence[str] = (),
     effort: str | None = None,
@@ -131,7 +132,40 @@ def identify_logs(  # noqa: PLR0913 - the options of the command
     progress: "Progress | None" = None,
     reading: str = "",
 ) -> Identified:
-    """Identify an axis from files; parameters, results and errors as `detent.identify_axis`."""
+    """Identify an axis from recordings of it.
+
+    Parameters
+    ----------
+    logs : path or sequence of path
+        CSV, HDF5, Parquet, MATLAB, NPZ or JSON.
+    mapping : path, optional
+        Mapping file (TOML): what the columns are; what neither it nor `columns` says is guessed.
+    columns : sequence of str
+        The same in short: ``"force=vir [35.15 N]"``.
+    effort : str, optional
+        What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
+    method : str
+        "regression", or "output error", which fits the simulation to the recordings too.
+    axis : path, optional
+        Cascade axis file that the constants are held against, and put into by `Identified.save`.
+    progress : callable, optional
+        ``progress(share, text)``.
+    reading : str
+        Options of a command that reads the same, as `Identified.save` notes them in the file.
+
+    Returns
+    -------
+    Identified
+        Also when nothing is trusted: see `Identified.verdict` and `Identified.refusals`.
+
+    Raises
+    ------
+    InputError
+        A log, the mapping or the axis file cannot be read, or a log holds no position or nothing that drives the axis.
+    DetentError
+        The axis file is of another method.
+    """
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
 
     def tell(share: float, text: str) -> None:
         if progress is not None:
@@ -142,17 +176,17 @@ def identify_logs(  # noqa: PLR0913 - the options of the command
         cascade_spec(text, str(axis))
     if not paths:
         raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
-    logs: list[Log] = []
+    read: list[Log] = []
     for number, path in enumerate(paths):
         tell(0.1 * number / len(paths), f"reading {Path(path).name}")
-        logs.append(read_log(path, mapping, columns))
+        read.append(read_log(path, mapping, columns))
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))
         tell(begin + share * (end - begin), text)
 
     return Identified(
-        identify(logs, effort, method=method, report=report), text, "" if axis is None else str(axis), reading
+        identify(read, effort, method=method, report=report), text, "" if axis is None else str(axis), reading
     )
 
 

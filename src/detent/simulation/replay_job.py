@@ -10,7 +10,7 @@ from detent.axisfile.cascade.schema import CascadeSpec
 from detent.errors import DetentError
 
 EFFORTS = ("force", "torque", "current", "voltage", "command")
-"""Signals of a log that can drive an axis."""
+"""Signals of a log that can drive an axis, the nearest to its mechanics first."""
 
 Numbers = NDArray[np.float64]
 
