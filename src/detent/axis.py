@@ -427,9 +427,10 @@ class Run:
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
         from detent.report.methods import report_of
+        from detent.report.page import write_page
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.method.seed)} | self.settings
-        report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings)(path)
+        write_page(path, report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings))
         return Path(path)
 
     def save(self, path: str | Path) -> Path:

@@ -71,7 +71,7 @@ class CascadeDetail:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CascadeReportData:
-    """Everything `detent.report.cascade_page.write_cascade_report` shows; what is None or empty is left out.
+    """Everything `detent.report.cascade_page.make_cascade_page` shows; what is None or empty is left out.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class CascadeReportData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayReportData:
-    """Everything `detent.report.cascade_replay_page.write_replay_report` shows.
+    """Everything `detent.report.cascade_replay_page.make_replay_page` shows.
 
     Attributes
     ----------

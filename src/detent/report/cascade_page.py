@@ -2,7 +2,6 @@
 
 import math
 from html import escape
-from pathlib import Path
 
 from detent.report.cascade_charts import detail_charts, job_charts, rest_events
 from detent.report.cascade_comparisons import comparison_charts, comparison_section
@@ -19,10 +18,8 @@ from detent.report.page import (
     figure,
     headline,
     notes,
-    render_page,
     section,
     small_print,
-    write_page,
 )
 from detent.report.words import GAP, bar_cell, count, duration, further, number, offset_cell, table
 from detent.simulation.cascade_run import CascadeMove
@@ -31,26 +28,8 @@ MOST_MOVES = 500
 """Moves in the table: more than anybody reads."""
 
 
-def write_cascade_report(data: CascadeReportData, path: str | Path) -> None:
-    """Write the report of a run of moves as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : CascadeReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_cascade_report(data: CascadeReportData) -> str:
-    """Make the page as text.
+def make_cascade_page(data: CascadeReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -59,13 +38,9 @@ def render_cascade_report(data: CascadeReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: CascadeReportData) -> Page:
     drawn = all_charts(data)
     return {
         "title": f"{data.run.job.name} on {data.axis_name}: {'done' if data.run.done else 'not done'}",

@@ -1,7 +1,6 @@
 """The page about a replayed recording: how far simulation and machine are apart."""
 
 from html import escape
-from pathlib import Path
 
 from detent.report.cascade_charts import magnified, replay_charts, shown_signals
 from detent.report.cascade_data import ReplayReportData
@@ -18,35 +17,15 @@ from detent.report.page import (
     figure,
     headline,
     notes,
-    render_page,
     section,
     small_print,
-    write_page,
 )
 from detent.report.words import GAP, bar_cell, count, duration, number, table
 from detent.simulation.cascade_replay import Compared
 
 
-def write_replay_report(data: ReplayReportData, path: str | Path) -> None:
-    """Write the report of a replay as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : ReplayReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_replay_report(data: ReplayReportData) -> str:
-    """Make the page as text.
+def make_replay_page(data: ReplayReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -55,13 +34,9 @@ def render_replay_report(data: ReplayReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: ReplayReportData) -> Page:
     drawn = replay_charts(data.run, data.units)
     return {
         "title": f"{data.run.job.name} replayed on {data.axis_name}",

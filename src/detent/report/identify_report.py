@@ -38,7 +38,7 @@ def write_identify_report(
     DetentError
         The file cannot be written.
     """
-    write_page(path, **identify_page(identify_report_data(found, title, response, resonances)))
+    write_page(path, identify_page(identify_report_data(found, title, response, resonances)))
 
 
 def render_identify_report(
@@ -60,4 +60,4 @@ def render_identify_report(
     str
         A whole HTML document.
     """
-    return render_page(**identify_page(identify_report_data(found, title, response, resonances)))
+    return render_page(identify_page(identify_report_data(found, title, response, resonances)))

@@ -9,6 +9,7 @@ from detent.axisfile.methods import AnySpec
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.axisfile.rotary_table.schema import RotaryTableSpec
 from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.report.page import Page
 from detent.report.summary import move_summary_rows
 from detent.report.summary import summary_rows as print_summary_rows
 from detent.simulation.angle_comparison import AngleComparison
@@ -33,7 +34,6 @@ Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, heads and rows."""
 
 Comparisons = tuple[AnyComparison, ...]
-Writer = Callable[[str | Path], None]
 C = TypeVar("C")
 
 
@@ -72,20 +72,20 @@ def _servo(spec: AnySpec, result: AnyResult) -> tuple[ServoSpec, MoveRun]:
 
 def report_of(
     spec: AnySpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
-) -> Writer:
-    """The report of a run, to be written under a path."""
+) -> Page:
+    """The report of a run."""
     if isinstance(spec, PrintHeadSpec) and isinstance(result, PrintRun):
-        from detent.report.print_page import write_report
+        from detent.report.print_page import make_print_page
         from detent.report.print_report import print_report
 
         page = print_report(spec, result, trace, settings={"fidelity": spec.axis.fidelity} | settings)
-        return lambda path: write_report(page, path)
+        return make_print_page(page)
     if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
-        from detent.report.table_page import write_table_report
+        from detent.report.table_page import make_table_page
         from detent.report.table_report import sequence_report
 
         table = sequence_report(spec, result, trace, comparison=_first(comparisons, AngleComparison), settings=settings)
-        return lambda path: write_table_report(table, path)
+        return make_table_page(table)
     if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
         return _stage_report(spec, result, trace, comparisons, settings)
     if isinstance(spec, CascadeSpec):
@@ -95,18 +95,18 @@ def report_of(
 
 def _cascade_report(
     spec: CascadeSpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
-) -> Writer:
-    from detent.report.cascade_page import write_cascade_report
-    from detent.report.cascade_replay_page import write_replay_report
+) -> Page:
+    from detent.report.cascade_page import make_cascade_page
+    from detent.report.cascade_replay_page import make_replay_page
     from detent.report.cascade_report import cascade_report, replay_report
 
     if isinstance(result, ReplayRun):
         replay = replay_report(spec, result, settings=settings)
-        return lambda path: write_replay_report(replay, path)
+        return make_replay_page(replay)
     assert isinstance(result, CascadeRun)  # noqa: S101 - see above
     found = _first(comparisons, ProfileComparison)
     data = cascade_report(spec, result, trace, comparison=found, settings=settings)
-    return lambda path: write_cascade_report(data, path)
+    return make_cascade_page(data)
 
 
 def _stage_report(
@@ -115,19 +115,19 @@ def _stage_report(
     trace: Trace | None,
     comparisons: Comparisons,
     settings: dict[str, str],
-) -> Writer:
-    from detent.report.stage_page import write_stage_report
+) -> Page:
+    from detent.report.stage_page import make_stage_page
     from detent.report.stage_report import stage_report
 
     steps = tuple(found for found in comparisons if isinstance(found, StepComparison))
     data = stage_report(spec, result, trace, steps=steps, jerk=_first(comparisons, JerkComparison), settings=settings)
-    return lambda path: write_stage_report(data, path)
+    return make_stage_page(data)
 
 
 def _servo_report(
     spec: ServoSpec, result: MoveRun, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
-) -> Writer:
-    from detent.report.servo_page import write_servo_report
+) -> Page:
+    from detent.report.servo_page import make_servo_page
     from detent.report.servo_report import servo_report
 
     data = servo_report(
@@ -139,7 +139,7 @@ def _servo_report(
         feedback=_first(comparisons, FeedbackComparison),
         settings=settings,
     )
-    return lambda path: write_servo_report(data, path)
+    return make_servo_page(data)
 
 
 def _first(found: Sequence[object], kind: type[C]) -> C | None:

@@ -14,7 +14,7 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import Any, Literal, NotRequired, TypedDict, Unpack
+from typing import Any, Literal, NotRequired, TypedDict
 
 from detent import __version__
 from detent.errors import DetentError
@@ -54,14 +54,14 @@ class Page(TypedDict):
     version: NotRequired[str]
 
 
-def write_page(path: str | Path, **page: Unpack[Page]) -> None:
+def write_page(path: str | Path, page: Page) -> None:
     """Write a page as one self-contained HTML file.
 
     Parameters
     ----------
     path : str or Path
         Target; replaced if it exists.
-    **page : Page
+    page : Page
         What it is made of.
 
     Raises
@@ -73,19 +73,19 @@ def write_page(path: str | Path, **page: Unpack[Page]) -> None:
     part = path.with_name(path.name + ".part")
     try:
         # A file name need not be valid UTF-8; the page must be.
-        part.write_text(render_page(**page), encoding="utf-8", errors="replace")
+        part.write_text(render_page(page), encoding="utf-8", errors="replace")
         part.replace(path)
     except OSError as error:
         reason = error.strerror or str(error)
         raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
 
 
-def render_page(**page: Unpack[Page]) -> str:
+def render_page(page: Page) -> str:
     """Make a page as text.
 
     Parameters
     ----------
-    **page : Page
+    page : Page
         What it is made of.
 
     Returns

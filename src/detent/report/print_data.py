@@ -292,7 +292,7 @@ class IdentifiedLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportData:
-    """Everything `detent.report.print_page.write_report` shows. Parts that are None or empty are left out of the page.
+    """Everything `detent.report.print_page.make_print_page` shows. Parts that are None or empty are left out.
 
     Attributes
     ----------

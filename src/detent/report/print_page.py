@@ -2,7 +2,6 @@
 
 from html import escape
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 from detent.report import print_charts
@@ -19,11 +18,9 @@ from detent.report.page import (
     headline,
     notes,
     paper_figure,
-    render_page,
     section,
     side_by_side,
     small_print,
-    write_page,
 )
 from detent.report.print_data import COLUMN, ColumnErrors, ReportData
 from detent.report.words import (
@@ -43,26 +40,8 @@ MOST_LINES = 500
 """Lines in the table: more than anybody reads."""
 
 
-def write_report(data: ReportData, path: str | Path) -> None:
-    """Write the report of a run as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : ReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_report(data: ReportData) -> str:
-    """Make the page as text.
+def make_print_page(data: ReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -71,13 +50,9 @@ def render_report(data: ReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: ReportData) -> Page:
     paper = print_charts.page_data(data.marks, data.column_limit) if len(data.marks) else None
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'printed' if data.printed else 'not printed'}",

@@ -243,7 +243,7 @@ class FilteredMove:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoReportData:
-    """Everything `detent.report.servo_page.write_servo_report` shows. Parts that are None or empty are left out.
+    """Everything `detent.report.servo_page.make_servo_page` shows. Parts that are None or empty are left out.
 
     Attributes
     ----------

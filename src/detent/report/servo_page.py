@@ -2,7 +2,6 @@
 
 from html import escape
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 from detent.report import servo_charts
@@ -18,10 +17,8 @@ from detent.report.page import (
     headline,
     notes,
     paper_figure,
-    render_page,
     section,
     small_print,
-    write_page,
 )
 from detent.report.print_charts import page_data
 from detent.report.servo_comparisons import comparison_charts, comparison_section
@@ -38,26 +35,8 @@ FEWEST_MOVES = 5
 """Moves below which a histogram says less than the table."""
 
 
-def write_servo_report(data: ServoReportData, path: str | Path) -> None:
-    """Write the report of a run of moves as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : ServoReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_servo_report(data: ServoReportData) -> str:
-    """Make the page as text.
+def make_servo_page(data: ServoReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -66,13 +45,9 @@ def render_servo_report(data: ServoReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: ServoReportData) -> Page:
     paper = page_data(data.marks, data.tolerance) if len(data.marks) else None
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",

@@ -283,7 +283,7 @@ class MoveDetail:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageReportData:
-    """Everything `detent.report.stage_page.write_stage_report` shows. Parts that are None or empty are left out.
+    """Everything `detent.report.stage_page.make_stage_page` shows. Parts that are None or empty are left out.
 
     Attributes
     ----------

@@ -2,7 +2,6 @@
 
 from html import escape
 from math import isfinite
-from pathlib import Path
 
 from detent.report import stage_charts
 from detent.report.chart import Chart
@@ -16,10 +15,8 @@ from detent.report.page import (
     figure,
     headline,
     notes,
-    render_page,
     section,
     small_print,
-    write_page,
 )
 from detent.report.stage_comparisons import comparison_charts, comparison_section
 from detent.report.stage_data import MotorRuns, MoveDetail, StageReportData
@@ -42,26 +39,8 @@ MOST_ZONES = 4
 """Zones that are named below a figure."""
 
 
-def write_stage_report(data: StageReportData, path: str | Path) -> None:
-    """Write the report of a job on a stage as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : StageReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_stage_report(data: StageReportData) -> str:
-    """Make the page as text.
+def make_stage_page(data: StageReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -70,13 +49,9 @@ def render_stage_report(data: StageReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: StageReportData) -> Page:
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
         "body": [

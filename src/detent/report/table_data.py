@@ -217,7 +217,7 @@ class TurnDetail:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableReportData:
-    """Everything `detent.report.table_page.write_table_report` shows. Parts that are None or empty are left out.
+    """Everything `detent.report.table_page.make_table_page` shows. Parts that are None or empty are left out.
 
     Attributes
     ----------

@@ -2,7 +2,6 @@
 
 import math
 from html import escape
-from pathlib import Path
 
 from detent.report.chart import Chart
 from detent.report.page import (
@@ -15,10 +14,8 @@ from detent.report.page import (
     figure,
     headline,
     notes,
-    render_page,
     section,
     small_print,
-    write_page,
 )
 from detent.report.servo_data import CountUnit
 from detent.report.summary import in_counts
@@ -35,26 +32,8 @@ COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
 """Of the kinds of steps, as in the time line."""
 
 
-def write_table_report(data: TableReportData, path: str | Path) -> None:
-    """Write the report of a sequence as one self-contained HTML file.
-
-    Parameters
-    ----------
-    data : TableReportData
-        What to show.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
-    write_page(path, **_page(data))
-
-
-def render_table_report(data: TableReportData) -> str:
-    """Make the page as text.
+def make_table_page(data: TableReportData) -> Page:
+    """What the page is made of.
 
     Parameters
     ----------
@@ -63,13 +42,9 @@ def render_table_report(data: TableReportData) -> str:
 
     Returns
     -------
-    str
-        A whole HTML document.
+    Page
+        For `detent.report.page.write_page`.
     """
-    return render_page(**_page(data))
-
-
-def _page(data: TableReportData) -> Page:
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
         "body": [

@@ -19,7 +19,8 @@ from tests.unit.report.page_reader import Reader, charts_of
 
 from detent.report import cascade_page
 from detent.report.cascade_data import CascadeReportData
-from detent.report.cascade_page import render_cascade_report, write_cascade_report
+from detent.report.cascade_page import make_cascade_page
+from detent.report.page import render_page, write_page
 
 JOB = ["job-position", "job-following", "job-command"]
 MOVE = ["move-position", "move-speed", "move-following", "move-command", "move-rest"]
@@ -27,11 +28,11 @@ PROFILES = ["profile-speed", "profile-following", "profile-twist"]
 
 
 def read(data: CascadeReportData) -> str:
-    return Reader(render_cascade_report(data)).text
+    return Reader(render_page(make_cascade_page(data))).text
 
 
 def test_the_first_lines_say_whether_it_was_done_and_how_well() -> None:
-    html = render_cascade_report(cascade_data())
+    html = render_page(make_cascade_page(cascade_data()))
     text = Reader(html).text
     assert "Simulated run of the axis slide <1> ✔ Every move in position shuttle.csv" in text
     assert "2 moves in 3 s. On the way the axis was never more than 80 µm from where it should be" in text
@@ -45,7 +46,7 @@ def test_the_first_lines_say_whether_it_was_done_and_how_well() -> None:
 
 
 def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
-    html = render_cascade_report(cascade_data(run=failed_run()))
+    html = render_page(make_cascade_page(cascade_data(run=failed_run())))
     text = Reader(html).text
     assert "✘ Not done shuttle.csv" in text
     assert "Stopped after 1 of 2 moves, 2.00 s in. Move 2 to <200 mm>: the drive is off." in text
@@ -57,7 +58,7 @@ def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
 
 
 def test_a_load_that_stands_beside_its_target_gets_no_praise() -> None:
-    html = render_cascade_report(cascade_data(run=cascade_run(move(1), move(2, position=0.2 + 70e-6))))
+    html = render_page(make_cascade_page(cascade_data(run=cascade_run(move(1), move(2, position=0.2 + 70e-6)))))
     text = Reader(html).text
     assert "! Done, but beside its targets" in text
     assert "the load stood up to 70.0 µm beside its target while the loop was in position." in text
@@ -83,7 +84,7 @@ def test_a_run_that_made_no_move_shows_no_table() -> None:
 
 def test_a_rotary_axis_is_told_in_degrees() -> None:
     run = cascade_run(move(1, start=0.0, target=math.pi / 2, position=math.pi / 2, peak_following=0.05), tolerance=1e-3)
-    html = render_cascade_report(cascade_data(units=ROTARY, run=run, comparison=comparison(rotary=True)))
+    html = render_page(make_cascade_page(cascade_data(units=ROTARY, run=run, comparison=comparison(rotary=True))))
     text = Reader(html).text
     assert "never more than 2.86 deg from" in text
     assert "within 206 arcsec" in text
@@ -95,7 +96,7 @@ def test_a_rotary_axis_is_told_in_degrees() -> None:
 
 
 def test_every_move_stands_in_the_table_and_a_long_one_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    html = render_cascade_report(cascade_data())
+    html = render_page(make_cascade_page(cascade_data()))
     assert "−8" in Reader(html).text
     assert html.count("✔") == 3
     monkeypatch.setattr(cascade_page, "MOST_MOVES", 1)
@@ -115,7 +116,7 @@ def test_every_move_stands_in_the_table_and_a_long_one_is_cut(monkeypatch: pytes
     ],
 )
 def test_every_chart_has_its_place(changes: dict[str, object], ids: list[str]) -> None:
-    html = render_cascade_report(cascade_data(**changes))
+    html = render_page(make_cascade_page(cascade_data(**changes)))
     page = Reader(html)
     assert [chart["id"] for chart in charts_of(html)] == ids
     assert html.count('class="chart"') == len(ids)
@@ -130,7 +131,7 @@ def test_what_names_and_texts_say_cannot_break_the_page() -> None:
     data = cascade_data(
         axis_name=evil, settings={"a": evil}, detail=None, run=cascade_run(done=False, failure=evil), notes=(),
     )  # fmt: skip
-    page = Reader(render_cascade_report(data))
+    page = Reader(render_page(make_cascade_page(data)))
     assert page.open == []
     # Title of the window, kicker, lead, small print.
     assert page.text.count(evil) == 4
@@ -138,6 +139,6 @@ def test_what_names_and_texts_say_cannot_break_the_page() -> None:
 
 def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
     target = tmp_path / "cascade.html"
-    write_cascade_report(cascade_data(version="9.9"), target)
-    assert target.read_text(encoding="utf-8") == render_cascade_report(cascade_data(version="9.9"))
+    write_page(target, make_cascade_page(cascade_data(version="9.9")))
+    assert target.read_text(encoding="utf-8") == render_page(make_cascade_page(cascade_data(version="9.9")))
     assert "Written by detent 9.9." in target.read_text(encoding="utf-8")

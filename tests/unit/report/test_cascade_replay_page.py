@@ -9,14 +9,15 @@ from tests.unit.report.page_reader import Reader, charts_of
 
 from detent.report.cascade_charts import magnified, replay_charts
 from detent.report.cascade_data import ReplayReportData
-from detent.report.cascade_replay_page import render_replay_report, write_replay_report
+from detent.report.cascade_replay_page import make_replay_page
+from detent.report.page import render_page, write_page
 
 WHOLE = ["whole-0", "whole-0-off", "whole-1", "whole-2"]
 NEAR = [name.replace("whole", "near") for name in WHOLE]
 
 
 def read(data: ReplayReportData) -> str:
-    return Reader(render_replay_report(data)).text
+    return Reader(render_page(make_replay_page(data))).text
 
 
 def test_the_first_lines_say_how_far_apart_they_are() -> None:
@@ -38,14 +39,16 @@ def test_an_open_loop_says_what_drove_the_axis() -> None:
 
 
 def test_a_simulation_that_ran_away_is_no_replay() -> None:
-    html = render_replay_report(replay_data(run=replay_run(done=False, failure="the axis ran away", compared=[])))
+    html = render_page(
+        make_replay_page(replay_data(run=replay_run(done=False, failure="the axis ran away", compared=[])))
+    )
     assert "✘ Not replayed log <1>.csv The axis ran away." in Reader(html).text
     assert charts_of(html) == []
     assert "In figures" not in html
 
 
 def test_it_is_shown_whole_and_where_it_differs_most() -> None:
-    html = render_replay_report(replay_data())
+    html = render_page(make_replay_page(replay_data()))
     charts = {chart["id"]: chart for chart in charts_of(html)}
     assert list(charts) == WHOLE + NEAR
     begin, end = magnified(replay_run())
@@ -65,7 +68,7 @@ def test_a_short_recording_is_shown_once() -> None:
 
 def test_a_rotary_recording_is_in_degrees() -> None:
     run = replay_run(compared=[compared("position", "rad", 1.0, 0.1), compared("torque", "N*m", 1.0, 0.01)])
-    html = render_replay_report(replay_data(run=run, units=ROTARY))
+    html = render_page(make_replay_page(replay_data(run=run, units=ROTARY)))
     labels = {chart["id"]: chart["yLabel"] for chart in charts_of(html)}
     assert labels["whole-0"] == "position [deg]"
     assert labels["whole-1"] == "torque [N m]"
@@ -82,9 +85,9 @@ def test_the_table_has_every_signal_and_a_recording_of_zeros_a_dash() -> None:
 
 def test_the_page_is_well_formed_whatever_names_say(tmp_path: Path) -> None:
     data = replay_data(version="9.9")
-    page = Reader(render_replay_report(data))
+    page = Reader(render_page(make_replay_page(data)))
     assert page.open == []
     assert page.fetched == []
     assert len(page.ids) == len(set(page.ids))
-    write_replay_report(data, tmp_path / "r.html")
-    assert (tmp_path / "r.html").read_text(encoding="utf-8") == render_replay_report(data)
+    write_page(tmp_path / "r.html", make_replay_page(data))
+    assert (tmp_path / "r.html").read_text(encoding="utf-8") == render_page(make_replay_page(data))

@@ -20,7 +20,7 @@ def parts() -> Page:
 
 
 def test_a_page_is_one_document_with_its_parts_in_order(parts: Page) -> None:
-    html = page.render_page(**parts)
+    html = page.render_page(parts)
     reader = Reader(html)
     assert reader.open == []
     assert "<title>run &lt;1&gt; of $title</title>" in html
@@ -29,31 +29,31 @@ def test_a_page_is_one_document_with_its_parts_in_order(parts: Page) -> None:
 
 
 def test_the_page_carries_the_charts_whatever_they_say(parts: Page) -> None:
-    html = page.render_page(**parts)
+    html = page.render_page(parts)
     assert charts_of(html) == [CHART]
     assert Reader(html).open == []
     assert "\u2028" not in html
 
 
 def test_paper_and_what_draws_it_are_there_only_for_what_was_printed(parts: Page) -> None:
-    without = page.render_page(**parts)
+    without = page.render_page(parts)
     assert paper_of(without) is None
     assert "drawPaper" not in without
-    with_paper = page.render_page(**parts, paper={"pages": ["</script>"]})
+    with_paper = page.render_page(parts | {"paper": {"pages": ["</script>"]}})
     assert paper_of(with_paper) == {"pages": ["</script>"]}
     assert "drawPaper" in with_paper
-    assert page.render_page(**parts, paper=None) == without
+    assert page.render_page(parts | {"paper": None}) == without
 
 
 def test_the_page_names_the_version_that_wrote_it(parts: Page) -> None:
-    assert f"Written by detent {detent.__version__}." in page.render_page(**parts)
-    other = page.render_page(**parts, version="9.<9>")
+    assert f"Written by detent {detent.__version__}." in page.render_page(parts)
+    other = page.render_page(parts | {"version": "9.<9>"})
     assert 'content="detent 9.&lt;9&gt;"' in other
     assert "Written by detent 9.&lt;9&gt;." in other
 
 
 def test_the_page_fetches_nothing_and_forbids_it(parts: Page) -> None:
-    html = page.render_page(**parts, paper={"pages": []})
+    html = page.render_page(parts | {"paper": {"pages": []}})
     assert Reader(html).fetched == []
     assert "Content-Security-Policy\" content=\"default-src 'none'" in html
     assert not re.search(r"@import|url\(|\bfetch\(|XMLHttpRequest", html)
@@ -62,20 +62,20 @@ def test_the_page_fetches_nothing_and_forbids_it(parts: Page) -> None:
 def test_the_vendored_library_carries_its_licence(parts: Page) -> None:
     vendor = resources.files("detent.report").joinpath("vendor")
     assert "MIT License" in vendor.joinpath("uPlot-LICENSE").read_text(encoding="utf-8")
-    assert "uPlot (v1.6.32)" in page.render_page(**parts)
+    assert "uPlot (v1.6.32)" in page.render_page(parts)
 
 
 def test_a_page_replaces_the_one_before_and_leaves_nothing_beside_it(parts: Page, tmp_path: Path) -> None:
     target = tmp_path / "a.html"
     target.write_text("before", encoding="utf-8")
-    page.write_page(target, **parts)
-    assert target.read_text(encoding="utf-8") == page.render_page(**parts)
+    page.write_page(target, parts)
+    assert target.read_text(encoding="utf-8") == page.render_page(parts)
     assert list(tmp_path.iterdir()) == [target]
 
 
 def test_a_folder_that_is_not_there_is_said(parts: Page, tmp_path: Path) -> None:
     with pytest.raises(DetentError, match=r"nowhere.*cannot be written \(No such file or directory\); choose another"):
-        page.write_page(tmp_path / "nowhere" / "a.html", **parts)
+        page.write_page(tmp_path / "nowhere" / "a.html", parts)
 
 
 @pytest.mark.parametrize(("level", "sign"), [("good", "✔"), ("warn", "!"), ("bad", "✘")])

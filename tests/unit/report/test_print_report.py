@@ -11,8 +11,9 @@ from detent.axisfile.load import load_spec
 from detent.axisfile.print_head.schema import PrintHeadSpec
 from detent.axisfile.quantities import INCH
 from detent.planning.print_job import load_job, parse_diablo, parse_text
+from detent.report.page import render_page
 from detent.report.print_data import ReportData
-from detent.report.print_page import render_report
+from detent.report.print_page import make_print_page
 from detent.report.print_report import NEEDED, comparison_figure, drift_text, print_report
 from detent.simulation.drive_comparison import DriveComparison, DriveConstants, DriveStart
 from detent.simulation.print_run import PrintRun, default_signals, print_job
@@ -177,7 +178,7 @@ def test_an_axis_that_failed_has_a_report_all_the_same() -> None:
     assert data.path
     assert not data.path.printing.any()
     assert [line.points for line in data.identified] == [(), ()]
-    assert "Not printed" in render_report(data)
+    assert "Not printed" in render_page(make_print_page(data))
 
 
 @pytest.mark.parametrize("left_out", NEEDED)
@@ -193,7 +194,7 @@ def test_without_a_trace_the_figures_over_time_are_left_out(letter: Played) -> N
     data = print_report(letter[0], letter[1], None)
     assert (data.path, data.profile, data.turn_around) == (None, None, None)
     assert data.lines
-    assert "histogram" in render_report(data)
+    assert "histogram" in render_page(make_print_page(data))
 
 
 @pytest.mark.parametrize("every", [100, 2_000, 25_000])
@@ -201,7 +202,7 @@ def test_a_sparse_trace_draws_what_it_can(every: int) -> None:
     data = print_report(*play(every=every))
     assert data.path
     assert (data.profile is not None) == (every == 100)
-    assert render_report(data)
+    assert render_page(make_print_page(data))
 
 
 def test_of_a_trace_that_ends_early_the_recorded_lines_are_drawn(letter: Played) -> None:
@@ -229,7 +230,7 @@ def test_warnings_and_notes_of_the_job_are_told() -> None:
 
 
 def test_every_report_can_be_drawn(letter: Played, data: ReportData) -> None:
-    page = render_report(data)
+    page = render_page(make_print_page(data))
     assert {chart["id"] for chart in charts_of(page)} == {
         "histogram", "path", "profile-speed", "profile-drive", "turn-current", "turn-speed", "identified-right",
         "identified-left",

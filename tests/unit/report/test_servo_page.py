@@ -10,13 +10,14 @@ from tests.unit.report.servo_samples import filtered_report, phase_move, phase_r
 
 from detent.report import servo_page
 from detent.report.data import INCH
+from detent.report.page import render_page, write_page
 from detent.report.print_data import Marks
 from detent.report.servo_data import JobPath, ServoReportData, Worst
-from detent.report.servo_page import render_servo_report, write_servo_report
+from detent.report.servo_page import make_servo_page
 
 
 def read(report: ServoReportData) -> str:
-    return Reader(render_servo_report(report)).text
+    return Reader(render_page(make_servo_page(report))).text
 
 
 def cells_of(html: str) -> list[list[str]]:
@@ -54,7 +55,7 @@ def test_the_cards_carry_the_figures() -> None:
     assert "Worst overshoot5 µm0.50 steps, move 3" in text
     assert "Worst error at rest2 µm0.20 steps, move 5, allowed 20 µm" in text
     assert "Peak speed346 mm/smove 6, limit 350" in text
-    assert 'class="card bad"' not in render_servo_report(phase_report())
+    assert 'class="card bad"' not in render_page(make_servo_page(phase_report()))
 
 
 def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
@@ -67,7 +68,7 @@ def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
     assert "Time0.600 suntil it stopped" in text
     assert "Settled after" not in text
     assert "✔" not in text
-    assert render_servo_report(failed).count('class="card bad"') == 2
+    assert render_page(make_servo_page(failed)).count('class="card bad"') == 2
 
 
 def test_an_axis_that_speaks_too_early_gets_no_praise() -> None:
@@ -80,7 +81,7 @@ def test_an_axis_that_speaks_too_early_gets_no_praise() -> None:
 
 
 def test_the_move_is_told_with_its_events_and_why_it_is_shown() -> None:
-    html = render_servo_report(phase_report())
+    html = render_page(make_servo_page(phase_report()))
     text = Reader(html).text
     assert "Move 2, 20 mm to the right" in text
     assert "Shown is the move of middle length." in text
@@ -92,7 +93,7 @@ def test_the_move_is_told_with_its_events_and_why_it_is_shown() -> None:
 
 
 def test_an_axis_that_never_stood_still_has_no_figure_of_its_rest() -> None:
-    html = render_servo_report(phase_report(detail=phase_move(approach=None)))
+    html = render_page(make_servo_page(phase_report(detail=phase_move(approach=None))))
     assert "Coming to rest" not in html
     assert "approach-place" not in {chart["id"] for chart in charts_of(html)}
 
@@ -104,7 +105,7 @@ def test_every_move_stands_in_the_table() -> None:
         result(3, 0.02, 0.0, settled=0.085),
         result(4, 0.0, 0.01, ready=math.nan, settled=math.nan, offset=-422e-6),
     ])  # fmt: skip
-    html = render_servo_report(report)
+    html = render_page(make_servo_page(report))
     cells = cells_of(html)
     assert ["1", "0.000", "0.000", "20.000", "→ right 20", "83", "82", "5", "+1.5"] in cells
     assert ["2", "0.100", "20.000", "20.000", "stays", "3", "0", "5", "−2"] in cells
@@ -116,16 +117,16 @@ def test_every_move_stands_in_the_table() -> None:
 
 def test_a_long_table_is_cut_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(servo_page, "MOST_MOVES", 4)
-    html = render_servo_report(phase_report())
+    html = render_page(make_servo_page(phase_report()))
     assert "2 further moves are in the JSON summary only." in Reader(html).text
     assert sum(len(row) == 9 for row in cells_of(html)) == 4
 
 
 def test_few_moves_make_no_histogram() -> None:
     few = phase_report(moves=phase_report().moves[:4])
-    assert "rest" not in {chart["id"] for chart in charts_of(render_servo_report(few))}
+    assert "rest" not in {chart["id"] for chart in charts_of(render_page(make_servo_page(few)))}
     assert "Error at rest" not in read(few).partition("What came out")[2]
-    assert "rest" in {chart["id"] for chart in charts_of(render_servo_report(phase_report()))}
+    assert "rest" in {chart["id"] for chart in charts_of(render_page(make_servo_page(phase_report())))}
 
 
 def test_a_job_that_is_drawn_in_part_says_so() -> None:
@@ -146,7 +147,7 @@ def test_the_page_is_well_formed_and_every_chart_has_its_place() -> None:
         (filtered_report(), {"job", "rest", "move-speed", "move-counted", "move-deviation", "move-drive",
                              "approach-place", "approach-words", "feedback-speed", "feedback-drive"}),
     ):  # fmt: skip
-        html = render_servo_report(report)
+        html = render_page(make_servo_page(report))
         page = Reader(html)
         assert page.open == []
         assert len(page.ids) == len(set(page.ids))
@@ -166,7 +167,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
         report, done=False, failure="Not ready.", figures=nothing, moves=(), path=None, detail=None, noise=None,
         hold=None, notes=(), settings={},
     )  # fmt: skip
-    html = render_servo_report(bare)
+    html = render_page(make_servo_page(bare))
     assert charts_of(html) == []
     assert paper_of(html) is None
     assert "<h2>" not in html
@@ -175,7 +176,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
 
 
 def test_a_text_stands_on_paper_and_its_characters_in_the_table() -> None:
-    html = render_servo_report(text_report())
+    html = render_page(make_servo_page(text_report()))
     paper = paper_of(html)
     assert paper
     assert [line["text"] for page in paper["pages"] for line in page["lines"]] == ["ab", "<", "c"]
@@ -190,7 +191,7 @@ def test_a_text_stands_on_paper_and_its_characters_in_the_table() -> None:
 
 def test_pages_of_a_text_that_are_not_drawn_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("detent.report.print_charts.MARKS", 3)
-    html = render_servo_report(text_report())
+    html = render_page(make_servo_page(text_report()))
     assert "1 further page is not drawn." in Reader(html).text
     assert "page-next" not in Reader(html).ids
 
@@ -198,7 +199,7 @@ def test_pages_of_a_text_that_are_not_drawn_are_counted(monkeypatch: pytest.Monk
 def test_what_names_and_labels_say_cannot_break_the_page() -> None:
     evil = "</script><b>$data</b>"
     report = text_report(axis_name=evil, job_name=evil, moves=[result(1, 0.0, 0.01, label=evil)], settings={"a": evil})
-    page = Reader(render_servo_report(report))
+    page = Reader(render_page(make_servo_page(report)))
     assert page.open == []
     # Twice in the title of the window, then axis, job, character and small print.
     assert page.text.count(evil) == 6
@@ -206,6 +207,6 @@ def test_what_names_and_labels_say_cannot_break_the_page() -> None:
 
 def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
     target = tmp_path / "moves.html"
-    write_servo_report(phase_report(version="9.9"), target)
-    assert target.read_text(encoding="utf-8") == render_servo_report(phase_report(version="9.9"))
+    write_page(target, make_servo_page(phase_report(version="9.9")))
+    assert target.read_text(encoding="utf-8") == render_page(make_servo_page(phase_report(version="9.9")))
     assert "Written by detent 9.9." in target.read_text(encoding="utf-8")

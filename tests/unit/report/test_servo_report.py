@@ -10,8 +10,9 @@ import detent
 from detent.axisfile.load import load_spec
 from detent.planning.move_job import Move, MoveJob, text_job
 from detent.report.data import INCH
+from detent.report.page import render_page
 from detent.report.servo_data import FilteredMove, PhaseMove, ServoReportData
-from detent.report.servo_page import render_servo_report
+from detent.report.servo_page import make_servo_page
 from detent.report.servo_report import NEEDED_FILTERED, NEEDED_PATH, NEEDED_PHASE, servo_report
 from detent.simulation.move_file import load_moves
 from detent.simulation.move_run import FILTERED_SIGNALS, PHASE_SIGNALS, MoveRun, ServoSpec, run_moves
@@ -170,7 +171,7 @@ def test_the_move_that_failed_is_shown(pushed_off: Played) -> None:
     assert math.isnan(data.moves[1].settled)
     assert data.moves[1].offset == pytest.approx(-PITCH, rel=0.01)
     assert [note.text for note in data.notes] == ["interference on the pulse lines: 30 pulses put in"]
-    text = Reader(render_servo_report(data)).text
+    text = Reader(render_page(make_servo_page(data))).text
     assert "Stopped after 1 of 10 moves" in text
     assert "on the positioning point 1 pitch off" in text
 
@@ -226,7 +227,7 @@ def test_a_trace_without_a_needed_signal_gives_a_report_without_its_figures(move
 def test_without_a_trace_the_figures_over_time_are_left_out(slide: Played) -> None:
     data = servo_report(slide[0], slide[1], None)
     assert (data.path, data.detail) == (None, None)
-    assert "Done" in Reader(render_servo_report(data)).text
+    assert "Done" in Reader(render_page(make_servo_page(data))).text
 
 
 def test_of_a_trace_that_ends_early_only_whole_moves_are_shown(moves: Played) -> None:
@@ -244,7 +245,7 @@ def test_a_run_without_a_move_has_no_figures_over_time(moves: Played) -> None:
     spec, _, trace = moves
     data = servo_report(spec, run_of(asked=2, failure="never ready"), trace)
     assert (data.path, data.detail, data.moves) == (None, None, [])
-    assert "Not done" in Reader(render_servo_report(data)).text
+    assert "Not done" in Reader(render_page(make_servo_page(data))).text
 
 
 def text_report(text: str) -> tuple[MoveRun, ServoReportData]:

@@ -18,13 +18,14 @@ from tests.unit.report.stage_samples import (
 )
 
 from detent.report import stage_page
+from detent.report.page import render_page, write_page
 from detent.report.stage_data import StageReportData
-from detent.report.stage_page import render_stage_report, write_stage_report
+from detent.report.stage_page import make_stage_page
 from detent.report.stage_results import StageMoveResult, WorstMotion
 
 
 def read(report: StageReportData) -> str:
-    return Reader(render_stage_report(report)).text
+    return Reader(render_page(make_stage_page(report))).text
 
 
 def cells_of(html: str) -> list[list[str]]:
@@ -51,7 +52,7 @@ def test_the_cards_carry_the_figures() -> None:
     assert "Worst rotor lag1.04 stepsmove 1, x; out of step from 2" in text
     assert "Least torque margin× 2.50 move 2, x; falls behind below 1" in text
     assert "Time saved0.800 s5 times as fast as at the start frequency (1 s)" in text
-    assert 'class="card bad"' not in render_stage_report(stage_data())
+    assert 'class="card bad"' not in render_page(make_stage_page(stage_data()))
 
 
 def test_tiles_go_by_their_names() -> None:
@@ -65,7 +66,9 @@ def test_lost_steps_are_the_headline() -> None:
         placed=1, lost={"x": -12, "y": 4}, first_lost=WorstMotion(-16.0, 2, "x"), lag=WorstMotion(17.0, 2, "x"),
         margin=WorstMotion(0.87, 2, "x"),
     )  # fmt: skip
-    html = render_stage_report(stage_data(done=False, failure="move 2: motor x lost 16 steps; lower it", figures=lost))
+    html = render_page(
+        make_stage_page(stage_data(done=False, failure="move 2: motor x lost 16 steps; lower it", figures=lost))
+    )
     text = Reader(html).text
     assert "✘ Not done list.csv" in text
     assert "1 of 2 moves in place. Move 2: motor x lost 16 steps; lower it." in text
@@ -85,7 +88,7 @@ def test_a_run_that_broke_off_says_how_far_it_came() -> None:
 
 
 def test_the_move_is_told_with_its_motor_and_why_it_is_shown() -> None:
-    html = render_stage_report(stage_data())
+    html = render_page(make_stage_page(stage_data()))
     text = Reader(html).text
     assert "Move 2 “zoom & in”, step by step" in text
     assert "Shown is the motion with the least torque margin: motor x, 1 mm up. " in text
@@ -102,7 +105,7 @@ def test_a_motion_that_needs_no_torque_has_any_margin() -> None:
 
 
 def test_every_motion_stands_in_the_table() -> None:
-    html = render_stage_report(stage_data())
+    html = render_page(make_stage_page(stage_data()))
     cells = cells_of(html)
     assert ["1", "zoom in", "0.000", "x", "0.000", "1.000", "↑ up 1", "100", "2 000", "1.04", "2.50", "0"] in cells
     assert ["", "", "", "y", "0.000", "1.000", "↑ up 1", "100", "2 000", "1.04", "any", "0"] in cells
@@ -122,7 +125,7 @@ def test_what_is_wrong_is_marked_in_the_table_and_where_the_rotor_stands_after_i
         StageMoveResult(number=2, label="", begin=0.2, seconds=0.1, motions=[motion(off=-4)]),
         StageMoveResult(number=3, label="", begin=0.4, seconds=0.0, motions=[]),
     ]  # fmt: skip
-    html = render_stage_report(stage_data(moves=moves))
+    html = render_page(make_stage_page(stage_data(moves=moves)))
     cells = cells_of(html)
     assert ["1", "0.000", "x", "0.000", "−2.000", "↓ down 2", "100", "2 000", "5", "0.900", "−4", "−4"] in cells
     assert ["2", "0.200", "x", "0.000", "1.000", "↑ up 1", "100", "2 000", "1.04", "2.50", "0", "−4"] in cells
@@ -134,7 +137,7 @@ def test_what_is_wrong_is_marked_in_the_table_and_where_the_rotor_stands_after_i
 
 def test_a_long_table_is_cut_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stage_page, "MOST_MOTIONS", 2)
-    html = render_stage_report(stage_data())
+    html = render_page(make_stage_page(stage_data()))
     assert "1 further row is in the JSON summary only." in Reader(html).text
     assert sum(len(row) == 12 for row in cells_of(html)) == 2
 
@@ -162,8 +165,8 @@ def test_more_motors_than_have_room_are_counted() -> None:
     many = stage_data(runs=[motor_runs()] * 8, path=replace(path, motors=[path.motors[0]] * 8))
     text = read(many)
     assert text.count("2 further motors are not drawn.") == 2
-    assert {"runs-5", "path-5"} <= set(Reader(render_stage_report(many)).ids)
-    assert "runs-6" not in Reader(render_stage_report(many)).ids
+    assert {"runs-5", "path-5"} <= set(Reader(render_page(make_stage_page(many))).ids)
+    assert "runs-6" not in Reader(render_page(make_stage_page(many))).ids
 
 
 def test_a_job_that_is_drawn_in_part_says_so() -> None:
@@ -187,7 +190,7 @@ def test_the_page_is_well_formed_and_every_chart_has_its_place() -> None:
         "detail-lag", "rest-lag", "jerk-whole", "jerk-begin", "jerk-end",
     }  # fmt: skip
     for report in (stage_data(), tiles_data()):
-        html = render_stage_report(report)
+        html = render_page(make_stage_page(report))
         page = Reader(html)
         assert page.open == []
         assert len(page.ids) == len(set(page.ids))
@@ -206,12 +209,12 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
         done=False, failure="Not ready.", figures=nothing, moves=(), path=None, runs=(), detail=None, steps=(),
         jerk=None, notes=(), settings={},
     )  # fmt: skip
-    html = render_stage_report(bare)
+    html = render_page(make_stage_page(bare))
     assert charts_of(html) == []
     assert "<h2>" not in html
     assert "Stopped after 0 of 2 moves, 0 s into the job. Not ready. " in Reader(html).text
     assert "nan" not in Reader(html).text.lower()
-    html = render_stage_report(stage_data(detail=detail(torques=None, rotor=None)))
+    html = render_page(make_stage_page(stage_data(detail=detail(torques=None, rotor=None))))
     text = Reader(html).text
     assert "Margin of torque at every step" not in text
     assert "How the rotor followed" not in text
@@ -227,13 +230,13 @@ def test_what_names_and_labels_say_cannot_break_the_page() -> None:
         axis_name=evil, job_name=evil, moves=moves, plan=plan, settings={"a": evil},
         detail=detail(label=evil, motion=motion(evil)), runs=[motor_runs(evil)],
     )  # fmt: skip
-    page = Reader(render_stage_report(report))
+    page = Reader(render_page(make_stage_page(report)))
     assert page.open == []
     assert page.text.count(evil) >= 8
 
 
 def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
     target = tmp_path / "stage.html"
-    write_stage_report(stage_data(version="9.9"), target)
-    assert target.read_text(encoding="utf-8") == render_stage_report(stage_data(version="9.9"))
+    write_page(target, make_stage_page(stage_data(version="9.9")))
+    assert target.read_text(encoding="utf-8") == render_page(make_stage_page(stage_data(version="9.9")))
     assert "Written by detent 9.9." in target.read_text(encoding="utf-8")

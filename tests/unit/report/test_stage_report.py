@@ -11,8 +11,9 @@ from detent.axisfile.load import load_spec
 from detent.axisfile.stepper_envelope.build import instant
 from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.stage_job import Change, StageJob, StageJog, StageMove
+from detent.report.page import render_page
 from detent.report.stage_detail import NEEDED_ROTOR
-from detent.report.stage_page import render_stage_report
+from detent.report.stage_page import make_stage_page
 from detent.report.stage_report import NEEDED_PATH, stage_report
 from detent.report.stage_trace import NEEDED_STEPS
 from detent.simulation.recorder import Recorder
@@ -180,7 +181,7 @@ def test_lost_steps_move_all_later_tiles_and_are_shown(torn: Played) -> None:
     assert [motor.astray for motor in data.path.motors] == [True, False]
     assert data.detail
     assert (data.detail.number, data.detail.why) == (1, "the motion that lost steps first")
-    text = Reader(render_stage_report(data)).text
+    text = Reader(render_page(make_stage_page(data))).text
     assert "0 of 2 tiles in place. Move 1: motor x lost" in text
     assert "tile A, x lost" in text
 
@@ -268,4 +269,4 @@ def test_a_job_in_which_nothing_moves_has_a_report() -> None:
     spec, run, trace = play("zoom.toml", moves(StageMove(1, 1, targets={"group_a": 0.0})))
     data = stage_report(spec, run, trace)
     assert (data.path, data.runs, data.detail) == (None, [], None)
-    assert "1 move in" in Reader(render_stage_report(data)).text
+    assert "1 move in" in Reader(render_page(make_stage_page(data))).text

@@ -9,12 +9,13 @@ from tests.unit.report.table_samples import COUNT, deg, result, table_report, tu
 
 from detent.report import table_charts, table_page
 from detent.report.data import Note
+from detent.report.page import render_page, write_page
 from detent.report.table_data import Signal, TableReportData, WorstStep
-from detent.report.table_page import render_table_report, write_table_report
+from detent.report.table_page import make_table_page
 
 
 def read(report: TableReportData) -> str:
-    return Reader(render_table_report(report)).text
+    return Reader(render_page(make_table_page(report))).text
 
 
 def cells_of(html: str) -> list[list[str]]:
@@ -39,7 +40,7 @@ def test_the_first_lines_say_what_happened() -> None:
 
 
 def test_the_cards_carry_the_figures() -> None:
-    html = render_table_report(table_report())
+    html = render_page(make_table_page(table_report()))
     text = Reader(html).text
     assert "Steps5 of 51 positioning, 1 jog" in text
     assert "Time10 sfor the sequence" in text
@@ -60,7 +61,7 @@ def test_a_sequence_that_moves_nothing_says_nothing_about_the_table() -> None:
 
 def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
     failed = replace(figures(made=1, error=None), done=False, failure="step 2 of 5, <jog>: the table has run away")
-    html = render_table_report(failed)
+    html = render_page(make_table_page(failed))
     text = Reader(html).text
     assert "✘ Not done shop.toml" in text
     assert "Stopped after 1 of 5 steps, 10 s in. Step 2 of 5, <jog>: the table has run away." in text
@@ -72,7 +73,7 @@ def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
 
 def test_a_table_that_stands_beside_its_targets_gets_no_praise() -> None:
     off = figures(error=WorstStep(20 * COUNT, 1))
-    html = render_table_report(off)
+    html = render_page(make_table_page(off))
     text = Reader(html).text
     assert "! Done, but beside its targets shop.toml" in text
     assert "But in step 1 it stood 72 arcsec (20 counts) beside its target while the axis said" in text
@@ -95,13 +96,13 @@ def test_the_time_line_is_told_as_far_as_it_goes() -> None:
 
 
 def test_without_a_trace_the_time_line_shows_steps_and_signals() -> None:
-    html = render_table_report(table_report(path=None, detail=None, comparison=None))
+    html = render_page(make_table_page(table_report(path=None, detail=None, comparison=None)))
     assert [chart["id"] for chart in charts_of(html)] == ["line-steps"]
     assert "D is what the detector says" not in html
 
 
 def test_the_step_is_told_with_its_events_and_why_it_is_shown() -> None:
-    html = render_table_report(table_report())
+    html = render_page(make_table_page(table_report()))
     text = Reader(html).text
     assert "How the table goes on beyond a turn" in text
     assert "Step 5: jog + at <60> deg/s" in text
@@ -129,7 +130,7 @@ def test_the_caption_tells_what_is_shown(changes: dict[str, object], told: str, 
 
 
 def test_every_step_stands_in_the_table() -> None:
-    cells = cells_of(render_table_report(table_report()))
+    cells = cells_of(render_page(make_table_page(table_report())))
     nothing = [""] * 8
     assert ["1", "go to position 1 (90 deg, <shortest>)", "0.000", "2.000", "0.000", "90.000", "+90.000", "+0.50", "1",
             "", ""] in cells  # fmt: skip
@@ -141,7 +142,7 @@ def test_every_step_stands_in_the_table() -> None:
 
 def test_angles_of_the_table_stay_within_the_turn() -> None:
     steps = [result(1, start=-0.0004, stop=-90.0), result(2, start=719.9998, stop=0.0, offset=5 * COUNT)]
-    html = render_table_report(table_report(steps=steps))
+    html = render_page(make_table_page(table_report(steps=steps)))
     cells = cells_of(html)
     assert cells[-2][4:7] == ["0.000", "270.000", "−90.000"]
     assert cells[-1][4:7] == ["0.000", "0.000", "−720.000"]
@@ -151,19 +152,19 @@ def test_angles_of_the_table_stay_within_the_turn() -> None:
 
 
 def test_a_step_without_a_target_has_a_dash() -> None:
-    cells = cells_of(render_table_report(table_report(steps=[result(1, "jog", offset=math.nan)])))
+    cells = cells_of(render_page(make_table_page(table_report(steps=[result(1, "jog", offset=math.nan)]))))
     assert cells[-1][7] == "–"
 
 
 def test_a_long_table_is_cut_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_page, "MOST_STEPS", 3)
-    html = render_table_report(table_report())
+    html = render_page(make_table_page(table_report()))
     assert "2 further steps are in the JSON summary only." in Reader(html).text
     assert sum(len(row) == 11 for row in cells_of(html)) == 3
 
 
 def test_the_page_is_well_formed_and_every_chart_has_its_place() -> None:
-    html = render_table_report(table_report())
+    html = render_page(make_table_page(table_report()))
     page = Reader(html)
     ids = {
         "line-steps", "line-turns", "line-detected", "line-speed", "turn-angles", "turn-count", "turn-deviation",
@@ -189,7 +190,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
         report, done=False, failure="Not ready.", figures=nothing, steps=(), outputs=(), inputs=(), path=None,
         detail=None, comparison=None, notes=(), settings={},
     )  # fmt: skip
-    html = render_table_report(bare)
+    html = render_page(make_table_page(bare))
     assert charts_of(html) == []
     assert "<h2>" not in html
     assert "Stopped after 0 of 5 steps, 0 s in. Not ready. " in Reader(html).text
@@ -202,7 +203,7 @@ def test_what_names_and_texts_say_cannot_break_the_page() -> None:
         axis_name=evil, job_name=evil, steps=[result(1, text=evil)], outputs=[Signal(evil, [(0.0, 1.0)])],
         detail=turn_detail(text=evil, why=evil), notes=[Note("note", evil)], settings={"a": evil},
     )  # fmt: skip
-    page = Reader(render_table_report(report))
+    page = Reader(render_page(make_table_page(report)))
     assert page.open == []
     # Twice in the title of the window; axis, job, title and reason of the detail, step, note and small print.
     assert page.text.count(evil) == 9
@@ -210,6 +211,6 @@ def test_what_names_and_texts_say_cannot_break_the_page() -> None:
 
 def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
     target = tmp_path / "table.html"
-    write_table_report(table_report(version="9.9"), target)
-    assert target.read_text(encoding="utf-8") == render_table_report(table_report(version="9.9"))
+    write_page(target, make_table_page(table_report(version="9.9")))
+    assert target.read_text(encoding="utf-8") == render_page(make_table_page(table_report(version="9.9")))
     assert "Written by detent 9.9." in target.read_text(encoding="utf-8")

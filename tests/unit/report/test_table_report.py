@@ -10,8 +10,9 @@ import detent
 from detent.axisfile.load import load_spec
 from detent.axisfile.rotary_table.schema import RotaryTableSpec
 from detent.planning.sequence_job import Go, Jog, Output, SequenceJob, Step, Wait
+from detent.report.page import render_page
 from detent.report.table_data import Signal, TableReportData, TurnDetail
-from detent.report.table_page import render_table_report
+from detent.report.table_page import make_table_page
 from detent.report.table_report import NEEDED_DETAIL, NEEDED_PATH, sequence_report
 from detent.simulation.recorder import Recorder
 from detent.simulation.sequence_run import SEQUENCE_SIGNALS, SequenceRun, run_sequence
@@ -270,7 +271,7 @@ def test_the_step_that_failed_is_shown_and_a_jog_that_broke_off_has_no_target() 
     assert np.degrees(np.abs(detail.deviation).max()) > 300
     assert detail.events[1].text.endswith("D jumps from 360 to 0\u202fdeg")
     assert math.isnan(data.steps[1].offset)
-    text = Reader(render_table_report(data)).text
+    text = Reader(render_page(make_table_page(data))).text
     assert "Not done" in text
     assert "Stopped after 1 of 3 steps" in text
 
@@ -311,7 +312,7 @@ def test_a_trace_without_a_needed_signal_gives_a_report_without_its_figures(forw
 def test_without_a_trace_the_figures_over_time_are_left_out(mixed: Played) -> None:
     data = sequence_report(mixed[0], mixed[1], None)
     assert (data.path, data.detail, data.comparison, data.settings) == (None, None, None, {})
-    assert "Done" in Reader(render_table_report(data)).text
+    assert "Done" in Reader(render_page(make_table_page(data))).text
 
 
 def test_of_a_trace_that_ends_early_what_it_holds_is_shown(mixed: Played) -> None:
@@ -328,4 +329,4 @@ def test_of_a_trace_that_ends_early_what_it_holds_is_shown(mixed: Played) -> Non
 def test_a_run_without_a_step_has_no_figures_over_time(mixed: Played) -> None:
     data = sequence_report(mixed[0], run_of(asked=2, failure="never ready"), mixed[2])
     assert (data.path, data.detail, data.steps) == (None, None, [])
-    assert "Not done" in Reader(render_table_report(data)).text
+    assert "Not done" in Reader(render_page(make_table_page(data))).text
