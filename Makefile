@@ -42,8 +42,9 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 	$(BIN)/detent run $(EXAMPLES)/print_head.toml --job $(EXAMPLES)/letter.txt --output $(DEMO)
 	@echo "Open $(CURDIR)/$(DEMO)/report.html in a browser."
 
+# Files go whole to one process per processor: what a file prepares is prepared once.
 test: venv-test ## the tests, without those that take long
-	$(PYTEST) $(PYTEST_ARGS)
+	$(PYTEST) -n auto --dist loadfile -p no:benchmark $(PYTEST_ARGS)
 
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)
