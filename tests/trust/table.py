@@ -152,7 +152,9 @@ The bad ones are such logs too, but spoilt:
 
 Each is written to a CSV file and goes the way of a user's log: `read_log`, then `identify` with nothing stated. An
 interval counts where the constant is trusted. 95 % intervals should hold the truth in 95 % of the cases; of {count}
-such intervals, chance leaves {low:.1f} to {high:.1f} % (19 times out of 20).
+such intervals, chance leaves {low:.1f} to {high:.1f} % (19 times out of 20). Rules and windows were chosen with numbers
+below 5350 at hand; what came of numbers from 6000 on, which nothing was chosen with, stands in
+[decision 14](decisions/0014-identification-by-windows-and-instruments.md).
 """
 
 MIDDLE = """
