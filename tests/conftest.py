@@ -4,6 +4,9 @@ import os
 
 # The matrices here are small: threads of the linear algebra only stand in one another's way. Read when numpy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Output is compared as a pipe shows it, whatever terminal the tests run in.
+os.environ.pop("COLUMNS", None)
+os.environ.pop("LINES", None)
 
 from hypothesis import settings
 
