@@ -6,6 +6,7 @@ that ``"3 in"`` and ``"76.2 mm"`` are the same number. Pint is imported at the f
 """
 
 import math
+import pickle
 import re
 from fractions import Fraction
 from functools import cache
@@ -234,8 +235,9 @@ def _registry() -> Any:
     make_registry: Any = pint.UnitRegistry
     try:
         return make_registry(cache_folder=":auto:", non_int_type=Fraction)
-    except OSError:
-        # A read-only home: slower by a few tenths of a second, otherwise the same.
+    except (OSError, EOFError, pickle.UnpicklingError):
+        # A read-only home, or a cache that another process has just begun to write, or was killed writing: slower by a
+        # few tenths of a second, otherwise the same.
         return make_registry(non_int_type=Fraction)
 
 

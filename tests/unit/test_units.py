@@ -1,6 +1,7 @@
 """Quantities with units: exact conversion in, readable text out."""
 
 import math
+import os
 import subprocess
 import sys
 from fractions import Fraction
@@ -188,3 +189,19 @@ def test_a_home_that_cannot_be_written_only_costs_time(monkeypatch):
         assert units._registry().Quantity(1, "inch").to("m").magnitude == Fraction(127, 5000)
     finally:
         units._registry.cache_clear()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_a_cache_that_was_not_written_to_its_end_only_costs_time(share, tmp_path):
+    """Of two processes that started at once the second read what the first had begun to write: a traceback."""
+    program = (
+        "from detent.units import _registry; assert str(_registry().Quantity(1, 'inch').to('m')) == '127/5000 meter'"
+    )
+    words = {"args": [sys.executable, "-c", program], "env": os.environ | {"XDG_CACHE_HOME": str(tmp_path)}}
+    subprocess.run(**words, check=True, timeout=60)
+    pickles = list(tmp_path.rglob("*.pickle"))
+    assert pickles
+    for path in pickles:
+        whole = path.read_bytes()
+        path.write_bytes(whole[: int(share * len(whole))])
+    subprocess.run(**words, check=True, timeout=60)
