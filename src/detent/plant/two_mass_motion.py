@@ -4,8 +4,10 @@ The mechanics have no exact solution: the Stribeck curve and the pendulum are no
 for each of 18 regimes (direction of each mass or its standstill, contact or not). Within a regime the equations are
 smooth: the classical Runge-Kutta step has order 4, and `plant.two_mass.fastest_rate` says whether the tick is short
 enough. At the end of a regime the tick is split: the moment at which a mass comes to rest or a flank is met is found to
-rounding, so that the order is not lost there. A mass at rest stays exactly there until the force on it is beyond its
-static friction; this is asked at the beginning of a tick, and of each piece of one.
+rounding, so that the order is not lost there. A mass that stops and is pushed on within the same step shows in its way:
+the parabola through both velocities with that way goes below 0, and the tick is split there. A mass at rest stays
+exactly there until the force on it is beyond its static friction; this is asked at the beginning of a tick, and of each
+piece of one.
 """
 
 from detent.kernel.step import hot_step, step
@@ -50,12 +52,36 @@ def accept(p: TwoMassParams, r: TwoMass, after: State) -> None:
 
 
 @hot_step
+def lowest_of(sense: int, before: float, after: float, way: float) -> float:
+    """Share of a step at which a mass has turned round if it moves on in its direction at both ends; 1 if it has not.
+
+    Its velocity is taken for the parabola with these ends [m/s] and this mean [m/s].
+    """
+    begin = before * sense
+    bend = 3.0 * (begin + after * sense) - 6.0 * way * sense
+    slope = after * sense - begin - bend
+    if begin > 0.0 and slope < 0.0 and slope * slope > 4.0 * bend * begin and -slope < 2.0 * bend:
+        return -0.5 * slope / bend
+    return 1.0
+
+
+@hot_step
+def lowest(p: TwoMassParams, r: TwoMass, after: State, h: float) -> float:
+    """Share of a step of `h` [s] at which the first mass has turned round that moves on at its end; 1 if none has."""
+    m, n = r.motor, r.load
+    share = lowest_of(m.sense, m.velocity, after[2], (after[1] - m.position) / h)
+    if p.stiffness == 0.0:
+        return share
+    return min(share, lowest_of(n.sense, n.velocity, after[4], (after[3] - n.position) / h))
+
+
+@hot_step
 def move_masses(p: TwoMassParams, r: TwoMass) -> None:
     """One tick with the effort and the external force in `r`."""
     find_senses(p, r)
     after = flow(p, r, p.period)
     reversal = after[2] * r.motor.sense < 0.0 or after[4] * r.load.sense < 0.0
-    if reversal or gap_left(p, r.side, after[1] - after[3]) < 0.0:
+    if reversal or gap_left(p, r.side, after[1] - after[3]) < 0.0 or lowest(p, r, after, p.period) < 1.0:
         move_in_pieces(p, r)
     else:
         accept(p, r, after)
@@ -131,33 +157,43 @@ def end_regime(p: TwoMassParams, r: TwoMass, event: int) -> None:
 
 
 @step
-def hold(p: TwoMassParams, r: TwoMass, event: int) -> None:
-    """A mass that was pushed back as it broke loose has not broken loose."""
-    if event == MOTOR_REVERSES:
+def hold(p: TwoMassParams, r: TwoMass, held: int) -> None:
+    """A mass that was pushed back as it broke loose has not broken loose in this tick; `held` is the sum of them."""
+    if held & MOTOR_REVERSES:
         r.motor.sense = 0
-    if event == LOAD_REVERSES or p.stiffness == 0.0:
+    if held & LOAD_REVERSES or (p.stiffness == 0.0 and held > 0):
         r.load.sense = 0
+
+
+@step
+def next_event(p: TwoMassParams, r: TwoMass, before: State, left: float) -> tuple[int, float]:
+    """What ends the regime within `left` [s], 0 nothing, and when [s]; or where a mass seems to turn round unseen."""
+    after = flow_piece(p, r, left)
+    event, piece = first_event(p, r, before, after), left
+    if event == 0:
+        piece = left * lowest(p, r, after, left)
+        event = first_event(p, r, before, flow_piece(p, r, piece)) if piece < left else 0
+    return event, piece if event == 0 else time_of_event(p, r, event, before, piece)
 
 
 @step
 def move_in_pieces(p: TwoMassParams, r: TwoMass) -> None:
     """A tick in which a regime ends: piece by piece, one regime each."""
-    left = p.period
+    left, held = p.period, 0
     for _ in range(PIECES):
         find_senses(p, r)
+        hold(p, r, held)
         before = (r.current, r.motor.position, r.motor.velocity, r.load.position, r.load.velocity)
-        after = flow_piece(p, r, left)
-        event = first_event(p, r, before, after)
-        if event == 0:
-            accept(p, r, after)
-            return
-        moment = time_of_event(p, r, event, before, left)
-        if moment == 0.0 and event <= LOAD_REVERSES:
-            hold(p, r, event)
-            break
+        event, moment = next_event(p, r, before, left)
+        if moment == 0.0 and event in (MOTOR_REVERSES, LOAD_REVERSES):
+            held |= event
+            continue
         accept(p, r, flow_piece(p, r, moment))
-        end_regime(p, r, event)
         left -= moment
+        if event != 0:
+            end_regime(p, r, event)
+        elif left == 0.0:
+            return
     finish(p, r, left)
 
 

@@ -215,6 +215,34 @@ def test_a_tick_that_leaves_one_flank_and_meets_the_other_ends_in_contact(sign):
     assert energy(p, r) == pytest.approx(begin, rel=1e-6)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_mass_that_stops_and_is_pushed_on_in_one_tick_does_not_turn_round(sign):
+    """Found by the property that energy never grows: friction drove the motor back until the coupling caught it."""
+    p = coupled(period=1.0, damping=0.0)
+    p.period = 0.25 / fastest_rate(p)
+    set_friction(p.motor.friction, coulomb=5.0, static=7.5, stribeck=0.02)
+    r = moving()
+    r.motor.velocity, r.load.velocity = sign * 1e-7, sign * 0.2
+    begin = energy(p, r)
+    move_masses(p, r)
+    assert r.motor.position * sign >= 0.0
+    assert energy(p, r) < begin
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_mass_held_in_a_tick_is_held_over_the_flank_that_is_left_in_it(sign):
+    """The flank pushes it a little harder than its friction, but not for long; the rest was one step across a kink."""
+    p = coupled(period=1.0, damping=0.0, half_gap=1e-3)
+    p.period = 0.25 / fastest_rate(p)
+    set_friction(p.load.friction, coulomb=5.0)
+    r = moving()
+    r.motor.position, r.motor.velocity, r.side = -sign * (p.half_gap + 5.5 / K), sign * 0.2, -sign
+    begin = energy(p, r)
+    move_masses(p, r)
+    assert (r.load.velocity, r.side) == (0.0, 0)
+    assert energy(p, r) == pytest.approx(begin, rel=2e-5)
+
+
 # -- integration -------------------------------------------------------------------------------------------------------
 
 
