@@ -123,11 +123,21 @@ class _Trial:
     share: float
     integrates: bool
 
-    def columns(self, gain: float, feeds: tuple[int, ...]) -> Numbers:
-        """What the effort is made of, with a position gain and some of the feed-forwards."""
-        d = gain * self.error + self.demand
-        loops = [d, np.cumsum(d) * self.run.step] if self.integrates else [d]
+    def parts(self, feeds: tuple[int, ...]) -> Numbers:
+        """What the columns of every position gain are made of, and some of the feed-forwards."""
+        loops = [self.error, self.demand]
+        if self.integrates:
+            loops += [np.cumsum(signal) * self.run.step for signal in loops]
         return np.column_stack([*loops, self.feeds[:, [*feeds, -1]]])[self.rows]
+
+    def mix(self, gain: float, count: int) -> Numbers:
+        """How a position gain mixes so many parts: their product are its columns."""
+        loops = 2 if self.integrates else 1
+        mixed = np.zeros((count, count - loops))
+        for k in range(loops):
+            mixed[2 * k, k], mixed[2 * k + 1, k] = gain, 1.0
+        mixed[2 * loops :, loops:] = np.eye(count - 2 * loops)
+        return mixed
 
     def solve(self, feeds: tuple[int, ...] = (0, 1, 2)) -> Loops | None:
         """The best gains; None where they are none of a loop that holds an axis.
@@ -135,8 +145,9 @@ class _Trial:
         A feed-forward that is slight, or against the motion, is left out.
         """
         cut, effort = round(SEEN * len(self.rows)), self.run.effort[self.rows]
-        gain = self._search(feeds, effort[:cut])
-        columns = self.columns(gain, feeds)
+        parts = self.parts(feeds)
+        gain = self._search(parts[:cut], effort[:cut])
+        columns = parts @ self.mix(gain, parts.shape[1])
         theta, rest = _solve(columns[:cut], effort[:cut]), effort[cut:]
         first = 2 if self.integrates else 1
         least = SLIGHT * _rms(effort)
@@ -154,14 +165,16 @@ class _Trial:
             share, viscous = viscous / float(theta[0]), 0.0
         return Loops(gain, float(theta[0]), integral, self.span, share, acceleration, viscous, coulomb, error)
 
-    def _search(self, feeds: tuple[int, ...], effort: Numbers) -> float:
+    def _search(self, parts: Numbers, effort: Numbers) -> float:
         """The position gain with the least error: the best of a few, then between its neighbours."""
         optimize: Any = import_module("scipy.optimize")  # it states no types
-        count = len(effort)
+        products, moments = parts.T @ parts, parts.T @ effort
 
         def miss(logarithm: float) -> float:
-            columns = self.columns(float(np.exp(logarithm)), feeds)[:count]
-            return _rms(effort - columns @ _solve(columns, effort))
+            """Square of the error, less that of the effort."""
+            mix = self.mix(math.exp(logarithm), len(products))
+            own, told = mix.T @ products @ mix, mix.T @ moments
+            return -float(told @ _solve_normal(own, told))
 
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
@@ -171,10 +184,14 @@ class _Trial:
 
 def _solve(columns: Numbers, effort: Numbers) -> Numbers:
     """Least squares, worked out with columns of unit length by their normal equations, which are few."""
-    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    scaled = columns / size
+    return _solve_normal(columns.T @ columns, columns.T @ effort)
+
+
+def _solve_normal(products: Numbers, moments: Numbers) -> Numbers:
+    """The same from the normal equations."""
+    size = np.maximum(np.sqrt(np.diag(products)), 1e-150)
     linalg: Any = np.linalg
-    theta: Numbers = linalg.lstsq(scaled.T @ scaled, scaled.T @ effort, rcond=1e-12)[0]
+    theta: Numbers = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]
     return theta / size
 
 
