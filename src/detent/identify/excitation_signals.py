@@ -119,29 +119,37 @@ def make_multisine(  # noqa: PLR0913 - what a multisine has
     >>> len(made.t), len(made.frequency), round(float(abs(made.values).max()), 6)
     (6000, 39, 0.5)
     """
-    rows = round(period / step) if step > 0 else 0
     _check_band(band, step, periods)
-    if rows < 2:
-        raise DetentError(f"excitation: came a period of {period:g} s; allowed: two samples of {step:g} s or more")
+    rows = _rows_of(period, step)
     length = rows * step
     numbers = _lines_within(band, rows, length, odd=odd)
     count = len(numbers)
-    order = np.arange(1, count + 1)
-    phases = -np.pi * order * (order - 1) / count if seed is None else _random_phases(seed, count)
+    phases = _schroeder_phases(count) if seed is None else _random_phases(seed, count)
     spectrum = np.zeros(rows // 2 + 1, dtype=np.complex128)
     spectrum[numbers] = np.exp(1j * phases)
     omega = 2j * np.pi * np.arange(len(spectrum)) / length
     once, rate, bend = (np.fft.irfft(spectrum * omega**power, rows) for power in range(3))
     scale = _scale(once, rate, bend, limits)
     once = scale * np.roll(once, -int(np.argmin(np.abs(once))))
+    lines = f"{count} {'odd ' if odd else ''}lines from {numbers[0] / length:.4g} to {numbers[-1] / length:.4g} Hz"
     kind = "Schroeder phases" if seed is None else f"random phases of seed {seed}"
-    text = (
-        f"multisine of {count} {'odd ' if odd else ''}lines from {numbers[0] / length:.4g} to "
-        f"{numbers[-1] / length:.4g} Hz, {periods} periods of {length:.6g} s, {kind}"
-    )
-    return Excitation(
-        step * np.arange(rows * periods, dtype=np.float64), np.tile(once, periods), numbers / length, length, text
-    )
+    text = f"multisine of {lines}, {periods} periods of {length:.6g} s, {kind}"
+    t = step * np.arange(rows * periods, dtype=np.float64)
+    return Excitation(t, np.tile(once, periods), numbers / length, length, text)
+
+
+def _rows_of(period: float, step: float) -> int:
+    """Samples of a period, 2 or more."""
+    rows = round(period / step)
+    if rows < 2:
+        raise DetentError(f"excitation: came a period of {period:g} s; allowed: two samples of {step:g} s or more")
+    return rows
+
+
+def _schroeder_phases(count: int) -> Values:
+    """Phases [rad] of lines of equal amplitude that make low peaks."""
+    order = np.arange(1, count + 1)
+    return -np.pi * order * (order - 1) / count
 
 
 def _lines_within(band: tuple[float, float], rows: int, length: float, *, odd: bool) -> NDArray[np.int64]:

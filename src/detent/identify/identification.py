@@ -187,10 +187,7 @@ def identify(
     if method == "output error" and constants.value("mass") > 0.0:
         constants = _refine(runs, constants, "output error", report)
     refusals += look_at_constants(runs[0], constants, parts)
-    horizons: tuple[Horizon, ...] = ()
-    seen = closed = None
-    if constants.value("mass") > 0.0:
-        seen, horizons, closed = _test_simulation(runs, found, method, report)
+    seen, horizons, closed = _test_simulation(runs, found, constants, method, report)
     refusals += look_at_prediction(found.climbs, horizons, refusals)
     return Identification(
         tuple(logs),
@@ -365,9 +362,11 @@ def _is_rival(c: Climb, chosen: Climb) -> bool:
 
 
 def _test_simulation(
-    runs: Sequence[Run], found: _Found, method: Method, report: Report | None
+    runs: Sequence[Run], found: _Found, whole: Constants, method: Method, report: Report | None
 ) -> tuple[Constants | None, tuple[Horizon, ...], ClosedLoop | None]:
-    """Constants from the first part of each log, simulated along the last."""
+    """Constants from the first part of each log, simulated along the last; none where those of the whole cannot be."""
+    if whole.value("mass") <= 0.0:
+        return None, (), None
     cuts = [round((1.0 - HELD_OUT) * len(run.position)) for run in runs]
     seen = [run.part(0, cut) for run, cut in zip(runs, cuts, strict=True)]
     unseen = [run.part(cut, len(run.position)) for run, cut in zip(runs, cuts, strict=True)]

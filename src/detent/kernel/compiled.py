@@ -172,6 +172,7 @@ def stack_copy(_typingctx: Any, registers: Any) -> Any:
     """Copy a register file into a stack slot."""
 
     def codegen(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        """Reserve the slot and fill it."""
         size = ctypes.sizeof(sig.args[0].registers)
         slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), (size + 7) // 8))
         address = builder.bitcast(slot, BYTE.as_pointer())

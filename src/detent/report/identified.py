@@ -174,12 +174,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     text = "" if axis is None else read_axis_text(axis)
     if axis is not None:
         cascade_spec(text, str(axis))
-    if not paths:
-        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
-    read: list[Log] = []
-    for number, path in enumerate(paths):
-        tell(0.1 * number / len(paths), f"reading {Path(path).name}")
-        read.append(read_log(path, mapping, columns))
+    read = _read_logs(paths, mapping, columns, tell)
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))
@@ -188,6 +183,19 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     return Identified(
         identify(read, effort, method=method, report=report), text, "" if axis is None else str(axis), reading
     )
+
+
+def _read_logs(
+    paths: Sequence[str | Path], mapping: str | Path | None, columns: Sequence[str], tell: "Progress"
+) -> list[Log]:
+    """Recordings one after the other, and how far it is: the first tenth of the work."""
+    if not paths:
+        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
+    read: list[Log] = []
+    for number, path in enumerate(paths):
+        tell(0.1 * number / len(paths), f"reading {Path(path).name}")
+        read.append(read_log(path, mapping, columns))
+    return read
 
 
 def read_axis_text(path: str | Path) -> str:

@@ -211,6 +211,7 @@ def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) ->
     done = 0
 
     def told(what: str, result: Any) -> Any:
+        """Say that one more run is done, and hand it on."""
         nonlocal done
         done += 1
         if progress is not None:

@@ -9,7 +9,7 @@ from tests.identify_rig import TRUTH, Recorder
 from detent.identify.equations import LOSS
 from detent.identify.kernel import make_kernel
 from detent.identify.ladder import best_bend
-from detent.identify.regression import fit_equations, lag_of, make_columns, prepare, solve
+from detent.identify.regression import WIDER, fit_equations, lag_of, make_columns, prepare, solve
 from detent.identify.run import Run
 
 NAMES = tuple(TRUTH)
@@ -86,6 +86,13 @@ def closed_loop(seed, noise=2e-4, step=2e-3, seconds=12.0):
         q += end * step + (v - end) * (1 - fade) * mass / viscous
         v = end + (v - end) * fade
     return Run("loop", step, measured, force, np.ones(n, bool), reference=wanted, noise=noise)
+
+
+def test_wider_windows_share_little_noise_with_the_narrow_ones():
+    """Of white noise in the second derivative: the share that its product with the instrument keeps of its square."""
+    narrow, wide = (make_kernel(half, 1e-3).second for half in (20, round(WIDER * 20)))
+    inner = wide[len(wide) // 2 - 20 : len(wide) // 2 + 21]
+    assert inner @ narrow / (narrow @ narrow) == pytest.approx(0.026, abs=0.001)
 
 
 NOISES = {"reference": 2e-4, "position": 1e-5}
