@@ -255,7 +255,7 @@ def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) 
     at = job.t[0] + np.arange(len(seen)) * host.period
 
     def simulated(column: str) -> Numbers:
-        return np.interp(job.t, at, seen[column])
+        return at_stamps(job.t, at, seen[column])
 
     efforts = [one for one in _efforts(spec, job, simulated) if one.name != result.open_loop]
     result.compared = [*_motion(spec, job, simulated), *efforts]
@@ -264,6 +264,29 @@ def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) 
         at_limit = np.abs(seen["source.command"]) >= host.params.source.limit * (1 - 1e-12)
     result.limited = float(np.count_nonzero(at_limit)) * host.period
     result.warnings = _cautions(spec, result, seen)
+
+
+def at_stamps(t: Numbers, at: Numbers, values: Numbers) -> Numbers:
+    """Simulated values at the stamps of a recording.
+
+    Parameters
+    ----------
+    t : ndarray
+        Stamps [s], shape (n,). The last may lie a part of a period behind the last sample of the loops, which is as
+        far as a reference is known: there the last slope goes on.
+    at, values : ndarray
+        Time [s] and value of each sample of the loops, shape (m,).
+
+    Returns
+    -------
+    ndarray
+        Shape (n,).
+    """
+    found = np.interp(t, at, values)
+    if len(at) < 2:
+        return found
+    slope = (values[-1] - values[-2]) / (at[-1] - at[-2])
+    return np.asarray(found + np.maximum(t - at[-1], 0.0) * slope, np.float64)
 
 
 def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:

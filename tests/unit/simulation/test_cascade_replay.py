@@ -14,7 +14,7 @@ from detent.errors import DetentError
 from detent.planning.move_job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_job
 from detent.simulation.cascade_host import CascadeHost
-from detent.simulation.cascade_replay import per_command, run_cascade_replay
+from detent.simulation.cascade_replay import at_stamps, per_command, run_cascade_replay
 from detent.simulation.recorded_motion import starting_velocity
 from detent.simulation.replay_job import ReplayJob, make_replay_job
 
@@ -244,3 +244,12 @@ def test_the_published_model_of_a_real_axis_is_no_worse_than_published(force_axi
     assert 0.05 < errors["velocity"] < 0.2291
     assert 2.0 < errors["acceleration"] < 8.60
     assert 2.0 < errors["force"] < 5.85
+
+
+def test_the_last_stamp_may_lie_behind_the_last_sample_of_the_loops():
+    """Found in a figure: a recording of 1.00002 ms per sample ended in a difference of a third of a sample's way."""
+    at = 1e-3 * np.arange(50)
+    t = 1.00002e-3 * np.arange(50)
+    assert t[-1] > at[-1]
+    assert at_stamps(t, at, 0.04 * at) == pytest.approx(0.04 * t, abs=1e-15)
+    assert at_stamps(np.zeros(1), np.zeros(1), np.array([3.0])).tolist() == [3.0]
