@@ -41,7 +41,7 @@ def picture(name: str, rows: int, height: float, *, columns: int = 1, share_x: b
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    from detent.report.figures import STYLE
+    from detent.page.plots import STYLE
 
     with plt.rc_context(STYLE | {"axes.titleweight": "normal", "axes.titlesize": 10}):
         figure, axes = plt.subplots(
@@ -197,8 +197,8 @@ def turn_around() -> None:
 def comparison() -> None:
     """Three ways of choosing the drive value on the drifted machine: what `detent compare` draws."""
     import detent
-    from detent.report.figures import plot_comparison
-    from detent.report.print_report import comparison_figure
+    from detent.methods.print_head.report import comparison_figure
+    from detent.page.plots import plot_comparison
 
     axis = detent.load(detent.example("print_head.toml"), DRIFTED)
     (drives,) = axis.compare()

@@ -21,7 +21,7 @@ def slide(*overrides: str) -> Any:
 
 def one_move(axis: Any, target: float, *, dwell: float = 0.0, signals: tuple[str, ...] = ()) -> Any:
     """A move of the example to a place [m], with a row per sample."""
-    from detent.planning.move_job import Move, MoveJob
+    from detent.methods.moves.job import Move, MoveJob
 
     names = signals or ("reference.position", "machine.load.position", "law.position_error", "law.command")
     return axis.run(MoveJob("move", "moves", (Move(1, 0, target=target, dwell=dwell),)), signals=names)
@@ -51,7 +51,7 @@ def feed_forward() -> None:
 
 def profiles() -> None:
     """A move in four ways, as `detent compare` draws it."""
-    from detent.report.cascade_comparisons import plot_profiles
+    from detent.methods.cascade.comparison_section import plot_profiles
 
     plot_profiles(slide().compare()[0], FOLDER / "profiles.svg")
 

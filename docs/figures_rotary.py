@@ -27,7 +27,7 @@ def table(*overrides: str) -> Any:
 
 def jog(axis: Any, seconds: float, speed: float, sign: int = 1, **options: Any) -> Any:
     """Hold a button for so long from power-on; speed of the dial in deg/s."""
-    from detent.planning.sequence_job import Jog, SequenceJob
+    from detent.methods.rotary_table.sequence_job import Jog, SequenceJob
 
     step = Jog(direction=sign, speed=np.radians(speed), duration=seconds)
     return axis.run(SequenceJob("jog", (step,), {}), **options)
@@ -41,7 +41,7 @@ def degrees(spec: Any, words: Any) -> Any:
 # -- detector ----------------------------------------------------------------------------------------------------------
 def composition() -> None:
     """Motor turns by both words and by their difference, and the share of wrong angles over the coarse error."""
-    from detent.axisfile.rotary_table.build import build_rotary_table
+    from detent.methods.rotary_table.build import build_rotary_table
     from detent.sensing.angle_composition import AbsoluteAngle, compose
 
     spec = table().spec
@@ -186,7 +186,7 @@ def travelled(place: float, speed: float, judge: str, sign: int = 1, turns: floa
 
 def threshold(speed: float, judge: str) -> float:
     """Distance beyond the boundary up to which a start fails [deg]; by AR, before it."""
-    from detent.axisfile.rotary_table.derive import Machine
+    from detent.methods.rotary_table.derive import Machine
 
     side, turns = (1, 1.4) if judge == "theoretical" else (-1, 2.4)
     low, high = 0.0, 1.1 * float(np.degrees(Machine(table().spec).following_error(np.radians(speed)))) + 0.05
@@ -199,7 +199,7 @@ def threshold(speed: float, judge: str) -> float:
 
 def start_angles() -> None:
     """Where the literal form throws the table back, over time and over speed and start angle."""
-    from detent.axisfile.rotary_table.derive import Machine
+    from detent.methods.rotary_table.derive import Machine
 
     with picture("start-angles.svg", 1, 4.2, columns=2, share_x=False) as (ways, places):
         for place, colour in ((3.0, BLUE), (1.5, PINK), (0.5, ORANGE)):

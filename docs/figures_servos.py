@@ -53,7 +53,7 @@ def zero_line(area: Any) -> None:
 # -- phase servo -------------------------------------------------------------------------------------------------------
 def plus_pulse() -> None:
     """The third + pulse of a move, clock by clock."""
-    from detent.report.timing import plot_timing
+    from detent.page.timing import plot_timing
 
     axis = phase_axis()
     plus = axis.timing(4e-3, 2e-3, signals=["converters.tracking.plus"]).waveforms.signals[-1]
@@ -65,10 +65,10 @@ def plus_pulse() -> None:
 
 def absolute_word() -> None:
     """Absolute word, and the error made of it, against the displacement from a positioning point."""
-    from detent.axisfile.phase_servo.build import build_phase_servo
+    from detent.methods.phase_servo.build import build_phase_servo
+    from detent.methods.phase_servo.system import Converters, run_converters
     from detent.sensing.absolute_converter import absolute_error
     from detent.sensing.carrier import reset_carrier
-    from detent.systems.phase_servo import Converters, run_converters
 
     spec = phase_axis().spec
     n, p = spec.detector.counts, build_phase_servo(spec)
@@ -143,23 +143,23 @@ def phase_move() -> None:
 
 def noise() -> None:
     """Spurious pulses: what `detent compare` draws."""
-    from detent.report.comparison_figures import plot_noise
-    from detent.simulation.noise_comparison import compare_noise
+    from detent.methods.phase_servo.noise_comparison import compare_noise
+    from detent.page.plot_looks import plot_noise
 
     plot_noise(compare_noise(phase_axis().spec), FOLDER / "noise.svg")
 
 
 def hold() -> None:
     """Standing at the target: the other figure of `detent compare`."""
-    from detent.report.comparison_figures import plot_hold
-    from detent.simulation.hold_comparison import compare_hold
+    from detent.methods.phase_servo.hold_comparison import compare_hold
+    from detent.page.plot_looks import plot_hold
 
     plot_hold(compare_hold(phase_axis().spec), FOLDER / "hold.svg")
 
 
 def clock_order() -> None:
     """A push of 3 N: robust clocks, the literal set, and literal clocks with the robust gains."""
-    from detent.planning.move_job import MoveJob
+    from detent.methods.moves.job import MoveJob
 
     cases = (
         ("robust (default)", BLUE, ()),
@@ -189,7 +189,7 @@ def clock_order() -> None:
 @cache
 def feedback() -> Any:
     """The four ways to feed the speed back, compared on the example slide."""
-    from detent.simulation.feedback_comparison import compare_feedback
+    from detent.methods.filtered_servo.comparison import compare_feedback
 
     return compare_feedback(slide().spec)
 
@@ -223,7 +223,7 @@ def lumpy_speed() -> None:
 def filter_answer() -> None:
     """One window that counts a pulse too many, and the filter's gain over frequency."""
     from detent.analysis.first_order_filter import cutoff_hz
-    from detent.axisfile.filtered_servo.build import build_filtered_servo
+    from detent.methods.filtered_servo.build import build_filtered_servo
     from detent.sensing.speed_filter import SpeedFilter, filter_speed
 
     spec = slide().spec
@@ -260,14 +260,14 @@ def filter_answer() -> None:
 
 def model_of(spec: Any) -> Any:
     """The exact sampled-loop model of an axis."""
-    from detent.axisfile.filtered_servo.derive import Machine
+    from detent.methods.filtered_servo.derive import Machine
 
     return Machine(spec).loop
 
 
 def run_and_stop(seconds: float, rest: float, overrides: tuple[str, ...]) -> tuple[Any, Any]:
     """The ideal slide at 1000 pulses/s for so long, then at rest: time since the stop [s], following error [pulse]."""
-    from detent.planning.move_job import Move, MoveJob
+    from detent.methods.moves.job import Move, MoveJob
 
     axis = slide(*IDEAL, *overrides)
     speed = RATE * axis.spec.pulse
@@ -330,7 +330,7 @@ def loop_model() -> None:
 
 def stability() -> None:
     """Largest mode against the gain, for each kind of speed feedback."""
-    from detent.simulation.feedback_comparison import feedback_variants
+    from detent.methods.filtered_servo.comparison import feedback_variants
 
     spec = slide(*IDEAL).spec
     gains = np.geomspace(500, 60_000, 300)
@@ -380,7 +380,7 @@ def feedback_table() -> None:
     """The comparison as a table, for the page."""
     import generate
 
-    from detent.report.methods import comparison_table
+    from detent.methods.shown import comparison_table
 
     _, heads, rows = comparison_table(slide().spec, feedback())
     short = {"speed feedback": "", "std of speed word": "std of y", "stop overshoot": "overshoot"}

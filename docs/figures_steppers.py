@@ -31,7 +31,7 @@ def zoom(*overrides: str) -> Any:
 
 def standing(way: int, *overrides: str) -> Any:
     """Motor of the example at its lower end, its tables made for a run of `way` steps."""
-    from detent.simulation.stage_machine import StageMotor
+    from detent.methods.stepper_envelope.machine import StageMotor
 
     motor = StageMotor(zoom(*overrides).spec, MOTOR)
     motor.tables.up.move_start(0)
@@ -65,8 +65,8 @@ def lost(motor: Any) -> int:
 def watch(motor: Any, names: Sequence[str], seconds: float, every: int) -> tuple[Any, Any]:
     """Start upwards and record registers: time [s], and the registers by name."""
     from detent.control.step_rule import start_move
-    from detent.simulation.recorder import choose_leaves
-    from detent.systems.stepper import Stepper, advance_on_rig
+    from detent.methods.stepper_envelope.system import Stepper, advance_on_rig
+    from detent.record.recorder import choose_leaves
 
     leaves = choose_leaves(Stepper, names)
     picks = np.concatenate([np.arange(leaf.offset, leaf.offset + leaf.width.size) for leaf in leaves]).astype(np.int64)
@@ -91,7 +91,7 @@ def step_hz(motor: Any, period: Any) -> Any:
 @cache
 def figures_of(*overrides: str) -> Any:
     """What `detent check` works out for the motor."""
-    from detent.axisfile.stepper_envelope.derive import MotorFigures
+    from detent.methods.stepper_envelope.derive import MotorFigures
 
     return MotorFigures(zoom(*overrides).spec, MOTOR)
 
@@ -123,7 +123,7 @@ def lost_steps() -> None:
 def torque() -> None:
     """Pull-out torque and what of it a ramp takes: the form of the specification, and a winding at three supplies."""
     import detent
-    from detent.axisfile.stepper_envelope.build import pull_out
+    from detent.methods.stepper_envelope.build import pull_out
 
     m = figures_of(*OPEN)
     hz = np.linspace(0, 5000, 400)
@@ -254,7 +254,7 @@ def boundary() -> None:
 
 def stop_moved() -> None:
     """A run whose stop is moved on the way: outwards, inwards, and nearer than it can stop."""
-    from detent.planning.stage_job import Change, StageJob, StageMove
+    from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove
 
     cases = ((15.5e-3, ORANGE, 3.5), (16.135e-3, GREEN, 1.4), (20e-3, BLUE, 1.4))
     signals = tuple(f"{MOTOR}.{name}" for name in ("rule.position", "rule.direction", "timer.period"))
@@ -281,7 +281,7 @@ def stop_moved() -> None:
 
 def by_hand() -> None:
     """A joystick held over into the end of the travel, and half over on the way back."""
-    from detent.planning.stage_job import StageJob, StageJog
+    from detent.methods.stepper_envelope.stage_job import StageJob, StageJog
 
     jogs = (StageJog(1, 1, MOTOR, 20e-3, 3.6, dwell=0.2), StageJog(2, 2, MOTOR, -10e-3, 1.5, dwell=0.2))
     signals = tuple(f"{MOTOR}.{name}" for name in ("rule.position", "rule.direction", "timer.period"))
@@ -321,7 +321,7 @@ def still_follows(inertia: float, friction: float) -> bool:
 
 def margin() -> None:
     """How much more inertia and friction the ramp of the example bears."""
-    from detent.axisfile.stepper_envelope.cautions import MOST_FRICTION, MOST_USED, START_RESERVE
+    from detent.methods.stepper_envelope.cautions import MOST_FRICTION, MOST_USED, START_RESERVE
 
     m = figures_of(*OPEN)
     factors = np.array([0.5, 1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10.5, 11])
@@ -368,9 +368,9 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 def jerk() -> None:
     """Start by the envelope and by a profile of limited jerk, each as a ramp list, on the rotor."""
+    from detent.methods.stepper_envelope.comparison import compare_jerk
+    from detent.methods.stepper_envelope.system import load_rule
     from detent.planning.step_envelope import StepEnvelope
-    from detent.simulation.step_comparisons import compare_jerk
-    from detent.systems.stepper import load_rule
 
     way = 1000
     spec = zoom(*OPEN).spec
@@ -403,8 +403,8 @@ def methods_table() -> None:
     """The comparison with the other methods as a table, for the page."""
     import generate
 
-    from detent.report.methods import comparison_table
-    from detent.simulation.step_comparisons import compare_steps
+    from detent.methods.shown import comparison_table
+    from detent.methods.stepper_envelope.comparison import compare_steps
 
     spec = zoom().spec
     only = spec.model_copy(update={"stepper": {MOTOR: spec.stepper[MOTOR]}})

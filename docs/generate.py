@@ -39,7 +39,7 @@ def method_heading(method: Any) -> str:
 
 def registers() -> str:
     """State and parameters of the axis of each method."""
-    from detent.axisfile.methods import METHODS
+    from detent.methods.registry import METHODS
 
     parts: list[str] = []
     for method in METHODS.values():
@@ -54,14 +54,14 @@ def registers() -> str:
 
 def axis_file() -> str:
     """Every key of the axis file, one section per method, in it one per table."""
-    from detent.axisfile.methods import METHODS
+    from detent.methods.registry import METHODS
 
     return "\n".join(f"{method_heading(method)}\n{keys_of(method)}" for method in METHODS.values())
 
 
 def keys_of(method: Any) -> str:
     """Every key of a method's axis file, one section per table."""
-    from detent.axisfile.reference import reference_rows
+    from detent.methods.reference import reference_rows
 
     sections: dict[str, list[tuple[str, ...]]] = {}
     for row in reference_rows(method.name):
@@ -75,7 +75,7 @@ def keys_of(method: Any) -> str:
 
 def _tables(model: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
     """Dotted name and first sentence of every table of the schema; a placeholder stands for a name of the user's."""
-    from detent.axisfile.fields import extra_of, file_key, is_named, table_of
+    from detent.files.fields import extra_of, file_key, is_named, table_of
 
     for name, field in model.model_fields.items():
         below = table_of(field)

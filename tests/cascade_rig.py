@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from detent.planning.profile import Profile
-from detent.plant.stribeck import StribeckFriction
-from detent.systems.cascade import (
+from detent.methods.cascade.system import (
     Cascade,
     CascadeParams,
     advance,
@@ -17,6 +15,8 @@ from detent.systems.cascade import (
     fill_clocks,
     switch_on,
 )
+from detent.planning.profile import Profile
+from detent.plant.stribeck import StribeckFriction
 
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from detent.axisfile.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.axisfile.filtered_servo.schema import FilteredServoSpec
-from detent.axisfile.load import load_spec
 from detent.control.pulse_generator import PER_PULSE
-from detent.systems.filtered_servo import TICK, FilteredServo, FilteredServoParams, advance, switch_on
+from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams, advance, switch_on
+from detent.methods.load import load_spec
 
 EXAMPLE = Path(str(files("detent") / "examples" / "filtered_servo.toml"))
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from detent.identify.log import Finding, Log
-from detent.identify.run import Run
+from detent.identify.fit.run import Run
+from detent.logs.log import Finding, Log
 
 STEP = 2e-3
 """Time between two samples [s]."""

@@ -1,14 +1,13 @@
 """Recordings made by arithmetic, for the methods of identification."""
 
-from pathlib import Path
-
 import numpy as np
 
-from detent.identify.log import Log
-from detent.identify.mapping import Choice, ColumnMapping
-from detent.identify.read_log import read_log
+from detent.logs.log import Log
+from detent.logs.mapping import Choice, ColumnMapping
+from detent.logs.read_log import read_log
+from tests.places import DATA
 
-EMPS = Path(__file__).parents[2] / "shared/data/emps/DATA_EMPS.mat"
+EMPS = DATA / "emps/DATA_EMPS.mat"
 """A ball-screw axis, recorded for 25 s (A. Janot, M. Gautier, M. Brunot, 2019)."""
 
 UNITS = {

@@ -8,16 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from detent.axisfile.load import load_spec
-from detent.axisfile.phase_servo.build import build_phase_servo
-from detent.axisfile.phase_servo.schema import PhaseServoSpec
 from detent.kernel.turn_table import TURN
-from detent.sensing.absolute_converter import AbsoluteConverter
-from detent.sensing.carrier import count_carrier, reset_carrier
-from detent.sensing.gauge import set_gauge
-from detent.sensing.interference import plan_next
-from detent.sensing.phase_detector import Detector, DetectorParams, compare
-from detent.systems.phase_servo import (
+from detent.methods.load import load_spec
+from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.methods.phase_servo.system import (
     ConverterParams,
     Converters,
     PhaseServo,
@@ -28,6 +23,11 @@ from detent.systems.phase_servo import (
     run_converters,
     switch_on,
 )
+from detent.sensing.absolute_converter import AbsoluteConverter
+from detent.sensing.carrier import count_carrier, reset_carrier
+from detent.sensing.gauge import set_gauge
+from detent.sensing.interference import plan_next
+from detent.sensing.phase_detector import Detector, DetectorParams, compare
 
 EXAMPLE = Path(str(files("detent") / "examples" / "phase_servo.toml"))
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from detent.axisfile.load import load_spec
-from detent.axisfile.print_head.build import build_print_head
-from detent.axisfile.print_head.schema import EMITTER, PrintHeadSpec
 from detent.control.head_computer import FAULT, HIGH_STEADY, IDLE, POWER_ON
-from detent.systems.print_head import PERIOD_US, PrintHead, PrintHeadParams, advance, switch_on
+from detent.methods.load import load_spec
+from detent.methods.print_head.build import build_print_head
+from detent.methods.print_head.schema import EMITTER, PrintHeadSpec
+from detent.methods.print_head.system import PERIOD_US, PrintHead, PrintHeadParams, advance, switch_on
 
 EXAMPLE = Path(str(files("detent") / "examples" / "print_head.toml"))
 COUNT = 38.0 / 300

@@ -6,8 +6,8 @@ from functools import wraps
 
 import pytest
 
-from detent.axisfile.methods import METHODS
 from detent.errors import InputError
+from detent.methods.registry import METHODS
 from detent.units import format_quantity
 from tests.bad_files import Bad, check_bad_file
 

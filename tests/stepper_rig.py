@@ -11,11 +11,7 @@ import numpy as np
 from detent.control.step_comparison import CONSTANT_FREQUENCY
 from detent.control.step_rule import FAULT, REST, deflect, start_move
 from detent.kernel.registers import Leaf
-from detent.planning.pull_out import FirstOrderPullOut
-from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
-from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
-from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
-from detent.systems.stepper import (
+from detent.methods.stepper_envelope.system import (
     NOWHERE,
     Stepper,
     StepperParams,
@@ -24,6 +20,10 @@ from detent.systems.stepper import (
     load_rule,
     switch_on,
 )
+from detent.planning.pull_out import FirstOrderPullOut
+from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
+from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
+from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
 
 N = 8000
 START_HZ, MAX_HZ, FINE_HZ = 400.0, 4000.0, 1000.0

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from detent.errors import InputError
-from detent.identify.log import Log
-from detent.identify.read_log import read_log
+from detent.logs.log import Log
+from detent.logs.read_log import read_log
 
 HEADINGS = {
     "time": "t [s]",

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from detent.identify.average_periods import noise_parts
-from detent.identify.excitation_signals import Limits, make_multisine
-from detent.identify.frequency_response import FrequencyResponse, response_deviation
-from detent.identify.two_mass_response import TwoMassModel, modes_of, respond_sampled
+from detent.identify.analyse.average_periods import noise_parts
+from detent.identify.analyse.frequency_response import FrequencyResponse, response_deviation
+from detent.identify.analyse.two_mass_response import TwoMassModel, modes_of, respond_sampled
+from detent.identify.write.excitation_signals import Limits, make_multisine
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
 

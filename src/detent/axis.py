@@ -5,27 +5,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from detent.axisfile.cascade.schema import CascadeSpec
-from detent.axisfile.check import CheckReport, check_spec
-from detent.axisfile.load import AxisFile, read_axis
-from detent.axisfile.methods import AnySpec
-from detent.axisfile.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.errors import DetentError
-from detent.simulation.capture import Stretch, capture
-from detent.simulation.methods import AnyJob, AnyResult, Simulated, simulated
-from detent.simulation.print_run import Progress
-from detent.simulation.recorder import Recorder, choose_leaves, make_trace
-from detent.simulation.trace import Trace
-from detent.simulation.trace_files import load_trace, save_trace
-from detent.simulation.trace_store import TraceWriter
-from detent.simulation.vcd_file import save_vcd
-from detent.simulation.waveforms import Waveforms
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.check import CheckReport, check_spec
+from detent.methods.load import AxisFile, read_axis
+from detent.methods.print_head.run import Progress
+from detent.methods.registry import AnySpec
+from detent.methods.simulated import AnyJob, AnyResult, Simulated, simulated
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.record.capture import Stretch, capture
+from detent.record.recorder import Recorder, choose_leaves, make_trace
+from detent.record.trace import Trace
+from detent.record.trace_files import load_trace, save_trace
+from detent.record.trace_store import TraceWriter
+from detent.record.vcd_file import save_vcd
+from detent.record.waveforms import Waveforms
 
 if TYPE_CHECKING:
     # Loaded where a comparison is made, or a recording replayed: most commands do neither.
-    from detent.report.envelope_files import EnvelopeTables
-    from detent.simulation.comparisons import AnyComparison
-    from detent.simulation.replay_job import ReplayJob
+    from detent.methods.cascade.replay_job import ReplayJob
+    from detent.methods.compared import AnyComparison
+    from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
 
 KEPT_ROWS = 100_000
 """Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
@@ -127,8 +127,8 @@ class Axis:
         DetentError
             The axis is no cascade axis, or the log does not fit it.
         """
-        from detent.identify.read_log import read_log
-        from detent.simulation.replay_job import make_replay_job
+        from detent.logs.read_log import read_log
+        from detent.methods.cascade.replay_job import make_replay_job
 
         spec = self.spec
         if not isinstance(spec, CascadeSpec):
@@ -209,7 +209,7 @@ class Axis:
             one `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and
             a `JerkComparison`. Cascade: one `ProfileComparison`.
         """
-        from detent.simulation.comparisons import compare_methods
+        from detent.methods.compared import compare_methods
 
         return compare_methods(self.spec, progress)
 
@@ -274,8 +274,8 @@ class Axis:
 
 def _envelope_tables(spec: StepperEnvelopeSpec, name: str) -> "EnvelopeTables":
     """Tables of one motor as its file describes it."""
-    from detent.axisfile.stepper_envelope.build import make_tables
-    from detent.report.envelope_files import EnvelopeTables
+    from detent.methods.stepper_envelope.build import make_tables
+    from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
 
     table, tables = spec.stepper[name], make_tables(spec.stepper[name])
     return EnvelopeTables(
@@ -305,7 +305,7 @@ class Timing:
 
     def plot(self, path: str | Path) -> Path:
         """Draw the timing diagram into a PNG, SVG or PDF file."""
-        from detent.report.timing import plot_timing
+        from detent.page.timing import plot_timing
 
         plot_timing(self.waveforms, path)
         return Path(path)
@@ -336,8 +336,8 @@ class Envelope:
         DetentError
             The suffix is another, or the file cannot be written.
         """
-        from detent.report.envelope_figure import plot_envelope
-        from detent.report.envelope_files import write_envelope_csv, write_envelope_header
+        from detent.methods.stepper_envelope.envelope_figure import plot_envelope
+        from detent.methods.stepper_envelope.envelope_files import write_envelope_csv, write_envelope_header
 
         path = Path(path)
         writers = {".csv": write_envelope_csv, ".h": write_envelope_header}
@@ -416,7 +416,7 @@ class Run:
 
     def summary(self) -> list[tuple[str, str]]:
         """The figures a person wants first: name and text."""
-        from detent.report.methods import summary_rows
+        from detent.methods.shown import summary_rows
 
         return summary_rows(self.axis.spec, self.result)
 
@@ -426,8 +426,8 @@ class Run:
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
-        from detent.report.methods import report_of
-        from detent.report.page import write_page
+        from detent.methods.shown import report_of
+        from detent.page.page import write_page
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.method.seed)} | self.settings
         write_page(path, report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings))
@@ -440,7 +440,7 @@ class Run:
 
     def plot(self, signals: Iterable[str], path: str | Path, t_range: tuple[float, float] | None = None) -> Path:
         """Draw signals against time into a PNG, SVG or PDF file."""
-        from detent.report.figures import plot_signals
+        from detent.page.plots import plot_signals
 
         plot_signals(self._trace(), list(signals), path, t_range)
         return Path(path)

@@ -23,14 +23,14 @@ from tests.filtered_servo_rig import (
 
 from detent.analysis.sampled_loop import SampledLoop
 from detent.analysis.transfer_function import ServoTransfer
-from detent.axisfile.filtered_servo.schema import FilteredServoSpec
 from detent.control.deviation_counter import RUN, Deviation, count_deviation
 from detent.control.pulse_generator import FULL, PER_PULSE, PulseGenerator, clock_generator
 from detent.control.sample_clock import SampleClock, count_clock
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.filtered_servo.system import CLOCKS, TICK, FilteredServo, FilteredServoParams
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, preset_decoder
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
-from detent.systems.filtered_servo import CLOCKS, TICK, FilteredServo, FilteredServoParams
 
 FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]
 """Levels (A, B) of the quarters of a cycle: A leads."""

@@ -26,11 +26,11 @@ from detent.control.phase_sequencer import (
 )
 from detent.drive.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import drive_two, sense_current
+from detent.methods.phase_servo.system import actuate, move
 from detent.sensing.absolute_converter import absolute_error, count_absolute
 from detent.sensing.carrier import LARGE, Carrier, CarrierParams, coil_currents, count_carrier, reset_carrier
 from detent.sensing.interference import INSERT_MINUS, INSERT_PLUS
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
-from detent.systems.phase_servo import actuate, move
 
 N = 64
 SAMPLE_TICKS = 2048

@@ -47,9 +47,9 @@ from detent.control.speed_selection import fits, select_speed
 from detent.drive.h_bridge import Bridge, BridgeLines, decode, steer, terminal_voltage
 from detent.drive.pwm_timer import CLOCKS_PER_PERIOD, PwmTimer, clock, trigger
 from detent.kernel.step import step
+from detent.methods.print_head.comparison import DriveComparison, DriveConstants, MeasuringBench, compare_drives
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, fill_period
 from detent.plant.switched_motor import Scratch, SwitchedParams, fill_pulse_table, move_switched
-from detent.simulation.drive_comparison import DriveComparison, DriveConstants, MeasuringBench, compare_drives
 
 INCH = 0.0254
 RIGHT, LEFT = 1, -1

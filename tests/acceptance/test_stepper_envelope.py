@@ -35,9 +35,9 @@ from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
 from detent.drive.step_timer import reload_values
+from detent.methods.stepper_envelope.system import advance_on_rig
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory, turn_envelopes
 from detent.planning.step_ramp import start_frequency, total_inertia, travel_per_step
-from detent.systems.stepper import advance_on_rig
 
 TOP = len(RAMP) - 1
 L = len(RAMP)

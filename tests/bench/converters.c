@@ -1,4 +1,4 @@
-/* Both converters of the phase servo by hand: what `detent.systems.phase_servo.run_converters` is measured against.
+/* Both converters of the phase servo by hand: what `detent.methods.phase_servo.system.run_converters` is measured against.
  *
  * The same logic in the same order, so that both end on the same bits; everything that changes lives in local variables
  * of the machine's own width, and the pulses are worked out only where the gate is open. converters_registers.h, the

@@ -1,4 +1,4 @@
-/* The averaged print-head tick by hand: what `detent.systems.print_head.advance` is measured against.
+/* The averaged print-head tick by hand: what `detent.methods.print_head.system.advance` is measured against.
  *
  * The same arithmetic in the same order, so that both end on the same bits (compile with -ffp-contract=off). It covers
  * what print lines at high speed and their turn-arounds reach; anything else - command bytes, homing, identification,

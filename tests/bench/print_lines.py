@@ -9,7 +9,7 @@ from tests.bench.race import compile_c
 from tests.print_head_rig import Rig
 
 from detent.control.head_computer import PRINT
-from detent.systems.print_head import PrintHead, PrintHeadParams
+from detent.methods.print_head.system import PrintHead, PrintHeadParams
 
 SOURCE = Path(__file__).with_name("print_head_tick.c")
 

@@ -1,4 +1,4 @@
-/* The step by hand: what `detent.systems.stepper.advance` is measured against.
+/* The step by hand: what `detent.methods.stepper_envelope.system.advance` is measured against.
  *
  * Run-time rule, literal rule, step timer and phases of one motor, in the same order, so that both end on the same
  * registers; everything that changes lives in local copies, which the compiler keeps in machine registers. The methods

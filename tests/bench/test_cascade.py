@@ -4,8 +4,8 @@ import numpy as np
 from tests.bench.race import Race, timed
 from tests.cascade_rig import NO_TRACE, SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
+from detent.methods.cascade.system import advance_along
 from detent.planning.profile import MotionLimits, plan_move
-from detent.systems.cascade import advance_along
 
 LOG = 25.0
 """[s]"""

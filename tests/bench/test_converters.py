@@ -16,9 +16,9 @@ import pytest
 from tests.bench.race import COMPILER, OPTIMISED, Race, compile_c, first_line, needs_c, timed
 from tests.phase_servo_rig import make_spec
 
-from detent.axisfile.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.system import ConverterParams, Converters, DetectorParams, run_converters
 from detent.sensing.carrier import reset_carrier
-from detent.systems.phase_servo import ConverterParams, Converters, DetectorParams, run_converters
 
 C_BAR = 2.0
 """The composed steps may take this much longer than C."""

@@ -3,16 +3,16 @@
 import numpy as np
 from tests.bench.race import Race, timed
 
-from detent.identify.constants import Constants
-from detent.identify.equations import make_motion, usable_rows
-from detent.identify.identification import WINDOW, choose_windows, identify
-from detent.identify.inverse_dynamics import fit_inverse_dynamics
-from detent.identify.kernel import make_kernel
-from detent.identify.ladder import RUNGS
-from detent.identify.log import Log, Source
-from detent.identify.output_error import fit_output_error
-from detent.identify.regression import fit_equations
-from detent.identify.run import make_run
+from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import make_motion, usable_rows
+from detent.identify.fit.identification import WINDOW, choose_windows, identify
+from detent.identify.fit.inverse_dynamics import fit_inverse_dynamics
+from detent.identify.fit.kernel import make_kernel
+from detent.identify.fit.ladder import RUNGS
+from detent.identify.fit.output_error import fit_output_error
+from detent.identify.fit.regression import fit_equations
+from detent.identify.fit.run import make_run
+from detent.logs.log import Log, Source
 
 STEP, LOG = 1e-3, 25.0
 REGRESSION_BAR, SIMULATION_BAR = 1.0, 20.0

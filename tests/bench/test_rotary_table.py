@@ -5,7 +5,7 @@ from tests.bench.race import Race, timed
 from tests.rotary_table_rig import COUNT, Rig
 
 from detent.control.table_positioner import JOG
-from detent.systems.rotary_table import TICK
+from detent.methods.rotary_table.system import TICK
 
 HOUR_BAR = 3.0
 """Seconds to simulate an hour."""

@@ -6,19 +6,19 @@ from tests.filtered_servo_rig import EXAMPLE as SLIDE
 from tests.filtered_servo_rig import NO_TRACE
 from tests.phase_servo_rig import START, Rig
 
-from detent.axisfile.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.axisfile.load import load_spec
 from detent.control.pulse_generator import PER_PULSE
 from detent.drive.sawtooth_pwm import SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.step import step
+from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.system import RUN, TICK, FilteredServo, switch_on
+from detent.methods.filtered_servo.system import advance as advance_filtered
+from detent.methods.load import load_spec
+from detent.methods.phase_servo.system import advance, run_converters
 from detent.plant.drive_train import move_averaged
 from detent.sensing.gauge import read_gauge
 from detent.sensing.phase_detector import compare
-from detent.systems.filtered_servo import RUN, TICK, FilteredServo, switch_on
-from detent.systems.filtered_servo import advance as advance_filtered
-from detent.systems.phase_servo import advance, run_converters
 
 PHASE_BAR = 4.0
 FILTERED_BAR = 500.0

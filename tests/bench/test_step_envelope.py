@@ -22,9 +22,9 @@ from tests.stepper_rig import COARSE_FINE, MAX_HZ, NO_TRACE, RAMP, RELOAD_CLOCK_
 
 from detent.control.step_comparison import PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, OUT_OF_RANGE, REST
+from detent.methods.stepper_envelope.system import Stepper, StepperParams, advance
 from detent.planning.step_envelope import SENTINEL, StepEnvelope, ZoneMap
 from detent.planning.step_ramp import make_ramp
-from detent.systems.stepper import Stepper, StepperParams, advance
 
 BUILD_BAR = 0.05
 """Seconds to build a table of a million steps."""

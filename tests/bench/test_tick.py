@@ -8,7 +8,7 @@ from tests.bench.race import COMPILER, OPTIMISED, Race, first_line, needs_c, tim
 from tests.print_head_rig import NO_TRACE
 
 from detent.control.head_computer import IDLE
-from detent.systems.print_head import advance, advance_plain
+from detent.methods.print_head.system import advance, advance_plain
 
 C_BAR = 1.3
 """The composed steps may take this much longer than C."""

@@ -8,11 +8,11 @@ import pytest
 from tests.docs.pages import ROOT
 
 import detent
-from detent.axisfile.methods import METHODS
-from detent.axisfile.reference import reference_rows
 from detent.control import head_computer
 from detent.errors import SB1_TEXT
-from detent.simulation.trace import Trace
+from detent.methods.reference import reference_rows
+from detent.methods.registry import METHODS
+from detent.record.trace import Trace
 
 LEAVES = [
     (f"{name}: {leaf.path}", leaf)

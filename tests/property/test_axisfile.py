@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from tests.bad_files import EXAMPLES as EXAMPLE_OF
 from tests.bad_files import example_text
 
-from detent.axisfile.check import check_spec
 from detent.axisfile.dump import dump_spec
-from detent.axisfile.load import axis_of
-from detent.axisfile.methods import METHODS
-from detent.axisfile.source import parse_source
 from detent.errors import InputError
+from detent.files.source import parse_source
+from detent.methods.check import check_spec
+from detent.methods.load import axis_of
+from detent.methods.registry import METHODS
 from detent.units import KINDS, QuantityError, format_quantity, parse_quantity
 
 EXAMPLES = {name: example_text(EXAMPLE_OF[name]) for name in METHODS}

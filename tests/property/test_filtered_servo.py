@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
+from detent.methods.filtered_servo.system import CLOCKS
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
-from detent.systems.filtered_servo import CLOCKS
 
 RECORDED = (
     "generator.command", "deviation.position", "deviation.deviation", "deviation.error", "deviation.word",

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identify_rig import TRUTH, Recorder, changed
 
-from detent.identify.identification import identify
+from detent.identify.fit.identification import identify
 
 pytestmark = pytest.mark.compiled
 

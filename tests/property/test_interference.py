@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.phase_servo_rig import START, Rig, make_spec
 
-from detent.axisfile.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, receive_pulses, sample_speed
 from detent.sensing.interference import (
     CORRUPT,
     INSERT,
@@ -24,7 +25,6 @@ from detent.sensing.interference import (
     interfere,
     start_interference,
 )
-from detent.systems.phase_servo import PhaseServo, PhaseServoParams, receive_pulses, sample_speed
 
 TICKS = 120
 """Length of a bench run."""

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from tests.synthetic_logs import clean, kinds
 
 from detent.errors import InputError
-from detent.identify.agreement import FACTORS
-from detent.identify.differences import runs_of, window_rows
-from detent.identify.log import Action, Kind
-from detent.identify.read_log import read_log
-from detent.identify.read_table import READERS
+from detent.logs.agreement import FACTORS
+from detent.logs.differences import runs_of, window_rows
+from detent.logs.log import Action, Kind
+from detent.logs.read_log import read_log
+from detent.logs.read_table import READERS
 
 FEW = settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 seeds = st.integers(0, 2000)

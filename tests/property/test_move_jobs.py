@@ -7,8 +7,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from detent.errors import InputError
-from detent.planning.move_job import text_job
-from detent.simulation.move_file import load_moves
+from detent.methods.moves.job import text_job
+from detent.methods.moves.move_file import load_moves
 
 UNITS = {
     "target": {"m": Fraction(1), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from detent.errors import InputError
-from detent.planning import line_plan
-from detent.planning.diablo630_codes import CONTROL, ESCAPE
-from detent.planning.line_plan import Geometry, estimated_time, motion_time, plan_lines, run_speed
-from detent.planning.print_job import load_job, parse_diablo, parse_text
-from detent.planning.printed_page import PrintedCharacter, PrintLine
+from detent.methods.print_head import line_plan
+from detent.methods.print_head.diablo630_codes import CONTROL, ESCAPE
+from detent.methods.print_head.line_plan import Geometry, estimated_time, motion_time, plan_lines, run_speed
+from detent.methods.print_head.print_job import load_job, parse_diablo, parse_text
+from detent.methods.print_head.printed_page import PrintedCharacter, PrintLine
 
 codes = st.sampled_from(
     [bytes([byte]) for byte in CONTROL] + [b"\x1b" + bytes([byte]) for byte in ESCAPE] + [b"\x1b", b"a", b"b ", b"_"]

@@ -12,10 +12,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import detent
-from detent.axisfile.load import load_spec
 from detent.errors import InputError
-from detent.planning.sequence_faults import find_faults
-from detent.planning.sequence_job import (
+from detent.methods.load import load_spec
+from detent.methods.rotary_table.run import run_sequence
+from detent.methods.rotary_table.sequence_faults import find_faults
+from detent.methods.rotary_table.sequence_file import load_sequence
+from detent.methods.rotary_table.sequence_job import (
     MOST_STEPS,
     Go,
     Jog,
@@ -28,8 +30,6 @@ from detent.planning.sequence_job import (
     next_on,
     write_out,
 )
-from detent.simulation.sequence_file import load_sequence
-from detent.simulation.sequence_run import run_sequence
 
 TIMES = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)}
 

@@ -16,20 +16,20 @@ from hypothesis import strategies as st
 from tests.bad_files import example_text
 from tests.remedies import alternatives
 
-from detent.axisfile.cascade.build import build_cascade
-from detent.axisfile.check import check_spec
 from detent.axisfile.dump import dump_spec
-from detent.axisfile.fields import AnyName, is_list, leaf_fields, options_of, unit_of
-from detent.axisfile.filtered_servo.build import build_filtered_servo
-from detent.axisfile.load import axis_of
-from detent.axisfile.methods import METHODS
-from detent.axisfile.nearest import at_least, at_most
-from detent.axisfile.phase_servo.build import build_phase_servo
-from detent.axisfile.problems import dotted
-from detent.axisfile.rotary_table.build import build_rotary_table
-from detent.axisfile.source import parse_source
-from detent.axisfile.stepper_envelope.build import build_stepper, make_tables
 from detent.errors import InputError
+from detent.files.fields import AnyName, is_list, leaf_fields, options_of, unit_of
+from detent.files.nearest import at_least, at_most
+from detent.files.problems import dotted
+from detent.files.source import parse_source
+from detent.methods.cascade.build import build_cascade
+from detent.methods.check import check_spec
+from detent.methods.filtered_servo.build import build_filtered_servo
+from detent.methods.load import axis_of
+from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.registry import METHODS
+from detent.methods.rotary_table.build import build_rotary_table
+from detent.methods.stepper_envelope.build import build_stepper, make_tables
 from detent.units import parse_quantity
 
 

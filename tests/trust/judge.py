@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from detent.errors import InputError
-from detent.identify.estimate import Estimate
-from detent.identify.identification import Identification, identify
-from detent.identify.read_log import read_log
+from detent.identify.fit.estimate import Estimate
+from detent.identify.fit.identification import Identification, identify
+from detent.logs.read_log import read_log
 from tests.trust.plants import BAD, Case, make_case
 
 FIRST_BAD = 1_000_000

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from detent.methods.cascade.system import Cascade, CascadeParams, advance_along, fill_clocks, switch_on
 from detent.planning.profile import MotionLimits, Profile, plan_move, profile_of_recording
-from detent.systems.cascade import Cascade, CascadeParams, advance_along, fill_clocks, switch_on
 
 SUBSTEPS = 4
 """Ticks of the plant per sample."""

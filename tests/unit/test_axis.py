@@ -11,11 +11,11 @@ import pytest
 import detent
 from detent import axis as axis_module
 from detent.errors import DetentError, InputError
-from detent.planning.print_job import load_job
-from detent.report.print_report import print_report
-from detent.simulation.move_file import load_moves
-from detent.simulation.print_run import default_signals
-from detent.simulation.recorder import ROWS
+from detent.methods.moves.move_file import load_moves
+from detent.methods.print_head.print_job import load_job
+from detent.methods.print_head.report import print_report
+from detent.methods.print_head.run import default_signals
+from detent.record.recorder import ROWS
 
 pytestmark = pytest.mark.compiled
 

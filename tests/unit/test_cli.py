@@ -19,9 +19,9 @@ from typer.testing import CliRunner
 
 import detent
 from detent.cli import app
-from detent.report.words import GAP
-from detent.simulation.print_run import default_signals
-from detent.simulation.trace_files import load_trace
+from detent.methods.print_head.run import default_signals
+from detent.page.words import GAP
+from detent.record.trace_files import load_trace
 
 pytestmark = pytest.mark.compiled
 
@@ -299,7 +299,7 @@ def test_check_as_json_has_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     ).items()
     assert set(data["derived"][0]) == {"name", "value", "unit", "text", "formula"}
     assert [set(warning) for warning in data["warnings"]] == [{"name", "value", "limit", "consequence", "remedy"}]
-    monkeypatch.setattr("detent.axisfile.print_head.derive.Machine.acceleration", float("inf"))
+    monkeypatch.setattr("detent.methods.print_head.derive.Machine.acceleration", float("inf"))
     assert None in [row["value"] for row in call("check", AXIS, "--json").data["derived"]]  # not Infinity
 
 

@@ -9,8 +9,8 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.simulation.cascade_run import CASCADE_SIGNALS
-from detent.simulation.trace_files import load_trace
+from detent.methods.cascade.run import CASCADE_SIGNALS
+from detent.record.trace_files import load_trace
 
 pytestmark = pytest.mark.compiled
 

@@ -7,9 +7,9 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.simulation.move_run import FILTERED_SIGNALS, PHASE_SIGNALS
-from detent.simulation.trace_files import load_trace
-from detent.simulation.vcd_file import load_vcd
+from detent.methods.moves.run import FILTERED_SIGNALS, PHASE_SIGNALS
+from detent.record.trace_files import load_trace
+from detent.record.vcd_file import load_vcd
 
 pytestmark = pytest.mark.compiled
 

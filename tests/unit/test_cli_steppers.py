@@ -7,8 +7,8 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.simulation.trace_files import load_trace
-from detent.simulation.vcd_file import load_vcd
+from detent.record.trace_files import load_trace
+from detent.record.vcd_file import load_vcd
 
 pytestmark = pytest.mark.compiled
 

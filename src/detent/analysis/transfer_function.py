@@ -9,7 +9,7 @@ K    : K3·K4 [1/s²], drive word to acceleration in counts
 Tf   : lag of the filter in the speed path [s]; 0 without filter
 
 While Tf and the time the inertia takes are short against K2/K1, G is a first-order lag of K2/K1 whose reciprocal is the
-velocity-error constant. Windows and holds are not in it: `detent.analysis.sampled_loop` has them.
+velocity-error constant. Windows and holds are not in it: `sampled_loop` has them.
 """
 
 from dataclasses import dataclass

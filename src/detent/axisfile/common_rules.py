@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from detent.axisfile.findings import Contradiction
-from detent.axisfile.nearest import BARELY, at_least, at_most, either, put
 from detent.axisfile.tables import BurstTable, FrictionTables
+from detent.files.findings import Contradiction
+from detent.files.nearest import BARELY, at_least, at_most, either, put
 from detent.units import format_quantity
 
 BURST = "disturbance.lines.burst"

@@ -6,8 +6,8 @@ from typing import cast
 
 from pydantic.fields import FieldInfo
 
-from detent.axisfile.fields import Table, file_key, is_named, table_of, unit_of
 from detent.axisfile.tables import AxisSpec
+from detent.files.fields import Table, file_key, is_named, table_of, unit_of
 
 
 def dump_spec(spec: AxisSpec) -> str:

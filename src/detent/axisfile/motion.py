@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin
 from pydantic import create_model
 from pydantic.fields import FieldInfo
 
-from detent.axisfile.fields import Table, Unit, table_of
+from detent.files.fields import Table, Unit, table_of
 from detent.units import describe_kind
 
 TableT = TypeVar("TableT", bound=Table)

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
 
-from detent.axisfile.fields import Table, optional, required
-from detent.axisfile.quantities import (
+from detent.files.fields import Table, optional, required
+from detent.files.quantities import (
     Angle,
     BackEmfConstant,
     Current,

@@ -10,7 +10,7 @@ from detent.cli.identify import Columns, Effort, Mapping
 from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
 
 if TYPE_CHECKING:
-    from detent.identify.analyses import Analysis
+    from detent.identify.analyse.analyses import Analysis
 
 What = Annotated[
     list[str] | None,
@@ -47,8 +47,8 @@ def analyse(
     Exit status: 0 every question asked for has an answer, 1 some have none (the output says what is missing), 2 the
     input cannot be read.
     """
-    from detent.identify.analyses import ANALYSES, analyse, check_names
-    from detent.identify.read_log import read_log
+    from detent.identify.analyse.analyses import ANALYSES, analyse, check_names
+    from detent.logs.read_log import read_log
 
     names = list(dict.fromkeys(what or ANALYSES))
     check_names(names)

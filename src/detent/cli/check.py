@@ -7,8 +7,8 @@ from detent.cli.terminal import make_console, print_json, print_table
 @app.command()
 def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
     """Check an axis file: every value in effect and its origin, what follows from it, what looks wrong."""
-    from detent.axisfile.check import check_spec
-    from detent.axisfile.load import read_axis
+    from detent.methods.check import check_spec
+    from detent.methods.load import read_axis
 
     report = check_spec(read_axis(file, overrides or []))
     if as_json:

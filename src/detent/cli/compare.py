@@ -21,8 +21,8 @@ def compare(
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
-    from detent.report.figures import check_figure_path
-    from detent.report.methods import comparison_table, plot_comparison_of
+    from detent.methods.shown import comparison_table, plot_comparison_of
+    from detent.page.plots import check_figure_path
 
     check_figure_path(figure)
     axis = load(file, overrides or [])

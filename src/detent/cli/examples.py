@@ -79,7 +79,7 @@ def registers_command(
 
 def _registers_of(method: str) -> Any:
     """Class of the state of a method, named itself or by an axis file."""
-    from detent.axisfile.methods import METHODS
+    from detent.methods.registry import METHODS
 
     if method in METHODS:
         return METHODS[method].registers()

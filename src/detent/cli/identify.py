@@ -12,8 +12,8 @@ from detent.cli.terminal import make_console, print_json, print_table, progress_
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
-    from detent.identify.identification import Method
-    from detent.report.identified import Identified
+    from detent.identify.fit.identification import Method
+    from detent.identify.page.identified import Identified
 
 METHODS = {"regression": "regression", "output-error": "output error"}
 """Words of --method, and what the identification calls them."""
@@ -99,7 +99,7 @@ def identify(
     Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 the input
     cannot be read.
     """
-    from detent.report.identified import identify_axis
+    from detent.identify.page.identified import identify_axis
 
     _check_outputs(axis, write, job, report)
     chosen = cast("Method", _method(method))
@@ -207,7 +207,7 @@ def _print(done: "Identified", outside: list[str], files: _Files, *, asked: bool
 
 
 def _verdict_line(done: "Identified") -> str:
-    from detent.report.words import count
+    from detent.page.words import count
 
     found = done.found
     logs = " and ".join([log.name for log in found.logs[:2]]) if len(found.logs) < 3 else f"{len(found.logs)} logs"
@@ -240,7 +240,7 @@ def _print_refusals(console: Any, done: "Identified") -> None:
 
 def _print_logs(console: Any, found: Any) -> None:
     """What each log holds, what was wrong with it, what was guessed."""
-    from detent.report.words import count, duration, number
+    from detent.page.words import count, duration, number
 
     for log, run in zip(found.logs[:MOST_LINES], found.runs, strict=False):
         held = f"{count(len(log), 'sample')}, {duration(float(log.t[-1] - log.t[0]))} at {number(1 / run.step, 3)} Hz"
@@ -260,7 +260,7 @@ def _print_logs(console: Any, found: Any) -> None:
 
 
 def _print_constants(done: "Identified") -> None:
-    from detent.report.identify_words import is_known, written
+    from detent.identify.page.identify_words import is_known, written
 
     rows: list[tuple[str, ...]] = []
     for one in done.found.estimates:
@@ -290,7 +290,7 @@ def _print_ladder(found: Any) -> None:
 
 def _print_horizons(found: Any) -> None:
     """How far off the simulation is."""
-    from detent.report.identify_words import Ways
+    from detent.identify.page.identify_words import Ways
 
     ways = Ways(found.runs[0].position_unit)
     rows: list[tuple[str, ...]] = []

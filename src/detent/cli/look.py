@@ -32,7 +32,7 @@ def timing(
 ) -> None:
     """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
     from detent.axis import load
-    from detent.report.figures import check_figure_path
+    from detent.page.plots import check_figure_path
 
     check_figure_path(figure)
     axis = load(file, overrides or [])
@@ -76,7 +76,7 @@ def plot(
     as_json: Json = False,
 ) -> None:
     """Draw any recorded registers against time; without --signals, list them."""
-    from detent.simulation.trace_files import load_trace
+    from detent.record.trace_files import load_trace
 
     loaded = load_trace(trace)
     names = split_names(signals)
@@ -88,7 +88,7 @@ def plot(
         for row in rows:
             print(f"{row['name']:<28} {row['unit']:<10} {row['doc']}".rstrip())
         return
-    from detent.report.figures import plot_signals
+    from detent.page.plots import plot_signals
 
     begin, end = -math.inf if start is None else start, math.inf if stop is None else stop
     plot_signals(loaded, names, output, None if start is None and stop is None else (begin, end))

@@ -150,7 +150,7 @@ def _trace_kinds(formats: str) -> list[str]:
         if kind not in TRACE_KINDS:
             raise DetentError(f"--trace: came {kind!r}; allowed: h5, csv, parquet, comma-separated; choose of these")
     if "parquet" in kinds:
-        from detent.simulation.trace_files import need_parquet
+        from detent.record.trace_files import need_parquet
 
         need_parquet()
     return list(dict.fromkeys(kinds))
@@ -168,7 +168,7 @@ def _make_folder(folder: Path) -> None:
 
 def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
     """The HDF5 trace is there; make the others from it and drop it if it was not asked for."""
-    from detent.simulation.trace_files import convert_trace
+    from detent.record.trace_files import convert_trace
 
     store = folder / "trace.h5"
     for kind in kinds:

@@ -12,8 +12,11 @@ import sys
 from functools import cache
 from pathlib import Path
 
-STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "systems", "errors.py", "units.py")
-"""What a step can be made of; the rooms above (reports, command line) are not part of any compiled code."""
+STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "errors.py", "units.py")
+"""What a step can be made of, beside the `SYSTEM` of each method; other rooms are not part of any compiled code."""
+
+SYSTEM = "methods/*/system.py"
+"""The wiring and the tick of a method."""
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -49,12 +52,16 @@ def source_hash() -> str:
 def step_sources() -> list[Path]:
     """The hashed sources, sorted."""
     rooms = [PACKAGE / room for room in STEP_ROOMS]
-    return sorted(s for room in rooms for s in ([room] if room.is_file() else room.rglob("*.py")))
+    found = [s for room in rooms for s in ([room] if room.is_file() else room.rglob("*.py"))]
+    return sorted([*found, *PACKAGE.glob(SYSTEM)])
 
 
 def is_step_source(source: Path) -> bool:
     """True for a file whose edits change the hash: only its functions may be cached."""
-    return source.is_relative_to(PACKAGE) and source.relative_to(PACKAGE).parts[0] in STEP_ROOMS
+    if not source.is_relative_to(PACKAGE):
+        return False
+    place = source.relative_to(PACKAGE)
+    return place.parts[0] in STEP_ROOMS or place.match(SYSTEM)
 
 
 @cache

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from detent.errors import DetentError
-from detent.planning.move_job import MoveJob
+from detent.methods.moves.job import MoveJob
 
 Numbers = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import pytest
 
 from detent.axisfile import catalogue
 from detent.axisfile.catalogue import DC_MOTORS
-from detent.axisfile.fields import leaf_fields, unit_of
 from detent.axisfile.tables import MotorTable
+from detent.files.fields import leaf_fields, unit_of
 from detent.units import parse_quantity
 
 REAL = [name for name, entry in DC_MOTORS.entries().items() if not entry.get("inferred")]

@@ -7,11 +7,11 @@ import pytest
 from tests.bad_files import EXAMPLES, example_text
 
 from detent.axisfile.common_rules import Plant, inside_travel, time_constants
-from detent.axisfile.fields import held_leaves, unit_of
-from detent.axisfile.methods import METHODS
-from detent.axisfile.problems import dotted
 from detent.axisfile.tables import FrictionTable, FrictionTables
 from detent.errors import InputError
+from detent.files.fields import held_leaves, unit_of
+from detent.files.problems import dotted
+from detent.methods.registry import METHODS
 from detent.units import parse_quantity
 
 

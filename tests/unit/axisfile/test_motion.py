@@ -7,11 +7,11 @@ from pydantic import Field, ValidationError
 from tests.bad_files import example_text
 
 from detent.axisfile.dump import dump_spec
-from detent.axisfile.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of
-from detent.axisfile.methods import CASCADE
 from detent.axisfile.motion import ROTARY_UNITS, rotary_model, unit_in
-from detent.axisfile.quantities import Force, Length, Time
 from detent.errors import InputError
+from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of
+from detent.files.quantities import Force, Length, Time
+from detent.methods.registry import CASCADE
 from detent.units import KINDS, parse_quantity
 
 

@@ -145,7 +145,7 @@ def test_steps_outside_the_package_are_compiled_but_not_cached(package, tmp_path
     package.write("simulation/elsewhere.py", outside)  # a room whose edits do not change the hash
     program = """
         import elsewhere
-        from detent.simulation import elsewhere as above
+        from detent.record import elsewhere as above
 
         print(elsewhere.doubled(21), above.doubled(4), elsewhere.doubled.nopython_signatures != [])
     """
@@ -166,9 +166,10 @@ def test_a_cache_folder_that_cannot_be_made_does_not_stop_the_program(package, t
 
 def test_sources_of_the_hash_are_the_rooms_a_step_can_be_made_of():
     rooms = {source.relative_to(PACKAGE).parts[0] for source in cache.step_sources()}
-    assert rooms == set(cache.STEP_ROOMS)
+    assert rooms == {*cache.STEP_ROOMS, "methods"}
     assert cache.is_step_source(PACKAGE / "plant" / "drive_train.py")
-    assert not cache.is_step_source(PACKAGE / "report" / "html.py")
+    assert cache.is_step_source(PACKAGE / "methods" / "cascade" / "system.py")
+    assert not cache.is_step_source(PACKAGE / "methods" / "cascade" / "page.py")
     assert not cache.is_step_source(Path(__file__))
 
 

@@ -4,10 +4,10 @@ import hashlib
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numba
 import pytest
+from tests.places import ROOT
 from tests.print_head_rig import Rig
 
 from detent.kernel.compiled import byte_at, copy_back, local_copy
@@ -164,9 +164,6 @@ def test_byte_at_reads_raw_memory():
 def test_registers_of_another_class_are_another_type():
     with pytest.raises(Exception, match="Unknown attribute 'small' of type Registers"):
         through_blocks(Small(), 0)
-
-
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("fidelity", ["averaged", "switch-level"])

@@ -22,7 +22,7 @@ from detent.kernel.registers import (
     u2,
     u4,
 )
-from detent.systems.print_head import PrintHead, PrintHeadParams
+from detent.methods.print_head.system import PrintHead, PrintHeadParams
 
 
 class Widths(Registers):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from detent.errors import DetentError
+from detent.methods.moves.job import Move, MoveJob
 from detent.planning import profile as profile_module
-from detent.planning.move_job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_job, plan_move, profile_of_recording
 
 T = 1e-3

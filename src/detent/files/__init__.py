@@ -1,0 +1,1 @@
+"""What a text file of detent says: places, problems, fields, units."""

@@ -1,0 +1,99 @@
+"""The value nearest to a refused one that would do, as a message names it: ready to be copied into the file."""
+
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic.fields import FieldInfo
+
+from detent.files.fields import Table, unit_of
+from detent.files.problems import field_at
+from detent.units import IN_DEGREES, format_quantity, in_degrees, parse_quantity
+
+BARELY = 1e-9
+"""Relative distance that a value keeps from a bound it must not touch."""
+
+
+def at_most(value: float, unit: str, digits: int = 4) -> str:
+    """Write the largest short number that is not above a bound, in quotes as in the file.
+
+    Parameters
+    ----------
+    value : float
+        The bound in `unit`, above 0.
+    unit : str
+        A unit of `units.KINDS` that is written with a prefix of powers of ten, or in degrees.
+    digits : int
+        Significant digits.
+
+    Examples
+    --------
+    >>> at_most(0.407166, "m/s")
+    '"407.1 mm/s"'
+    """
+    return _written(value, unit, digits, ROUND_FLOOR)
+
+
+def at_least(value: float, unit: str, digits: int = 4) -> str:
+    """Write the smallest short number that is not below a bound; parameters as `at_most`.
+
+    Examples
+    --------
+    >>> at_least(0.407166, "m/s")
+    '"407.2 mm/s"'
+    """
+    return _written(value, unit, digits, ROUND_CEILING)
+
+
+def _written(value: float, unit: str, digits: int, rounding: str) -> str:
+    if unit in IN_DEGREES:
+        shown, name = in_degrees(value, unit)  # what is rounded is the number that is written
+        return f'"{_rounded(shown, digits, rounding):.{digits}g} {name}"'
+    return f'"{format_quantity(_rounded(value, digits, rounding), unit, digits)}"'
+
+
+def _rounded(value: float, digits: int, rounding: str) -> float:
+    # The shortest text of a float reads back as the same float, so that rounding it keeps to the bound.
+    shortest = Decimal(repr(value))
+    return float(shortest.quantize(Decimal(1).scaleb(shortest.adjusted() - digits + 1), rounding))
+
+
+def put(key: str, text: object) -> str:
+    """One remedy: the key with the value that would do."""
+    return f"set {key} = {text}"
+
+
+def offer(model: type[Table], key: str, text: object) -> str:
+    """`put`, if the key accepts the value at all; empty where the value lies beyond the key's own bounds.
+
+    Parameters
+    ----------
+    model : type of Table
+        Model of the whole file.
+    key : str
+        Dotted key of a number or a quantity.
+    text : object
+        A number, or a quantity in quotes.
+    """
+    field = field_at(model, tuple(key.split(".")))
+    unit = unit_of(field)
+    value = parse_quantity(str(text).strip('"'), unit) if unit else float(str(text))
+    return put(key, text) if _accepts(field, value) else ""
+
+
+def _accepts(field: FieldInfo, value: float) -> bool:
+    """True when a value lies within the bounds of a field."""
+    for bound in field.metadata:
+        if isinstance(bound, Ge | Gt):
+            least = float(str(bound.ge if isinstance(bound, Ge) else bound.gt))
+            if value < least or (value == least and isinstance(bound, Gt)):
+                return False
+        elif isinstance(bound, Le | Lt):
+            most = float(str(bound.le if isinstance(bound, Le) else bound.lt))
+            if value > most or (value == most and isinstance(bound, Lt)):
+                return False
+    return True
+
+
+def either(*remedies: str) -> str:
+    """Join remedies of which each would do; empty ones are left out."""
+    return " or ".join(remedy for remedy in remedies if remedy)

@@ -1,0 +1,316 @@
+"""What validation found, told to a person: from pydantic's errors to `FileProblem`."""
+
+import difflib
+import re
+from collections.abc import Iterator, Sequence
+from itertools import takewhile
+from typing import Any, cast
+
+from pydantic.fields import FieldInfo
+
+from detent.errors import FileProblem
+from detent.files.fields import (
+    AnyName,
+    Table,
+    bounds_of_length,
+    describe_allowed,
+    example_of,
+    extra_of,
+    file_key,
+    is_list,
+    is_named,
+    leaf_fields,
+    list_example,
+    named_as,
+    options_of,
+    table_of,
+    unit_of,
+)
+from detent.files.locate import Path, Place, find_place
+from detent.units import format_quantity
+
+MAX_SHOWN = 60
+"""Characters of a value shown in a message."""
+
+MAX_ELEMENTS = 3
+"""Wrong numbers of a list shown in a message."""
+
+
+class Reporter:
+    """Makes problems of one file (and its overrides) with their places.
+
+    Parameters
+    ----------
+    file : str
+        The file as the user named it.
+    places : dict
+        Where its keys stand.
+    overrides : dict
+        Text of each value given by ``--set``, by path.
+    root : type of Table
+        Model of the whole file.
+    """
+
+    def __init__(self, file: str, places: dict[Path, Place], overrides: dict[Path, str], root: type[Table]) -> None:
+        self._file = file
+        self._places = places
+        self._overrides = overrides
+        self._root = root
+
+    def problem(self, path: Path, came: str, allowed: str, remedy: str) -> FileProblem:
+        """Problem of a key, at its place."""
+        if path in self._overrides:
+            return FileProblem("--set", 0, 0, dotted(path), came, allowed, remedy)
+        place = find_place(self._places, path)
+        return FileProblem(self._file, place.line, place.column, dotted(path), came, allowed, remedy)
+
+    def is_stated(self, path: Path) -> bool:
+        """True when the file or an override gives this key."""
+        return path in self._overrides or path in self._places
+
+    def came(self, path: Path, value: object = None) -> str:
+        """Value of a key as it was written."""
+        text = self._overrides.get(path) or (self._places[path].text if path in self._places else repr(value))
+        return _shortened(text)
+
+    def from_errors(self, errors: Sequence[dict[str, Any]]) -> FileProblem:
+        """Problem for pydantic's errors about one key (entries of ``ValidationError.errors()``).
+
+        There is more than one only where several numbers of a list are wrong.
+        """
+        error = errors[0]
+        path = key_path(error["loc"])
+        if error["type"] == "extra_forbidden":
+            return self._unknown_key(path, error["input"])
+        field = field_at(self._root, path)
+        if is_named(field) and error["type"] in {"too_short", "too_long"}:
+            return self._wrong_number(path, field, len(error["input"]))
+        if error["type"] == "missing":
+            return self._missing(path, field)
+        if table_of(field) is not None:
+            return self._not_a_table(path, error["input"])
+        if is_list(field):
+            return self._bad_list(path, field, errors)
+        return self._bad_value(path, field, error)
+
+    def _unknown_key(self, path: Path, value: object) -> FileProblem:
+        """Unknown key: name the nearest known one, or the table it belongs to."""
+        *around, key = path
+        keys = known_keys(self._root, tuple(around))
+        what = f"the unknown table [{dotted(path)}]" if isinstance(value, dict) else f'the unknown key "{key}"'
+        place = f"in [{dotted(around)}]" if around else "at the top of the file"
+        near = nearest_key(self._root, path)
+        elsewhere = [known for known, _ in leaf_fields(self._root) if known[-1] == key]
+        if near:
+            remedy = f'did you mean "{near}"?'
+        elif elsewhere:
+            remedy = f"move it to [{dotted(named_as(elsewhere[0][:-1], path))}]"
+        else:
+            remedy = "remove it, or look the key up with `detent check` or in the reference"
+        return self.problem(path, what, f"{place}: {', '.join(keys)}", remedy)
+
+    def wrong_name(self, path: Path, field: FieldInfo) -> FileProblem:
+        """Problem of a table whose name will not do."""
+        remedy = f"rename it, as in [{dotted((*path[:-1], example_of(field)))}]"
+        return self.problem(path, f'the name "{path[-1]}"', extra_of(field, "allowed"), remedy)
+
+    def _wrong_number(self, path: Path, field: FieldInfo, came: int) -> FileProblem:
+        """Too few or too many tables that the user names."""
+        least, most = bounds_of_length(field)
+        table = dotted((*path, example_of(field)))
+        remedy = f"add [{table}] ({field.description})" if came < least else "remove some"
+        return self.problem(path, f"{came} tables", f"{least} to {most} tables such as [{table}]", remedy)
+
+    def _missing(self, path: Path, field: FieldInfo) -> FileProblem:
+        """Missing key or table: say what to add, and where."""
+        table = table_of(field)
+        if is_named(field):
+            return self._wrong_number(path, field, 0)
+        if table is not None:
+            keys = [dotted(known) for known, leaf in leaf_fields(table) if leaf.is_required()]
+            remedy = f"add [{dotted(path)}] with {', '.join(keys)}"
+            return self.problem(path, "nothing", f"the table [{dotted(path)}]", remedy)
+        where = f"in [{dotted(path[:-1])}]"
+        remedy = f"add {path[-1]} = {example_of(field)} {where} ({field.description})"
+        if "catalogue" in known_keys(self._root, path[:-1]):
+            remedy = f"{remedy}, or name a motor of the catalogue that has it"
+        return self.problem(path, "nothing", describe_allowed(field), remedy)
+
+    def _not_a_table(self, path: Path, value: object) -> FileProblem:
+        """Report a value where a table must stand, or several tables where there is one."""
+        keys = ", ".join(known_keys(self._root, path))
+        if is_named(field_at(self._root, path)):
+            table = dotted((*path, example_of(field_at(self._root, path))))
+            came = "a list" if isinstance(value, list) else self.came(path, value)
+            remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
+            return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
+        if isinstance(value, list):
+            remedy = f"write [{dotted(path)}] once, with single brackets: one file describes one axis"
+            return self.problem(path, "a list", f"one table [{dotted(path)}]", remedy)
+        remedy = f"write [{dotted(path)}] on a line of its own and its keys below it"
+        return self.problem(path, self.came(path, value), f"the table [{dotted(path)}] with {keys}", remedy)
+
+    def _bad_value(self, path: Path, field: FieldInfo, error: dict[str, Any]) -> FileProblem:
+        """Report a value of the wrong kind or outside its range."""
+        came = self.came(path, error["input"])
+        allowed = describe_allowed(field)
+        remedy = f"give {path[-1]} a value in this range ({field.description})"
+        if error["type"] == "quantity":
+            remedy = str(error["ctx"]["remedy"])
+        elif options_of(field):
+            remedy = f'write "{_nearest_option(str(error["input"]), options_of(field))}"'
+        elif error["type"].endswith("_type"):
+            remedy = _type_remedy(path[-1], field, error["input"])
+        return self.problem(path, came, allowed, remedy)
+
+    def _bad_list(self, path: Path, field: FieldInfo, errors: Sequence[dict[str, Any]]) -> FileProblem:
+        """Report what is no list, a list of the wrong length, or wrong numbers in a list."""
+        kinds = {error["type"] for error in errors}
+        example = f"{path[-1]} = {list_example(field)}"
+        remedy = f"give every number of {path[-1]} a value in this range ({field.description})"
+        if kinds & {"too_long", "too_short"}:
+            came = f"{len(errors[0]['input'])} numbers"
+            remedy = f"give {path[-1]} so many numbers ({field.description})"
+        elif "list_type" in kinds:
+            came = self.came(path, errors[0]["input"])
+            remedy = f"write {'quantities' if unit_of(field) else 'whole numbers'} in brackets, as in {example}"
+        else:
+            came = ", ".join(_wrong_elements(errors))
+        if kinds & {"int_type", "int_parsing_size"}:
+            remedy = f"write every element as a whole number, as in {example}"
+        elif "quantity" in kinds:
+            remedy = f"write every element as text with a unit, as in {example}"
+        return self.problem(path, came, describe_allowed(field), remedy)
+
+
+def key_path(location: Sequence[str | int]) -> Path:
+    """Path of the key at a location of pydantic's, which may go on into a list by a number."""
+    return tuple(str(part) for part in takewhile(lambda part: isinstance(part, str), location) if part != "[key]")
+
+
+def field_at(root: type[Table], path: Path) -> FieldInfo:
+    """Declaration of the key at a path.
+
+    Raises
+    ------
+    KeyError
+        The schema has no such key.
+    """
+    table: type[Table] | None = root
+    field: FieldInfo | None = None
+    for key in path:
+        if field is not None and is_named(field):
+            # One of the tables, whatever its name: a required table like any other.
+            field = FieldInfo(annotation=table, description=field.description)
+            continue
+        fields = {
+            file_key(name, candidate): candidate for name, candidate in (table.model_fields if table else {}).items()
+        }
+        field = fields[key]
+        table = table_of(field)
+    if field is None:
+        raise KeyError(path)
+    return field
+
+
+def known_keys(root: type[Table], path: Path) -> list[str]:
+    """Keys a table of the schema knows."""
+    field = field_at(root, path) if path else None
+    if field is not None and is_named(field):
+        return [AnyName(extra_of(field, "name"))]
+    table = root if field is None else table_of(field)
+    return [file_key(name, field) for name, field in table.model_fields.items()] if table else []
+
+
+def nearest_key(root: type[Table], path: Path) -> str:
+    """Known key that an unknown one was probably meant to be; empty when none is near."""
+    near = difflib.get_close_matches(path[-1].lower(), known_keys(root, path[:-1]), n=1, cutoff=0.6)
+    return near[0] if near else ""
+
+
+def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[tuple[Path, FieldInfo]]:
+    """Names of the user's own tables that will not do: their paths, each with the declaration of the tables."""
+    if not isinstance(tables, dict):
+        return
+    held = cast("dict[str, object]", tables)
+    for name, field in root.model_fields.items():
+        key = file_key(name, field)
+        below, value = table_of(field), held.get(key)
+        if below is None or not isinstance(value, dict):
+            continue
+        if not is_named(field):
+            yield from bad_names(below, cast("object", value), (*prefix, key))
+            continue
+        for own, table in cast("dict[str, object]", value).items():
+            if not re.fullmatch(extra_of(field, "pattern"), own):
+                yield (*prefix, key, own), field
+            yield from bad_names(below, table, (*prefix, key, own))
+
+
+def dotted(path: Sequence[str]) -> str:
+    """Key as written in messages; parts that need quotes get them."""
+    return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in path)
+
+
+def _shortened(text: str) -> str:
+    """First line of a text, and no more of it than a message has room for."""
+    first, *more = text.splitlines() or [""]
+    return f"{first[:MAX_SHOWN]}..." if more or len(first) > MAX_SHOWN else first
+
+
+def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Tell which elements of a list are wrong, the first of them in full."""
+    for error in errors[:MAX_ELEMENTS]:
+        value = error["input"]
+        text = str(value).lower() if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
+        index = next(part for part in error["loc"] if isinstance(part, int))
+        yield f"{_shortened(text)} as element {index + 1}"
+    if len(errors) > MAX_ELEMENTS:
+        yield f"and {len(errors) - MAX_ELEMENTS} more"
+
+
+def _nearest_option(came: str, options: tuple[str, ...]) -> str:
+    """The option most like what came; the first when none is."""
+    near = difflib.get_close_matches(came.lower(), options, n=1, cutoff=0.0)
+    return near[0] if near else options[0]
+
+
+def _type_remedy(key: str, field: FieldInfo, value: object) -> str:
+    """What to do about a value of the wrong type."""
+    if field.annotation is bool:
+        return f"write {key} = true or {key} = false, without quotes"
+    if field.annotation is str:
+        return f'put it in quotes: {key} = "{value}"'
+    if isinstance(value, str):
+        return f"write the number without quotes and without a unit, as in {key} = {_example_number(field)}"
+    kind = "a whole number" if field.annotation is int else "a number"
+    return f"write {kind}, as in {key} = {_example_number(field)}"
+
+
+def _example_number(field: FieldInfo) -> str:
+    """Number that would do: the example, or the default."""
+    return example_of(field) or str(field.default)
+
+
+def default_text(field: FieldInfo) -> str:
+    """Default of a key in words; empty when it has none."""
+    if field.is_required():
+        return ""
+    derived = extra_of(field, "derived")
+    if derived:
+        return derived
+    return format_value(field, field.default)
+
+
+def format_value(field: FieldInfo, value: object) -> str:
+    """Value of a field as a person writes it: quantities with units, words and numbers as in the file."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    unit = unit_of(field)
+    if unit and isinstance(value, float):
+        return format_quantity(value, unit)
+    if unit and isinstance(value, list):
+        return ", ".join(format_quantity(one, unit) for one in cast("list[float]", value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,185 @@
+"""The text of an axis file: read, parsed as far as it can be, with every error of syntax."""
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from detent.errors import FileProblem, InputError
+from detent.files.locate import Place, locate_keys
+
+MAX_BYTES = 1_000_000
+"""Largest axis file read; a real one has a few thousand bytes."""
+
+MAX_SYNTAX_PROBLEMS = 20
+"""Syntax errors reported at most: a file of another kind would have one in each line."""
+
+_POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+_ASSIGNMENT = re.compile(r"\s*[\w.\"' -]+=")
+_UNQUOTED_QUANTITY = re.compile(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?\s*[A-Za-z%µΩ][^\"']*")
+_UNQUOTED_WORD = re.compile(r"[A-Za-z_][\w -]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An axis file after reading.
+
+    Attributes
+    ----------
+    file : str
+        The file as the user named it.
+    tables : dict
+        What TOML makes of the text, lines with syntax errors left out.
+    places : dict
+        Where each key stands.
+    problems : tuple of FileProblem
+        Errors of syntax.
+    is_whole : bool
+        False when lines were left out: then a missing key proves nothing.
+    is_readable : bool
+        False when not even the tables are trustworthy.
+    """
+
+    file: str
+    tables: dict[str, Any]
+    places: dict[tuple[str, ...], Place]
+    problems: tuple[FileProblem, ...] = ()
+    is_whole: bool = True
+    is_readable: bool = True
+
+
+def read_source(path: Path | str) -> Source:
+    """Read and parse an axis file.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is no text.
+    """
+    return parse_source(str(path), _read_text(Path(path)))
+
+
+def parse_source(file: str, text: str) -> Source:
+    """Parse the text of an axis file; each line with a syntax error is reported and left out."""
+    problems: list[FileProblem] = []
+    lines = text.splitlines()
+    trustworthy = True
+    while len(problems) < MAX_SYNTAX_PROBLEMS:
+        try:
+            tables = tomllib.loads("\n".join(lines))
+        except (ValueError, RecursionError) as error:
+            row, column, reason = _where(error, lines)
+            problems.append(_syntax_problem(file, row, column, reason, lines[row - 1] if lines else ""))
+            trustworthy = trustworthy and _ASSIGNMENT.match(lines[row - 1]) is not None
+            if not trustworthy:
+                break
+            lines[row - 1] = ""
+        else:
+            places = locate_keys("\n".join(lines))
+            return Source(file, tables, places, tuple(problems), is_whole=not problems)
+    return Source(file, {}, {}, tuple(problems), is_whole=False, is_readable=False)
+
+
+def _read_text(path: Path) -> str:
+    """Text of a file, or an `InputError` that says why there is none."""
+    remedy = "name an axis file; `detent examples` copies one to start from"
+    try:
+        content = path.read_bytes() if path.stat().st_size <= MAX_BYTES else None
+    except FileNotFoundError:
+        raise InputError.of_file(str(path), "no such file", "an axis file (TOML)", remedy) from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError.of_file(
+            str(path), f"a file that cannot be read ({reason})", "an axis file (TOML)", remedy
+        ) from None
+    except ValueError:
+        raise InputError.of_file(repr(str(path)), "a name no file can have", "an axis file (TOML)", remedy) from None
+    if content is None:
+        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", "an axis file (TOML)", remedy)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        problem = FileProblem(
+            str(path), line, 1, "", f"the byte 0x{content[error.start]:02X}", "UTF-8 text", "save the file as UTF-8"
+        )
+        raise InputError([problem]) from None
+    if not text.strip():
+        raise InputError.of_file(str(path), "an empty file", "an axis file (TOML)", remedy)
+    return text
+
+
+def _where(error: Exception, lines: list[str]) -> tuple[int, int, str]:
+    """Line, column and reason of a parser's error; places past the end become the last line that says something."""
+    if isinstance(error, RecursionError):
+        return _deepest(lines), 1, "brackets nested too deeply"
+    found = _POSITION.search(str(error))
+    reason = str(error)[: found.start()] if found else str(error)
+    if found and found.group(1):
+        row, column = int(found.group(1)), int(found.group(2))
+        return min(row, len(lines)), column, reason
+    if found is None:
+        return _longest_number(lines), 1, reason
+    row = next((index for index in range(len(lines), 0, -1) if lines[index - 1].strip()), 1)
+    return row, len(lines[row - 1]) + 1, reason
+
+
+def _deepest(lines: list[str]) -> int:
+    """Line with the most opening brackets."""
+    return max(range(len(lines)), key=lambda index: lines[index].count("[") + lines[index].count("{")) + 1
+
+
+def _longest_number(lines: list[str]) -> int:
+    """Line with the most digits: the only error without a place is a whole number of thousands of digits."""
+    return max(range(len(lines)), key=lambda index: sum(char.isdigit() for char in lines[index])) + 1
+
+
+def _syntax_problem(file: str, row: int, column: int, reason: str, line: str) -> FileProblem:
+    """Say what is wrong with a line of TOML, with the usual cause named."""
+    bare = _without_comment(line).strip()
+    shown = f"`{bare[:60]}{'...' if len(bare) > 60 else ''}`" if bare else "the end of the file"
+    key, remedy = next(_usual_causes(bare, reason), ("", f"correct the line ({_lower_first(reason)})"))
+    return FileProblem(file, row, column, key, shown, 'TOML: `key = value`, text and quantities in "quotes"', remedy)
+
+
+def _without_comment(line: str) -> str:
+    """Line up to its comment, if it has one outside quotes."""
+    parts = line.split("#")
+    for count in range(1, len(parts)):
+        before = "#".join(parts[:count])
+        if before.count('"') % 2 == 0:
+            return before
+    return line
+
+
+def _usual_causes(line: str, reason: str) -> Iterator[tuple[str, str]]:
+    """Key and remedy of the slips people make most."""
+    key, equals, value = (part.strip() for part in line.partition("="))
+    if equals and not value:
+        yield key, f"give {key} a value, or remove the line"
+    if "4300 digits" in reason:
+        yield key, "write a number of fewer digits"
+    if equals and _UNQUOTED_QUANTITY.fullmatch(value):
+        yield key, f'put the quantity in quotes: {key} = "{value}"'
+    if equals and value.lower() in {"true", "false", "yes", "no", "on", "off"}:
+        yield key, f"write {key} = {'true' if value.lower() in {'true', 'yes', 'on'} else 'false'}"
+    if equals and _UNQUOTED_WORD.fullmatch(value):
+        yield key, f'put the text in quotes: {key} = "{value}"'
+    if "Cannot overwrite" in reason:
+        yield key, "remove one of the two lines that set this key"
+    if "Cannot declare" in reason:
+        yield line.strip("[] "), "merge this table with the earlier one of the same name"
+    if line.count('"') % 2 == 1:
+        yield key if equals else "", "close the quotes"
+    if line.startswith("[") and "]" not in line:
+        yield line.strip("[ "), "close the bracket of the table's name"
+    colon = re.fullmatch(r"([\w.]+)\s*:\s*(\S.*)", line)
+    if colon:
+        yield colon.group(1), f"write = between key and value: {colon.group(1)} = {colon.group(2)}"
+
+
+def _lower_first(text: str) -> str:
+    """Make a parser's sentence part of ours."""
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,1 @@
+"""What one log tells without a model of the whole axis."""

@@ -1,0 +1,201 @@
+"""What else a log can tell, each by its own method: asked for by name, answered with limits or with what is missing."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from detent.errors import DetentError
+from detent.identify.analyse.encoder_resolution import estimate_resolution
+from detent.identify.analyse.friction_map import map_friction
+from detent.identify.analyse.measure_response import response_of
+from detent.identify.analyse.resonances import fit_resonances
+from detent.identify.analyse.step_metrics import measure_steps
+from detent.identify.analyse.two_speeds import fit_two_speeds
+from detent.identify.analyse.winding import fit_winding
+from detent.identify.fit.dead_time import find_dead_time
+from detent.identify.fit.estimate import Estimate, estimate
+from detent.logs.log import Log
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """What one method says about one log.
+
+    Attributes
+    ----------
+    name, title : str
+        The word it is asked for by, and a few words for people.
+    log : str
+        Name of the log.
+    estimates : tuple of Estimate
+        What was found.
+    reason : str
+        Why there is nothing, or why it is not to be trusted; empty where neither is so.
+    notes : tuple of str
+        What to know about it.
+    details : dict
+        All of it, as plain data for JSON.
+    """
+
+    name: str
+    title: str
+    log: str
+    estimates: tuple[Estimate, ...]
+    reason: str
+    notes: tuple[str, ...]
+    details: dict[str, Any]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; a number that is not finite is None."""
+        return {"analysis": self.name, "log": self.log, "reason": self.reason, **_finite(self.details)}
+
+
+Found = tuple[tuple[Estimate, ...], str, tuple[str, ...], dict[str, Any]]
+
+
+def _two_speeds(log: Log, effort: str, _: float) -> Found:
+    found = fit_two_speeds(log, effort)
+    notes = (*found.positive.notes, *found.negative.notes)
+    partly = tuple(f"{line.direction}: {line.reason}" for line in (found.positive, found.negative) if line.reason)
+    return found.estimates, found.reason, notes if found.reason else (*partly, *notes), found.to_dict()
+
+
+def _friction_map(log: Log, effort: str, mass: float) -> Found:
+    found = map_friction(log, effort, mass)
+    bins = tuple(
+        estimate(
+            f"at {speed:.4g} {found.speed_unit}", friction, found.unit, error, "mean of a bin of the speed", windows
+        )
+        for speed, friction, error, windows in zip(
+            found.speed.tolist(), found.friction.tolist(), found.error.tolist(), found.windows.tolist(), strict=True
+        )
+    )
+    dips = tuple(
+        f"{dip.direction}: friction falls by {dip.depth.value:.3g} {found.unit} from the lowest speed "
+        f"to {dip.speed:.3g} {found.speed_unit}"
+        for dip in found.dips
+        if dip.is_found and dip.depth is not None
+    )
+    return bins, found.reason, (*dips, *found.refused), found.to_dict()
+
+
+def _winding(log: Log, _: str, __: float) -> Found:
+    found = fit_winding(log)
+    return found.estimates, found.reason, found.notes, found.to_dict()
+
+
+def _steps(log: Log, _: str, __: float) -> Found:
+    found = measure_steps(log)
+    named = tuple(
+        replace(one, name=f"step {number}, {one.name}")
+        for number, step in enumerate(found.steps, 1)
+        for one in step.estimates
+    )
+    notes = tuple(note for step in found.steps for note in step.notes)
+    return named, found.reason, (*found.notes, *notes), found.to_dict()
+
+
+def _frequency(log: Log, effort: str, _: float) -> Found:
+    has_load = "position_load" in log.signals
+    motor = response_of(log, effort or None) if "position" in log.signals or not has_load else None
+    load = response_of(log, effort or None, "position_load") if has_load else None
+    found = fit_resonances(motor, load, hold=log.period)
+    lines = found.frequency
+    notes = (f"{len(lines)} lines from {lines[0]:.3g} to {lines[-1]:.3g} Hz, encoder of {' and '.join(found.outputs)}",)
+    measured = {name: response for name, response in (("motor", motor), ("load", load)) if response is not None}
+    details = found.to_dict() | {"coherence": {name: one.coherence.tolist() for name, one in measured.items()}}
+    return tuple(found.estimates.values()), found.reason, notes, details
+
+
+def _sensors(log: Log, effort: str, _: float) -> Found:
+    resolution = estimate_resolution(log.signals["position"])
+    counts = f"{resolution.counts} counts, {resolution.share:.0%} of the positions on the grid"
+    told: list[Estimate] = []
+    notes = [resolution.reason or counts]
+    details: dict[str, Any] = {"resolution": resolution.step, "counts": resolution.counts, "share": resolution.share}
+    if np.isfinite(resolution.step):
+        unit = log.units["position"]
+        told.append(estimate("resolution", resolution.step, unit, 0.0, "step common to all positions"))
+    role = effort or next(
+        (name for name in ("force", "torque", "current", "voltage", "command") if name in log.signals), ""
+    )
+    if role:
+        dead = find_dead_time(log.t, log.signals[role], log.signals["position"])
+        told.append(dead.estimate)
+        notes += [dead.reason] if dead.reason else []
+        details["dead_time"] = dead.to_dict()
+    return tuple(told), "" if told else notes[0], tuple(notes), details
+
+
+ANALYSES: dict[str, tuple[str, Callable[[Log, str, float], Found]]] = {
+    "two-speeds": ("slope and friction from steady speeds", _two_speeds),
+    "friction-map": ("friction over the speed", _friction_map),
+    "winding": ("resistance, inductance and constants of the winding", _winding),
+    "frequency": ("frequency response, resonances and two masses", _frequency),
+    "steps": ("answers to steps of the reference", _steps),
+    "sensors": ("step of the encoder, dead time of the drive", _sensors),
+}
+"""Every analysis by the word it is asked for by: what it finds, and what finds it."""
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Refuse a name that no analysis has.
+
+    Raises
+    ------
+    DetentError
+        Naming those there are.
+    """
+    for name in names:
+        if name not in ANALYSES:
+            raise DetentError(f"analysis: came {name}; allowed: {', '.join(ANALYSES)}; name one of these")
+
+
+def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysis:
+    """Ask a log for one thing.
+
+    Parameters
+    ----------
+    log : Log
+        As `read_log` gives it.
+    name : str
+        A key of `ANALYSES`.
+    effort : str
+        Role of the signal that drives the axis; the first that the log holds by default.
+    mass : float
+        Effort per acceleration, where it is known: the friction map then needs no steady speeds.
+
+    Returns
+    -------
+    Analysis
+        With a reason where the log cannot tell.
+
+    Raises
+    ------
+    DetentError
+        There is no analysis of that name.
+    """
+    check_names([name])
+    title, method = ANALYSES[name]
+    try:
+        estimates, reason, notes, details = method(log, effort, mass)
+    except DetentError as error:
+        return Analysis(name, title, log.name, (), str(error), (), {})
+    return Analysis(name, title, log.name, estimates, reason, notes, details)
+
+
+def _finite(value: Any) -> Any:
+    """Plain data with None for every number that is not finite."""
+    if isinstance(value, dict):
+        known = cast("dict[str, Any]", value)
+        return {key: _finite(one) for key, one in known.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in cast("list[Any]", value)]
+    if isinstance(value, np.ndarray):
+        return _finite(value.tolist())
+    if isinstance(value, float | np.floating):
+        number = float(value)  # pyright: ignore[reportUnknownArgumentType]
+        return number if np.isfinite(number) else None
+    return value

@@ -1,0 +1,105 @@
+"""A measured frequency response, with its coherence and its scatter.
+
+`measure_response` makes one of a recording, `resonances` takes resonances from it.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.logs.log import Values
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Response of an axis at some frequencies.
+
+    Attributes
+    ----------
+    frequency : ndarray
+        Rising [Hz], shape (n,).
+    response : ndarray of complex
+        Output over input, shape (n,).
+    coherence : ndarray
+        Part of the power of the output that the input explains, 0..1, shape (n,).
+    deviation : ndarray
+        Standard deviation of the response: of its magnitude, as a part of it, and of its phase [rad]; shape (n,).
+    averages : float
+        Periods, or independent windows, that were averaged.
+    resolution : float
+        Width over which the response is an average [Hz]; 0 for a periodic excitation.
+    method : str
+        How it was found, with its figures.
+    input_unit, output_unit : str
+        Units of the two, empty for a pure number.
+    """
+
+    frequency: Values
+    response: Complex
+    coherence: Values
+    deviation: Values
+    averages: float
+    resolution: float
+    method: str
+    input_unit: str = ""
+    output_unit: str = ""
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    @property
+    def magnitude(self) -> Values:
+        """Magnitude, in units of the output per unit of the input, shape (n,)."""
+        return np.abs(self.response)
+
+    @property
+    def phase(self) -> Values:
+        """Phase without jumps [rad], shape (n,)."""
+        return np.unwrap(np.angle(self.response))
+
+    def within(self, low: float, high: float) -> "FrequencyResponse":
+        """The part between two frequencies [Hz], both included."""
+        inside = (self.frequency >= low) & (self.frequency <= high)
+        return replace(
+            self,
+            frequency=self.frequency[inside],
+            response=self.response[inside],
+            coherence=self.coherence[inside],
+            deviation=self.deviation[inside],
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        series = ("frequency", "magnitude", "phase", "coherence", "deviation")
+        single = ("averages", "resolution", "method", "input_unit", "output_unit")
+        return {name: getattr(self, name).tolist() for name in series} | {name: getattr(self, name) for name in single}
+
+
+def response_deviation(coherence: Values, averages: float) -> Values:
+    """Standard deviation of a response by its coherence.
+
+    ``sqrt((1 - g2) / (2 n g2))``: J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, section 9.2.4.
+
+    Parameters
+    ----------
+    coherence : ndarray
+        0..1, shape (n,).
+    averages : float
+        Independent averages.
+
+    Returns
+    -------
+    ndarray
+        Of the magnitude, as a part of it, and of the phase [rad], shape (n,).
+
+    Examples
+    --------
+    >>> response_deviation(np.array([0.9]), 10).round(4)
+    array([0.0745])
+    """
+    safe = np.clip(coherence, 1e-12, 1.0)
+    return np.sqrt((1.0 - safe) / (2.0 * averages * safe))

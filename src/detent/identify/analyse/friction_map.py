@@ -1,0 +1,335 @@
+"""Friction over the speed: effort less its inertia part, averaged per bin of speed and direction.
+
+What remains of the effort of an axis when ``mass * acceleration`` is taken away is friction, whatever its law. It is
+averaged in bins of speed, finer towards rest, where friction changes most. Without a mass only steady stretches are
+used (`detent.identify.fit.steady`).
+
+The residual about such an average is coloured: friction depends on the position, and filters smear noise. The recording
+is therefore cut into windows much longer than its residual remembers; what one window adds to a bin counts as one
+observation, and the interval of the bin comes from the scatter of the windows (ratio estimator of cluster sampling:
+Cochran, Sampling Techniques, 3rd ed. 1977, 6.3). A bin with too few windows is refused.
+
+Stribeck's dip (friction that falls from its value at the lowest speed before it rises) is told where the lowest bin
+lies above another by more than chance would make any of them.
+
+Assumptions: the velocity is known well enough that samples fall in their own bin; a constant force is part of the
+friction of both directions, with opposite signs.
+"""
+
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
+from detent.identify.fit.steady import find_steady, find_velocity, select_effort
+from detent.logs.differences import grain, window_rows
+from detent.logs.log import Log, Values
+from detent.logs.stamps import stretches
+from detent.logs.windows import parabolas
+
+FEWEST_WINDOWS = 5.0
+"""Independent windows of a bin, at least."""
+
+MEMORIES = 10
+"""Length of a window, in memories of the residual."""
+
+RANGE = 40.0
+"""Highest over lowest speed of the map, at most."""
+
+OVER_NOISE = 5.0
+"""Lowest speed of the map, at least, in standard deviations of the noise of the velocity."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dip:
+    """Whether friction falls from its value at the lowest speed, in one direction.
+
+    Attributes
+    ----------
+    direction : str
+        ``"positive"`` or ``"negative"``.
+    is_found : bool
+        True where it does, significantly.
+    depth : Estimate or None
+        Friction of the lowest bin less that of the smallest, as magnitudes; None where there are not two bins.
+    speed : float
+        Where friction is smallest; nan without a depth.
+    """
+
+    direction: str
+    is_found: bool
+    depth: Estimate | None
+    speed: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionMap:
+    """Friction over the speed; arrays of shape (k,), one entry per bin that was accepted, by rising velocity.
+
+    Attributes
+    ----------
+    effort, unit, speed_unit : str
+        Role and unit of what drives, unit of the speed.
+    mass : float
+        By how much the effort rises with the acceleration; 0 where only steady stretches were used.
+    speed, friction : float64 array
+        Mean velocity and friction of the bins, signed.
+    error, low, high : float64 array
+        Standard error and 95 % interval of the friction.
+    windows, samples : float64 array
+        Independent windows, and samples, behind each.
+    dips : tuple of Dip
+        One for each direction.
+    refused : tuple of str
+        Bins that have samples, but too few windows.
+    reason : str
+        Why there is no map; empty where there is one.
+    """
+
+    effort: str
+    unit: str
+    speed_unit: str
+    mass: float
+    speed: Values
+    friction: Values
+    error: Values
+    low: Values
+    high: Values
+    windows: Values
+    samples: Values
+    dips: tuple[Dip, ...] = ()
+    refused: tuple[str, ...] = ()
+    reason: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(self).items()}
+
+
+def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) -> FrictionMap:
+    """Average the friction of a recording per bin of speed and direction.
+
+    Parameters
+    ----------
+    log : Log
+        With position or velocity, and an effort.
+    effort : str
+        Role of the effort; the most direct one by default.
+    mass : float
+        Effort per acceleration [kg for a force]; 0 to use steady stretches only.
+    bins : int
+        Bins of each direction.
+
+    Returns
+    -------
+    FrictionMap
+
+    Raises
+    ------
+    DetentError
+        A signal is missing, the mass is negative, or there are no bins.
+    """
+    if not mass >= 0 or not np.isfinite(mass):
+        raise DetentError(f"friction map: came a mass of {mass:g}; allowed: 0 or above; 0 takes steady stretches only")
+    if bins < 1:
+        raise DetentError(f"friction map: came {bins} bins; allowed: at least 1; ten are usual")
+    role = select_effort(log, effort)
+    _, speed_unit, _ = find_velocity(log)
+    moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)
+    units = (role, log.units[role], speed_unit)
+    if not len(moving.place):
+        return _without_result(units, mass, _nothing_moves(mass))
+    return _mapped(moving, units, mass, bins)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moving:
+    """Samples in motion: place in the log, velocity, effort less inertia, each of shape (m,); lowest speed to trust."""
+
+    place: NDArray[np.int64]
+    v: Values
+    friction: Values
+    lowest: float
+
+
+def _nothing_moves(mass: float) -> str:
+    if mass > 0:
+        return "the axis does not move in this log; record moves to and fro at several speeds"
+    return "no steady speed in this log; record passes at steady speeds, or state the mass"
+
+
+def _without_result(
+    units: tuple[str, str, str], mass: float, reason: str, refused: tuple[str, ...] = ()
+) -> FrictionMap:
+    none = np.empty(0)
+    return FrictionMap(*units, mass, none, none, none, none, none, none, none, refused=refused, reason=reason)
+
+
+def _steady(log: Log, role: str) -> _Moving:
+    """Samples of steady stretches, each at the mean speed of its stretch."""
+    velocity, _, step = find_velocity(log)
+    parts = find_steady(log.t, velocity, step=step)
+    place = [np.arange(part.start, part.stop, dtype=np.int64) for part in parts]
+    speed = [np.full(part.stop - part.start, velocity[part].mean()) for part in parts]
+    index = np.concatenate([np.empty(0, dtype=np.int64), *place])
+    return _Moving(index, np.concatenate([np.empty(0), *speed]), log.signals[role][index], 0.0)
+
+
+def _driven(log: Log, role: str, mass: float) -> _Moving:
+    """Samples in motion, velocity and acceleration by a parabola through a window about each."""
+    base = log.signals["position"] if "position" in log.signals else log.signals["velocity"]
+    rows = 2 * window_rows(base) + 1
+    parts = [part for part in stretches(log.t) if part.stop - part.start > rows]
+    place, v, a, f = np.concatenate([np.empty((4, 0)), *(_smoothed(log, role, part, rows) for part in parts)], axis=1)
+    top = float(np.abs(v).max(initial=0.0))
+    noise = _velocity_noise(log, base, rows)
+    lowest = max(top / RANGE, OVER_NOISE * noise)
+    kept = ~_near_rest(v, 0.5 * lowest, rows)
+    return _Moving(place[kept].astype(np.int64), v[kept], (f - mass * a)[kept], lowest)
+
+
+def _smoothed(log: Log, role: str, part: slice, rows: int) -> NDArray[np.float64]:
+    """Place, velocity, acceleration and effort in the middle of each window of a part, shape (4, m)."""
+    period = float(log.t[part][-1] - log.t[part][0]) / (part.stop - part.start - 1)
+    effort = parabolas(log.signals[role][part], period, rows)[0]
+    if "position" in log.signals:
+        _, v, a = parabolas(log.signals["position"][part], period, rows)
+    else:
+        v, a, _ = parabolas(log.signals["velocity"][part], period, rows)
+    place = np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.float64)
+    return np.array([place, v, a, effort])
+
+
+def _velocity_noise(log: Log, base: Values, rows: int) -> float:
+    """Standard deviation of the slope (of a position) or mean (of a velocity) of a window of rows."""
+    if "position" in log.signals:
+        return grain(base) * float(np.sqrt(12.0 / rows**3)) / log.period
+    return grain(base) * 1.5 / float(np.sqrt(rows))
+
+
+def _near_rest(v: Values, slow: float, rows: int) -> NDArray[np.bool_]:
+    """Samples whose window reaches into rest or a reversal, where the effort of two directions is mixed."""
+    return np.convolve(np.abs(v) <= slow, np.ones(rows), "same") > 0.5
+
+
+class _Bin(NamedTuple):
+    """Mean velocity and friction of a bin, standard error, independent windows, samples."""
+
+    speed: float
+    friction: float
+    error: float
+    windows: float
+    samples: int
+
+
+def _mapped(moving: _Moving, units: tuple[str, str, str], mass: float, bins: int) -> FrictionMap:
+    """The map of samples in motion."""
+    member = _members(moving, bins)
+    window = moving.place // _window_rows(moving, member)
+    found: list[_Bin] = []
+    refused: list[str] = []
+    for number in sorted(set(member[member != 0].tolist())):
+        inside = member == number
+        one = _average(moving.v[inside], moving.friction[inside], window[inside])
+        if one.windows >= FEWEST_WINDOWS:
+            found.append(one)
+        else:
+            refused.append(
+                f"about {one.speed:.3g} {units[2]}: {one.samples} samples are worth {one.windows:.1f} independent "
+                f"windows, not {FEWEST_WINDOWS:.0f}; record this speed longer or more often"
+            )
+    if not found:
+        reason = "no speed was held long enough for an interval; record longer, or each speed more often"
+        return _without_result(units, mass, reason, tuple(refused))
+    speed, friction, error, windows, samples = np.array(found, dtype=np.float64).T
+    reach = error * np.array([quantile(one.windows - 1.0) for one in found])
+    dips = tuple(_dip(name, found, units[1]) for name in ("positive", "negative"))
+    return FrictionMap(
+        *units, mass, speed, friction, error, friction - reach, friction + reach, windows, samples, dips, tuple(refused)
+    )
+
+
+def _members(moving: _Moving, bins: int) -> NDArray[np.int64]:
+    """Number of the bin of each sample, from 1, negative in negative direction; 0 below the lowest speed."""
+    size = np.abs(moving.v)
+    lowest = max(moving.lowest, float(size.max()) / RANGE)
+    edges = np.geomspace(min(lowest, 0.9 * float(size.max())), float(size.max()) * (1.0 + 1e-9), bins + 1)
+    number = np.searchsorted(edges, size, side="right")
+    return (number * np.sign(moving.v)).astype(np.int64)
+
+
+def _window_rows(moving: _Moving, member: NDArray[np.int64]) -> int:
+    """Rows of a window: many times what the residual about the means of the bins remembers."""
+    used = member != 0
+    _, which = np.unique(member[used], return_inverse=True)
+    value = moving.friction[used]
+    residual = value - (np.bincount(which, value) / np.bincount(which))[which]
+    return max(1, round(MEMORIES * memory_rows(residual, moving.place[used])))
+
+
+def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
+    """Rows over which a residual remembers: integral of its correlation, over the log, gaps left out.
+
+    Parameters
+    ----------
+    residual : float64 array, shape (m,)
+        With a mean of 0.
+    place : int64 array, shape (m,)
+        Rows of the log that they belong to, rising.
+
+    Returns
+    -------
+    float
+        ``1 + 2 sum rho_k``, the sum up to the first lag beyond five times itself (Sokal's window); at least 1.
+    """
+    power = float(residual @ residual)
+    if not len(residual) or power <= 0.0:
+        return 1.0
+    signals: Any = import_module("scipy.signal")  # it states no types
+    first = int(place[0])
+    rows = int(place[-1]) - first + 1
+    series, mask = np.zeros(rows), np.zeros(rows)
+    series[place - first], mask[place - first] = residual, 1.0
+    products, pairs = (np.asarray(signals.correlate(x, x, method="fft"), float)[rows - 1 :] for x in (series, mask))
+    known = pairs > 0.5
+    rho = np.where(known, products / np.maximum(pairs, 1.0), 0.0) * len(residual) / power
+    memory = 2.0 * np.cumsum(rho) - 1.0
+    enough = np.flatnonzero(np.arange(rows) >= 5.0 * memory)
+    return max(1.0, float(memory[enough[0] if len(enough) else -1]))
+
+
+def _average(v: Values, friction: Values, window: NDArray[np.int64]) -> _Bin:
+    """Mean friction of a bin, its windows taken as clusters."""
+    _, which = np.unique(window, return_inverse=True)
+    count = np.bincount(which).astype(np.float64)
+    total = float(count.sum())
+    mean = float(friction.mean())
+    excess = np.bincount(which, friction - mean)
+    independent = total**2 / float(count @ count)
+    spread = independent / (independent - 1.0) if independent > 1.0 else 1.0
+    error = float(np.sqrt(spread * (excess @ excess))) / total
+    return _Bin(float(v.mean()), mean, error, independent, len(v))
+
+
+def _dip(direction: str, found: list[_Bin], unit: str) -> Dip:
+    """Stribeck's dip of one direction: the lowest bin against the smallest, which is one of several."""
+    sign = 1.0 if direction == "positive" else -1.0
+    bins = sorted((one for one in found if one.speed * sign > 0), key=lambda one: abs(one.speed))
+    if len(bins) < 2:
+        return Dip(direction, is_found=False, depth=None, speed=np.nan)
+    lowest, others = bins[0], bins[1:]
+    least = min(others, key=lambda one: one.friction * sign)
+    depth = (lowest.friction - least.friction) * sign
+    error = float(np.hypot(lowest.error, least.error))
+    degrees = min(lowest.windows, least.windows) - 1.0
+    stats: Any = import_module("scipy.stats")  # it states no types
+    # One-sided, and as many times as there are bins to choose the smallest from (Bonferroni).
+    limit = float(stats.t.ppf(1.0 - (1.0 - LEVEL) / len(others), degrees))
+    name, method = f"stribeck.{direction}", f"friction map, {len(bins)} bins"
+    return Dip(
+        direction, depth > limit * error, estimate(name, depth, unit, error, method, degrees), float(least.speed)
+    )

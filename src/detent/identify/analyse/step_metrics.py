@@ -1,0 +1,395 @@
+"""Step response: what the answer of an axis to steps of its reference says.
+
+A step is a change of the reference between two rests, sudden or along a profile; times count from where the reference
+leaves its rest. Words as usual in control (K. Ogata, Modern Control Engineering, 5th ed. 2010, 5-3): rise from 10 to
+90 % of the way between the rests of the position, settling for good within 2 or 5 % of the size of the step about the
+rest of the position. Overshoot counts from the reference, since the axis may rest elsewhere; how far off is the rest
+error, reference less position. Ringing is told by `ringing`.
+
+Each number that noise makes uncertain has an interval: a rest is a mean, peak and crossings are polynomials fitted
+about them. The noise is that of the position at rest, with its colour, and that of rounding to counts of the encoder.
+
+Assumptions: the reference holds still (to 1/10000 of its range) before and after a step; position and reference are
+recorded at the same moment.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.identify.analyse.local_polynomial import fit_local_polynomial
+from detent.identify.analyse.ringing import Ringing, fit_ringing
+from detent.identify.fit.estimate import Estimate, estimate
+from detent.identify.fit.steady import mean_error
+from detent.logs.differences import resolution, runs_of
+from detent.logs.log import Log, Values
+
+STILL = 1e-4
+"""Change of the reference from sample to sample, as a part of its range, up to which it rests."""
+
+PAUSE = 10
+"""Samples of a rest of the reference, at least; a shorter one is part of the step."""
+
+SMALL = 0.05
+"""Steps smaller than this part of the largest are passed over."""
+
+LAST = 0.25
+"""Part of a rest of the reference, its last, in which the position is taken to rest."""
+
+FEWEST = 20
+"""Samples of the answer to a step, at least."""
+
+CREST = 0.2
+"""Part of the overshoot, its highest, that the polynomial of the peak is fitted to."""
+
+ABOUT = 0.08
+"""Part of the way, to both sides of a crossing, that its polynomial is fitted to."""
+
+DITHER = 2.5
+"""Standard deviation of the position, in those of rounding, from which rounding averages out."""
+
+CLEAR = 6.0
+"""Standard deviations of the noise by which a peak or a swing stands out of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepMetrics:
+    """The answer to one step.
+
+    Attributes
+    ----------
+    begin, duration : float
+        Where the reference leaves its rest, and for how long it moves [s].
+    start, target : float
+        Reference before and after.
+    rise_time : Estimate or None
+        From 10 to 90 % of the way between the rests [s]; None where these levels are not crossed.
+    overshoot : Estimate or None
+        Farthest position beyond the target; None where none stands out of noise.
+    peak_time : Estimate or None
+        Of the farthest position, from `begin` [s].
+    settling_2, settling_5 : float
+        From `begin` until the position stays within 2 or 5 % of the size of the step about its rest [s]; infinite
+        where it does not in this record.
+    rest_error : Estimate
+        Reference less position at rest.
+    ringing : Ringing or None
+        None where there are not enough swings.
+    notes : tuple of str
+        What to know about it.
+    """
+
+    begin: float
+    duration: float
+    start: float
+    target: float
+    rise_time: Estimate | None
+    overshoot: Estimate | None
+    peak_time: Estimate | None
+    settling_2: float
+    settling_5: float
+    rest_error: Estimate
+    ringing: Ringing | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> float:
+        """Size of the step, signed."""
+        return self.target - self.start
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """All numbers with an interval."""
+        ringing = (self.ringing.period, self.ringing.damping_ratio) if self.ringing else ()
+        found = (self.rise_time, self.overshoot, self.peak_time, self.rest_error, *ringing)
+        return tuple(one for one in found if one is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class StepResponse:
+    """Answers to the steps of a recording.
+
+    Attributes
+    ----------
+    unit : str
+        Unit of positions.
+    steps : tuple of StepMetrics
+        In order of time.
+    reason : str
+        Why there is none; empty where there is one.
+    notes : tuple of str
+        What was passed over.
+    """
+
+    unit: str
+    steps: tuple[StepMetrics, ...] = ()
+    reason: str = ""
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; a time that is not reached is None."""
+        plain = asdict(self)
+        for step in plain["steps"]:
+            for key in ("settling_2", "settling_5"):
+                step[key] = step[key] if np.isfinite(step[key]) else None
+        return plain
+
+
+def measure_steps(log: Log) -> StepResponse:
+    """Metrics of each step of the reference of a recording.
+
+    Parameters
+    ----------
+    log : Log
+        With reference and position.
+
+    Returns
+    -------
+    StepResponse
+
+    Raises
+    ------
+    DetentError
+        A signal is missing, or the two have different units.
+    """
+    missing = [role for role in ("reference", "position") if role not in log.signals]
+    if missing:
+        raise DetentError(
+            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with reference and position; "
+            f"name the column, as in {missing[0]}=COLUMN [mm]"
+        )
+    unit = log.units["position"]
+    if unit != log.units["reference"]:
+        raise DetentError(
+            f"{log.name}: came a position in {unit} and a reference in {log.units['reference']}; allowed: one unit; "
+            "state both, as in reference=COLUMN [0.5 um]"
+        )
+    moves = find_steps(log.signals["reference"])
+    if not moves:
+        return StepResponse(unit, reason="the reference takes no step between two rests; record a step and its answer")
+    size = [abs(move.target - move.start) for move in moves]
+    large = [move for move, one in zip(moves, size, strict=True) if one >= SMALL * max(size)]
+    notes = [f"{len(moves) - len(large)} steps below {SMALL:.0%} of the largest passed over"] * (
+        len(large) < len(moves)
+    )
+    long = [move for move in large if move.stop - move.first >= FEWEST]
+    if len(long) < len(large):
+        notes.append(f"{len(large) - len(long)} steps with an answer of fewer than {FEWEST} samples passed over")
+    if not long:
+        return StepResponse(unit, reason="no step is followed by a rest; record longer after the step", notes=(*notes,))
+    return StepResponse(unit, tuple(_measure(log, move, unit) for move in long), notes=tuple(notes))
+
+
+class Move(NamedTuple):
+    """A step of the reference: samples where the rest before begins, it begins, it arrives, the next begins; values."""
+
+    before: int
+    first: int
+    arrived: int
+    stop: int
+    start: float
+    target: float
+
+
+def find_steps(reference: Values) -> list[Move]:
+    """Changes of a reference between rests.
+
+    Parameters
+    ----------
+    reference : float64 array, shape (n,)
+        Position asked for.
+
+    Returns
+    -------
+    list of Move
+        Places are samples; `first` is the last sample at rest, `arrived` the first at the target.
+    """
+    if not np.ptp(reference) > 0:
+        return []
+    changes = np.abs(np.diff(reference)) > STILL * float(np.ptp(reference))
+    runs = runs_of(changes).tolist()
+    joined: list[list[int]] = []
+    for first, stop in runs:
+        if joined and first - joined[-1][1] < PAUSE:
+            joined[-1][1] = stop
+        else:
+            joined.append([first, stop])
+    bounds = [0, *(first for first, _ in joined), len(reference)]
+    return [
+        Move(joined[k - 1][1] if k else 0, first, stop, bounds[k + 2], float(reference[first]), float(reference[stop]))
+        for k, (first, stop) in enumerate(joined)
+        if reference[first] != reference[stop] and bounds[k + 2] - stop >= PAUSE
+    ]
+
+
+class _Level(NamedTuple):
+    """A value and its standard error, with its degrees of freedom."""
+
+    value: float
+    error: float
+    degrees: float
+
+
+class _Noise(NamedTuple):
+    """Noise of the position at rest, a series; that of rounding to counts, standard deviation."""
+
+    series: Values
+    rounding: float
+
+    @property
+    def size(self) -> float:
+        """Standard deviation of both."""
+        return float(np.hypot(self.series.std(), self.rounding))
+
+
+def _measure(log: Log, move: Move, unit: str) -> StepMetrics:
+    """Metrics of one step."""
+    t, x = log.t, log.signals["position"]
+    still = x[move.stop - max(PAUSE // 2, round(LAST * (move.stop - move.arrived))) : move.stop]
+    noise = _Noise(still - still.mean(), resolution(x) / float(np.sqrt(12.0)))
+    rest = _rest(still, noise)
+    home = _rest(x[move.first + 1 - max(1, round(LAST * (move.first + 1 - move.before))) : move.first + 1], noise)
+    after = slice(move.first, move.stop)
+    since, y = t[after] - t[move.first], x[after]
+    size = move.target - move.start
+    least = max(CLEAR * noise.size, 0.01 * abs(size))
+    overshoot, peak_time, peak = _peak(since, (y - move.target) * np.sign(size), noise, unit)
+    ringing = fit_ringing(since[peak:], y[peak:], least, *noise) if overshoot else None
+    settling_2, settling_5 = (_settling(since, y - rest.value, share * abs(size)) for share in (0.02, 0.05))
+    note = "not settled within 2 % when the record of the step ends: rest and rest error are means"
+    return StepMetrics(
+        float(t[move.first]),
+        float(t[move.arrived] - t[move.first]),
+        move.start,
+        move.target,
+        _rise(since, y, (home, rest), noise),
+        overshoot,
+        peak_time,
+        settling_2,
+        settling_5,
+        estimate("rest_error", move.target - rest.value, unit, rest.error, "mean of the last quarter", rest.degrees),
+        ringing,
+        (note,) if np.isinf(settling_2) else (),
+    )
+
+
+def _rest(x: Values, noise: _Noise) -> _Level:
+    """Mean position of a stretch; a few samples are as uncertain as the noise."""
+    if len(x) < 2 * PAUSE:
+        return _Level(float(x.mean()), max(float(x.std()), noise.size), np.inf)
+    error, degrees = mean_error(x)
+    # A mean sees between the counts only where noise carries the position across them.
+    rounding = noise.rounding if float(x.std()) < DITHER * noise.rounding else 0.0
+    return _Level(float(x.mean()), float(np.hypot(error, rounding)), degrees)
+
+
+def _settling(t: Values, off: Values, band: float) -> float:
+    """Time from which a deviation stays within a band; infinite where it is still outside in the last quarter."""
+    outside = np.flatnonzero(np.abs(off) > band)
+    last = int(outside[-1]) + 1 if len(outside) else 0
+    return float(t[last]) if last < len(t) - max(1, round(LAST * len(t))) else np.inf
+
+
+def _peak(t: Values, beyond: Values, noise: _Noise, unit: str) -> tuple[Estimate | None, Estimate | None, int]:
+    """Overshoot, its time and its sample, by a polynomial about the farthest position."""
+    top = int(np.argmax(beyond))
+    if beyond[top] < CLEAR * noise.size or top in {0, len(t) - 1}:
+        return None, None, top
+    near = _around(beyond > beyond[top] - max(CREST * beyond[top], CLEAR * noise.size), top)
+    fit = fit_local_polynomial(t[near], beyond[near], float(t[top]), *noise)
+    if fit is None:
+        return *_coarse_peak(t, beyond, top, noise.size, unit), top
+    method = "polynomial about the peak"
+    place = fit.summit()
+    late = fit.error_at(place, 1) / max(abs(fit.at(place, 2)), 1e-300)
+    return (
+        estimate("overshoot", fit.at(place), unit, fit.error_at(place), method, fit.degrees),
+        estimate("peak_time", place + float(t[top]), "s", late, method, fit.degrees),
+        top,
+    )
+
+
+def _coarse_peak(t: Values, beyond: Values, top: int, least: float, unit: str) -> tuple[Estimate, Estimate]:
+    """Overshoot and its time by a parabola through three samples, as uncertain as it lies off the farthest of them."""
+    before, at, behind = (float(one) for one in t[top - 1 : top + 2] - t[top])
+    left = (float(beyond[top - 1]) - float(beyond[top])) / (before - at)
+    right = (float(beyond[top + 1]) - float(beyond[top])) / (behind - at)
+    bend = (right - left) / (behind - before)
+    slope = left - bend * before
+    place = -0.5 * slope / bend if bend < 0 else 0.0
+    gain = 0.5 * slope * place
+    method = "parabola through three samples"
+    return (
+        estimate("overshoot", float(beyond[top]) + gain, unit, float(np.hypot(gain, least)), method),
+        estimate("peak_time", float(t[top]) + place, "s", 0.125 * (behind - before), method),
+    )
+
+
+def _rise(t: Values, y: Values, rests: tuple[_Level, _Level], noise: _Noise) -> Estimate | None:
+    """Time from 10 to 90 % of the way between two rests."""
+    home, rest = rests
+    way = rest.value - home.value
+    if way == 0.0:
+        return None
+    share = (y - home.value) / way
+    scaled = _Noise(noise.series / way, noise.rounding / abs(way))
+    low, high = (_crossing(t, share, level, scaled) for level in (0.1, 0.9))
+    if low is None or high is None:
+        return None
+    # Both crossings move with both rests.
+    by_home = (0.1 / high.slope - 0.9 / low.slope) * home.error / way
+    by_rest = (0.9 / high.slope - 0.1 / low.slope) * rest.error / way
+    error = float(np.linalg.norm([low.error, high.error, by_home, by_rest]))
+    return estimate("rise_time", high.time - low.time, "s", error, "10 to 90 % of the way between rests", low.degrees)
+
+
+class _Crossing(NamedTuple):
+    """Time at which a level is first crossed, its standard error, the slope there, degrees of freedom."""
+
+    time: float
+    error: float
+    slope: float
+    degrees: float
+
+
+def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Crossing | None:
+    above = np.flatnonzero(share >= level)
+    if not len(above) or above[0] == 0:
+        return None
+    k = int(above[0])
+    fit = fit_local_polynomial(*_near(t, share, level, k), float(t[k]), *noise)
+    if fit is None:
+        return _between(t, share, level, k, noise.size)
+    place = fit.solve(level)
+    slope = fit.at(place, 1)
+    return _Crossing(place + float(t[k]), fit.error_at(place) / abs(slope), slope, fit.degrees)
+
+
+def _near(t: Values, share: Values, level: float, k: int) -> tuple[Values, Values]:
+    """Samples about a crossing that a polynomial can be fitted to."""
+    near = _around(np.abs(share - level) < ABOUT, k if abs(share[k] - level) < ABOUT else k - 1)
+    return t[near], share[near]
+
+
+def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _Crossing:
+    """Crossing between two samples by a line and the bend of the four about it, whose change is part of the error."""
+    step = float(t[k] - t[k - 1])
+    slope = float(share[k] - share[k - 1]) / step
+    part = (level - float(share[k - 1])) / float(share[k] - share[k - 1])
+    bends = np.diff(share[max(k - 2, 0) : k + 2], 2)
+    sag, doubt = (float(bends.mean()), float(np.ptp(bends))) if len(bends) > 1 else (0.0, abs(slope) * step)
+    below = 0.5 * part * (1.0 - part)
+    # Both samples together are less noisy than one, by as much as the bend adds.
+    error = float(np.hypot(noise, below * doubt)) / slope
+    return _Crossing(float(t[k - 1]) + part * step + below * sag / slope, error, slope, np.inf)
+
+
+def _around(mask: NDArray[np.bool_], place: int) -> slice:
+    """Run of True about a place; the place alone where it is False."""
+    for first, stop in runs_of(mask).tolist():
+        if first <= place < stop:
+            return slice(first, stop)
+    return slice(place, place + 1)

@@ -1,0 +1,259 @@
+"""Slope and friction per direction from runs at two steady speeds or more.
+
+An axis that moves at a steady speed needs no effort for its mass: what is left is friction and what grows with the
+speed. Two speeds of a direction give both,
+
+    slope = (F1 - F2) / (v1 - v2),    coulomb = direction * (F1 - slope * v1),
+
+the claim of the print head (US 4,775,945), which measures the effort in counts of its modulator. More speeds give the
+line through all stretches, each weighted by its length. What the slope is depends on the effort: viscous friction of a
+force or torque; of a current, that over the torque constant; of a voltage or a duty cycle, the back-EMF constant and
+the resistance's share of viscous friction. The friction of a direction holds any constant force (gravity, an offset of
+the amplifier) in it.
+
+Assumptions: acceleration is negligible in the stretches taken (see `identify.fit.steady`), and friction between the
+speeds is a line. The error of each stretch is that of its mean with coloured residuals; where more than two stretches
+scatter about the line by more than that, the scatter between stretches is added, and said.
+"""
+
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.estimate import Estimate, estimate
+from detent.identify.fit.steady import (
+    SteadyStretch,
+    find_steady,
+    find_velocity,
+    measure_stretch,
+    select_effort,
+    unit_per_speed,
+)
+from detent.logs.log import Log, Values
+
+APART = 0.1
+"""Difference of the highest and lowest speed, at least, as a part of the highest."""
+
+ROUNDS = 3
+"""Times that weights and line are computed in turn: the errors of the stretches depend on the slope."""
+
+UNLIKELY = 0.05
+"""Probability of the scatter about the line below which it is more than the errors of the stretches."""
+
+DIRECTIONS = {"positive": 1.0, "negative": -1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLine:
+    """Effort against speed in one direction.
+
+    Attributes
+    ----------
+    direction : str
+        ``"positive"`` or ``"negative"``.
+    stretches : tuple of SteadyStretch
+        What it was found from.
+    slope : Estimate or None
+        Effort per speed.
+    coulomb : Estimate or None
+        Effort of the line at speed 0, as a magnitude against the motion.
+    between : float
+        Scatter of the stretches about the line beside their own errors, standard deviation; 0 where there is none.
+    reason : str
+        Why there is no result; empty where there is one.
+    notes : tuple of str
+        What to know about it.
+    """
+
+    direction: str
+    stretches: tuple[SteadyStretch, ...]
+    slope: Estimate | None = None
+    coulomb: Estimate | None = None
+    between: float = 0.0
+    reason: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TwoSpeeds:
+    """Outcome of the method.
+
+    Attributes
+    ----------
+    effort : str
+        Role of the signal that drives.
+    positive, negative : SpeedLine
+        One for each direction.
+    """
+
+    effort: str
+    positive: SpeedLine
+    negative: SpeedLine
+
+    @property
+    def reason(self) -> str:
+        """Why there is no result in either direction; empty where there is one."""
+        if self.positive.reason and self.negative.reason:
+            return f"{self.positive.reason}; {self.negative.reason}"
+        return ""
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """All constants found."""
+        lines = (self.positive, self.negative)
+        return tuple(found for line in lines for found in (line.slope, line.coulomb) if found is not None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {**asdict(self), "reason": self.reason}
+
+
+def fit_two_speeds(log: Log, effort: str = "", shortest: float | None = None, tolerance: float = 0.05) -> TwoSpeeds:
+    """Slope and friction of each direction from the steady stretches of a recording.
+
+    Parameters
+    ----------
+    log : Log
+        With position or velocity, and an effort.
+    effort : str
+        Role of the effort; the most direct one by default (force, torque, current, voltage, command).
+    shortest, tolerance : float
+        What counts as steady: as in `detent.identify.fit.steady.find_steady`.
+
+    Returns
+    -------
+    TwoSpeeds
+        Units of the effort, and that per unit of the velocity.
+
+    Raises
+    ------
+    DetentError
+        A signal is missing, or a limit is not positive.
+    """
+    role = select_effort(log, effort)
+    velocity, speed_unit, step = find_velocity(log)
+    drive = log.signals[role]
+    parts = find_steady(log.t, velocity, shortest, tolerance, step)
+    units = (log.units[role], unit_per_speed(log.units[role], speed_unit), speed_unit)
+    lines = {
+        name: _fit_direction(name, (log.t, velocity, drive), [p for p in parts if velocity[p].mean() * sign > 0], units)
+        for name, sign in DIRECTIONS.items()
+    }
+    return TwoSpeeds(role, lines["positive"], lines["negative"])
+
+
+def _fit_direction(
+    name: str, series: tuple[Values, Values, Values], parts: list[slice], units: tuple[str, str, str]
+) -> SpeedLine:
+    """The line of one direction, or why there is none."""
+    measured = _measured(series, parts, 0.0)
+    reason = _refusal(name, measured, units[2])
+    if reason:
+        return SpeedLine(name, measured, reason=reason)
+    slope = 0.0
+    for _ in range(ROUNDS):
+        line = _weighted_line(measured)
+        slope = float(line.values[0])
+        measured = _measured(series, parts, slope)
+    line = _weighted_line(measured)
+    method = f"two-speed method, {len(measured)} stretches"
+    errors: list[float] = np.sqrt(np.diag(line.covariance)).tolist()
+    sign = DIRECTIONS[name]
+    return SpeedLine(
+        name,
+        measured,
+        estimate(f"slope.{name}", float(line.values[0]), units[1], errors[0], method, line.degrees[0]),
+        estimate(f"coulomb.{name}", sign * float(line.values[1]), units[0], errors[1], method, line.degrees[1]),
+        line.between,
+        notes=_notes(line, measured, units),
+    )
+
+
+def _measured(series: tuple[Values, Values, Values], parts: list[slice], slope: float) -> tuple[SteadyStretch, ...]:
+    return tuple(measure_stretch(*series, part, slope) for part in parts)
+
+
+def _refusal(name: str, measured: tuple[SteadyStretch, ...], unit: str) -> str:
+    """Why a direction has no line; empty where it has one."""
+    advice = "record passes at two steady speeds that differ by half or more"
+    if not measured:
+        return f"no steady speed in {name} direction; {advice}"
+    speeds = sorted(abs(stretch.speed) for stretch in measured)
+    if speeds[-1] - speeds[0] < APART * speeds[-1]:
+        return f"only one steady speed in {name} direction ({speeds[-1]:.4g} {unit}); {advice}"
+    return ""
+
+
+def _notes(line: "_Line", measured: tuple[SteadyStretch, ...], units: tuple[str, str, str]) -> tuple[str, ...]:
+    speeds = [abs(stretch.speed) for stretch in measured]
+    notes = [f"holds from {min(speeds):.4g} to {max(speeds):.4g} {units[2]}; friction at rest is not measured"]
+    if line.between > 0:
+        text = "position-dependent friction, or friction that is no line over the speed"
+        notes.append(f"stretches scatter about the line by {line.between:.3g} {units[0]} beside their errors: {text}")
+    return tuple(notes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A weighted line: slope and height at zero, their covariance, degrees of freedom of each, scatter between."""
+
+    values: Values
+    covariance: Values
+    degrees: tuple[float, float]
+    between: float
+
+
+def _weighted_line(measured: tuple[SteadyStretch, ...]) -> _Line:
+    """Line through the means of the stretches, weighted by their length.
+
+    Weights from the errors of the stretches would make the interval too short: each error is known with few degrees
+    of freedom.
+    """
+    v = np.array([stretch.speed for stretch in measured])
+    f = np.array([stretch.effort for stretch in measured])
+    columns = np.column_stack([v, np.ones(len(v))])
+    own = np.array([stretch.effort_error**2 for stretch in measured])
+    own = np.maximum(own, 1e-24 * max(float(np.max(f * f)), 1e-300))
+    seconds = np.array([stretch.seconds for stretch in measured])
+    degrees = np.array([stretch.degrees for stretch in measured])
+    pooled = float(degrees @ (own * seconds)) / float(degrees.sum()) / seconds
+    between = _scatter_between(columns, f, pooled, float(degrees.sum()))
+    pull = _pull(columns, pooled + between**2)
+    shares = pull**2 * own
+    # Satterthwaite: degrees of a sum of variances, each known with its own.
+    inner = shares.sum(axis=1) ** 2 / (shares**2 / degrees).sum(axis=1)
+    if between > 0:
+        inner = np.minimum(inner, len(v) - 2)
+    covariance = pull * (own + between**2) @ pull.T
+    return _Line(pull @ f, covariance, (float(inner[0]), float(inner[1])), between)
+
+
+def _pull(columns: Values, size: Values) -> NDArray[np.float64]:
+    """What each stretch adds to slope and height, shape (2, m): the weighted least-squares solution as a matrix."""
+    weighted = columns.T / size
+    return np.asarray(np.linalg.solve(weighted @ columns, weighted), float)
+
+
+def _scatter_between(columns: Values, effort: Values, pooled: Values, degrees: float) -> float:
+    """Standard deviation between stretches that brings the scatter about the line to what is expected.
+
+    Paule and Mandel, Journal of Research of the National Bureau of Standards 87 (1982) 377; 0 where the scatter is
+    likely without it.
+    """
+    free = len(effort) - 2
+
+    def excess(between: float) -> float:
+        """Weighted squares of the residuals beyond what their errors explain."""
+        size = pooled + between**2
+        residual = effort - columns @ (_pull(columns, size) @ effort)
+        return float(residual @ (residual / size)) - free
+
+    stats: Any = import_module("scipy.stats")  # it states no types
+    if free < 1 or float(stats.f.sf((excess(0.0) + free) / free, free, degrees)) > UNLIKELY:
+        return 0.0
+    optimize: Any = import_module("scipy.optimize")
+    most = float(np.ptp(effort)) + float(np.sqrt(pooled.max()))
+    return float(optimize.brentq(excess, 0.0, 10.0 * most))

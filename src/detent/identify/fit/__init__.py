@@ -1,0 +1,1 @@
+"""From a cleaned log to constants with intervals, and a verdict."""

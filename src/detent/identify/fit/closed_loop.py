@@ -1,0 +1,139 @@
+"""An axis with identified constants under the loops that a log shows, following the log's reference.
+
+Loops hide errors of the constants in the position, and show them in the effort; both are stated. The loops are those
+that `loop_fit` finds in the first part of the log; a log whose effort they do not explain is not simulated so.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.constants import Constants
+from detent.identify.fit.free_run import plant_registers, start_velocities
+from detent.identify.fit.loop_fit import Loops, fit_loops
+from detent.identify.fit.run import Run
+from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, advance_along, fill_clocks, switch_on
+from detent.planning.profile import profile_of_recording
+from detent.plant.two_mass import fastest_rate
+from detent.sensing.position_sensor import MEMORY
+
+Numbers = NDArray[np.float64]
+
+SUBSTEPS = 4
+"""Ticks of the plant per sample of the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedLoop:
+    """Errors of the simulation under the loops of the log.
+
+    Attributes
+    ----------
+    rms, largest : float
+        Error of the position [m] or [rad].
+    relative, effort : float
+        Norm of the error over that of the recording, of the position and of the effort.
+    duration : float
+        Simulated time over all logs [s].
+    loops : Loops
+        Of the first log.
+    """
+
+    rms: float
+    largest: float
+    relative: float
+    effort: float
+    duration: float
+    loops: Loops
+
+
+def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequence[Run]) -> ClosedLoop | None:
+    """Follow the references of the parts that were not seen.
+
+    Parameters
+    ----------
+    constants : Constants
+    seen, unseen : sequence of Run
+        First and last part of each log: loops come from the one, errors from the other.
+
+    Returns
+    -------
+    ClosedLoop or None
+        None where a log shows no such loops.
+    """
+    found = [fit_loops(run) for run in seen]
+    if any(loops is None for loops in found):
+        return None
+    pairs: list[tuple[Numbers, Numbers, Run]] = []
+    for loops, run in zip(found, unseen, strict=True):
+        if loops is not None and len(run.position) > MEMORY:
+            pairs.append((*_follow(constants, loops, run), run))
+    if not pairs or found[0] is None:
+        return None
+    position = np.concatenate([q - run.position for q, _, run in pairs])
+    effort = np.concatenate([u - run.effort for _, u, run in pairs])
+    if not (np.isfinite(position).all() and np.isfinite(effort).all()):
+        return None
+    return ClosedLoop(
+        rms=float(np.sqrt(np.mean(position**2))),
+        largest=float(np.abs(position).max()),
+        relative=_share(position, np.concatenate([run.position for *_, run in pairs])),
+        effort=_share(effort, np.concatenate([run.effort for *_, run in pairs])),
+        duration=sum(float(run.t[-1]) for *_, run in pairs),
+        loops=found[0],
+    )
+
+
+def _share(error: Numbers, signal: Numbers) -> float:
+    size = float(np.linalg.norm(signal))
+    return float(np.linalg.norm(error)) / size if size > 0.0 else math.nan
+
+
+def _params(constants: Constants, loops: Loops, run: Run) -> CascadeParams:
+    """Plant and loops; the velocity is the difference that the log's loops took."""
+    p = plant_registers(constants)
+    law, feed = p.law, p.law.feed_forward
+    law.cascade.position_gain, law.cascade.velocity_gain = loops.position, loops.velocity
+    law.cascade.integral_gain = loops.integral
+    feed.velocity, feed.acceleration, feed.viscous = loops.feed_velocity, loops.feed_acceleration, loops.feed_viscous
+    feed.coulomb_positive = feed.coulomb_negative = loops.feed_coulomb
+    p.source.delay = min(max(round(constants.value("delay") / run.step), 0), MEMORY - 1)
+    p.motor_sensor.span, p.motor_sensor.resolution = loops.span, run.resolution
+    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.machine) * run.step / MAX_RATE))
+    fill_clocks(p, run.step / ticks, ticks)
+    return p
+
+
+def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
+    """Where the log says the axis was, as fast, and with the integral that its effort shows."""
+    velocity = float(start_velocities(run)[min(len(run.position) // 4, max(4, round(0.006 / run.step)))])
+    place = float(run.position[0])
+    switch_on(p, r, place)
+    r.machine.motor.velocity = r.machine.load.velocity = velocity
+    r.motor_sensor.memory[:] = [place - (MEMORY - k) * velocity * run.step for k in range(MEMORY)]
+    r.motor_sensor.place = MEMORY - 1
+    if loops.integral > 0.0 and run.reference is not None:
+        speeds = np.gradient(run.reference[:8], run.step)
+        demand = loops.position * (float(run.reference[0]) - place) + loops.feed_velocity * float(speeds[0])
+        fed = loops.feed_viscous * float(speeds[0]) + loops.feed_coulomb * float(np.sign(speeds[0]))
+        r.law.integral = float(run.effort[0]) - loops.velocity * (demand - velocity) - fed
+
+
+def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Numbers, Numbers]:
+    """Position at each sample, and the effort commanded there."""
+    p, r = _params(constants, loops, run), Cascade()
+    _start(p, r, loops, run)
+    reference = run.reference if run.reference is not None else run.position
+    along = profile_of_recording(run.t, reference, run.step)
+    leaves = {leaf.path: leaf.offset for leaf in Cascade.leaves()}
+    picks = np.concatenate([np.arange(leaves[n], leaves[n] + 8) for n in ("machine.motor.position", "law.command")])
+    samples = len(run.position)
+    rows = np.zeros((samples + 1, 16), np.uint8)
+    every = p.sample_ticks
+    signals = (along.position, along.velocity, along.acceleration)
+    advance_along(p, r, *signals, samples * every, rows, picks.astype(np.int64), every)
+    table = rows.view(np.float64)
+    return np.concatenate([run.position[:1], table[1:samples, 0]]), table[1 : samples + 1, 1].copy()

@@ -1,0 +1,159 @@
+"""Constants of an axis, each direction its own, from a fitted model and from those that explain the log nearly as well.
+
+Which model was chosen is itself uncertain. Where another rung predicts the held-out stretches as well within their
+scatter, the difference between its constants and those of the chosen one is an error that no residual shows; its mean
+square adds to the variance (S. T. Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of
+inference", Biometrics 53 (1997)).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.estimate import Estimate, estimate
+from detent.identify.fit.regression import Fit, Instruments
+from detent.identify.fit.run import Run
+
+Numbers = NDArray[np.float64]
+
+_SUMS: dict[str, dict[str, float]] = {
+    "mass": {"mass": 1.0},
+    "coulomb.positive": {"coulomb": 1.0, "offset": 1.0, "coulomb.positive": 1.0},
+    "coulomb.negative": {"coulomb": 1.0, "offset": -1.0, "coulomb.negative": 1.0},
+    "viscous.positive": {"viscous": 1.0, "viscous.positive": 1.0},
+    "viscous.negative": {"viscous": 1.0, "viscous.negative": 1.0},
+    "static.positive": {"coulomb.positive": 1.0, "excess.positive": 1.0},
+    "static.negative": {"coulomb.negative": 1.0, "excess.negative": 1.0},
+    "pendulum": {"pendulum": 1.0},
+    "pendulum.across": {"pendulum.across": 1.0},
+    "spring": {"spring": 1.0},
+    "stribeck": {"stribeck": 1.0},
+    "loss": {"loss": 1.0},
+    "delay": {"delay": 1.0},
+}
+"""Constants as sums of those of the terms; a force that does not turn round is part of both Coulomb constants."""
+
+
+METHODS: dict[Instruments, str] = {
+    "reference": "instrumental variables",
+    "position": "instrumental variables of wider windows",
+    "none": "least squares",
+}
+"""How the constants of a fit were found, by what its instruments are made of."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constants:
+    """Constants of an axis with all that is known about their errors.
+
+    Attributes
+    ----------
+    names : tuple of str
+        In their order; the delay of the effort comes last.
+    values : float64 array, shape (k,)
+        In SI units.
+    covariance : float64 array, shape (k, k)
+        Of their errors.
+    degrees : float64 array, shape (k,)
+        Degrees of freedom behind the variance of each.
+    method : str
+        How they were found.
+    delay_is_told : bool
+        False where the delay is only what fits best.
+    """
+
+    names: tuple[str, ...]
+    values: Numbers
+    covariance: Numbers
+    degrees: Numbers
+    method: str
+    delay_is_told: bool = True
+
+    def value(self, name: str) -> float:
+        """A constant; 0 where it was not looked for."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    @property
+    def errors(self) -> Numbers:
+        """Standard errors, shape (k,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def correlation(self) -> Numbers:
+        """Correlation of the errors, shape (k, k)."""
+        error = np.maximum(self.errors, 1e-300)
+        return np.clip(self.covariance / np.outer(error, error), -1.0, 1.0)
+
+    def inseparable(self, limit: float = 0.95) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of constants whose errors go together, with their correlation: the data cannot tell them well apart."""
+        c, n = self.correlation, len(self.names)
+        pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if abs(float(c[i, j])) > limit]
+        return tuple((self.names[i], self.names[j], float(c[i, j])) for i, j in pairs)
+
+    def estimates(self, run: Run) -> tuple[Estimate, ...]:
+        """Each with its interval, in the units of a run.
+
+        Without a reference the delay is none of them: in a loop it hides in the answer of the effort to the noise.
+        """
+        told = zip(self.names, self.values.tolist(), self.errors.tolist(), self.degrees.tolist(), strict=True)
+        return tuple(
+            estimate(name, value, run.unit(name), error, self.method, degrees)
+            for name, value, error, degrees in told
+            if name != "delay" or self.delay_is_told
+        )
+
+
+def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
+    """Constants of a fitted model.
+
+    Parameters
+    ----------
+    fit : Fit
+        The chosen model.
+    rivals : sequence of Fit
+        Others that explain the log as well.
+
+    Returns
+    -------
+    Constants
+    """
+    names, values, covariance, degrees = _sums_of(fit)
+    if rivals:
+        covariance = covariance + np.diag(_spread(names, values, rivals))
+    return Constants(names, values, covariance, degrees, METHODS[fit.instruments], fit.instruments == "reference")
+
+
+def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers, Numbers]:
+    """Names, values, covariance and degrees of freedom of the constants that a model has; a sum has the fewest."""
+    wanted = [name for name, sums in _SUMS.items() if _has(fit, name, sums)]
+    weights = np.zeros((len(wanted), len(fit.values)))
+    for row, name in enumerate(wanted):
+        for term, sign in _SUMS[name].items():
+            if term in fit.names:
+                weights[row, fit.names.index(term)] = sign
+    degrees = np.where(weights != 0.0, fit.degrees, np.inf).min(axis=1)
+    return tuple(wanted), weights @ fit.values, weights @ fit.covariance @ weights.T, degrees
+
+
+def _has(fit: Fit, name: str, sums: dict[str, float]) -> bool:
+    if name.startswith("static"):
+        return all(term in fit.names for term in sums)
+    return any(term in fit.names for term in sums)
+
+
+def _spread(names: Sequence[str], values: Numbers, rivals: Sequence[Fit]) -> Numbers:
+    """Mean square of what the rivals say otherwise; a constant that a rival does not have counts as its own value."""
+    squares = np.zeros(len(values))
+    for rival in rivals:
+        theirs, found, *_ = _sums_of(rival)
+        known = dict(zip(theirs, found.tolist(), strict=True))
+        squares += np.array([(known.get(n, v) - v) ** 2 for n, v in zip(names, values.tolist(), strict=True)])
+    return squares / len(rivals)
+
+
+def hanging_position(constants: Constants) -> float:
+    """Position at which a pendulum hangs [rad]; 0 without one."""
+    return -math.atan2(constants.value("pendulum.across"), constants.value("pendulum"))

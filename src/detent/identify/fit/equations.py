@@ -1,0 +1,177 @@
+"""The equation of motion of an axis over a run, window by window: one row per window, linear in the constants.
+
+    F = M a + sum over the terms of the friction and the weight
+
+Each term is a constant times a function of velocity, its direction or the position. One number may bend the model, in
+which it is not linear: the Stribeck velocity, or the share ``l`` of the effort that a transmission loses, with which
+``F - l |F| sign(v)`` takes the place of F, so that all columns grow by ``1 / (1 - l sign(F v))``.
+
+A window is usable where it holds no sample that is missing, saturated, at standstill or turning round: there friction
+is whatever holds the axis, and no equation says how much.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.kernel import Kernel, Rows, make_kernel
+from detent.identify.fit.run import Run
+
+Numbers = NDArray[np.float64]
+
+FINE, FINEST = 6e-3, 4
+"""Half of the window that tells the direction [s], and its fewest samples."""
+
+NOISES = 5.0
+"""Velocity that is told from standstill, in standard deviations of its noise."""
+
+HOPS = 2
+"""Rows per half window."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What a position says, window by window, each of shape (m,) unless said otherwise.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : float64 array
+        Means over the window around each row [m, m/s, m/s^2] or in rad.
+    right : float64 array
+        Share of each window in motion to larger positions.
+    quick, places, effort : float64 array, shape (n,)
+        Velocity, by a short window, position and effort at every sample.
+    rows : int array
+        Samples around which the windows lie.
+    kernel : Kernel
+        Their window.
+    """
+
+    position: Numbers
+    velocity: Numbers
+    acceleration: Numbers
+    right: Numbers
+    quick: Numbers
+    places: Numbers
+    effort: Numbers
+    rows: Rows
+    kernel: Kernel
+
+
+def fine_kernel(kernel: Kernel) -> Kernel:
+    """The short window that tells the direction."""
+    return make_kernel(min(kernel.half, max(FINEST, round(FINE / kernel.step))), kernel.step)
+
+
+def make_motion(position: Numbers, effort: Numbers, kernel: Kernel, rows: Rows) -> Motion:
+    """Position, velocity and acceleration by a window.
+
+    Parameters
+    ----------
+    position, effort : float64 array, shape (n,)
+        Evenly sampled.
+    kernel : Kernel
+        The window.
+    rows : int array, shape (m,)
+        Samples around which it lies.
+    """
+    quick = fine_kernel(kernel).velocities(position)
+    return Motion(
+        kernel.mean(position, rows),
+        kernel.velocity(position, rows),
+        kernel.acceleration(position, rows),
+        kernel.mean((quick > 0.0) + 0.5 * (quick == 0.0), rows),
+        quick,
+        position,
+        effort,
+        rows,
+        kernel,
+    )
+
+
+Term = Callable[[Motion, float], Numbers]
+"""What multiplies a constant, window by window; the number is the Stribeck velocity, for terms that have one."""
+
+
+def _bristle(m: Motion, stribeck: float, sense: int) -> Numbers:
+    """Part of the low-speed friction that is left at each sample, in one direction."""
+    speed = m.quick * sense
+    left = np.where(speed > 0.0, np.exp(-np.minimum((speed / stribeck) ** 2, 50.0)), 0.0)
+    return sense * m.kernel.mean(left, m.rows)
+
+
+TERMS: Mapping[str, Term] = {
+    "mass": lambda m, _: m.acceleration,
+    "offset": lambda m, _: np.ones_like(m.velocity),
+    "coulomb": lambda m, _: 2.0 * m.right - 1.0,
+    "coulomb.positive": lambda m, _: m.right,
+    "coulomb.negative": lambda m, _: m.right - 1.0,
+    "viscous": lambda m, _: m.velocity,
+    "viscous.positive": lambda m, _: np.maximum(m.velocity, 0.0),
+    "viscous.negative": lambda m, _: np.minimum(m.velocity, 0.0),
+    "excess.positive": lambda m, s: _bristle(m, s, 1),
+    "excess.negative": lambda m, s: _bristle(m, s, -1),
+    "pendulum": lambda m, _: m.kernel.mean(np.sin(m.places), m.rows),
+    "pendulum.across": lambda m, _: m.kernel.mean(np.cos(m.places), m.rows),
+    "spring": lambda m, _: m.position,
+}
+"""Every term of an equation of motion; `excess` is static less Coulomb friction."""
+
+
+LOSS = "loss"
+"""Named in a model whose transmission loses a share of the effort; it bends the other terms and has no column."""
+
+
+def is_bent(names: Sequence[str]) -> bool:
+    """True for a model with a Stribeck velocity or a loss."""
+    return LOSS in names or any(name.startswith("excess") for name in names)
+
+
+def terms_of(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of a model that have a column."""
+    return tuple(name for name in names if name != LOSS)
+
+
+def model_columns(m: Motion, names: Sequence[str], bend: float) -> Numbers:
+    """Columns of a model over windows.
+
+    Parameters
+    ----------
+    m : Motion
+    names : sequence of str
+        Terms of `TERMS`, and `LOSS` where a share of the effort is lost.
+    bend : float
+        Stribeck velocity [m/s], or share lost.
+
+    Returns
+    -------
+    float64 array, shape (m, k)
+        One column per term of `terms_of`.
+    """
+    columns = np.column_stack([TERMS[name](m, bend) for name in terms_of(names)])
+    if LOSS not in names:
+        return columns
+    with_motion = np.sign(m.effort) * np.sign(m.quick)
+    return columns * m.kernel.mean(1.0 / (1.0 - bend * with_motion), m.rows)[:, None]
+
+
+def standstill_velocity(run: Run, kernel: Kernel) -> float:
+    """Velocity below which a window cannot tell motion from noise [m/s]."""
+    noise = run.noise * math.sqrt(float(kernel.first @ kernel.first))
+    count = run.resolution / (2.0 * kernel.half * run.step)
+    return max(NOISES * noise, 0.5 * count)
+
+
+def usable_rows(run: Run, kernel: Kernel) -> Rows:
+    """Samples, evenly spaced, around which the equation of motion holds for a whole window."""
+    half, n = kernel.half, len(run.position)
+    fine = fine_kernel(kernel)
+    quick = fine.velocities(run.position)
+    bad = ~run.usable | (np.abs(quick) <= standstill_velocity(run, fine))
+    bad[:-1] |= quick[1:] * quick[:-1] < 0.0
+    before = np.concatenate([[0], np.cumsum(bad)])
+    rows = np.arange(half + 2, n - half - 2, max(half // HOPS, 1))
+    return rows[before[rows + half + 1] == before[rows - half]]

@@ -1,0 +1,246 @@
+"""An axis with identified constants, simulated along a log: the test that no residual replaces.
+
+The axis gets the recorded effort and nothing else; its loops are open, so that every error of the constants adds up.
+From many moments of the log it starts where the log says the axis was, and runs for a horizon: a sample, a second, to
+the end. The same compiled blocks move it as in every other simulation.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.constants import Constants, hanging_position
+from detent.identify.fit.equations import fine_kernel
+from detent.identify.fit.kernel import make_kernel
+from detent.identify.fit.run import Run
+from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, advance_driven, fill_clocks, switch_on
+from detent.plant.two_mass import fastest_rate
+
+Numbers = NDArray[np.float64]
+Report = Callable[[float], None]
+
+HORIZONS = (0.1, 0.5, 1.0, 2.0)
+"""Lengths of simulated stretches [s]."""
+
+SUBSTEPS = 4
+"""Ticks of the plant per sample of the log."""
+
+MOST_STARTS = 60
+"""Stretches simulated per horizon at most, evenly spread over the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Horizon:
+    """Errors of stretches of one length.
+
+    Attributes
+    ----------
+    duration : float
+        Length of a stretch [s]; a sample, or to the end of the log.
+    name : str
+        What it is called.
+    starts : int
+        Stretches simulated.
+    rms, largest : float
+        Error of the position at the end of a stretch over all stretches; of the free run over its whole length.
+    moved : float
+        Root mean square of the way the axis made in these stretches, which 0 would be wrong by.
+    naive : float
+        Error of going on with the velocity of the start: what no model needs to know.
+    """
+
+    duration: float
+    name: str
+    starts: int
+    rms: float
+    largest: float
+    moved: float
+    naive: float
+
+
+class Plant:
+    """An axis with identified constants that can be run along a log.
+
+    Parameters
+    ----------
+    constants : Constants
+        Its constants; friction below 0 counts as none.
+    step : float
+        Time between two samples of the logs [s].
+    """
+
+    def __init__(self, constants: Constants, step: float) -> None:
+        p = plant_registers(constants)
+        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.machine) * step / MAX_RATE))
+        fill_clocks(p, step / self.ticks, 1)
+        self._params = p
+        self._late = round(constants.value("delay") / step * self.ticks)
+        self._hanging = hanging_position(constants)
+        self._step = step
+
+    def run(self, effort: Numbers, begin: int, samples: int, position: float, velocity: float) -> Numbers:
+        """Positions at samples under a recorded effort, loops open.
+
+        Parameters
+        ----------
+        effort : float64 array, shape (n,)
+            Of the whole log; what was recorded before `begin` may still be on its way.
+        begin, samples : int
+            First sample, and how many.
+        position, velocity : float
+            Where the axis is then.
+
+        Returns
+        -------
+        float64 array, shape (samples,)
+            The first is `position`.
+        """
+        r = Cascade()
+        switch_on(self._params, r, position - self._hanging)
+        r.machine.motor.velocity = r.machine.load.velocity = velocity
+        ticks = (samples - 1) * self.ticks
+        at = np.arange(ticks) + begin * self.ticks - self._late
+        command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
+        rows = np.zeros((samples, 8), np.uint8)
+        advance_driven(self._params, r, command, ticks, rows, _PICKS, self.ticks)
+        moved = rows.view(np.float64)[:, 0] + self._hanging
+        moved[0] = position
+        return moved
+
+
+def plant_registers(constants: Constants) -> CascadeParams:
+    """Registers of a plant that is driven by the effort itself.
+
+    Parameters
+    ----------
+    constants : Constants
+        Friction below 0 counts as none.
+
+    Returns
+    -------
+    CascadeParams
+        Without loops; its clocks are still to be filled.
+    """
+    p = CascadeParams()
+    p.machine.motor.mass = constants.value("mass")
+    offset = 0.5 * (constants.value("coulomb.positive") - constants.value("coulomb.negative"))
+    friction = p.machine.motor.friction
+    friction.offset = offset
+    for direction, way, sign in ((friction.positive, "positive", 1.0), (friction.negative, "negative", -1.0)):
+        direction.coulomb = max(constants.value(f"coulomb.{way}") - sign * offset, 0.0)
+        direction.viscous = max(constants.value(f"viscous.{way}"), 0.0)
+        direction.static = max(constants.value(f"static.{way}") - sign * offset, 0.0)
+        direction.stribeck = max(constants.value("stribeck"), 0.0)
+    p.machine.pendulum = math.hypot(constants.value("pendulum"), constants.value("pendulum.across"))
+    p.machine.loss = min(max(constants.value("loss"), 0.0), 1.0)
+    p.machine.winding.max_current = p.law.cascade.max_velocity = math.inf
+    p.source.gain, p.source.limit, p.law.max_command = 1.0, math.inf, math.inf
+    for sensor in (p.motor_sensor, p.load_sensor):
+        sensor.span, sensor.smoothing = 1, 1.0
+    return p
+
+
+def _position_bytes() -> NDArray[np.int64]:
+    """Where the position of the motor stands in the registers."""
+    leaf = next(leaf for leaf in Cascade.leaves() if leaf.path == "machine.motor.position")
+    return np.arange(leaf.offset, leaf.offset + 8).astype(np.int64)
+
+
+_PICKS = _position_bytes()
+
+
+def start_velocities(run: Run) -> Numbers:
+    """Velocity at every sample, as a simulation starts with it."""
+    return fine_kernel(make_kernel(max(4, round(0.02 / run.step)), run.step)).velocities(run.position)
+
+
+def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report | None = None) -> tuple[Horizon, ...]:
+    """Errors over a sample, over each of `HORIZONS`, and to the end.
+
+    Parameters
+    ----------
+    constants : Constants
+    runs : sequence of Run
+        Parts of logs that the constants need not have seen.
+    report : callable, optional
+        Is told the share that is done.
+
+    Returns
+    -------
+    tuple of Horizon
+        Those that fit into the runs.
+    """
+    found: list[Horizon] = []
+    step = runs[0].step
+    named = [(1, "one step"), *((round(h / step), f"{h:g} s") for h in HORIZONS)]
+    for k, (samples, name) in enumerate(named):
+        if samples < 1 or (samples == 1 and name != "one step"):
+            continue
+        made = [_stretches(constants, run, samples) for run in runs if len(run.position) > samples + 2]
+        rows = np.concatenate(made) if made else np.empty((0, 3))
+        if len(rows):
+            found.append(_horizon(name, samples * step, rows))
+        if report is not None:
+            report((k + 1) / (len(named) + 1))
+    found.append(_free_run(constants, runs))
+    return tuple(found)
+
+
+def _stretches(constants: Constants, run: Run, samples: int) -> Numbers:
+    """Error, way and naive error at the end of stretches, shape (stretches, 3)."""
+    plant, velocity, q = Plant(constants, run.step), start_velocities(run), run.position
+    border = min(max(4, round(0.006 / run.step)), len(q) // 4)
+    last = len(q) - samples - border
+    starts = np.unique(np.linspace(border, max(last, border), MOST_STARTS).astype(int))
+    starts = starts[starts + samples < len(q)]
+    rows: list[tuple[float, float, float]] = []
+    for s in starts.tolist():
+        end = plant.run(run.effort, s, samples + 1, float(q[s]), float(velocity[s]))[-1]
+        way = float(q[s + samples] - q[s])
+        rows.append((float(end - q[s + samples]), way, float(velocity[s]) * samples * run.step - way))
+    return np.array(rows).reshape(-1, 3)
+
+
+def _horizon(name: str, duration: float, rows: Numbers) -> Horizon:
+    error, way, naive = rows.T
+    return Horizon(duration, name, len(rows), _rms(error), float(np.abs(error).max()), _rms(way), _rms(naive))
+
+
+def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
+    """The whole of each run in one piece."""
+    errors: list[Numbers] = []
+    ways: list[Numbers] = []
+    naive: list[Numbers] = []
+    for run in runs:
+        velocity = float(start_velocities(run)[_border(run)])
+        cut = run.part(_border(run), len(run.position))
+        q = cut.position
+        errors.append(free_run(constants, run) - q)
+        ways.append(q - q[0])
+        naive.append(q[0] + velocity * cut.t - q)
+    error = np.concatenate(errors)
+    duration = max(run.t[-1] for run in runs)
+    largest = float(np.abs(error).max())
+    return Horizon(
+        duration, "free run", len(runs), _rms(error), largest, _rms(np.concatenate(ways)), _rms(np.concatenate(naive))
+    )
+
+
+def _border(run: Run) -> int:
+    """Samples at the begin whose velocity is not known well."""
+    return min(max(4, round(0.006 / run.step)), len(run.position) // 4)
+
+
+def free_run(constants: Constants, run: Run) -> Numbers:
+    """A run in one piece, from its first well-known velocity on; a few samples shorter than the run."""
+    begin = _border(run)
+    samples = len(run.position) - begin
+    velocity = float(start_velocities(run)[begin])
+    return Plant(constants, run.step).run(run.effort, begin, samples, float(run.position[begin]), velocity)
+
+
+def _rms(values: Numbers) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,382 @@
+"""From logs to constants with limits, and a verdict: the whole way, in its order."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import InputError
+from detent.identify.fit.closed_loop import ClosedLoop, simulate_closed_loop
+from detent.identify.fit.constants import Constants, constants_of
+from detent.identify.fit.equations import LOSS
+from detent.identify.fit.estimate import Estimate, quantiles
+from detent.identify.fit.free_run import Horizon, simulate_horizons
+from detent.identify.fit.kernel import make_kernel
+from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung
+from detent.identify.fit.output_error import STRETCH, fit_output_error
+from detent.identify.fit.regression import Fit, Instruments, Prepared, prepare
+from detent.identify.fit.residuals import Residuals, residuals_of
+from detent.identify.fit.run import Run, make_run
+from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
+from detent.logs.log import Log
+
+Numbers = NDArray[np.float64]
+Report = Callable[[str, float], None]
+Method = Literal["regression", "output error"]
+Verdict = Literal["trusted", "partly trusted", "refused"]
+
+WINDOW = 0.02
+"""Half of the window to begin with [s]."""
+
+WIDEST = 0.12
+"""Half of the widest window [s]."""
+
+NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "none": 0.002}
+"""Share of the noise in the square of the acceleration, at most, by what instruments are made of."""
+
+LIKENESS: dict[Instruments, float] = {"reference": 0.6, "position": 0.95}
+"""Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken."""
+
+WIDEST_BEND = 0.5
+"""Half of the interval of a Stribeck velocity or a loss over its value, at most."""
+
+HELD_OUT = 0.25
+"""Last part of a log that the simulation is tested on."""
+
+_WAYS: dict[Instruments, str] = {
+    "reference": "references as instruments",
+    "position": "wider windows as instruments: no reference that the axis follows closely",
+    "none": "least squares: no reference that the axis follows closely, and motion too quick for wider windows",
+}
+
+TURN = 0.5
+"""Range of an angle from which on a weight may show [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Constants of an axis, their limits, and what of them can be trusted.
+
+    Attributes
+    ----------
+    logs : tuple of Log
+        What was read.
+    runs : tuple of Run
+        The same on even grids.
+    constants : Constants or None
+        None where nothing could be fitted.
+    estimates : tuple of Estimate
+        Each constant with its interval.
+    climbs : tuple of Climb
+        The model-order ladder; the last one taken is the model.
+    fit : Fit or None
+        The regression behind the constants.
+    horizons : tuple of Horizon
+        Simulation errors on the last part of each log, with constants from the first.
+    refusals : tuple of Refusal
+        What is not trusted.
+    seen : Constants or None
+        Constants from the first part of each log, which the simulation errors belong to.
+    closed_loop : ClosedLoop or None
+        The same simulated under the loops of the log; None where it shows none.
+    notes : tuple of str
+        What was chosen on the way.
+    """
+
+    logs: tuple[Log, ...]
+    runs: tuple[Run, ...]
+    constants: Constants | None
+    estimates: tuple[Estimate, ...]
+    climbs: tuple[Climb, ...]
+    fit: Fit | None
+    horizons: tuple[Horizon, ...]
+    refusals: tuple[Refusal, ...]
+    seen: Constants | None = None
+    closed_loop: ClosedLoop | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Trusted without refusals, refused where one concerns all constants, else partly trusted."""
+        if not self.refusals:
+            return "trusted"
+        return "refused" if any(not r.constants for r in self.refusals) or not self.trusted else "partly trusted"
+
+    @property
+    def residuals(self) -> Residuals | None:
+        """What the residuals of the regression look like."""
+        return None if self.fit is None else residuals_of(self.fit)
+
+    @property
+    def rung(self) -> Rung | None:
+        """The chosen model."""
+        return chosen_rung(self.climbs) if self.climbs else None
+
+    @property
+    def trusted(self) -> tuple[Estimate, ...]:
+        """Constants that no refusal concerns."""
+        if any(not r.constants for r in self.refusals):
+            return ()
+        refused = {name for r in self.refusals for name in r.constants}
+        return tuple(e for e in self.estimates if e.name not in refused)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        c = self.constants
+        return {
+            "verdict": self.verdict,
+            "model": self.rung.name if self.rung else None,
+            "constants": [e.to_dict() | {"trusted": e in self.trusted} for e in self.estimates],
+            "correlation": None if c is None else {"names": list(c.names), "matrix": c.correlation.tolist()},
+            "inseparable": [] if c is None else [list(pair) for pair in c.inseparable()],
+            "residuals": None if self.residuals is None else asdict(self.residuals),
+            "ladder": [
+                {"model": s.rung.name, "error": s.error, "gain": None if np.isnan(s.gain) else s.gain, "taken": s.taken}
+                for s in self.climbs
+            ],
+            "simulation": [asdict(h) for h in self.horizons],
+            "closed_loop": None if self.closed_loop is None else asdict(self.closed_loop),
+            "refusals": [r.to_dict() for r in self.refusals],
+            "notes": list(self.notes),
+            "logs": [log.to_dict() for log in self.logs],
+        }
+
+
+def identify(
+    logs: Sequence[Log],
+    effort: str | None = None,
+    *,
+    method: Method = "regression",
+    report: Report | None = None,
+) -> Identification:
+    """Identify an axis from recorded runs.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Runs of one axis, as `read_log` gives them.
+    effort : str, optional
+        Which signal drives the axis; by default the first of `replay_job.EFFORTS` that the logs hold.
+    method : str
+        "regression" of the equation of motion; or "output error", which goes on from there by simulation.
+    report : callable, optional
+        Is told what is being done, and the share that is done.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    InputError
+        A log holds no position, nothing that drives the axis, or too few samples.
+    """
+    runs = tuple(make_run(log, effort) for log in logs)
+    _check_alike(runs)
+    refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]
+    parts = choose_windows(runs)
+    refusals += look_at_motion(runs, parts)
+    if sum(len(p.motion.rows) for p in parts) < 5 * len(RUNGS[-1].terms):
+        if not refusals:
+            refusals.append(Refusal("too short", "hardly any window without standstill", "record longer moves"))
+        return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
+    found = _fit_all(parts, runs, report)
+    constants = constants_of(found.fit, found.rivals)
+    if method == "output error" and constants.value("mass") > 0.0:
+        constants = _refine(runs, constants, "output error", report)
+    refusals += look_at_constants(runs[0], constants, parts)
+    seen, horizons, closed = _test_simulation(runs, found, constants, method, report)
+    refusals += look_at_prediction(found.climbs, horizons, refusals)
+    return Identification(
+        tuple(logs),
+        runs,
+        constants,
+        constants.estimates(runs[0]),
+        found.climbs,
+        found.fit,
+        horizons,
+        tuple(refusals),
+        seen,
+        closed,
+        _notes_of(runs, parts),
+    )
+
+
+def _notes_of(runs: Sequence[Run], parts: Sequence[Prepared]) -> tuple[str, ...]:
+    """What was chosen on the way."""
+    kernel, windows = parts[0].motion.kernel, sum(len(p.motion.rows) for p in parts)
+    return (
+        f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
+        f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {windows} of them",
+        _WAYS[parts[0].instruments],
+    )
+
+
+def _check_alike(runs: Sequence[Run]) -> None:
+    """Refuse logs of which one axis cannot have made all."""
+    first = runs[0]
+    for run in runs[1:]:
+        for what, came, wanted in (
+            ("positions", run.position_unit, first.position_unit),
+            ("effort", f"{run.effort_name} [{run.effort_unit}]", f"{first.effort_name} [{first.effort_unit}]"),
+        ):
+            if came != wanted:
+                raise InputError.of_file(
+                    run.name,
+                    f"{what} in {came}",
+                    f"{wanted}, as in {first.name}",
+                    "state the columns and units of both",
+                )
+
+
+def _teller(report: Report | None, what: str) -> Callable[[float], None] | None:
+    """What tells the share of one step that is done."""
+    if report is None:
+        return None
+
+    def tell(share: float) -> None:
+        report(what, share)
+
+    return tell
+
+
+def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report | None) -> Constants:
+    """Constants by simulation, from those of the regression on."""
+    tell = _teller(report, what)
+    longest = min(float(run.t[-1]) for run in runs)
+    return fit_output_error(runs, constants, min(STRETCH, longest / 4), tell).constants
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """The ladder, the chosen model and its rivals."""
+
+    climbs: tuple[Climb, ...]
+    fit: Fit
+    rivals: tuple[Fit, ...]
+
+
+def choose_windows(runs: Sequence[Run]) -> list[Prepared]:
+    """Windows with their instruments: the first of references, wider windows and none that is near the motion.
+
+    Instruments that say little of the motion leave a bias smaller than the scatter that they bring.
+    """
+    ways: list[Instruments] = ["reference"] if all(run.reference is not None for run in runs) else []
+    for way in (*ways, "position"):
+        parts = prepare_all(runs, way)
+        if all(_follows(p) for p in parts):
+            return parts
+    return prepare_all(runs, "none")
+
+
+def _follows(part: Prepared) -> bool:
+    """True where velocity and acceleration of the instruments are those of the axis for the most part."""
+    if not len(part.motion.rows):
+        return False
+    pairs = (
+        (part.motion.velocity, part.ideal.velocity),
+        (part.motion.acceleration, part.ideal.acceleration),
+    )
+    return all(_cosine(*pair) > LIKENESS[part.instruments] for pair in pairs)
+
+
+def _cosine(a: Numbers, b: Numbers) -> float:
+    """Cosine of the angle between two signals; 0 where one is absent."""
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
+    """Windows wide enough that noise does not matter, the same for all runs."""
+    half = WINDOW
+    while True:
+        kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
+        parts = [prepare(run, kernel, instruments) for run, kernel in zip(runs, kernels, strict=True)]
+        if half >= WIDEST or _noise_share(parts) < NOISE_SHARE[instruments]:
+            return parts
+        half *= 1.4
+
+
+def _noise_share(parts: Sequence[Prepared]) -> float:
+    """Share of the noise of the position in the square of the acceleration."""
+    noise = sum(
+        len(p.motion.rows) * p.run.noise**2 * float(p.motion.kernel.second @ p.motion.kernel.second) for p in parts
+    )
+    power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
+    return noise / power if power > 0.0 else 0.0
+
+
+def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
+    """The ladder of these runs: an axis that turns may lift a weight, and lose force where it does."""
+    if not runs[0].is_rotary or max(float(np.ptp(run.position)) for run in runs) < TURN:
+        return RUNGS
+    plain = RUNGS[1]
+    weights = [plain, *(extended(plain, terms) for terms in (("pendulum",), ("pendulum", "pendulum.across")))]
+    lifts = climb(parts, weights)
+    extra = chosen_rung(lifts).terms[len(plain.terms) :]
+    if not extra:
+        return RUNGS
+    ladder = [extended(rung, extra) for rung in RUNGS]
+    each = next(rung for rung in ladder if rung.name == "per direction")
+    lossy = Rung(
+        "loss", "friction of each direction, and a share of the force lost in the transmission", (*each.terms, LOSS)
+    )
+    return (*ladder, lossy)
+
+
+def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report | None) -> _Found:
+    """Climb the ladder, then fit the chosen model and those as good."""
+    climbs = climb(parts, _rungs_for(parts, runs), _teller(report, "ladder"))
+    chosen = next(c for c in reversed(climbs) if c.taken)
+    fits = {c.rung.name: fit_rung(parts, c.rung) for c in climbs if _is_rival(c, chosen)}
+    if chosen.rung.is_bent and not _is_told(fits[chosen.rung.name]):
+        climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
+        chosen = next(c for c in reversed(climbs) if c.taken)
+        fits.setdefault(chosen.rung.name, fit_rung(parts, chosen.rung))
+    fit = fits.pop(chosen.rung.name)
+    return _Found(climbs, fit, tuple(fits.values()))
+
+
+def _is_told(fit: Fit) -> bool:
+    """True where the log tells the bend of a model, and that friction rises towards standstill.
+
+    A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
+    """
+    reach = quantiles(fit.degrees) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    if not reach[-1] < WIDEST_BEND * fit.bend:
+        return False
+    excess = [k for k, name in enumerate(fit.names) if name.startswith("excess")]
+    return all(fit.values[k] > reach[k] for k in excess)
+
+
+def _is_rival(c: Climb, chosen: Climb) -> bool:
+    """True for the chosen rung, and for one whose predictions are as good within their scatter."""
+    if c is chosen:
+        return True
+    if not c.possible or len(c.stretches) != len(chosen.stretches) or "viscous" not in " ".join(c.rung.terms):
+        return False
+    worse = c.stretches - chosen.stretches
+    return bool(worse.mean() < worse.std(ddof=1) / np.sqrt(len(worse)))
+
+
+def _test_simulation(
+    runs: Sequence[Run], found: _Found, whole: Constants, method: Method, report: Report | None
+) -> tuple[Constants | None, tuple[Horizon, ...], ClosedLoop | None]:
+    """Constants from the first part of each log, simulated along the last; none where those of the whole cannot be."""
+    if whole.value("mass") <= 0.0:
+        return None, (), None
+    cuts = [round((1.0 - HELD_OUT) * len(run.position)) for run in runs]
+    seen = [run.part(0, cut) for run, cut in zip(runs, cuts, strict=True)]
+    unseen = [run.part(cut, len(run.position)) for run, cut in zip(runs, cuts, strict=True)]
+    parts = prepare_all(seen, found.fit.instruments)
+    if sum(len(p.motion.rows) for p in parts) < 3 * len(found.fit.names):
+        return None, (), None
+    constants = constants_of(fit_rung(parts, chosen_rung(found.climbs)))
+    if constants.value("mass") <= 0.0:
+        return None, (), None
+    if method == "output error":
+        constants = _refine(seen, constants, "output error on the first part", report)
+    tell = _teller(report, "simulation")
+    return constants, simulate_horizons(constants, unseen, tell), simulate_closed_loop(constants, seen, unseen)

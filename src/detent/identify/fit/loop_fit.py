@@ -1,0 +1,199 @@
+"""The loops that drove an axis, from its log: what the recorded effort is of the recorded reference and position.
+
+A position loop P over a velocity loop P or PI, its feed-forward included, says exactly what it puts out:
+
+    u = Kv d + Ki int d + A a_ref + B v_ref + C sign(v_ref) + const,    d = Kp (r - q) + s v_ref - v
+
+With Kp known this is linear in all others; Kp is searched. A velocity `v` is a difference of positions over some
+samples, and `s` is 0 or 1 where there is an integral: each of these is tried. Loops that explain a part of the log that
+the fit did not see are those of the machine as far as the log can tell; where none do, nothing is said of them.
+
+References
+----------
+Ljung: System Identification, Theory for the User (1999), section 13.5, direct identification of the regulator.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.identify.fit.run import Run
+
+Numbers = NDArray[np.float64]
+
+SPANS = (1, 2, 3, 4, 6, 8, 12)
+"""Samples that the velocity may be a difference over."""
+
+SEEN = 0.7
+"""Part of the log that is fitted; the rest tests."""
+
+WORST = 0.1
+"""Error of the effort over the effort in the rest, at most."""
+
+SLIGHT = 0.01
+"""Share of the effort below which a feed-forward is none."""
+
+GAINS = (0.5, 2000.0)
+"""Position gains looked at [1/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loops:
+    """Loops as a log tells them; efforts in the unit of the log.
+
+    Attributes
+    ----------
+    position : float
+        Gain of the position loop [1/s].
+    velocity, integral : float
+        Gains of the velocity loop: effort per velocity, and per position.
+    span : int
+        Samples that the velocity is a difference over.
+    feed_velocity : float
+        Share of the reference's velocity in the demand; without an integral it holds viscous feed-forward too.
+    feed_acceleration, feed_viscous, feed_coulomb : float
+        Effort per acceleration and per velocity of the reference, and for its direction.
+    error : float
+        Effort not explained over the effort, in the part that was not fitted.
+    """
+
+    position: float
+    velocity: float
+    integral: float
+    span: int
+    feed_velocity: float
+    feed_acceleration: float
+    feed_viscous: float
+    feed_coulomb: float
+    error: float
+
+
+def fit_loops(run: Run) -> Loops | None:
+    """Find the loops that drove an axis.
+
+    Parameters
+    ----------
+    run : Run
+        With a reference.
+
+    Returns
+    -------
+    Loops or None
+        None without a reference, and where no such loops explain the effort.
+    """
+    if run.reference is None or len(run.position) < 10 * max(SPANS):
+        return None
+    found = [loops for trial in _trials(run, run.reference) if (loops := trial.solve()) is not None]
+    best = min(found, key=lambda loops: loops.error, default=None)
+    return best if best is not None and best.error < WORST else None
+
+
+def _trials(run: Run, reference: Numbers) -> Iterator["_Trial"]:
+    """Every structure that is tried, the simplest first."""
+    step, count = run.step, len(reference)
+    velocity = np.gradient(reference, step)
+    feeds = np.column_stack([np.gradient(velocity, step), velocity, np.sign(velocity), np.ones(count)])
+    rows = np.flatnonzero(run.usable)
+    rows = rows[(rows >= max(SPANS) + 3) & (rows < count - 3)]
+    if len(rows) < 10 * max(SPANS):
+        return
+    for span in SPANS:
+        moved = np.zeros(count)
+        moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)
+        # Without an integral a share of the velocity and a viscous feed-forward are one and the same.
+        for share, integrates in ((0.0, False), (0.0, True), (1.0, True)):
+            yield _Trial(run, reference - run.position, share * velocity - moved, feeds, rows, span, share, integrates)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """One structure."""
+
+    run: Run
+    error: Numbers
+    demand: Numbers
+    feeds: Numbers
+    rows: NDArray[np.intp]
+    span: int
+    share: float
+    integrates: bool
+
+    def parts(self, feeds: tuple[int, ...]) -> Numbers:
+        """What the columns of every position gain are made of, and some of the feed-forwards."""
+        loops = [self.error, self.demand]
+        if self.integrates:
+            loops += [np.cumsum(signal) * self.run.step for signal in loops]
+        return np.column_stack([*loops, self.feeds[:, [*feeds, -1]]])[self.rows]
+
+    def mix(self, gain: float, count: int) -> Numbers:
+        """How a position gain mixes so many parts: their product are its columns."""
+        loops = 2 if self.integrates else 1
+        mixed = np.zeros((count, count - loops))
+        for k in range(loops):
+            mixed[2 * k, k], mixed[2 * k + 1, k] = gain, 1.0
+        mixed[2 * loops :, loops:] = np.eye(count - 2 * loops)
+        return mixed
+
+    def solve(self, feeds: tuple[int, ...] = (0, 1, 2)) -> Loops | None:
+        """The best gains; None where they are none of a loop that holds an axis.
+
+        A feed-forward that is slight, or against the motion, is left out.
+        """
+        cut, effort = round(SEEN * len(self.rows)), self.run.effort[self.rows]
+        parts = self.parts(feeds)
+        gain = self._search(parts[:cut], effort[:cut])
+        columns = parts @ self.mix(gain, parts.shape[1])
+        theta, rest = _solve(columns[:cut], effort[:cut]), effort[cut:]
+        first = 2 if self.integrates else 1
+        least = SLIGHT * _rms(effort)
+        if not (theta[:first] > 0.0).all() or (self.integrates and _rms(columns[:, 1] * theta[1]) < least):
+            return None
+        kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and _rms(columns[:, k] * theta[k]) > least)
+        if kept != feeds:
+            return self.solve(kept)
+        error = _rms(rest - columns[cut:] @ theta) / max(_rms(rest), 1e-300)
+        known = dict(zip(feeds, theta[first:-1].tolist(), strict=True))
+        integral = float(theta[1]) if self.integrates else 0.0
+        acceleration, viscous, coulomb = (known.get(f, 0.0) for f in range(3))
+        share = self.share
+        if not self.integrates:
+            share, viscous = viscous / float(theta[0]), 0.0
+        return Loops(gain, float(theta[0]), integral, self.span, share, acceleration, viscous, coulomb, error)
+
+    def _search(self, parts: Numbers, effort: Numbers) -> float:
+        """The position gain with the least error: the best of a few, then between its neighbours."""
+        optimize: Any = import_module("scipy.optimize")  # it states no types
+        products, moments = parts.T @ parts, parts.T @ effort
+
+        def miss(logarithm: float) -> float:
+            """Square of the error, less that of the effort."""
+            mix = self.mix(math.exp(logarithm), len(products))
+            own, told = mix.T @ products @ mix, mix.T @ moments
+            return -float(told @ _solve_normal(own, told))
+
+        grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
+        best = int(np.argmin([miss(g) for g in grid]))
+        around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+        return float(np.exp(optimize.minimize_scalar(miss, bounds=around, method="bounded").x))
+
+
+def _solve(columns: Numbers, effort: Numbers) -> Numbers:
+    """Least squares, worked out with columns of unit length by their normal equations, which are few."""
+    return _solve_normal(columns.T @ columns, columns.T @ effort)
+
+
+def _solve_normal(products: Numbers, moments: Numbers) -> Numbers:
+    """The same from the normal equations."""
+    size = np.maximum(np.sqrt(np.diag(products)), 1e-150)
+    linalg: Any = np.linalg
+    theta: Numbers = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]
+    return theta / size
+
+
+def _rms(values: Numbers) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,312 @@
+"""Constants by simulation: those with which the axis, moved by the recorded effort alone, stays closest to the log.
+
+The log is cut into stretches; each starts where the log says the axis was, and is simulated by the compiled blocks, so
+that standstill, breaking loose and every other corner of the friction count, which no regression sees. What a start is
+wrong by in position and velocity is fitted along with each stretch. The residuals of a stretch are as coloured as can
+be, but stretches are nearly independent: the covariance is that of their scores (K.-Y. Liang, S. L. Zeger,
+"Longitudinal data analysis using generalized linear models", Biometrika 73 (1986)), with Student's distribution of as
+many degrees as there are stretches beyond the constants.
+
+References
+----------
+Ljung: System Identification, 2nd ed. (1999), section 7.2 (output-error structure).
+Bock: Recent advances in parameter identification for ordinary differential equations (1983), multiple shooting.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.identify.fit.constants import Constants
+from detent.identify.fit.free_run import Plant, start_velocities
+from detent.identify.fit.run import Run
+
+Numbers = NDArray[np.float64]
+Report = Callable[[float], None]
+
+STRETCH = 2.0
+"""Length of a simulated stretch [s]."""
+
+MOST_ROUNDS = 40
+"""Rounds of the search, at most."""
+
+NUDGE = 1e-4
+"""Change of a constant for its sensitivity, in parts of its scale."""
+
+MEANT = 0.98
+"""Share of a stretch's samples that must mean something."""
+
+SLOWEST = 0.1
+"""Least Stribeck velocity in parts of that of the start: towards 0 the plant's rate has no bound."""
+
+_FREE = frozenset({"offset", "pendulum", "pendulum.across"})
+"""Searched constants that may be below 0."""
+
+
+_FORCES = frozenset({"coulomb", "offset", "static", "pendulum"})
+
+MOST_LOST = 0.95
+"""Share of the effort that a transmission may lose, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Part of a run that is simulated in one piece: first sample, samples, and the velocity at its begin."""
+
+    run: Run
+    begin: int
+    samples: int
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutputErrorFit:
+    """Outcome of a fit by simulation.
+
+    Attributes
+    ----------
+    constants : Constants
+        With intervals.
+    error : float
+        Root mean square of simulated less measured position over all stretches [m] or [rad].
+    before : float
+        The same with the constants that it began with.
+    stretches : int
+        Stretches simulated.
+    simulations : int
+        How often all of them were.
+    """
+
+    constants: Constants
+    error: float
+    before: float
+    stretches: int
+    simulations: int
+
+
+def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretch]:
+    """Stretches of a duration, without samples that mean nothing.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    duration : float
+        [s]; a run that is shorter is one stretch.
+    """
+    found: list[Stretch] = []
+    for run in runs:
+        velocity = start_velocities(run)
+        border = max(4, round(0.006 / run.step))
+        n = len(run.position) - 2 * border
+        samples = min(max(round(duration / run.step), 8), n)
+        begins: list[int] = []
+        if n >= 8:
+            begins = (np.linspace(0, n - samples, max(round(n / samples), 1)).astype(np.int64) + border).tolist()
+        found += [
+            Stretch(run, begin, samples, float(velocity[begin]))
+            for begin in begins
+            if float(run.usable[begin : begin + samples].mean()) > MEANT
+        ]
+    return found
+
+
+def fit_output_error(
+    runs: Sequence[Run], start: Constants, duration: float = STRETCH, report: Report | None = None
+) -> OutputErrorFit:
+    """Fit constants by simulation.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    start : Constants
+        Where the search begins; its delay is kept.
+    duration : float
+        Length of a stretch [s].
+    report : callable, optional
+        Is told the share that is done, of the most rounds that both passes may take.
+
+    Returns
+    -------
+    OutputErrorFit
+
+    Raises
+    ------
+    DetentError
+        The runs hold too few stretches for the constants.
+    """
+    names = tuple(name for name in start.names if name != "delay")
+    stretches = cut_stretches(runs, duration)
+    if len(stretches) < 4 or sum(s.samples for s in stretches) < 20 * len(names):
+        raise DetentError(
+            f"identify: came {len(stretches)} stretches of {duration:g} s; allowed: 4 or more; "
+            "record longer, or shorten the stretches"
+        )
+    search = _Search(names, start, stretches)
+    before = search.residual(search.begin)
+    rough = search.minimise(search.begin, _part_of(report, 0.0, 0.5))
+    # What an error of a start does depends on the constants: once more with those found.
+    search.look_at_starts(rough.x)
+    found = search.minimise(rough.x, _part_of(report, 0.5, 1.0))
+    constants = search.constants_at(found.x, found.jac, found.fun)
+    return OutputErrorFit(constants, _rms(found.fun), _rms(before), len(stretches), search.count)
+
+
+def _part_of(report: Report | None, begin: float, end: float) -> Report | None:
+    """What tells the share that is done of a part of the work."""
+    if report is None:
+        return None
+
+    def tell(share: float) -> None:
+        report(begin + share * (end - begin))
+
+    return tell
+
+
+class _Search:
+    """Residuals and their minimum, with constants in parts of their scales.
+
+    In place of the Coulomb friction of both directions their mean and half their difference are searched: the mean is
+    friction and cannot be below 0, the difference is a constant force.
+    """
+
+    def __init__(self, names: tuple[str, ...], start: Constants, stretches: Sequence[Stretch]) -> None:
+        self.names, self._start, self._stretches = names, start, stretches
+        self._searched, self._back = _searched_constants(names)
+        known = np.array([start.value(name) for name in names], np.float64)
+        values = np.asarray(np.linalg.pinv(self._back) @ known, np.float64)
+        self._scale = _scales(self._searched, values)
+        self.begin = values / self._scale
+        self.count = 0
+        self._removers: list[Numbers] = []
+        self.look_at_starts(self.begin)
+
+    def look_at_starts(self, x: Numbers) -> None:
+        """Work out what an error of each start does."""
+        self._removers = [self._remover(x, s) for s in self._stretches]
+
+    def _constants(self, x: Numbers) -> Constants:
+        values = np.append(self._back @ (x * self._scale), self._start.value("delay"))
+        k = len(values)
+        return Constants((*self.names, "delay"), values, np.zeros((k, k)), np.ones(k), "output error")
+
+    def _remover(self, x: Numbers, s: Stretch) -> Numbers:
+        """What an error of the start does to a stretch: position and velocity, orthonormal columns."""
+        plant = Plant(self._constants(x), s.run.step)
+        q = float(s.run.position[s.begin])
+        nudge = 1e-3 * max(abs(s.velocity), float(np.abs(np.diff(s.run.position)).max()) / s.run.step)
+        a, b = (plant.run(s.run.effort, s.begin, s.samples, q, s.velocity + d) for d in (0.0, nudge))
+        ways = np.column_stack([np.ones(s.samples), b - a])
+        ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
+        return np.linalg.qr(ways)[0]
+
+    def residual(self, x: Numbers) -> Numbers:
+        """Simulated less measured position of all stretches, without what the starts explain."""
+        self.count += 1
+        constants = self._constants(x)
+        plants: dict[float, Plant] = {}
+        made: list[Numbers] = []
+        for s, ways in zip(self._stretches, self._removers, strict=True):
+            plant = plants.setdefault(s.run.step, Plant(constants, s.run.step))
+            q = s.run.position[s.begin : s.begin + s.samples]
+            miss = plant.run(s.run.effort, s.begin, s.samples, float(q[0]), s.velocity) - q
+            made.append(miss - ways @ (ways.T @ miss))
+        return np.concatenate(made)
+
+    def minimise(self, x: Numbers, report: Report | None) -> Any:
+        """Least squares within what is possible."""
+        rounds = 0
+
+        def jacobian(at: Numbers) -> Numbers:
+            """Change of the residuals with each constant, by differences."""
+            nonlocal rounds
+            rounds += 1
+            if report is not None:
+                report(min(rounds / MOST_ROUNDS, 1.0))
+            middle = self.residual(at)
+            columns = [(self.residual(at + NUDGE * unit) - middle) / NUDGE for unit in np.eye(len(at))]
+            return np.column_stack(columns)
+
+        low, high = self._bounds()
+        optimize: Any = import_module("scipy.optimize")  # it states no types
+        start = np.clip(x, low + 1e-6, high - 1e-6)
+        found = optimize.least_squares(
+            self.residual,
+            start,
+            jac=jacobian,
+            bounds=(low, high),
+            x_scale=1.0,
+            max_nfev=MOST_ROUNDS,
+            xtol=1e-6,
+            ftol=1e-8,
+        )
+        if report is not None:
+            report(1.0)
+        return found
+
+    def _bounds(self) -> tuple[Numbers, Numbers]:
+        """Least and largest value of each searched constant, in parts of its scale."""
+        low, high = np.zeros(len(self._searched)), np.full(len(self._searched), np.inf)
+        for k, name in enumerate(self._searched):
+            if name in _FREE:
+                low[k] = -np.inf
+            if name in {"mass", "stribeck"}:
+                low[k] = SLOWEST * abs(self.begin[k])
+            if name == "loss":
+                high[k] = MOST_LOST / self._scale[k]
+        return low, high
+
+    def constants_at(self, x: Numbers, jacobian: Numbers, residual: Numbers) -> Constants:
+        """Constants with the covariance of the stretches' scores."""
+        edges = np.cumsum([0, *(s.samples for s in self._stretches)])
+        scores = np.array([jacobian[a:b].T @ residual[a:b] for a, b in pairwise(edges.tolist())])
+        inverse = np.linalg.pinv(jacobian.T @ jacobian)
+        count = len(scores)
+        degrees = max(count - len(self.names), 1)
+        covariance = inverse @ (scores.T @ scores) @ inverse * (count / degrees)
+        covariance = self._back @ (covariance * np.outer(self._scale, self._scale)) @ self._back.T
+        covariance = np.pad(covariance, ((0, 1), (0, 1)))
+        covariance[-1, -1] = self._start.errors[self._start.names.index("delay")] ** 2
+        return Constants(
+            (*self.names, "delay"),
+            self._constants(x).values,
+            covariance,
+            np.full(len(covariance), float(degrees)),
+            "output error",
+            self._start.delay_is_told,
+        )
+
+
+def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Numbers]:
+    """What is searched, and the sums of it that the constants are, shape (k, k)."""
+    searched = tuple({"coulomb.positive": "coulomb", "coulomb.negative": "offset"}.get(name, name) for name in names)
+    back = np.eye(len(names))
+    if {"coulomb.positive", "coulomb.negative"} <= set(names):
+        mean, half = searched.index("coulomb"), searched.index("offset")
+        back[mean, half], back[half, mean], back[half, half] = 1.0, 1.0, -1.0
+        for name, sign in (("static.positive", 1.0), ("static.negative", -1.0)):
+            if name in names:
+                back[names.index(name), half] = sign
+    return searched, back
+
+
+def _scales(names: Sequence[str], values: Numbers) -> Numbers:
+    """Scale of each searched constant: its size, or a tenth of the largest of its unit where it is nearly nothing."""
+    forces = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.partition(".")[0] in _FORCES]
+    drags = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.startswith("viscous")]
+    floors: list[float] = []
+    for name in names:
+        kind = name.partition(".")[0]
+        alike = forces if kind in _FORCES else drags if kind == "viscous" else [0.1]
+        floors.append(0.1 * max(alike))
+    return np.maximum(np.maximum(np.abs(values), floors), 1e-12)
+
+
+def _rms(values: Numbers) -> float:
+    return math.sqrt(float(np.mean(values**2)))

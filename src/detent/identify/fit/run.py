@@ -1,0 +1,220 @@
+"""A log made ready for a fit: what moved and what moved it, on an even grid."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import InputError
+from detent.logs.log import Kind, Log
+from detent.methods.cascade.replay_job import EFFORTS
+
+Numbers = NDArray[np.float64]
+
+GAP = 1.5
+"""Time between two samples, in periods, from which on something is missing between them."""
+
+FEWEST = 20
+"""Samples below which nothing is said about a log."""
+
+_MASS = {"N": "kg", "N*m": "kg*m^2"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One run on an even grid.
+
+    Attributes
+    ----------
+    name : str
+        Name of the log.
+    step : float
+        Time between two samples [s].
+    position : float64 array, shape (n,)
+        As measured [m], [rad] or [count].
+    effort : float64 array, shape (n,)
+        What drives the axis, from each sample to the next.
+    usable : bool array, shape (n,)
+        Samples that mean something.
+    effort_name, effort_unit : str
+        What it is.
+    position_unit : str
+        Unit of the position.
+    reference, load_position : float64 array or None
+        Position asked for; position of a second encoder.
+    resolution : float
+        Way of a count of the encoder; 0 where none shows.
+    noise : float
+        Standard deviation of the measured position, counts included.
+    """
+
+    name: str
+    step: float
+    position: Numbers
+    effort: Numbers
+    usable: NDArray[np.bool_]
+    effort_name: str = "force"
+    effort_unit: str = "N"
+    position_unit: str = "m"
+    reference: Numbers | None = None
+    load_position: Numbers | None = None
+    resolution: float = 0.0
+    noise: float = 0.0
+
+    @property
+    def t(self) -> Numbers:
+        """Time from the first sample [s]."""
+        return np.asarray(np.arange(len(self.position)) * self.step, np.float64)
+
+    @property
+    def is_rotary(self) -> bool:
+        """True where the position is an angle."""
+        return self.position_unit == "rad"
+
+    def part(self, begin: int, end: int) -> "Run":
+        """Samples from `begin` to before `end`."""
+        cut = slice(begin, end)
+        return replace(
+            self,
+            position=self.position[cut],
+            effort=self.effort[cut],
+            usable=self.usable[cut],
+            reference=None if self.reference is None else self.reference[cut],
+            load_position=None if self.load_position is None else self.load_position[cut],
+        )
+
+    def unit(self, name: str) -> str:
+        """Unit of a constant by its name, such as ``viscous.positive``."""
+        return _unit(name, self.effort_unit or "1", self.position_unit)
+
+
+def _unit(name: str, effort: str, way: str) -> str:
+    kind = name.partition(".")[0]
+    per_way = f"{effort}*s/{way}" if effort != "1" else f"s/{way}"
+    per_rise = f"{effort}*s^2/{way}" if effort != "1" else f"s^2/{way}"
+    units: Mapping[str, str] = {
+        "mass": _MASS.get(effort, per_rise),
+        "viscous": per_way,
+        "stribeck": f"{way}/s",
+        "delay": "s",
+        "spring": f"{effort}/{way}",
+        "loss": "1",
+        "hanging": "rad",
+    }
+    return units.get(kind, effort)
+
+
+def make_run(log: Log, effort: str | None = None) -> Run:
+    """Put a log on an even grid and choose what drives its axis.
+
+    Parameters
+    ----------
+    log : Log
+        As `read_log` gives it.
+    effort : str, optional
+        One of `EFFORTS`; by default the first that the log holds.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        No position, nothing that drives the axis, or too few samples.
+    """
+    name = _choose_effort(log, effort)
+    if "position" not in log.signals:
+        raise InputError.of_file(
+            log.name,
+            f"signals {', '.join(log.signals)}",
+            "a measured position",
+            "name its column: position=COLUMN [UNIT]",
+        )
+    if len(log.t) < FEWEST:
+        raise InputError.of_file(log.name, f"{len(log.t)} samples", f"{FEWEST} or more", "record a longer run")
+    step = log.period
+    samples = math.floor((log.t[-1] - log.t[0]) / step + 0.5) + 1
+    grid: Numbers = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
+    position = np.interp(grid, log.t, log.signals["position"])
+    others = {
+        role: np.interp(grid, log.t, log.signals[role])
+        for role in ("reference", "position_load")
+        if role in log.signals
+    }
+    resolution = find_count(log.signals["position"])
+    return Run(
+        name=log.name,
+        step=step,
+        position=position,
+        effort=_hold(grid, log.t, log.signals[name], step),
+        usable=_usable(log, grid, name),
+        effort_name=name,
+        effort_unit=log.units[name] or "1",
+        position_unit=log.units["position"],
+        reference=others.get("reference"),
+        load_position=others.get("position_load"),
+        resolution=resolution,
+        noise=max(noise_of(position), 0.29 * resolution),
+    )
+
+
+def _choose_effort(log: Log, asked: str | None) -> str:
+    found = [role for role in EFFORTS if role in log.signals]
+    if asked is not None and asked not in found:
+        raise InputError.of_file(
+            log.name, f"signals {', '.join(log.signals)}", f"a column for {asked}", f"name it: {asked}=COLUMN"
+        )
+    if not found:
+        raise InputError.of_file(
+            log.name,
+            f"signals {', '.join(log.signals)}",
+            "something that drives the axis: " + ", ".join(EFFORTS),
+            "name its column, such as force=COLUMN [N]",
+        )
+    return asked or found[0]
+
+
+def _hold(grid: Numbers, t: Numbers, values: Numbers, step: float) -> Numbers:
+    """A signal that stands from each of its samples to the next, on the grid."""
+    if len(grid) == len(t) and float(np.abs(grid - t).max()) < 0.2 * step:
+        return values.astype(np.float64)
+    places = np.searchsorted(t, grid + 0.2 * step, side="right") - 1
+    return values[np.clip(places, 0, len(t) - 1)].astype(np.float64)
+
+
+def _usable(log: Log, grid: Numbers, effort: str) -> NDArray[np.bool_]:
+    """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
+    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK)
+    for finding in log.findings:
+        if finding.kind is Kind.SATURATED and finding.signal in {effort, "position"}:
+            for first, last in finding.rows:
+                bad |= (log.rows >= first) & (log.rows <= last)
+    if effort in {"voltage", "command"} and "enabled" in log.signals:
+        # A winding that is switched off does not brake: another axis.
+        bad |= log.signals["enabled"] < 0.5
+    before = np.clip(np.searchsorted(log.t, grid, side="right") - 1, 0, len(log.t) - 1)
+    after = np.clip(before + 1, 0, len(log.t) - 1)
+    gap = log.t[after] - log.t[before] > GAP * log.period
+    return ~(bad[before] | (gap & (np.abs(grid - log.t[before]) > 0.2 * log.period)))
+
+
+def find_count(position: Numbers) -> float:
+    """Way of a count: the smallest step of a position whose steps are whole multiples of it; 0 where there is none."""
+    ways = np.abs(np.diff(position))
+    ways = ways[ways > 1e-12 * max(float(np.abs(position).max()), 1e-300)]
+    if len(ways) < 10:
+        return 0.0
+    count = float(np.quantile(ways, 0.01))
+    near = ways[ways < 1.5 * count]
+    count = float(np.median(near)) if len(near) else count
+    rest = np.abs(ways / count - np.round(ways / count))
+    return count if float(np.median(rest[ways < 20 * count])) < 0.05 else 0.0
+
+
+def noise_of(position: Numbers) -> float:
+    """Standard deviation of what is not smooth in a position: its third differences, 20 times their variance apart."""
+    third = np.diff(position, 3)
+    return float(np.sqrt(np.mean(third**2) / 20.0)) if len(third) else 0.0

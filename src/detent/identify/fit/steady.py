@@ -1,0 +1,286 @@
+"""Signals of a recording as the methods want them, and stretches of it in which the speed is steady."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from detent.errors import DetentError
+from detent.identify.fit.coloured import coloured_covariance
+from detent.logs.differences import grain
+from detent.logs.effort import EFFORTS
+from detent.logs.log import Log, Values
+from detent.logs.stamps import stretches
+
+BLOCKS = 10
+"""Blocks, at least, of which a steady stretch is made."""
+
+FEWEST_ROWS = 50
+"""Rows of a steady stretch, at least, where nothing is stated."""
+
+SHARE = 0.004
+"""The same as a part of the recording."""
+
+SLOWEST = 0.003
+"""Speeds below this part of the highest are rest."""
+
+DRIFT = 0.1
+"""Difference of the mean speeds of both halves of a stretch that is none, as a part of the tolerance."""
+
+STANDS_OUT = 3.0
+"""Standard deviations by which the first or last block differs where the speed is still settling there."""
+
+
+@dataclass(frozen=True, slots=True)
+class SteadyStretch:
+    """A part of a recording at one speed.
+
+    Attributes
+    ----------
+    first, stop : int
+        First sample, and the one behind the last.
+    begin, seconds : float
+        Where it lies in time and how long it is [s].
+    speed, effort : float
+        Means, signed, in SI units.
+    effort_error : float
+        Standard error of the mean effort at this speed: what noise of the speed does to it is part of it.
+    degrees : float
+        Degrees of freedom behind it.
+    """
+
+    first: int
+    stop: int
+    begin: float
+    seconds: float
+    speed: float
+    effort: float
+    effort_error: float
+    degrees: float
+
+
+def select_effort(log: Log, role: str = "") -> str:
+    """Role of the signal that drives the axis: as asked for, or the most direct one that the log has.
+
+    Raises
+    ------
+    DetentError
+        The log has no such signal, or none that drives.
+    """
+    present = [name for name in EFFORTS if name in log.signals]
+    if role and role not in present:
+        raise DetentError(
+            f"{log.name}: came effort {role}; allowed: {', '.join(present) or 'none: the log holds no effort'}; "
+            f"name a signal that drives the axis ({', '.join(EFFORTS)})"
+        )
+    if not present:
+        raise DetentError(
+            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with {', '.join(EFFORTS)}; "
+            "name its column, as in current=COLUMN [A]"
+        )
+    return role or present[0]
+
+
+def find_velocity(log: Log) -> tuple[Values, str, float]:
+    """Velocity as measured, or by central differences of the position; its unit; the grain of that position, or 0.
+
+    Raises
+    ------
+    DetentError
+        The log has neither.
+    """
+    if "velocity" in log.signals:
+        return log.signals["velocity"], log.units["velocity"], 0.0
+    if "position" not in log.signals:
+        raise DetentError(
+            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with velocity or position; "
+            "name its column, as in position=COLUMN [mm]"
+        )
+    if len(log) < 3:
+        raise DetentError(f"{log.name}: came {len(log)} samples; allowed: at least 3; record longer")
+    position = log.signals["position"]
+    return np.gradient(position, log.t), f"{log.units['position']}/s", grain(position)
+
+
+def unit_per_speed(effort: str, speed: str) -> str:
+    """Unit of an effort per speed.
+
+    Examples
+    --------
+    >>> unit_per_speed("V", "rad/s"), unit_per_speed("N", "m/s"), unit_per_speed("", "m/s")
+    ('V*s/rad', 'N*s/m', 's/m')
+    """
+    length = speed.removesuffix("/s")
+    return f"{effort}*s/{length}" if effort else f"s/{length}"
+
+
+def find_steady(
+    t: Values, velocity: Values, shortest: float | None = None, tolerance: float = 0.05, step: float = 0.0
+) -> list[slice]:
+    """Find the stretches of a recording in which the axis moves at a steady speed.
+
+    The recording is divided into short blocks. A stretch is as many of them in a row whose mean speeds stay within the
+    tolerance; blocks at its ends that stand out are left out, and one whose halves differ is no stretch. What is left
+    is searched again with blocks twice as long, in which the grain of an encoder counts less; neighbours that are
+    steady as one become one.
+
+    Parameters
+    ----------
+    t, velocity : float64 array, shape (n,)
+        Time [s], rising, and velocity; gaps in the time end a stretch.
+    shortest : float, optional
+        Shortest stretch [s]; by default `SHARE` of the recording, and `FEWEST_ROWS` rows.
+    tolerance : float
+        Largest difference of two blocks of a stretch, as a part of its speed.
+    step : float
+        Grain of the position behind the velocity: a block moves over so many that one of them is within the tolerance.
+
+    Returns
+    -------
+    list of slice
+        Samples of each stretch, in order of time.
+
+    Raises
+    ------
+    DetentError
+        A limit is not positive.
+    """
+    for name, limit in (("shortest", shortest), ("tolerance", tolerance)):
+        if limit is not None and not limit > 0:
+            raise DetentError(f"steady stretches: came {name} = {limit:g}; allowed: above 0; leave it out if unsure")
+    if len(t) < 2:
+        return []
+    period = float(np.median(np.diff(t)))
+    rows = max(FEWEST_ROWS, round(SHARE * len(t))) if shortest is None else round(shortest / period)
+    block = max(1, round(rows / BLOCKS))
+    rest, found = stretches(t), list[slice]()
+    size = block
+    while size * (BLOCKS + 2) <= len(t):
+        slowest = max(SLOWEST * _top_speed(velocity, size), 2.0 * step / (tolerance * size * period))
+        new = [part for free in rest for part in _search(velocity, free, size, (tolerance, slowest))]
+        found += new
+        rest = [piece for free in rest for piece in _without(free, new)]
+        size *= 2
+    found.sort(key=lambda part: int(part.start))
+    return _joined(velocity, found, stretches(t), (block, tolerance))
+
+
+def measure_stretch(t: Values, velocity: Values, effort: Values, part: slice, slope: float) -> SteadyStretch:
+    """Mean speed and effort of a stretch, and the error of the effort at that speed.
+
+    Parameters
+    ----------
+    t, velocity, effort : float64 array, shape (n,)
+        Time [s], velocity, and what drives the axis.
+    part : slice
+        Samples of the stretch.
+    slope : float
+        By how much the effort rises with the speed: the two vary together, and the error is that of
+        ``effort - slope * velocity``.
+    """
+    speed, drive = float(velocity[part].mean()), float(effort[part].mean())
+    error, degrees = mean_error(effort[part] - slope * velocity[part])
+    seconds = float(t[part.stop - 1] - t[part.start])
+    return SteadyStretch(part.start, part.stop, float(t[part.start]), seconds, speed, drive, error, degrees)
+
+
+def mean_error(values: Values) -> tuple[float, int]:
+    """Standard error of a mean of coloured values, and the degrees of freedom behind it."""
+    covariance, degrees = coloured_covariance(np.ones((len(values), 1)), values - values.mean())
+    return float(np.sqrt(covariance[0, 0])), degrees
+
+
+def _top_speed(velocity: Values, block: int) -> float:
+    """Highest mean speed of a block."""
+    return float(np.abs(_block_means(velocity, slice(0, len(velocity)), block)).max())
+
+
+def _search(velocity: Values, free: slice, block: int, limits: tuple[float, float]) -> list[slice]:
+    """Stretches in a part without gaps, by blocks of some rows."""
+    speeds = _block_means(velocity, free, block)
+    tolerance, slowest = limits
+    found: list[slice] = []
+    first = 0
+    while first + BLOCKS + 2 <= len(speeds):
+        stop = _reach(speeds, first, tolerance)
+        kept = _trimmed(speeds, first, stop, tolerance) if abs(speeds[first]) > slowest else None
+        if kept is None:
+            first += max(1, (stop - first) // BLOCKS)
+        else:
+            found.append(slice(free.start + kept[0] * block, free.start + kept[1] * block))
+            first = stop
+    return found
+
+
+def _block_means(velocity: Values, part: slice, block: int) -> Values:
+    count = (part.stop - part.start) // block
+    return velocity[part][: count * block].reshape(count, block).mean(axis=1)
+
+
+def _reach(speeds: Values, first: int, tolerance: float) -> int:
+    """First block behind `first` that is not of the same speed as those before it."""
+    low = high = total = float(speeds[first])
+    stop = first + 1
+    while stop < len(speeds):
+        new = float(speeds[stop])
+        low, high, total = min(low, new), max(high, new), total + new
+        if high - low > tolerance * abs(total) / (stop + 1 - first):
+            break
+        stop += 1
+    return stop
+
+
+def _trimmed(speeds: Values, first: int, stop: int, tolerance: float) -> tuple[int, int] | None:
+    """First block and block behind the last of the steady part of a run; None where nothing long enough is left."""
+    while stop - first > BLOCKS and _stands_out(speeds[first], speeds[first + 1 : stop]):
+        first += 1
+    while stop - first > BLOCKS and _stands_out(speeds[stop - 1], speeds[first : stop - 1]):
+        stop -= 1
+    # Within the tolerance, the blocks at the ends may still hold the edge of a ramp with its effort of acceleration.
+    first, stop = first + 1, stop - 1
+    if stop - first < BLOCKS or _drifts(speeds[first:stop], tolerance):
+        return None
+    return first, stop
+
+
+def _drifts(speeds: Values, tolerance: float) -> bool:
+    """True where the halves of a run differ by more than the scatter of its blocks explains."""
+    half = len(speeds) // 2
+    drift = abs(float(speeds[:half].mean() - speeds[-half:].mean()))
+    scatter = 2.0 * float(speeds.std()) * np.sqrt(2.0 / half)
+    return drift > DRIFT * tolerance * abs(float(speeds.mean())) + scatter
+
+
+def _joined(velocity: Values, found: list[slice], wholes: list[slice], limits: tuple[int, float]) -> list[slice]:
+    """Neighbours that are steady together made one: grain may have cut one stretch in two."""
+    block, tolerance = limits
+    joined: list[slice] = []
+    for part in found:
+        before = joined[-1] if joined else part
+        both = slice(before.start, part.stop)
+        is_near = part.start - before.stop < BLOCKS * block
+        is_whole = any(whole.start <= both.start and both.stop <= whole.stop for whole in wholes)
+        if joined and is_near and is_whole and _is_steady(velocity, both, tolerance):
+            joined[-1] = both
+        else:
+            joined.append(part)
+    return joined
+
+
+def _is_steady(velocity: Values, part: slice, tolerance: float) -> bool:
+    speeds = _block_means(velocity, part, (part.stop - part.start) // BLOCKS)
+    return float(np.ptp(speeds)) <= tolerance * abs(float(speeds.mean())) and not _drifts(speeds, tolerance)
+
+
+def _stands_out(speed: float, others: Values) -> bool:
+    return abs(speed - float(others.mean())) > STANDS_OUT * float(others.std())
+
+
+def _without(free: slice, taken: list[slice]) -> list[slice]:
+    """What is left of a part when others are taken out of it."""
+    left: list[slice] = []
+    start = free.start
+    for part in taken:
+        if free.start <= part.start < free.stop:
+            left.append(slice(start, part.start))
+            start = part.stop
+    return [*left, slice(start, free.stop)]

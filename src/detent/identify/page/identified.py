@@ -1,0 +1,231 @@
+"""What an identification found, and the files it can leave: an axis file, a job, a report."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from detent.errors import DetentError
+from detent.identify.fit.estimate import Estimate
+from detent.identify.fit.identification import Identification, Method, Verdict, identify
+from detent.identify.fit.verdict import Refusal
+from detent.identify.write.axis_output import axis_toml, cascade_spec
+from detent.identify.write.excitation import excitation_job
+from detent.identify.write.file_numbers import Contrast, contrasts
+from detent.logs.log import Log
+from detent.logs.read_log import read_log
+from detent.methods.cascade.schema import CascadeSpec
+
+if TYPE_CHECKING:
+    from detent.methods.print_head.run import Progress
+
+_STAGES = {
+    "ladder": (0.1, 0.4, "fitting models to parts of the log"),
+    "output error": (0.4, 0.65, "fitting the simulation to the log"),
+    "output error on the first part": (0.65, 0.85, "fitting the simulation to the first part"),
+    "simulation": (0.85, 0.95, "simulating the part not seen"),
+}
+"""Shares of the whole at which the parts of an identification begin and end, and what is said meanwhile."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What was found in the logs of an axis.
+
+    Attributes
+    ----------
+    found : Identification
+        Everything: models, constants with their limits, simulation errors, refusals.
+    axis : str
+        Text of the axis file that the constants belong to; empty where none was named.
+    axis_name : str
+        Name of that file.
+    reading : str
+        How the logs were read, as options of the command line.
+    """
+
+    found: Identification
+    axis: str = ""
+    axis_name: str = ""
+    reading: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the constants can be trusted."""
+        return self.found.verdict
+
+    @property
+    def constants(self) -> dict[str, Estimate]:
+        """Every constant with its interval, by its name, those that are not trusted too."""
+        return {one.name: one for one in self.found.estimates}
+
+    @property
+    def trusted(self) -> dict[str, Estimate]:
+        """Constants that are trusted, by their names."""
+        return {one.name: one for one in self.found.trusted}
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """What is not trusted, why, and what to record instead."""
+        return self.found.refusals
+
+    def contrasts(self) -> list[Contrast]:
+        """Constants that the axis file states outside of their intervals; none without an axis file.
+
+        Raises
+        ------
+        DetentError
+            The axis is of another kind of motion, or has no effort like that of the logs.
+        """
+        spec = self._spec()
+        return [] if spec is None else contrasts(self.found, spec)
+
+    def save(self, path: str | Path) -> Path:
+        """Write an axis file: that of the axis with the identified constants, or a new one.
+
+        Raises
+        ------
+        AxisError
+            Nothing is trusted, or not the mass.
+        DetentError
+            The file cannot be written, or its axis is of another kind.
+        """
+        return write_text(path, axis_toml(self.found, self.axis or None, self.axis_name or str(path), self.reading))
+
+    def save_job(self, path: str | Path) -> Path:
+        """Write a list of moves that shows what the logs did not, within the limits of axis or logs.
+
+        Raises
+        ------
+        DetentError
+            The limits are not known, or the file cannot be written.
+        """
+        return write_text(path, excitation_job(self.found, self._spec()))
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one self-contained HTML file."""
+        from detent.identify.page.identify_report import write_identify_report
+
+        write_identify_report(self.found, path)
+        return Path(path)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as ``--json`` prints it."""
+        outside = [
+            {"name": c.name, "stated": c.stated, "low": c.found.low, "high": c.found.high, "unit": c.found.unit}
+            for c in self.contrasts()
+        ]
+        return self.found.to_dict() | {"axis": self.axis_name or None, "outside": outside}
+
+    def _spec(self) -> CascadeSpec | None:
+        return cascade_spec(self.axis, self.axis_name) if self.axis else None
+
+
+def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
+    logs: str | Path | Sequence[str | Path],
+    *,
+    mapping: str | Path | None = None,
+    columns: Sequence[str] = (),
+    effort: str | None = None,
+    method: Method = "regression",
+    axis: str | Path | None = None,
+    progress: "Progress | None" = None,
+    reading: str = "",
+) -> Identified:
+    """Identify an axis from recordings of it.
+
+    Parameters
+    ----------
+    logs : path or sequence of path
+        CSV, HDF5, Parquet, MATLAB, NPZ or JSON.
+    mapping : path, optional
+        Mapping file (TOML): what the columns are; what neither it nor `columns` says is guessed.
+    columns : sequence of str
+        The same in short: ``"force=vir [35.15 N]"``.
+    effort : str, optional
+        What drives the axis: force, torque, current, voltage or command; by default the first of these in the logs.
+    method : str
+        "regression", or "output error", which fits the simulation to the recordings too.
+    axis : path, optional
+        Cascade axis file that the constants are held against, and put into by `Identified.save`.
+    progress : callable, optional
+        ``progress(share, text)``.
+    reading : str
+        Options of a command that reads the same, as `Identified.save` notes them in the file.
+
+    Returns
+    -------
+    Identified
+        Also when nothing is trusted: see `Identified.verdict` and `Identified.refusals`.
+
+    Raises
+    ------
+    InputError
+        A log, the mapping or the axis file cannot be read, or a log holds no position or nothing that drives the axis.
+    DetentError
+        The axis file is of another method.
+    """
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+
+    def tell(share: float, text: str) -> None:
+        if progress is not None:
+            progress(share, text)
+
+    text = "" if axis is None else read_axis_text(axis)
+    if axis is not None:
+        cascade_spec(text, str(axis))
+    read = _read_logs(paths, mapping, columns, tell)
+
+    def report(stage: str, share: float) -> None:
+        begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))
+        tell(begin + share * (end - begin), text)
+
+    return Identified(
+        identify(read, effort, method=method, report=report), text, "" if axis is None else str(axis), reading
+    )
+
+
+def _read_logs(
+    paths: Sequence[str | Path], mapping: str | Path | None, columns: Sequence[str], tell: "Progress"
+) -> list[Log]:
+    """Recordings one after the other, and how far it is: the first tenth of the work."""
+    if not paths:
+        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
+    read: list[Log] = []
+    for number, path in enumerate(paths):
+        tell(0.1 * number / len(paths), f"reading {Path(path).name}")
+        read.append(read_log(path, mapping, columns))
+    return read
+
+
+def read_axis_text(path: str | Path) -> str:
+    """Text of an axis file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or holds errors.
+    """
+    from detent.methods.load import read_axis
+
+    read_axis(path)  # tells everything that is wrong with it
+    with Path(path).open(encoding="utf-8-sig", newline="") as file:
+        return file.read()
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a file.
+
+    Raises
+    ------
+    DetentError
+        It cannot be written.
+    """
+    path = Path(path)
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            file.write(text)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+    return path

@@ -1,0 +1,193 @@
+"""Plots over the logarithm of the frequency, drawn as SVG without a script."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from detent.page.parts import Numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """One curve of a plot over the frequency.
+
+    Attributes
+    ----------
+    label : str
+        As in the legend; empty for none.
+    colour : str
+        Name of a colour of template/report.css.
+    x, y : ndarray
+        Frequency [Hz] and value, NaN for a gap, shape (n,).
+    dash : str
+        Of the line, as SVG writes it; empty for a solid one.
+    """
+
+    label: str
+    colour: str
+    x: Numbers
+    y: Numbers
+    dash: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """A plot over the logarithm of the frequency.
+
+    Attributes
+    ----------
+    label : str
+        Of the vertical axis.
+    lines : sequence of Line
+        The first is drawn first.
+    logarithmic : bool
+        The values are, too.
+    span : (float, float) or None
+        Of the values; by the first line unless given.
+    height : int
+        [px]
+    levels : sequence of float
+        Marked values.
+    """
+
+    label: str
+    lines: Sequence[Line]
+    logarithmic: bool = False
+    span: tuple[float, float] | None = None
+    height: int = 200
+    levels: Sequence[float] = ()
+
+
+LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
+
+
+def frequency_plots(plots: Sequence[Plot]) -> str:
+    """Draw plots above one another over the same frequencies, the axis logarithmic.
+
+    Parameters
+    ----------
+    plots : sequence of Plot
+        From top to bottom; the lines of the first say which frequencies.
+
+    Returns
+    -------
+    str
+        HTML, as wide as there is room.
+    """
+    low, high = (float(f(plots[0].lines[0].x)) for f in (np.min, np.max))
+    named = [line for line in plots[0].lines if line.label]
+    legend = " ".join(
+        f'<span class="nowrap"><svg width="26" height="10"><path d="M1 5h24" style="{_stroke(line, 2.5)}"/></svg> '
+        f"{escape(line.label)}</span>"
+        for line in named
+    )
+    drawn = "".join(_plot(plot, low, high, last=plot is plots[-1]) for plot in plots)
+    return f'{drawn}<p class="hint">{legend}</p>'
+
+
+def _stroke(line: Line, width: float) -> str:
+    dash = f";stroke-dasharray:{line.dash}" if line.dash else ""
+    return f"fill:none;stroke:var(--{line.colour});stroke-width:{width}{dash}"
+
+
+def _plot(plot: Plot, low: float, high: float, *, last: bool) -> str:
+    bottom, top = plot.span or _span(plot)
+    inner = plot.height - TOP - FOOT
+
+    def right(f: Numbers) -> Numbers:
+        return LEFT + (FULL - LEFT - RIGHT) * np.log(f / low) / math.log(high / low)
+
+    def down(y: Numbers) -> Numbers:
+        share = np.log(y / bottom) / math.log(top / bottom) if plot.logarithmic else (y - bottom) / (top - bottom)
+        return TOP + inner * (1.0 - share)
+
+    parts = [_grid_x(low, high, right, plot.height), _grid_y(plot, bottom, top, down)]
+    for level in plot.levels:
+        at = float(down(np.array([level]))[0])
+        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--soft);stroke-dasharray:3 3"/>')
+    wide = FULL - LEFT - RIGHT
+    clip = f'<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{inner}" viewBox="{LEFT} {TOP} {wide} {inner}">'
+    curves = "".join(
+        f'<path d="{_path(right(one.x), down(one.y))}" style="{_stroke(one, 1.8)}"/>' for one in plot.lines
+    )
+    foot = f'<text x="{FULL / 2}" y="{plot.height + 14}" text-anchor="middle">frequency [Hz]</text>' if last else ""
+    height = plot.height + (18 if last else 0)
+    turned = f"translate(14 {TOP + inner / 2:.0f}) rotate(-90)"
+    side = f'<text transform="{turned}" text-anchor="middle">{escape(plot.label)}</text>'
+    return (
+        f'<svg viewBox="0 0 {FULL:.0f} {height}" role="img" aria-label="{escape(plot.label)} over the frequency" '
+        f'style="display:block;width:100%;height:auto;font:12px system-ui,sans-serif;fill:var(--soft)">'
+        f"{''.join(parts)}{clip}{curves}</svg>{side}{foot}</svg>"
+    )
+
+
+def _span(plot: Plot) -> tuple[float, float]:
+    """By the first line, with some room."""
+    values = plot.lines[0].y[np.isfinite(plot.lines[0].y)]
+    low, high = float(values.min()), float(values.max())
+    if plot.logarithmic:
+        return low / 2.0, high * 2.0
+    room = max(0.1 * (high - low), 10.0)
+    return low - room, high + room
+
+
+def _path(x: Numbers, y: Numbers) -> str:
+    """A line through points, broken where one is missing."""
+    text: list[str] = []
+    pen = "M"
+    for a, b in zip(x.tolist(), y.tolist(), strict=True):
+        if not math.isfinite(b):
+            pen = "M"
+            continue
+        text.append(f"{pen}{a:.1f} {b:.1f}")
+        pen = "L"
+    return "".join(text)
+
+
+def _grid_x(low: float, high: float, right: Callable[[Numbers], Numbers], height: int) -> str:
+    """Lines at 1 to 9 of each decade, figures at 1, 2 and 5, or at 1 alone of many decades."""
+    figures = (1, 2, 5) if high / low < 2e3 else (1,)
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    ticks = [(digit * 10.0**decade, digit) for decade in decades for digit in range(1, 10)]
+    parts: list[str] = []
+    for f, digit in ticks:
+        if not low <= f <= high:
+            continue
+        at = float(right(np.array([f]))[0])
+        parts.append(f'<path d="M{at:.1f} {TOP}V{height - FOOT}" style="stroke:var(--grid)"/>')
+        if digit in figures:
+            parts.append(f'<text x="{at:.1f}" y="{height - 6}" text-anchor="middle">{f:g}</text>')
+    return "".join(parts)
+
+
+def _grid_y(plot: Plot, bottom: float, top: float, down: Callable[[Numbers], Numbers]) -> str:
+    ticks = _powers(bottom, top) if plot.logarithmic else _steps(bottom, top)
+    parts: list[str] = []
+    for value, text in ticks:
+        at = float(down(np.array([value]))[0])
+        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--grid)"/>')
+        parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')
+    return "".join(parts)
+
+
+def _powers(bottom: float, top: float) -> list[tuple[float, str]]:
+    """Powers of ten, every second or third of many."""
+    powers = range(math.ceil(math.log10(bottom)), math.floor(math.log10(top)) + 1)
+    every = max(1, math.ceil(len(powers) / 6))
+    return [(10.0**k, _power_text(k)) for k in powers if k % every == 0]
+
+
+def _power_text(power: int) -> str:
+    return f'10<tspan dy="-5" font-size="9">{str(power).replace("-", chr(0x2212))}</tspan>'
+
+
+def _steps(bottom: float, top: float) -> list[tuple[float, str]]:
+    """Round steps; of angles those of a quarter turn."""
+    wide = top - bottom
+    steps = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
+    step = next((one for one in steps if wide / one <= 6.0), wide / 5.0)
+    first, last = math.ceil(bottom / step - 1e-9), math.floor(top / step + 1e-9)
+    return [(k * step, f"{k * step:g}".replace("-", "\u2212")) for k in range(first, last + 1)]

@@ -1,0 +1,231 @@
+"""How the report of an identification writes constants, units and numbers with their limits."""
+
+import math
+from dataclasses import dataclass
+from math import isfinite
+
+from detent.identify.fit.estimate import Estimate
+from detent.methods.cascade.units import Scale, Units
+from detent.page.words import GAP, number
+
+UNKNOWN = 10.0
+"""Half of an interval over the value from which on nothing is known about a constant."""
+
+UNKNOWN_DELAY = 0.1
+"""The same of a delay [s], which may be 0."""
+
+_KINDS = {
+    "coulomb": "Coulomb friction",
+    "viscous": "viscous friction",
+    "static": "static friction",
+    "stribeck": "Stribeck velocity",
+    "spring": "spring",
+    "loss": "share lost in the transmission",
+    "delay": "delay of the effort",
+}
+
+_MEANINGS = {
+    "mass": "effort per acceleration",
+    "coulomb": "at any speed; constant forces are part of it",
+    "viscous": "grows with speed",
+    "static": "just before standstill",
+    "stribeck": "below it friction rises to the static one",
+    "pendulum": "times the sine of the angle",
+    "pendulum.across": "times the cosine of the angle",
+    "spring": "effort per way from position 0",
+    "delay": "how much later it acts than it was recorded",
+}
+
+_WAYS = {"positive": "in positive direction", "negative": "in negative direction"}
+
+_SMALL_EFFORTS = {"N": "mN", "N*m": "mN*m", "A": "mA", "V": "mV"}
+
+
+def constant_name(name: str, unit: str = "") -> str:
+    """Name of a constant for people.
+
+    Parameters
+    ----------
+    name : str
+        As in an identification.
+    unit : str
+        Its unit, by which a moment of inertia is told from a mass.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> constant_name("viscous.positive"), constant_name("mass", "kg*m^2")
+    ('viscous friction in positive direction', 'moment of inertia')
+    """
+    kind, _, way = name.partition(".")
+    if kind == "mass":
+        return {"kg": "mass", "kg*m^2": "moment of inertia"}.get(unit, "inertia")
+    if kind == "pendulum":
+        return "weight, across" if way else "weight"
+    words = _KINDS.get(kind, kind)
+    return f"{words} {_WAYS.get(way, way)}" if way else words
+
+
+def meaning_of(name: str) -> str:
+    """What a constant says, in a few words; empty where its name does."""
+    return _MEANINGS.get(name) or _MEANINGS.get(name.partition(".")[0], "")
+
+
+def sentence(text: str) -> str:
+    """Begin a text with a capital letter."""
+    return text[:1].upper() + text[1:]
+
+
+def unit_text(unit: str) -> str:
+    """Write a unit as it is printed.
+
+    Examples
+    --------
+    >>> unit_text("N*s/m").replace(GAP, " "), unit_text("kg*m^2").replace(GAP, " "), unit_text("1")
+    ('N s/m', 'kg m²', '')
+    """
+    return "" if unit == "1" else unit.replace("^2", "²").replace("*", GAP)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A number with its limits, written out.
+
+    Attributes
+    ----------
+    value : str
+        With as many digits as its limits leave.
+    half : str
+        Half of the interval, in two digits.
+    unit : str
+        As it is printed.
+    """
+
+    value: str
+    half: str
+    unit: str
+
+    def __str__(self) -> str:
+        """Give value, limits and unit."""
+        return f"{self.value} ± {self.half}{GAP + self.unit if self.unit else ''}"
+
+
+def written(found: Estimate) -> Written:
+    """Write an estimate so that its last digit is the second of its uncertainty; a delay in ms."""
+    if found.unit == "s":
+        return _written(found.value * 1e3, half_of(found) * 1e3, "ms")
+    return _written(found.value, half_of(found), unit_text(found.unit))
+
+
+def half_of(found: Estimate) -> float:
+    """Half of the 95 % interval, in SI units."""
+    return 0.5 * (found.high - found.low)
+
+
+def relative_half(found: Estimate) -> float:
+    """Half of the 95 % interval over the value; infinite for a value of 0."""
+    return half_of(found) / abs(found.value) if found.value else math.inf
+
+
+def is_known(found: Estimate) -> bool:
+    """False where the interval says nothing: a log without what this constant needs."""
+    if found.unit == "s":
+        return half_of(found) < UNKNOWN_DELAY
+    return relative_half(found) < UNKNOWN
+
+
+def may_be_zero(found: Estimate) -> bool:
+    """True where the interval holds 0."""
+    return found.holds(0.0)
+
+
+def _written(value: float, half: float, unit: str) -> Written:
+    if not 0.0 < half < math.inf:
+        return Written(number(value), "0", unit)
+    power = _power(max(abs(value), half))
+    scaled, reach = value / 10.0**power, half / 10.0**power
+    places = min(max(0, 1 - math.floor(math.log10(reach))), 9)
+    text = f"{scaled:.{places}f}".replace("-", "\u2212")
+    times = f"{GAP}·{GAP}10{_raised(power)}" if power else ""
+    return Written(text + times, f"{reach:.{places}f}{times}", unit)
+
+
+def _power(size: float) -> int:
+    """Power of ten that is set apart: none for a number that reads well without."""
+    if 1e-3 <= size < 1e6:
+        return 0
+    return 3 * math.floor(math.log10(size) / 3)
+
+
+def _raised(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+# ---- places and efforts
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """How positions of a log are written.
+
+    Attributes
+    ----------
+    unit : str
+        Of the log's positions: "m", "rad", or anything else as it is.
+    """
+
+    unit: str
+
+    @property
+    def _units(self) -> Units | None:
+        return Units(rotary=self.unit == "rad") if self.unit in {"m", "rad"} else None
+
+    @property
+    def place(self) -> Scale:
+        """Of positions."""
+        return self._units.place if self._units else Scale(1.0, unit_text(self.unit))
+
+    @property
+    def speed(self) -> Scale:
+        """Of velocities."""
+        return self._units.speed if self._units else Scale(1.0, f"{unit_text(self.unit)}/s")
+
+    def small(self, peak: float) -> Scale:
+        """Of errors, by the largest of them."""
+        return self._units.small(peak) if self._units else self.place
+
+    def error(self, value: float) -> str:
+        """Write an error with its unit."""
+        return self._units.error(value) if self._units else f"{number(value)}{GAP}{self.place.name}"
+
+
+def effort_scale(unit: str, peak: float) -> Scale:
+    """Unit in which efforts are drawn, by the largest of them.
+
+    Examples
+    --------
+    >>> effort_scale("N*m", 0.02).factor, effort_scale("N", 80.0).factor
+    (1000.0, 1.0)
+    """
+    if peak < 0.1 and unit in _SMALL_EFFORTS:
+        return Scale(1e3, unit_text(_SMALL_EFFORTS[unit]))
+    return Scale(1.0, unit_text(unit))
+
+
+def digits_for(peak: float) -> int:
+    """Digits after the point that a chart keeps of numbers up to a peak: four significant ones of the largest.
+
+    Examples
+    --------
+    >>> digits_for(150.0), digits_for(0.02)
+    (2, 6)
+    """
+    return 3 if not (isfinite(peak) and peak > 0.0) else min(max(0, 4 - math.floor(math.log10(peak))), 12)
+
+
+def label_of(words: str, unit: str) -> str:
+    """Label of an axis: words, and the unit in brackets if there is one."""
+    return f"{words} [{unit}]" if unit else words

@@ -1,0 +1,1 @@
+"""From constants to an axis file."""

@@ -1,0 +1,248 @@
+"""A list of moves that shows what a log did not: what each constant needs, within the limits of the axis.
+
+A mass shows in ramps, viscous friction in steady speeds that differ, Coulomb friction and a constant force in both
+directions, static friction in the slowest moves. The moves go to and fro between places inside the travel, at shares of
+the top speed.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from detent.errors import DetentError
+from detent.identify.fit.identification import Identification
+from detent.identify.fit.verdict import Refusal
+from detent.identify.write.file_numbers import plain
+from detent.identify.write.seen import see
+from detent.methods.cascade.schema import CascadeSpec
+from detent.units import format_quantity
+
+INSIDE = 0.05
+"""Share of the travel that is left free at both ends."""
+
+STEADY = 0.8
+"""Time at a steady speed that a move is planned for [s]."""
+
+SLOWER = 0.5
+"""Share of the top speed that remains where the effort was at its limit."""
+
+LEAST = 20.0
+"""Length of a recording that is aimed at [s]."""
+
+RAMP = 0.15
+"""Time of a ramp where neither the axis nor the log tells one [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Where moves may go, and how fast, in m or rad.
+
+    Attributes
+    ----------
+    lowest, highest : float
+        Positions.
+    speed, acceleration : float
+        Largest magnitudes.
+    start : float
+        Where the axis stands.
+    is_rotary : bool
+        True for angles.
+    source : str
+        What told them.
+    """
+
+    lowest: float
+    highest: float
+    speed: float
+    acceleration: float
+    start: float
+    is_rotary: bool
+    source: str
+
+    @property
+    def middle(self) -> float:
+        """Place that the moves lie around."""
+        return 0.5 * (self.lowest + self.highest)
+
+
+def bounds_of_axis(spec: CascadeSpec) -> Bounds:
+    """Limits of an axis, and a little less of its travel."""
+    margin = INSIDE * spec.limits.travel
+    return Bounds(
+        spec.limits.lowest + margin,
+        spec.highest - margin,
+        spec.limits.speed,
+        spec.limits.acceleration,
+        spec.mechanics.start_position,
+        spec.axis.motion == "rotary",
+        f"limits of {plain(spec.axis.name)}",
+    )
+
+
+def bounds_of_logs(found: Identification) -> Bounds:
+    """What the axis did in its logs.
+
+    Raises
+    ------
+    DetentError
+        It did not move, or its positions are counts.
+    """
+    seen = see(found.runs)
+    if not (seen.way > 20.0 * seen.resolution and seen.speed > 0.0):
+        raise DetentError(
+            f"{found.runs[0].name}: came a log without motion; allowed: one that shows how far and how fast the axis "
+            "may go; name the axis file whose limits the moves shall keep: --axis FILE"
+        )
+    source = f"travel and speed of {plain(found.runs[0].name)}"
+    acceleration = max(seen.acceleration, seen.speed / 2.0)
+    return Bounds(seen.lowest, seen.highest, seen.speed, acceleration, seen.start, seen.is_rotary, source)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Moves for one thing that is to be seen.
+
+    Attributes
+    ----------
+    text : str
+        What they are for.
+    shares : tuple of float
+        Speeds, as shares of the top speed.
+    steady : float
+        Time at that speed in each move [s]; 0 for the shortest way that reaches it.
+    dwell : float
+        Rest after each move [s].
+    """
+
+    text: str
+    shares: tuple[float, ...]
+    steady: float
+    dwell: float = 0.0
+
+
+SPEEDS = Part(
+    "several steady speeds, both ways: viscous friction, Coulomb friction, a constant force",
+    (0.1, 0.25, 0.5, 0.75, 1.0),
+    STEADY,
+)
+RAMPS = Part("short ramps, one after the other: the mass", (0.6, 0.8, 1.0, 0.9, 0.7, 1.0), 0.0)
+SLOW = Part("slow, both ways: friction near standstill", (0.01, 0.02, 0.04, 0.07), 1.5, 0.1)
+REVERSALS = Part("both directions: friction is told from a constant force", (0.3, 0.6), STEADY, 0.1)
+
+_BY_SUBJECT = {
+    "model does not explain the log": (SLOW,),
+    "friction below 0": (SPEEDS, SLOW),
+}
+"""What a refusal asks for beside its constants and, where it concerns all of them, a log of its own."""
+
+_BY_CONSTANT = {"mass": RAMPS, "viscous": SPEEDS, "coulomb": REVERSALS}
+"""What shows a constant, by its kind; slow moves show all others."""
+
+
+def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
+    """Moves that refusals ask for; all of them where there are none.
+
+    A log of which nothing is trusted is of no use, so that the next one must show everything but static friction; else
+    the moves only add what is missing.
+
+    Examples
+    --------
+    >>> [part.text for part in missing_parts([Refusal("little acceleration", "", "", ("mass",))])]
+    ['short ramps, one after the other: the mass']
+    """
+    wanted: list[Part] = []
+    for refusal in refusals:
+        wanted += _BY_SUBJECT.get(refusal.subject, ())
+        wanted += [_BY_CONSTANT.get(name.partition(".")[0], SLOW) for name in refusal.constants]
+        wanted += [] if refusal.constants else [SPEEDS, RAMPS]
+    parts = [part for part in (REVERSALS, SPEEDS, RAMPS, SLOW) if not wanted or part in wanted]
+    return [part for part in parts if part is not REVERSALS or SPEEDS not in parts]
+
+
+def excitation_job(found: Identification, axis: CascadeSpec | None = None) -> str:
+    """Write a list of moves that a recording needs for what is missing.
+
+    Parameters
+    ----------
+    found : Identification
+        Its refusals say what is missing; without any the moves show everything.
+    axis : CascadeSpec, optional
+        Axis whose limits the moves keep; by default they keep to what the logs show.
+
+    Returns
+    -------
+    str
+        A job as `detent run --job` reads it.
+
+    Raises
+    ------
+    DetentError
+        The limits are not known: no axis, and a log without motion or in counts.
+    """
+    bounds = bounds_of_logs(found) if axis is None else bounds_of_axis(axis)
+    saturated = any(refusal.subject == "saturated" for refusal in found.refusals)
+    moves = _Moves(bounds, SLOWER * bounds.speed if saturated else bounds.speed)
+    lines = ["", "# To the middle of the way.", *moves.to(bounds.middle, 0.5 * moves.top)]
+    for part in missing_parts(found.refusals):
+        lines += ["", f"# {part.text[0].upper()}{part.text[1:]}.", *moves.of(part)]
+    lines += ["", "# Back to the begin.", *moves.to(bounds.start, 0.5 * moves.top)]
+    repeat = max(1, math.ceil(LEAST / moves.seconds))
+    return "\n".join([*_head(found, bounds, moves, repeat, saturated=saturated), *lines]) + "\n"
+
+
+def _head(found: Identification, bounds: Bounds, moves: "_Moves", repeat: int, *, saturated: bool) -> Iterator[str]:
+    """What the job is for."""
+    logs = ", ".join(plain(log.name) for log in found.logs)
+    yield f"# Moves to be recorded, about {repeat * moves.seconds:.0f} s, after {logs} was looked at."
+    yield f"# They keep to the {bounds.source}: {moves.shown(bounds.lowest)} to {moves.shown(bounds.highest)}, up to"
+    yield f"# {format_quantity(moves.top, moves.speed_unit, 3)}."
+    yield "#"
+    yield "# Record position, reference and what drives the axis, 500 samples a second or more, without a gap."
+    if found.verdict == "partly trusted":
+        yield f"# Then look at both: detent identify {plain(found.logs[0].name)} NEW_LOG"
+    if not found.refusals:
+        yield "# Nothing was refused: these moves show every constant once more."
+    for refusal in found.refusals:
+        yield f"# {plain(str(refusal))}"
+    if saturated:
+        yield f"# The effort was at its limit: the moves reach {SLOWER:.0%} of the speed only."
+    if any(refusal.subject in {"wrong sign", "wrong unit", "lost sign"} for refusal in found.refusals):
+        yield "# No move mends a sign or a unit: state them first (--column, --map), and look at the log again."
+    if repeat > 1:
+        yield ""
+        yield f"repeat = {repeat}"
+
+
+class _Moves:
+    """Writes moves to and fro, and counts their time."""
+
+    def __init__(self, bounds: Bounds, top: float) -> None:
+        self.top, self.seconds = top, 0.0
+        self._bounds, self._place = bounds, bounds.start
+        self.way_unit, self.speed_unit = ("rad", "rad/s") if bounds.is_rotary else ("m", "m/s")
+        self._rise = bounds.acceleration if bounds.acceleration > 0.0 else top / RAMP
+
+    def shown(self, place: float) -> str:
+        """A position as people read it."""
+        return format_quantity(place, self.way_unit)
+
+    def of(self, part: Part) -> Iterator[str]:
+        """Moves of a part, each speed there and back around the middle of the travel."""
+        for share in part.shares:
+            speed = share * self.top
+            free = self._bounds.highest - self._bounds.lowest
+            way = min(speed * part.steady + speed**2 / self._rise, free)
+            for sign in (1.0, -1.0):
+                yield from self.to(self._bounds.middle + sign * 0.5 * way, speed, part.dwell)
+
+    def to(self, target: float, speed: float, dwell: float = 0.0) -> Iterator[str]:
+        """One move."""
+        way = abs(target - self._place)
+        self._place = target
+        ramp = speed / self._rise
+        self.seconds += dwell + (way / speed + ramp if way > speed * ramp else 2.0 * math.sqrt(way / self._rise))
+        yield "[[move]]"
+        yield f'target = "{format_quantity(target, self.way_unit)}"'
+        yield f'speed = "{format_quantity(speed, self.speed_unit, 4)}"'
+        if dwell:
+            yield f'dwell = "{format_quantity(dwell, "s")}"'

@@ -1,0 +1,351 @@
+"""What identified constants are in an axis file: the numbers of its keys, each with its interval.
+
+An axis file knows forces, masses, and friction of two masses; a log knows what its effort did to all that moves. So
+the effort is converted to a force by what the file says of its drive, and what the file states beside a number, such as
+the friction of the load, is taken off it.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from detent.axisfile.motion import unit_in
+from detent.errors import DetentError
+from detent.identify.fit.constants import hanging_position
+from detent.identify.fit.estimate import Estimate
+from detent.identify.fit.identification import Identification
+from detent.identify.fit.run import Run
+from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, FrictionTable
+from detent.units import format_quantity
+
+NATIVE = {"linear": "N", "rotary": "N*m"}
+"""Unit of an effort that an axis file has itself, by the motion of its axis."""
+
+MOST_LOSS = 0.95
+"""Largest share of the effort that a file can say is lost."""
+
+LINEAR_UNITS = {"mass": "kg", "viscous": "N*s/m", "stribeck": "m/s", "delay": "s", "spring": "N/m", "loss": ""}
+"""Unit of a constant in the file of a linear axis, by its kind; that of the others is N."""
+
+_WAYS = ("positive", "negative")
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number of an axis file.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key.
+    value : float
+        In `unit`; a pure number where that is empty.
+    unit : str
+        SI unit.
+    note : str
+        Its interval and where it comes from.
+    trusted : bool
+        False where the identification refused it.
+    """
+
+    key: str
+    value: float
+    unit: str
+    note: str
+    trusted: bool = True
+
+    @property
+    def text(self) -> str:
+        """The value as a file has it."""
+        return f'"{format_quantity(self.value, self.unit, 6)}"' if self.unit else f"{self.value:.6g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How the effort of a log becomes the force of an axis file.
+
+    Attributes
+    ----------
+    factor : float
+        Force per effort.
+    drag : float
+        Force per velocity that back-EMF takes, and that the log shows as viscous friction [N s/m].
+    """
+
+    factor: float = 1.0
+    drag: float = 0.0
+
+    def force(self, found: Estimate) -> Estimate:
+        """An estimate in the units of the axis file, times aside."""
+        kind = found.name.partition(".")[0]
+        if kind in {"stribeck", "delay", "loss"}:
+            return found
+        less = self.drag if kind == "viscous" else 0.0
+        f = self.factor
+        return replace(
+            found,
+            value=f * found.value - less,
+            low=f * found.low - less,
+            high=f * found.high - less,
+            error=f * found.error,
+        )
+
+
+def scale_of(spec: CascadeSpec, run: Run) -> Scale:
+    """How the effort of a run becomes the force of an axis.
+
+    Raises
+    ------
+    DetentError
+        The axis has no such effort, or is of another kind of motion.
+    """
+    motion = "rotary" if run.is_rotary else "linear"
+    if spec.axis.motion != motion:
+        raise DetentError(
+            f"{run.name}: came a position in {run.position_unit}; allowed: {spec.unit('m')}, as {spec.axis.name} is a "
+            f"{spec.axis.motion} axis; state the unit of the column, or name another axis file"
+        )
+    by_voltage = Scale(spec.effort_per_command, spec.back_emf_drag)
+    scales = {NATIVE[motion]: Scale(), "1": by_voltage, "V": by_voltage}
+    if spec.drive.input == "voltage" and spec.motor is not None:
+        scales["V"] = Scale(spec.force_constant / spec.motor.resistance, spec.back_emf_drag)
+    if spec.motor is not None:
+        scales |= {"A": Scale(spec.force_constant)}
+        if motion == "linear":
+            scales["N*m"] = Scale(1.0 / spec.radius)
+    if run.effort_unit in scales:
+        return scales[run.effort_unit]
+    role = "torque" if motion == "rotary" else "force"
+    raise DetentError(
+        f"{run.name}: came a {run.effort_name} in {run.effort_unit}; allowed for {spec.axis.name}: "
+        f"{', '.join(scales)}; give what it does in these, such as --column '{role}=COLUMN [35 {NATIVE[motion]}]' with "
+        f"the {role} per {run.effort_unit}"
+    )
+
+
+def stated_constants(spec: CascadeSpec) -> dict[str, float]:
+    """Constants of a whole axis as its file states them, by the names of the identification, in SI units."""
+    mechanics = spec.mechanics
+    frictions = (mechanics.friction, mechanics.load_friction)
+    found = {
+        "mass": spec.mass,
+        "pendulum": mechanics.pendulum,
+        "pendulum.across": 0.0,
+        "delay": (spec.drive.delay + spec.encoder.delay) * spec.method.sample_period,
+        "loss": mechanics.transmission_loss,
+        "spring": 0.0,
+    }
+    fading = False
+    for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
+        tables = [_direction(f, way) for f in frictions]
+        steady = sum(t.coulomb + sign * f.offset for t, f in zip(tables, frictions, strict=True))
+        found[f"coulomb.{way}"] = steady + sign * mechanics.weight
+        found[f"viscous.{way}"] = sum(t.viscous for t in tables)
+        excess = sum(t.static - t.coulomb for t in tables if t.stribeck > 0)
+        fading = fading or excess > 0
+        found[f"static.{way}"] = found[f"coulomb.{way}"] + excess
+    if fading:
+        found["stribeck"] = max(_direction(mechanics.friction, way).stribeck for way in _WAYS)
+    return found
+
+
+def _direction(friction: FrictionTable, way: str) -> DirectionTable:
+    return friction.positive if way == "positive" else friction.negative
+
+
+@dataclass(frozen=True, slots=True)
+class Contrast:
+    """A constant that an axis file states outside of its interval.
+
+    Attributes
+    ----------
+    name : str
+        Name of the constant.
+    stated : float
+        Of the whole axis, by the file.
+    found : Estimate
+        The same by the logs, in the units of the file.
+    """
+
+    name: str
+    stated: float
+    found: Estimate
+
+    def __str__(self) -> str:
+        """Give it as one line."""
+        unit = self.found.unit
+        limits = f"{format_quantity(self.found.low, unit)} to {format_quantity(self.found.high, unit)}"
+        return f"{self.name}: the file says {format_quantity(self.stated, unit)}, the log {limits}"
+
+
+def contrasts(found: Identification, spec: CascadeSpec) -> list[Contrast]:
+    """Constants that a file states outside of what was identified and is trusted.
+
+    Parameters
+    ----------
+    found : Identification
+    spec : CascadeSpec
+        The axis by its file.
+
+    Raises
+    ------
+    DetentError
+        The axis has no effort like that of the log.
+    """
+    scale, stated = scale_of(spec, found.runs[0]), stated_constants(spec)
+    known = [in_file_units(scale.force(e), spec.axis.motion) for e in found.trusted if e.name in stated]
+    return [Contrast(e.name, stated[e.name], e) for e in known if not e.holds(stated[e.name])]
+
+
+def in_file_units(found: Estimate, motion: str) -> Estimate:
+    """An estimate with the unit that the file of an axis has for it."""
+    kind = found.name.partition(".")[0]
+    return replace(found, unit=unit_in(motion, LINEAR_UNITS.get(kind, "N")))
+
+
+class FileNumbers:
+    """Identified constants as numbers of an axis file.
+
+    Parameters
+    ----------
+    found : Identification
+        With constants.
+    base : CascadeSpec, optional
+        Axis whose file the numbers are for; by default one with nothing beside them, whose force is the effort.
+    """
+
+    def __init__(self, found: Identification, base: CascadeSpec | None = None) -> None:
+        run = found.runs[0]
+        scale = Scale() if base is None else scale_of(base, run)
+        self.motion = "rotary" if run.is_rotary else "linear"
+        self._found, self._base = found, base
+        self._known = {e.name: in_file_units(scale.force(e), self.motion) for e in found.estimates}
+        self._trusted = {e.name for e in found.trusted}
+        names = [one.name for one in found.logs]
+        self._where = plain(names[0]) if len(names) == 1 else f"{len(names)} logs"
+
+    def numbers(self) -> Iterator[Number]:
+        """Every number, in the order of the file."""
+        if "delay" in self._known:
+            yield self._delay()
+        yield self._mass()
+        if "pendulum" in self._known:
+            yield self._pendulum()
+        if "loss" in self._known:
+            share = min(max(self._value("loss"), 0.0), MOST_LOSS)
+            yield self._make("mechanics.transmission_loss", share, "", "loss")
+        yield from self._friction()
+
+    def interval(self, name: str) -> str:
+        """What is said of a constant's limits."""
+        e = self._known[name]
+        digits = 4
+        while digits < 8 and e.low != e.high and f"{e.low:.{digits - 1}g}" == f"{e.high:.{digits - 1}g}":
+            digits += 1
+        low, high = (format_quantity(limit, e.unit, digits) for limit in (e.low, e.high))
+        return f"95 %: {low} to {high}, {self._where}"
+
+    def _unit(self, linear: str) -> str:
+        return unit_in(self.motion, linear)
+
+    def _value(self, name: str) -> float:
+        return self._known[name].value if name in self._known else 0.0
+
+    def _make(self, key: str, value: float, linear: str, name: str, text: str = "") -> Number:
+        return Number(key, value, self._unit(linear), f"{text}{self.interval(name)}", name in self._trusted)
+
+    def _delay(self) -> Number:
+        run, base, e = self._found.runs[0], self._base, self._known["delay"]
+        period = run.step if base is None else base.method.sample_period
+        samples = round(e.value / period) - (0 if base is None else base.encoder.delay)
+        note = f"samples of {format_quantity(period, 's')}; {self.interval('delay')}"
+        return Number("drive.delay", float(min(max(samples, 0), MOST_SAMPLES)), "", note, "delay" in self._trusted)
+
+    def _mass(self) -> Number:
+        base, total = self._base, self._value("mass")
+        if base is None:
+            return self._make("mechanics.motor_mass", total, "kg", "mass")
+        on_load = base.mechanics.coupling is not None or base.mechanics.load_mass > 0
+        rest = base.motor_mass if on_load else base.mass - base.mechanics.motor_mass
+        key = f"mechanics.{'load' if on_load else 'motor'}_mass"
+        if total <= rest and "mass" in self._trusted:
+            unit = self._unit("kg")
+            raise DetentError(
+                f"{base.axis.name}: came {format_quantity(total, unit)} for all that moves; allowed: more than "
+                f"{format_quantity(rest, unit)}, which the axis file states without {key}; correct the axis file"
+            )
+        text = f"with the other {format_quantity(rest, self._unit('kg'))} of this file; " if rest else ""
+        return self._make(key, total - rest, "kg", "mass", text)
+
+    def _pendulum(self) -> Number:
+        weight = math.hypot(self._value("pendulum"), self._value("pendulum.across"))
+        place = 0.0 if self._found.constants is None else hanging_position(self._found.constants)
+        text = "" if abs(place) < math.radians(1) else f"hangs at {format_quantity(place, 'rad', 3)} of the log; "
+        return self._make("mechanics.pendulum", weight, "N*m", "pendulum", text)
+
+    def _friction(self) -> Iterator[Number]:
+        """Friction of the motor's side: the whole without the load's and the weight."""
+        base = self._base
+        load = FrictionTable() if base is None else base.mechanics.load_friction
+        weight = 0.0 if base is None else base.mechanics.weight
+        needs: dict[str, float] = {}
+        for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
+            beside = _direction(load, way).coulomb + sign * (load.offset + weight)
+            needs[way] = self._value(f"coulomb.{way}") - beside
+        offset = self._offset(needs)
+        if base is None or offset != base.mechanics.friction.offset:
+            trusted = {"coulomb.positive", "coulomb.negative"} <= self._trusted
+            text = "half of what the directions differ by: in motion nothing tells it from an uneven friction"
+            yield Number("mechanics.friction.offset", offset, self._unit("N"), text, trusted)
+        for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
+            yield from self._one_way(way, sign * offset, max(needs[way] - sign * offset, 0.0), _direction(load, way))
+
+    def _offset(self, needs: dict[str, float]) -> float:
+        """Force that does not turn round: as stated where that leaves a friction in both directions, else the half."""
+        stated = None if self._base is None else self._base.mechanics.friction.offset
+        if stated is not None and needs["positive"] >= stated and needs["negative"] >= -stated:
+            return stated
+        return 0.5 * (needs["positive"] - needs["negative"])
+
+    def _one_way(self, way: str, offset: float, coulomb: float, load: DirectionTable) -> Iterator[Number]:
+        """Friction in one direction."""
+        table = f"mechanics.friction.{way}"
+        if f"coulomb.{way}" not in self._known:
+            return
+        unit = self._unit("N")
+        text = f"with the offset {format_quantity(coulomb + offset, unit)}; " if offset else ""
+        yield self._make(f"{table}.coulomb", coulomb, "N", f"coulomb.{way}", text)
+        yield from self._low_speed(way, offset, coulomb, load)
+        if f"viscous.{way}" in self._known:
+            value = self._value(f"viscous.{way}") - load.viscous
+            text = "came out below 0; " if value < 0 else ""
+            yield self._make(f"{table}.viscous", max(value, 0.0), "N*s/m", f"viscous.{way}", text)
+
+    def _low_speed(self, way: str, offset: float, coulomb: float, load: DirectionTable) -> Iterator[Number]:
+        """Static friction of one direction, and where it ends."""
+        table, name = f"mechanics.friction.{way}", f"static.{way}"
+        if name not in self._known:
+            yield from self._no_low_speed(way, coulomb)
+            return
+        excess = (
+            self._value(name) - self._value(f"coulomb.{way}") - (load.static - load.coulomb if load.stribeck else 0.0)
+        )
+        yield self._make(
+            f"{table}.static", coulomb + max(excess, 0.0), "N", name, "with the offset; " if offset else ""
+        )
+        if "stribeck" in self._known:
+            trusted = {name, "stribeck"} <= self._trusted and self._known["stribeck"].low > 0.0
+            note = self.interval("stribeck")
+            yield Number(f"{table}.stribeck", max(self._value("stribeck"), 0.0), self._unit("m/s"), note, trusted)
+
+    def _no_low_speed(self, way: str, coulomb: float) -> Iterator[Number]:
+        """Static friction of a direction where the log shows none of its own: never below Coulomb friction."""
+        note, base = "none above Coulomb friction shows in the log", self._base
+        if base is None or _direction(base.mechanics.friction, way).static < coulomb:
+            trusted = f"coulomb.{way}" in self._trusted
+            yield Number(f"mechanics.friction.{way}.static", coulomb, self._unit("N"), note, trusted)
+
+
+def plain(name: str) -> str:
+    """A name that any comment or text can hold."""
+    return "".join(c if c.isprintable() else "?" for c in name)

@@ -1,0 +1,1 @@
+"""Recordings: reading, cleaning, what is guessed and what is found."""

@@ -1,0 +1,310 @@
+"""Which column is which signal, and in which unit: as the user says, otherwise guessed by name, unit and numbers."""
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from detent.errors import FileProblem, InputError
+from detent.files.job_values import short
+from detent.logs.draft import Draft
+from detent.logs.log import Action, Kind, Severity, Source, Values
+from detent.logs.log_units import Conversion, bits_of, find_conversion, split_heading
+from detent.logs.mapping import Choice, ColumnMapping
+from detent.logs.raw_table import RawTable, tell
+from detent.logs.roles import ROLES, rank, words_of
+
+_BY_UNIT = ("force", "torque", "current", "voltage", "temperature", "acceleration", "velocity")
+"""Signals that a unit alone tells."""
+
+_MOTION = ("position", "reference", "position_load", "velocity", "acceleration")
+_ANGLE_WORDS = frozenset({"angle", "theta", "phi", "rpm", "omega", "rad", "deg", "turn", "turns"})
+_TIME_UNITS = (("s", 1e-7, 0.2), ("ms", 0.2, 200.0), ("us", 200.0, 2e5), ("ns", 2e5, 2e8))
+"""Time between two rows, in numbers of a column without a unit, from which to which a unit is believed: recordings of
+servos are made with 5 to 5000 rows a second, seldom more."""
+
+
+@dataclass
+class Chosen:
+    """Columns of a table by their roles.
+
+    Attributes
+    ----------
+    columns : dict
+        From a role to the name of its column.
+    choices : dict
+        From a role to what the user says; only roles that the user names.
+    guesses : list of str
+        What was guessed.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict[str, str])
+    choices: dict[str, Choice] = field(default_factory=dict[str, Choice])
+    guesses: list[str] = field(default_factory=list[str])
+
+
+def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
+    """Find the column of each signal.
+
+    Parameters
+    ----------
+    table : RawTable
+        The columns.
+    mapping : ColumnMapping
+        What the user says; only the other signals are guessed.
+
+    Returns
+    -------
+    Chosen
+        With the time, unless the period is stated, and at least one signal.
+
+    Raises
+    ------
+    InputError
+        A stated column is not there, or there is no column for the time, or no signal.
+    """
+    chosen = Chosen(choices={role: choice for role, choice in mapping.columns.items() if choice.column})
+    problems: list[FileProblem] = []
+    for role, choice in chosen.choices.items():
+        name = find_column(table, choice.column)
+        if name is None:
+            problems.append(_no_column(table, role, choice.column))
+        else:
+            chosen.columns[role] = name
+    if problems:
+        raise InputError(problems)
+    silent = {role for role, choice in mapping.columns.items() if not choice.column}
+    if mapping.file.period is not None and "time" not in chosen.columns:
+        silent.add("time")
+    _guess(table, chosen, silent)
+    if "time" not in chosen.columns and mapping.file.period is None:
+        remedy = "state it as time=COLUMN [UNIT], or the time between rows as period=1 ms"
+        raise InputError.of_file(table.file, f"columns {table.told_columns()}", "a column for the time", remedy)
+    if not set(chosen.columns) - {"time"}:
+        remedy = "state what the columns are, as in position=COLUMN [mm]"
+        raise InputError.of_file(table.file, f"columns {table.told_columns()}", f"signals: {', '.join(ROLES)}", remedy)
+    return chosen
+
+
+def find_column(table: RawTable, wanted: str) -> str | None:
+    """Name of the column that a person means: its whole heading, its heading without the unit, or its number."""
+    if wanted in table.columns:
+        return wanted
+    same = [name for name in table.columns if split_heading(name)[0] == wanted]
+    alike = [name for name in table.columns if _plain(name) == _plain(wanted)]
+    for found in (same, alike):
+        if len(found) == 1:
+            return found[0]
+    number = int(wanted) if wanted.isascii() and wanted.isdigit() and len(wanted) < 6 else 0
+    return list(table.columns)[number - 1] if 1 <= number <= len(table.columns) else None
+
+
+def _plain(name: str) -> str:
+    return split_heading(name)[0].casefold()
+
+
+def _no_column(table: RawTable, role: str, wanted: str) -> FileProblem:
+    """The problem of a column that is not there."""
+    near = difflib.get_close_matches(wanted.casefold(), [_plain(name) for name in table.columns], n=1, cutoff=0.6)
+    remedy = f'did you mean "{near[0]}"?' if near else "name one of these, or its number from 1"
+    came = f'the column "{short(wanted)}"'
+    return FileProblem(table.file, 0, 0, role, came, f"columns {table.told_columns()}", remedy)
+
+
+def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
+    """Guess the signals that the user does not name: by the names of columns, then by their units."""
+    for role in ROLES:
+        if role in chosen.columns or role in silent:
+            continue
+        ranks = {name: place for name in _free(table, chosen) if (place := _rank(table, name, role)) is not None}
+        if ranks:
+            best = min(ranks, key=lambda name: ranks[name])
+            chosen.columns[role] = best
+            others = [name for name in ranks if name != best and ranks[name] == ranks[best]]
+            alike = f"; {tell([short(name) for name in others])} would fit as well" if others else ""
+            chosen.guesses.append(f'{role}: column "{short(best)}", by its name{alike}')
+    for role in _BY_UNIT:
+        fitting = [name for name in _free(table, chosen) if _fits_unit(table.units[name], role)]
+        if len(fitting) == 1 and role not in chosen.columns and role not in silent:
+            chosen.columns[role] = fitting[0]
+            chosen.guesses.append(f'{role}: column "{short(fitting[0])}", by its unit {table.units[fitting[0]]}')
+    rest = [short(name) for name in _free(table, chosen)]
+    if rest:
+        chosen.guesses.append(f"columns not read: {tell(rest)}")
+
+
+def _free(table: RawTable, chosen: Chosen) -> Iterable[str]:
+    taken = set(chosen.columns.values())
+    return [name for name in table.columns if name not in taken]
+
+
+def _rank(table: RawTable, name: str, role: str) -> int | None:
+    """How well a column fits a role: None where its name or its unit says that it does not."""
+    unit = table.units[name]
+    if unit and not _fits_unit(unit, role) and any(_fits_unit(unit, other) for other in ROLES):
+        return None
+    return rank(split_heading(name)[0], role)
+
+
+def _fits_unit(unit: str, role: str) -> bool:
+    return bool(unit) and any(find_conversion(unit, target) for target in ROLES[role].units)
+
+
+def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft:
+    """Put the chosen columns into a draft, with what their numbers mean.
+
+    Parameters
+    ----------
+    table : RawTable
+        The columns, no longer rotated.
+    chosen : Chosen
+        Which of them are read.
+    mapping : ColumnMapping
+        What the user says.
+
+    Returns
+    -------
+    Draft
+        Numbers of the file, with their conversions.
+
+    Raises
+    ------
+    InputError
+        A factor names no constant.
+    """
+    draft = Draft(table.file, table.rows, np.empty(0), {}, {}, {}, findings=table.findings)
+    draft.guesses = [*table.notes, *chosen.guesses]
+    constants = {**table.constants, **mapping.constants}
+    if "time" not in chosen.columns and mapping.file.period is not None:
+        period = mapping.file.period
+        draft.t, draft.has_clock = (table.rows - 1).astype(np.float64), False
+        draft.conversions["time"] = Conversion("s", period)
+        draft.sources["time"] = Source("", "rows", period)
+    bases = _Bases(table, chosen)
+    for role in sorted(chosen.columns, key=list(ROLES).index):
+        name = chosen.columns[role]
+        unit, conversion = bases.find(role, draft)
+        choice = chosen.choices.get(role, Choice(name))
+        factor = choice.sign * _number_of(table.file, role, choice.factor, constants)
+        # Behind the border: unit factor * (sign * factor * number + offset) + unit offset.
+        total = conversion.factor * choice.offset + conversion.offset
+        draft.conversions[role] = Conversion(conversion.unit, conversion.factor * factor, total)
+        draft.sources[role] = Source(name, unit, conversion.factor * factor, total)
+        if role == "time":
+            draft.t = table.columns[name]
+        else:
+            draft.values[role] = table.columns[name].copy()
+        draft.bits |= {role: choice.bits} if choice.bits else {}
+        draft.delays |= {role: choice.delay} if choice.delay else {}
+    _check_widths(draft, table, chosen)
+    return draft
+
+
+def _number_of(file: str, role: str, factor: float | str, constants: dict[str, float | str]) -> float:
+    """A factor, looked up where it is the name of a constant."""
+    if not isinstance(factor, str):
+        return factor
+    value = constants.get(factor)
+    if isinstance(value, float) and abs(value) > 0 and np.isfinite(value):
+        return value
+    numbers = [name for name, constant in constants.items() if isinstance(constant, float)]
+    allowed = f"a number, or one of the constants {tell(numbers) or '(there are none)'}"
+    problem = FileProblem(file, 0, 0, role, f'the factor "{short(factor)}"', allowed, "state the number as factor")
+    raise InputError([problem])
+
+
+class _Bases:
+    """Finds the units of signals; those of a motion without a unit follow those with one."""
+
+    def __init__(self, table: RawTable, chosen: Chosen) -> None:
+        self._table, self._chosen = table, chosen
+        stated = (find for role in _MOTION if (find := self._stated(role)) is not None)
+        first = next(stated, None)
+        self._base = first[1].unit.partition("/")[0] if first else ""
+
+    def _stated(self, role: str) -> tuple[str, Conversion] | None:
+        """Unit of a signal that the user or the heading states."""
+        if role not in self._chosen.columns:
+            return None
+        choice = self._chosen.choices.get(role)
+        for unit in (choice.unit if choice else "", self._table.units[self._chosen.columns[role]]):
+            for target in ROLES[role].units if unit else ():
+                conversion = find_conversion(unit, target)
+                if conversion is not None:
+                    return unit, conversion
+        return None
+
+    def find(self, role: str, draft: Draft) -> tuple[str, Conversion]:
+        """Unit of a signal, guessed where it is not stated, with how it becomes SI."""
+        stated = self._stated(role)
+        if stated is not None:
+            return stated
+        name = self._chosen.columns[role]
+        unit, reason = self._guess(role, name)
+        draft.guessed_units.add(role)
+        odd = self._table.units[name]
+        why = f'"{short(odd)}" is no unit of {ROLES[role].meaning}' if odd else "no unit stated"
+        if unit:
+            draft.guesses.append(f"{role}: {why}, taken as {unit}{reason}")
+        target = next(target for target in ROLES[role].units if not unit or find_conversion(unit, target))
+        return unit, find_conversion(unit, target) or Conversion(target, 1.0)
+
+    def _guess(self, role: str, name: str) -> tuple[str, str]:
+        """Unit of a signal that has none, and the reason."""
+        values = self._table.columns[name]
+        if role == "time":
+            return _guess_time_unit(values)
+        if role == "temperature":
+            return "degC", ""
+        if role not in _MOTION:
+            return ROLES[role].units[0], ""
+        turns = {"rad": 1, "count": 2}
+        units = ROLES[role].units
+        if self._base:
+            return units[turns.get(self._base, 0)], f", as the other signals in {self._base}"
+        if _are_counts(values) and role not in {"velocity", "acceleration"}:
+            self._base = "count"
+            return "count", f": whole numbers; say how long one is, as in {role}={short(name)} [0.5 um]"
+        is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in self._chosen.columns
+        self._base = "rad" if is_angle else "m"
+        other = "moves straight" if is_angle else "turns"
+        said = f"; for an axis that {other} state it, as in {role}={short(name)} [{'mm' if is_angle else 'rad'}]"
+        return units[turns.get(self._base, 0)], said
+
+
+def _guess_time_unit(values: Values) -> tuple[str, str]:
+    """Unit of a time without one: the one in which its rows are as far apart as recordings are made."""
+    steps = np.diff(values[np.isfinite(values)])
+    steps = steps[steps > 0]
+    step = float(np.median(steps)) if len(steps) else 0.0
+    unit = next((unit for unit, low, high in _TIME_UNITS if low <= step < high), "s")
+    return unit, f": its rows are {step:.4g} apart"
+
+
+def _are_counts(values: Values) -> bool:
+    """True for whole numbers that go through more than a few."""
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and bool(np.all(known == np.rint(known))) and float(np.ptp(known)) > 20
+
+
+def _check_widths(draft: Draft, table: RawTable, chosen: Chosen) -> None:
+    """Leave out words whose heading states a width in bits that they do not fit: they are something else."""
+    for role in list(draft.values):
+        # What the user states is believed.
+        bits = None if role in chosen.choices else bits_of(table.units[chosen.columns[role]])
+        values = draft.values[role]
+        if bits is None or not np.nanmax(np.abs(values), initial=0) >= 2**bits:
+            continue
+        low, high = np.nanmin(values), np.nanmax(values)
+        text = f"the heading says {bits} bits, but the numbers go from {low:g} to {high:g}: they are something else"
+        advice = f"state what the column is, as in reference={short(chosen.columns[role])} [{_example(draft)}]"
+        beyond = np.flatnonzero(np.abs(values) >= 2**bits)
+        draft.note(Kind.WRONG_UNIT, role, beyond, text, Action.LEFT_OUT, advice, Severity.WARNING)
+        draft.drop_signal(role)
+
+
+def _example(draft: Draft) -> str:
+    """Unit in which an example names a position."""
+    unit = draft.conversions["position"].unit if "position" in draft.conversions else "m"
+    return {"count": "steps", "m": "mm"}.get(unit, unit)

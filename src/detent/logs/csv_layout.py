@@ -1,0 +1,242 @@
+"""How a text table is laid out: separator, decimal sign, header, units, and where its numbers begin."""
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from detent.errors import InputError
+from detent.files.job_values import short
+from detent.logs.csv_cells import MISSING, is_moment, is_number
+from detent.logs.log_units import is_unit, split_heading
+
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
+"""Separators by the words that name them in options."""
+
+SAMPLE_LINES = 200
+"""Lines that say something from which the layout is guessed."""
+
+_TRIED = ("\t", ";", ",", "|", " ")
+_COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
+
+
+@dataclass(frozen=True, slots=True)
+class FileOptions:
+    """What the user says about a file, whatever its kind.
+
+    Attributes
+    ----------
+    separator : str
+        Between the cells of a text table; empty: guessed.
+    decimal : str
+        Decimal sign of a text table, ``"."`` or ``","``; empty: guessed.
+    header : int or None
+        Line of the header of a text table, from 1; 0 for none; None: guessed.
+    table : str
+        Group, structure or list to read from a file that holds several; empty: the whole file.
+    period : float or None
+        Time between two rows [s] of a file without a column for the time.
+    """
+
+    separator: str = ""
+    decimal: str = ""
+    header: int | None = None
+    table: str = ""
+    period: float | None = None
+
+
+@dataclass(slots=True)
+class CsvLayout:
+    """How one text table is laid out.
+
+    Attributes
+    ----------
+    separator, decimal : str
+        As of `FileOptions`, both stated.
+    first : int
+        Index of the first line of numbers.
+    width : int
+        Cells of a usual row; less than there are columns where the last are always empty.
+    names, units : list of str
+        Per column, from the header; a unit is empty where none is stated.
+    text_columns, moment_columns : set of int
+        Columns that hold words, and those that hold dates with times of day.
+    notes : list of str
+        What was guessed.
+    """
+
+    separator: str
+    decimal: str
+    first: int
+    width: int
+    names: list[str] = field(default_factory=list[str])
+    units: list[str] = field(default_factory=list[str])
+    text_columns: set[int] = field(default_factory=set[int])
+    moment_columns: set[int] = field(default_factory=set[int])
+    notes: list[str] = field(default_factory=list[str])
+
+
+def is_telling(line: str) -> bool:
+    """True for a line that is neither empty nor a comment."""
+    return bool(line.strip()) and not _COMMENT.match(line)
+
+
+def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
+    """Cells of lines, without the blanks around them."""
+    if separator == " ":
+        yield from (line.split() for line in lines)
+    else:
+        reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+        yield from ([cell.strip() for cell in cells] for cells in reader)
+
+
+def guess_layout(file: str, lines: Sequence[str], options: FileOptions) -> CsvLayout:
+    """Find out how a text table is laid out.
+
+    The separator is the one that gives the most cells that are numbers in rows of one width. The first such row is the
+    first row of numbers; the header is the line above it, which may be a comment; a line of nothing but units may stand
+    between them.
+
+    Parameters
+    ----------
+    file : str
+        The file as the user named it.
+    lines : sequence of str
+        Its lines.
+    options : FileOptions
+        What the user says; nothing of it is guessed.
+
+    Returns
+    -------
+    CsvLayout
+        With at least one column.
+
+    Raises
+    ------
+    InputError
+        There are no rows of numbers, or the header is not where the user says.
+    """
+    begin = options.header or 0
+    sample = [index for index in range(begin, len(lines)) if is_telling(lines[index])][:SAMPLE_LINES]
+    separator = options.separator or _guess_separator([lines[index] for index in sample])
+    rows = list(split_lines([lines[index] for index in sample], separator))
+    width = _width(rows)
+    place = _first_data(rows, width)
+    if place is None:
+        came = short(lines[sample[0]].strip()) if sample else "no lines below the header"
+        allowed = "a table: a header such as t [s],position [mm], then lines of numbers"
+        remedy = "state separator=, decimal= or header= (its line), or name another file"
+        raise InputError.of_file(file, came, allowed, remedy)
+    # Lines may end in separators behind which nothing ever stands.
+    while width > 1 and not any(cells[width - 1 : width] != [""] for cells in rows[place:] if len(cells) >= width):
+        width -= 1
+    decimal = options.decimal or _guess_decimal(rows[place:], separator)
+    layout = CsvLayout(separator, decimal, sample[place], width)
+    _read_header(file, lines, layout, options.header)
+    _find_texts(rows[place:], layout)
+    shown = {value: word for word, value in SEPARATORS.items()}.get(separator, separator)
+    if not options.separator and separator != ",":
+        layout.notes.append(f"separator {shown}")
+    if not options.decimal and layout.decimal == ",":
+        layout.notes.append("decimal comma")
+    return layout
+
+
+def _guess_separator(lines: Sequence[str]) -> str:
+    """Separator that leaves the most cells of one width that are numbers."""
+
+    def score(separator: str) -> tuple[float, int]:
+        """Rows whose cells are numbers, and how many cells they have."""
+        rows = list(split_lines(lines, separator))
+        width = _width(rows)
+        fractions = [_share(cells) for cells in rows if len(cells) == width]
+        return (sum(fractions) if width > 1 else 0.0), width
+
+    return max(_TRIED, key=score) if any(score(separator)[0] for separator in _TRIED) else ","
+
+
+def _share(cells: Sequence[str]) -> float:
+    """Share of the cells that hold numbers, or nothing."""
+    return sum(is_number(cell) or is_moment(cell) or cell.lower() in MISSING for cell in cells) / max(len(cells), 1)
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """Commonest number of cells among the rows that hold numbers."""
+    widths = Counter(len(cells) for cells in rows if any(is_number(cell) for cell in cells))
+    return widths.most_common(1)[0][0] if widths else 0
+
+
+def _first_data(rows: Sequence[Sequence[str]], width: int) -> int | None:
+    """Index of the first row of numbers: of the usual width, as is the next; numbers alone may be fewer before it."""
+    data = [len(cells) == width and _numbers(cells) >= max(1, width / 2) for cells in rows]
+    place = next((place for place, ok in enumerate(data) if ok and all(data[place + 1 : place + 2])), None)
+    while place and len(rows[place - 1]) >= width / 2 and _numbers(rows[place - 1]) == len(rows[place - 1]):
+        place -= 1
+    return place
+
+
+def _numbers(cells: Sequence[str]) -> int:
+    """How many cells are numbers."""
+    return sum(is_number(cell) or is_moment(cell) for cell in cells)
+
+
+def _guess_decimal(rows: Sequence[Sequence[str]], separator: str) -> str:
+    """Decimal sign: a comma where numbers have one and it does not separate cells, or stands in quotes."""
+    commas = sum("," in cell and is_number(cell) for cells in rows for cell in cells)
+    points = sum("." in cell and is_number(cell) for cells in rows for cell in cells)
+    return "," if commas and (separator != "," or commas > points) else "."
+
+
+def _read_header(file: str, lines: Sequence[str], layout: CsvLayout, stated: int | None) -> None:
+    """Names and units of the columns."""
+    width = layout.width
+    above = [index for index in range(layout.first) if lines[index].strip()]
+    if stated is not None and stated > len(lines):
+        raise InputError.of_file(file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
+    if stated is not None:
+        above = [stated - 1] if stated else []
+    rows = [_cells(lines[index], layout.separator) for index in above]
+    units: list[str] = []
+    if stated is None and len(rows) > 1 and _is_units(rows[-1]) and len(rows[-2]) >= len(rows[-1]) > 1:
+        units = [cell.strip("[]() ") for cell in rows.pop()]
+    # A line above the numbers that is much narrower than they are is no header but a remark.
+    names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
+    passed = len(rows) - bool(names)
+    if passed:
+        layout.notes.append(f"{passed} line{'s' if passed > 1 else ''} above the header passed over")
+    if names and len(names) < width:
+        layout.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last have no name")
+    if not names:
+        layout.notes.append("no header: columns are called by their numbers")
+    for index in range(max(len(names), width)):
+        name = names[index] if index < len(names) else ""
+        layout.names.append(name or f"column {index + 1}")
+        layout.units.append(split_heading(name)[1] or (units[index] if index < len(units) else ""))
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Cells of a line above the numbers; a mark of a comment before them is left out."""
+    match = _COMMENT.match(line)
+    text = line[match.end() :] if match else line
+    cells = next(split_lines([text], separator), list[str]())
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """True for a row of nothing but units, such as ``[s];[mm]``; some columns may have none."""
+    telling = [cell for cell in cells if cell.strip("[]() -")]
+    return bool(telling) and all(is_unit(cell.strip("[]() ")) for cell in telling)
+
+
+def _find_texts(rows: Sequence[Sequence[str]], layout: CsvLayout) -> None:
+    """Find the columns of words and those of dates: at least half of their cells are no numbers."""
+    for index in range(len(layout.names)):
+        cells = [row[index] for row in rows if index < len(row) and row[index].lower() not in MISSING]
+        moments = sum(map(is_moment, cells))
+        if moments > len(cells) / 2:
+            layout.moment_columns.add(index)
+        elif sum(map(is_number, cells)) < len(cells) / 2:
+            layout.text_columns.add(index)

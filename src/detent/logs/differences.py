@@ -1,0 +1,146 @@
+"""What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.logs.log import Values
+from detent.logs.stamps import stretches
+from detent.logs.windows import sliding_products
+
+QUANTA = 20.0
+"""Times its grain by which a position should change over a window for rounding and noise not to count."""
+
+FARTHEST = 200
+"""Rows up to which a shift is looked for."""
+
+FEWEST_WINDOWS = 20
+"""Windows that a recording is divided into at least."""
+
+
+class Likeness(NamedTuple):
+    """How alike two series are: correlation, and the factor of the first to the second."""
+
+    correlation: float
+    factor: float
+
+
+def resolution(values: Values) -> float:
+    """Smallest step between two different values; 0 for a constant.
+
+    Steps below a billionth of the range are rounding of the file, not of the sensor.
+    """
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-9 * float(np.ptp(values))]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def grain(values: Values) -> float:
+    """Smallest difference that means something: the resolution, or the noise (standard deviation) if that is more.
+
+    The noise is taken from second differences, in which a smooth motion leaves next to nothing.
+    """
+    bends = np.abs(np.diff(values, 2))
+    noise = 1.4826 * float(np.median(bends)) / np.sqrt(6.0) if len(bends) else 0.0
+    return max(resolution(values), noise)
+
+
+def window_rows(position: Values) -> int:
+    """Rows of a window over which a position changes by `QUANTA` grains, as a rule."""
+    wanted, rows, most = QUANTA * grain(position), 4, max(4, len(position) // FEWEST_WINDOWS)
+    while rows < most and float(np.sqrt(np.mean((position[rows:] - position[:-rows]) ** 2))) < wanted:
+        rows = min(2 * rows, most)
+    return rows
+
+
+def integral(values: Values, t: Values) -> Values:
+    """Integral over time by trapezoids, 0 at the first sample, shape (n,)."""
+    return np.r_[0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(t))]
+
+
+def paired_changes(position: Values, velocity: Values, t: Values) -> tuple[Values, Values]:
+    """Changes of a position over windows, measured and by the velocity.
+
+    Over a window the change of the position is the integral of the velocity, whatever the stamps; both see the same
+    window, so that neither is delayed against the other, and rounding counts once per window.
+
+    Parameters
+    ----------
+    position, velocity, t : ndarray
+        Shape (n,); the velocity in units of the position per unit of the time.
+
+    Returns
+    -------
+    tuple of ndarray
+        By the velocity and by the position, both of shape (m,); windows across gaps are left out.
+    """
+    rows = window_rows(position)
+    path = integral(velocity, t)
+    step = max(1, rows // 2)
+    first = np.concatenate([np.arange(part.start, part.stop - rows, step, dtype=np.int64) for part in stretches(t)])
+    return path[first + rows] - path[first], position[first + rows] - position[first]
+
+
+def likeness(ours: Values, theirs: Values, *, is_centred: bool = False) -> Likeness:
+    """Correlation of two series about zero, or about their means, and the factor between them.
+
+    Parameters
+    ----------
+    ours, theirs : ndarray
+        Shape (n,).
+    is_centred : bool
+        True to take the means away first.
+
+    Returns
+    -------
+    Likeness
+        Zeros where one of them says nothing.
+    """
+    if len(ours) < 2:
+        return Likeness(0.0, 0.0)
+    if is_centred:
+        ours, theirs = ours - ours.mean(), theirs - theirs.mean()
+    both, own, other = float(ours @ theirs), float(ours @ ours), float(theirs @ theirs)
+    if own <= 0 or other <= 0:
+        return Likeness(0.0, 0.0)
+    correlation = both / np.sqrt(own * other)
+    # The ratio of their sizes: a regression would make the factor smaller by the noise of the second.
+    return Likeness(correlation, float(np.copysign(np.sqrt(own / other), correlation)))
+
+
+def correlation_curve(ours: Values, theirs: Values, most: int) -> Values:
+    """Correlation of two series, about their means, for each shift of the first.
+
+    Parameters
+    ----------
+    ours, theirs : ndarray
+        Shape (n,), n > 2 `most`.
+    most : int
+        Rows of the largest shift, to both sides.
+
+    Returns
+    -------
+    ndarray
+        Shape (2 most + 1,); the value at ``most + k`` is that of the first taken from k rows later.
+    """
+    ours, theirs = ours - ours.mean(), theirs - theirs.mean()
+    # Only what lies in the middle takes part, so that each shift compares as many samples.
+    middle = theirs[most : len(theirs) - most]
+    products = sliding_products(ours, middle)
+    squares = np.cumsum(np.r_[0.0, ours**2])
+    sizes = np.sqrt(np.maximum(squares[len(middle) :] - squares[: len(squares) - len(middle)], 1e-300))
+    return products / (sizes * (float(np.sqrt(middle @ middle)) or 1.0))
+
+
+def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """First index and index behind the last of each run of True, shape (k, 2)."""
+    edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(np.int8), 0]))
+    return edges.reshape(-1, 2)
+
+
+def equal_runs(values: Values, fewest: int) -> NDArray[np.int64]:
+    """Runs of the same number, first index and index behind the last, at least `fewest` samples long, shape (k, 2)."""
+    same = runs_of(np.diff(values) == 0)
+    runs = np.column_stack([same[:, 0], same[:, 1] + 1])
+    return runs[runs[:, 1] - runs[:, 0] >= fewest]

@@ -1,0 +1,112 @@
+"""A recording while it is being checked: its columns as numbers of the file first, in SI units after `convert`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.logs.log import Action, Finding, Kind, Rows, Severity, Source, Values, row_ranges
+from detent.logs.log_units import Conversion
+
+
+@dataclass
+class Draft:
+    """Columns of a recording, by their roles.
+
+    Attributes
+    ----------
+    file : str
+        The file as the user named it.
+    rows : ndarray
+        Row of the file of each sample, shape (n,).
+    t : ndarray
+        Time, shape (n,).
+    values : dict
+        From a role to its numbers, shape (n,).
+    conversions : dict
+        From a role, ``time`` too, to how its numbers become SI units.
+    sources : dict
+        From a role, ``time`` too, to where it comes from.
+    bits : dict
+        From a role to the width of its counter, where stated.
+    delays : dict
+        From a role to its stated delay [s].
+    guessed_units : set
+        Roles whose unit was guessed.
+    has_clock : bool
+        False where the time was made from a stated period.
+    findings : list of Finding
+        What was found so far.
+    guesses : list of str
+        What was guessed so far.
+    """
+
+    file: str
+    rows: Rows
+    t: Values
+    values: dict[str, Values]
+    conversions: dict[str, Conversion]
+    sources: dict[str, Source]
+    bits: dict[str, int] = field(default_factory=dict[str, int])
+    delays: dict[str, float] = field(default_factory=dict[str, float])
+    guessed_units: set[str] = field(default_factory=set[str])
+    has_clock: bool = True
+    findings: list[Finding] = field(default_factory=list[Finding])
+    guesses: list[str] = field(default_factory=list[str])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def keep(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> None:
+        """Keep some samples, by a mask or in the order of indices."""
+        self.t, self.rows = self.t[which], self.rows[which]
+        self.values = {role: values[which] for role, values in self.values.items()}
+
+    def note(  # noqa: PLR0913 - the fields of a finding
+        self,
+        kind: Kind,
+        signal: str,
+        where: NDArray[np.bool_] | NDArray[np.intp] | Sequence[int],
+        text: str,
+        action: Action,
+        advice: str = "",
+        severity: Severity = Severity.WARNING,
+    ) -> None:
+        """Note a finding about samples given by a mask or by indices; all samples where there are no indices."""
+        places = np.asarray(where)
+        rows = self.rows[places] if len(places) else np.empty(0, dtype=np.int64)
+        self.findings.append(Finding(kind, signal, row_ranges(np.sort(rows)), text, action, advice, severity))
+
+    def drop_signal(self, role: str) -> None:
+        """Leave a signal out."""
+        del self.values[role]
+
+    def convert(self) -> None:
+        """Bring all numbers into SI units."""
+        conversion = self.conversions["time"]
+        self.t = self.t * conversion.factor + conversion.offset
+        for role, values in self.values.items():
+            conversion = self.conversions[role]
+            self.values[role] = values * conversion.factor + conversion.offset
+
+    def rescale(self, role: str, factor: float) -> None:
+        """Multiply a converted signal, and remember it."""
+        self.values[role] = self.values[role] * factor
+        source = self.sources[role]
+        self.sources[role] = replace(source, factor=source.factor * factor, offset=source.offset * factor)
+
+    def unit(self, role: str) -> str:
+        """Unit of a signal after `convert`."""
+        return self.conversions[role].unit
+
+
+def tell_count(count: int, what: str) -> str:
+    """A number of things in a sentence.
+
+    Examples
+    --------
+    >>> tell_count(1, "row"), tell_count(3, "row")
+    ('1 row', '3 rows')
+    """
+    return f"{count} {what}{'' if count == 1 else 's'}"

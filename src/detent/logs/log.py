@@ -1,0 +1,252 @@
+"""A recorded run after import: signals in SI units, and what was found in the file that held them."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+"""Numbers of a signal, shape (n,)."""
+
+Rows = NDArray[np.int64]
+"""Numbers of rows of a file, from 1, header lines not counted, shape (n,)."""
+
+MOST_RANGES = 5
+"""Stretches of rows named in a sentence; the finding itself holds all."""
+
+
+class Kind(StrEnum):
+    """What can be wrong with a recording."""
+
+    BROKEN_ROWS = "broken rows"
+    MISSING_VALUES = "missing values"
+    ROTATED_COLUMNS = "rotated columns"
+    DUPLICATED_ROWS = "duplicated rows"
+    REPEATED_STAMPS = "repeated stamps"
+    TIME_BACKWARDS = "time runs backwards"
+    IRREGULAR_TIME = "irregular time"
+    DROPPED_ROWS = "dropped rows"
+    WRAPPED_COUNTER = "wrapped counter"
+    UNSIGNED = "signed read as unsigned"
+    STUCK = "stuck"
+    SATURATED = "saturated"
+    WRONG_SIGN = "wrong sign"
+    LOST_SIGN = "lost sign"
+    WRONG_UNIT = "wrong unit"
+    SHIFTED = "shifted"
+
+
+class Action(StrEnum):
+    """What the import did about a finding."""
+
+    REMOVED = "removed"
+    REORDERED = "put in order"
+    INTERPOLATED = "interpolated"
+    UNWRAPPED = "unwrapped"
+    CONVERTED = "converted"
+    TURNED = "turned round"
+    MOVED = "moved"
+    LEFT = "left"
+    LEFT_OUT = "left out"
+
+
+class Severity(StrEnum):
+    """How much a finding matters: worth knowing, costs accuracy, makes results wrong."""
+
+    NOTE = "note"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing wrong with a recording.
+
+    Attributes
+    ----------
+    kind : Kind
+        What it is.
+    signal : str
+        Role of the signal, or empty for whole rows.
+    rows : tuple of (int, int)
+        Stretches of rows of the file, first and last, both counted from 1 below the header; empty where the finding is
+        about all of them.
+    text : str
+        What was found, with its figures.
+    action : Action
+        What was done.
+    advice : str
+        What the user does about it; empty where nothing is left to do.
+    severity : Severity
+        How much it matters.
+    """
+
+    kind: Kind
+    signal: str
+    rows: tuple[tuple[int, int], ...]
+    text: str
+    action: Action
+    advice: str = ""
+    severity: Severity = Severity.WARNING
+
+    def __str__(self) -> str:
+        """Give the finding as one line."""
+        where = ", ".join(part for part in (tell_rows(self.rows), self.signal) if part)
+        line = f"{self.severity}: {where}: {self.text}; {self.action}"
+        return f"{line}; do: {self.advice}" if self.advice else line
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {**asdict(self), "rows": [list(stretch) for stretch in self.rows]}
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a signal came from.
+
+    Attributes
+    ----------
+    column : str
+        Column of the file.
+    unit : str
+        Unit of its numbers, as stated or guessed.
+    factor, offset : float
+        ``value = factor * number + offset``, the value in SI units. A correction by a finding (a wrong unit, a wrong
+        sign) is part of them; what unwrapping a counter added is not.
+    """
+
+    column: str
+    unit: str
+    factor: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recorded run.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    t : ndarray
+        Time [s], shape (n,), strictly increasing.
+    signals : dict
+        From a role of `roles.ROLES` to its values in SI units (or counts), shape (n,), all finite.
+    units : dict
+        From a role, ``time`` too, to the unit of its values; empty for a pure number.
+    columns : dict
+        From a role, ``time`` too, to the column it came from.
+    rows : ndarray
+        Row of the file that each sample came from, from 1 below the header, shape (n,).
+    findings : tuple of Finding
+        What was wrong, and what was done.
+    guesses : tuple of str
+        What was not stated and had to be guessed, and what was passed over.
+    constants : dict
+        Single numbers and texts that the file holds beside its columns.
+    """
+
+    name: str
+    t: Values
+    signals: dict[str, Values]
+    units: dict[str, str]
+    columns: dict[str, Source]
+    rows: Rows
+    findings: tuple[Finding, ...] = ()
+    guesses: tuple[str, ...] = ()
+    constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def is_rotary(self) -> bool:
+        """True where positions or speeds are angles."""
+        return any(unit.startswith("rad") for unit in self.units.values())
+
+    @property
+    def period(self) -> float:
+        """Time between two samples [s], the median."""
+        return float(np.median(np.diff(self.t)))
+
+    def mask(self, *kinds: Kind) -> NDArray[np.bool_]:
+        """Samples in the rows of findings of some kinds.
+
+        Parameters
+        ----------
+        *kinds : Kind
+            Kinds of findings.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,); a finding without rows marks none.
+        """
+        found = np.zeros(len(self.t), dtype=np.bool_)
+        for finding in self.findings:
+            for first, last in finding.rows if finding.kind in kinds else ():
+                found |= (self.rows >= first) & (self.rows <= last)
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was read, as plain data for JSON: everything but the numbers."""
+        return {
+            "name": self.name,
+            "samples": len(self),
+            "span": [float(self.t[0]), float(self.t[-1])],
+            "period": self.period,
+            "units": dict(self.units),
+            "columns": {role: asdict(source) for role, source in self.columns.items()},
+            "constants": dict(self.constants),
+            "findings": [finding.to_dict() for finding in self.findings],
+            "guesses": list(self.guesses),
+        }
+
+
+def row_ranges(rows: Sequence[int] | NDArray[np.integer]) -> tuple[tuple[int, int], ...]:
+    """Put row numbers together to stretches.
+
+    Parameters
+    ----------
+    rows : sequence of int
+        Row numbers, rising.
+
+    Returns
+    -------
+    tuple of (int, int)
+        First and last row of each stretch.
+
+    Examples
+    --------
+    >>> row_ranges([3, 4, 5, 9])
+    ((3, 5), (9, 9))
+    """
+    numbers = np.asarray(rows, dtype=np.int64)
+    if not len(numbers):
+        return ()
+    cuts = np.flatnonzero(np.diff(numbers) > 1)
+    firsts = numbers[np.r_[0, cuts + 1]].tolist()
+    lasts = numbers[np.r_[cuts, len(numbers) - 1]].tolist()
+    return tuple(zip(firsts, lasts, strict=True))
+
+
+def tell_rows(ranges: Sequence[tuple[int, int]]) -> str:
+    """Name stretches of rows in a sentence.
+
+    Examples
+    --------
+    >>> tell_rows([(3, 5), (9, 9)])
+    'rows 3-5, 9'
+    >>> tell_rows([])
+    'all rows'
+    """
+    if not ranges:
+        return "all rows"
+    named = [str(first) if first == last else f"{first}-{last}" for first, last in ranges[:MOST_RANGES]]
+    more = f" and {len(ranges) - MOST_RANGES} more places" if len(ranges) > MOST_RANGES else ""
+    word = "row" if len(ranges) == 1 and ranges[0][0] == ranges[0][1] else "rows"
+    return f"{word} {', '.join(named)}{more}"

@@ -1,0 +1,156 @@
+"""Recordings as files of arrays: MATLAB up to version 7, and NumPy's NPZ."""
+
+import importlib
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from detent.errors import InputError
+from detent.files.file_bytes import check_file
+from detent.files.job_values import short
+from detent.logs.csv_layout import FileOptions
+from detent.logs.log_units import split_heading
+from detent.logs.raw_table import MAX_CELLS, Item, RawTable, table_of
+from detent.logs.read_hdf5 import read_hdf5
+
+MAX_BYTES = 500_000_000
+"""Largest file of arrays read."""
+
+ALLOWED_MAT = "a MATLAB file with vectors of equal length"
+ALLOWED_NPZ = "an NPZ or NPY file with vectors of equal length"
+
+_DEEPEST = 4
+
+
+def read_mat(path: Path, options: FileOptions) -> RawTable:
+    """Read a MATLAB file: version 4 to 7 with SciPy, version 7.3, which is HDF5, as such.
+
+    Fields of structures give names joined by points; ``table`` names the structure to read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : FileOptions
+        Of which ``table`` counts.
+
+    Returns
+    -------
+    RawTable
+        At least one column and one row.
+
+    Raises
+    ------
+    InputError
+        It is no such file, or holds no vectors of numbers.
+    """
+    files: Any = importlib.import_module("scipy.io")
+    check_file(path, MAX_BYTES, ALLOWED_MAT)
+    try:
+        _check_shapes(path, [shape for _, shape, _ in files.whosmat(path)], ALLOWED_MAT)
+        found: dict[str, Any] = files.loadmat(path, squeeze_me=True, struct_as_record=True)
+    except NotImplementedError:
+        return read_hdf5(path, options)
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 - a damaged file is reported by whatever SciPy's parser stumbles over
+        came = f"a file that is no MATLAB file ({short(str(error) or type(error).__name__)})"
+        raise InputError.of_file(str(path), came, ALLOWED_MAT, "save it again with save -v7, or as CSV") from None
+    items = [item for name, value in found.items() if not name.startswith("__") for item in _fields(name, value, 0)]
+    return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
+
+
+def read_npz(path: Path, options: FileOptions) -> RawTable:
+    """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : FileOptions
+        Of which ``table`` counts: the array to read.
+
+    Returns
+    -------
+    RawTable
+        At least one column and one row.
+
+    Raises
+    ------
+    InputError
+        It is no such file, or holds no vectors of numbers.
+    """
+    check_file(path, MAX_BYTES, ALLOWED_NPZ)
+    items: list[Item] = []
+    try:
+        with path.open("rb") as stream:
+            if zipfile.is_zipfile(stream):
+                _check_unpacked(path)
+                with np.load(path, allow_pickle=False) as arrays:
+                    for name in arrays.files:
+                        items += _fields(name, _load_member(arrays, name), 0)
+            else:
+                stream.seek(0)  # whether it is an archive was asked at its end
+                array = np.load(stream, allow_pickle=False)
+                items = list(_fields("" if array.dtype.names else "column", array, 0))
+    except (MemoryError, ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, SyntaxError) as error:
+        came = f"a file that is no NPZ file ({short(str(error) or type(error).__name__)})"
+        raise InputError.of_file(str(path), came, ALLOWED_NPZ, "save it again with numpy.savez, or as CSV") from None
+    return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
+
+
+def _load_member(arrays: Any, name: str) -> Any:
+    """One array of an NPZ file; None for one of pickled objects."""
+    try:
+        return arrays[name]
+    except ValueError as error:
+        if "pickle" in str(error):
+            return None
+        raise
+
+
+def _check_unpacked(path: Path) -> None:
+    """Refuse an archive that unpacks to more than memory should take."""
+    with zipfile.ZipFile(path) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+    if size > 8 * MAX_CELLS:
+        allowed = f"up to {8 * MAX_CELLS // 1_000_000} MB unpacked"
+        remedy = "cut the recording into pieces"
+        raise InputError.of_file(str(path), f"{size // 1_000_000} MB unpacked", allowed, remedy)
+
+
+def _check_shapes(path: Path, shapes: list[tuple[int, ...]], allowed: str) -> None:
+    """Refuse arrays that would fill the memory, before they are read."""
+    cells = sum(int(np.prod(shape, dtype=object)) for shape in shapes)
+    if cells > MAX_CELLS:
+        remedy = "cut the recording into pieces"
+        raise InputError.of_file(str(path), f"{cells} numbers", f"{allowed}, up to {MAX_CELLS} numbers", remedy)
+
+
+def _fields(name: str, value: Any, depth: int) -> Iterator[Item]:
+    """What a value of a MATLAB file holds: fields of a structure under names joined by points."""
+    kind: np.dtype[Any] | None = getattr(value, "dtype", None)
+    if kind is not None and kind.names:
+        if kind.hasobject and (value.size != 1 or depth >= _DEEPEST):
+            return
+        record: Any = value.reshape(-1)[0] if kind.hasobject else value
+        for field in kind.names:
+            yield from _fields(f"{name}.{field}" if name else field, record[field], depth + 1)
+    else:
+        yield Item(name, value, split_heading(name)[1])
+
+
+def _inside(file: str, items: list[Item], table: str) -> list[Item]:
+    """Items of one structure, or all."""
+    if not table:
+        return items
+    found = [item for item in items if item.name == table or item.name.startswith(f"{table}.")]
+    if not found:
+        names = sorted({item.name.partition(".")[0] for item in items})
+        allowed = f"one of {', '.join(map(short, names[:12]))}"
+        raise InputError.of_file(file, f'the table "{short(table)}"', allowed, "state one of these as table=")
+    return [item._replace(name=item.name.removeprefix(f"{table}.")) for item in found]

@@ -1,0 +1,90 @@
+"""Read a recording: the file, what its columns are, what is wrong with them, and the log that comes of it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from detent.errors import InputError
+from detent.files.job_values import short
+from detent.logs.choose import choose_columns, make_draft
+from detent.logs.dirt import clean
+from detent.logs.draft import Draft, tell_count
+from detent.logs.log import Action, Finding, Kind, Log, Severity, row_ranges
+from detent.logs.mapping import ColumnMapping, load_mapping, parse_options
+from detent.logs.raw_table import RawTable
+from detent.logs.read_table import read_table
+from detent.logs.rotation import mend_rotation
+
+EPOCH = 1e8
+"""A time from which on it counts from some year, and is counted from the first sample instead [s]."""
+
+_ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
+
+
+def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None, options: Sequence[str] = ()) -> Log:
+    """Read a recording of a machine, and find what is wrong with it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of one of `read_table.READERS`: CSV, HDF5, Parquet, MATLAB, NPZ, JSON.
+    mapping : ColumnMapping, str or Path, optional
+        What its columns are, or the mapping file that says it; guessed as far as it says nothing.
+    options : sequence of str
+        The same in short, such as ``position=qm [m]``; they override the mapping.
+
+    Returns
+    -------
+    Log
+        Signals in SI units, what was found and done, and what was guessed.
+
+    Raises
+    ------
+    InputError
+        The file, the mapping or an option is wrong, or nothing usable is left.
+    """
+    stated = load_mapping(mapping) if isinstance(mapping, str | Path) else mapping or ColumnMapping()
+    stated = stated.overridden(parse_options(options))
+    table = read_table(path, stated.file)
+    chosen = choose_columns(table, stated)
+    if "time" in chosen.columns:
+        mend_rotation(table, chosen.columns["time"])
+    _tell_broken(table)
+    draft = make_draft(table, chosen, stated)
+    if not draft.values:
+        raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "state what the columns are")
+    clean(draft)
+    if not draft.values:
+        raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "record the signals again")
+    return _finish(Path(path).name, table, draft)
+
+
+def _tell_broken(table: RawTable) -> None:
+    """Note the rows that could not be read."""
+    if table.broken:
+        rows = [broken.row for broken in table.broken]
+        reasons = list(dict.fromkeys(broken.reason for broken in table.broken))
+        more = f" and {len(reasons) - 3} more reasons" if len(reasons) > 3 else ""
+        text = f"{tell_count(len(rows), 'row')} cannot be read: {'; '.join(reasons[:3])}{more}"
+        table.findings.append(Finding(Kind.BROKEN_ROWS, "", row_ranges(rows), text, Action.REMOVED))
+
+
+def _nothing_left(draft: Draft) -> str:
+    """What was found, where nothing is left of it."""
+    return short("no usable signal: " + "; ".join(f"{finding.signal} {finding.text}" for finding in draft.findings))
+
+
+def _finish(name: str, table: RawTable, draft: Draft) -> Log:
+    """The log of a draft."""
+    t = draft.t
+    sources = {role: draft.sources[role] for role in ("time", *draft.values) if role in draft.sources}
+    if abs(t[0]) > EPOCH:
+        draft.guesses.append(f"time: counted from the first sample, {t[0]:.0f} s")
+        sources["time"] = replace(sources["time"], offset=sources["time"].offset - float(t[0]))
+        t = t - t[0]
+    units = {role: draft.unit(role) for role in sources}
+    findings = sorted(draft.findings, key=lambda finding: _ORDER.index(finding.severity))
+    values = {role: np.ascontiguousarray(found) for role, found in draft.values.items()}
+    return Log(name, t, values, units, sources, draft.rows, tuple(findings), tuple(draft.guesses), table.constants)

@@ -1,0 +1,71 @@
+"""Recordings in Parquet, where pyarrow is installed."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from detent.errors import InputError
+from detent.files.file_bytes import check_file
+from detent.files.job_values import short
+from detent.logs.csv_layout import FileOptions
+from detent.logs.log_units import split_heading
+from detent.logs.raw_table import Item, RawTable, check_size, table_of
+
+MAX_BYTES = 2_000_000_000
+"""Largest file read; what counts is how many numbers it holds."""
+
+ALLOWED = "a Parquet file with columns of numbers"
+
+
+def read_parquet(path: Path, options: FileOptions) -> RawTable:
+    """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    options : FileOptions
+        None of it says anything about such a file.
+
+    Returns
+    -------
+    RawTable
+        At least one column and one row.
+
+    Raises
+    ------
+    InputError
+        It is no such file, pyarrow is not installed, or there are no columns of numbers.
+    """
+    del options
+    check_file(path, MAX_BYTES, ALLOWED)
+    try:
+        arrow: Any = importlib.import_module("pyarrow")
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+    except ImportError:
+        remedy = 'pip install "detent[parquet]", or save the recording as CSV or HDF5'
+        came = "a file that needs pyarrow, which is not installed"
+        raise InputError.of_file(str(path), came, ALLOWED, remedy) from None
+    try:
+        with parquet.ParquetFile(path) as file:
+            check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
+            items = [_item(field, column) for field, column in zip(file.schema_arrow, file.read().columns, strict=True)]
+    except (arrow.ArrowException, OSError, ValueError) as error:
+        came = f"a file that is no Parquet file ({short(str(error))})"
+        raise InputError.of_file(str(path), came, ALLOWED, "save it again, or as CSV") from None
+    return table_of(str(path), items, ALLOWED)
+
+
+def _item(field: Any, column: Any) -> Item:
+    """A column with its unit; one of anything but numbers and moments has no value."""
+    metadata: dict[bytes, bytes] = field.metadata or {}
+    unit = metadata.get(b"unit", b"").decode("utf-8", "replace") or split_heading(field.name)[1]
+    values: Any = column.to_numpy()
+    if values.dtype.kind == "O":
+        try:  # truth values and decimals with gaps come as objects
+            values = values.astype(np.float64)
+        except (ValueError, TypeError):
+            values = None
+    return Item(field.name, values, unit)

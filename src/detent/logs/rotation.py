@@ -1,0 +1,190 @@
+"""Columns that are rotated against the header: found by the column in which the clock really runs, and put right."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.files.job_values import short
+from detent.logs.log import Action, Finding, Kind, Severity, Values, row_ranges
+from detent.logs.raw_table import BrokenRow, RawTable
+from detent.logs.roles import words_of
+from detent.logs.windows import fill_holes
+
+SHORTEST = 10
+"""Rows in which a column must run like a clock to be taken for one: a signal that happens to rise as evenly as a clock
+for so long, while the clock does not, is not met by chance."""
+
+_HOLE = 3
+"""Rows in which a clock may stumble (a row dropped, a row doubled) without ending the stretch."""
+
+_EVEN = 0.5
+"""A clock's step is within this share of the usual one."""
+
+_ROUNDING = 0.02
+_MOSTLY, _HALF, _MANY, _FEW = 0.9, 0.5, 0.1, 0.02
+_WHOLE = 0.95
+_COUNTERS = frozenset({"sample", "index", "row", "number", "line"})
+
+
+class Rotation(NamedTuple):
+    """Cells stand `shift` columns to the right of their headings in some rows."""
+
+    shift: int
+    where: NDArray[np.bool_]
+
+
+def mend_rotation(table: RawTable, time: str) -> None:
+    """Find rows whose cells are rotated against the header, and put the cells where they belong.
+
+    The clock of a recording runs evenly. Where the column called time does not run at all or jumps about, and another
+    column runs like a clock for at least `SHORTEST` rows, the cells are rotated by the distance of the two. If the
+    first row lacks as many cells as the others have too many in front, the lines of the file are broken in the wrong
+    places: then the first cells of a line belong to the row before. Otherwise the cells of each row belong together.
+
+    Parameters
+    ----------
+    table : RawTable
+        The columns, changed in place; what was found is added to its findings.
+    time : str
+        Name of the column for the time.
+    """
+    if len(table.rows) < SHORTEST:
+        return
+    names = list(table.columns)
+    matrix = np.column_stack([table.columns[name] for name in names])
+    found = _find(matrix, names, names.index(time))
+    if found is None:
+        return
+    whole = found.where.mean() > _WHOLE
+    head = _head(table, matrix, names.index(time), found.shift) if whole else None
+    if head is None:
+        matrix[found.where] = np.roll(matrix[found.where], -found.shift, axis=1)
+        _tell(table, names, time, found, table.rows[found.where])
+    else:
+        matrix = _reflow(table, matrix, found.shift, head)
+        _tell(table, names, time, found, table.rows, "; lines are broken in the wrong places")
+    table.columns = {name: matrix[:, index] for index, name in enumerate(names)}
+
+
+def _find(matrix: Values, names: list[str], clock: int) -> Rotation | None:
+    """The rotation that the most rows have; None where the clock is where the header says."""
+    ours: Values = matrix[:, clock]
+    own = _usual_step(ours)
+    # A clock that runs in most rows tells the step that it has in the others. One that does not is asked elsewhere.
+    runs, back = np.mean(np.abs(np.diff(ours) - own) <= _EVEN * own), np.mean(np.diff(ours) < 0)
+    best = _best_rotation(matrix, names, clock, own) if runs > _HALF else None
+    return best or (_best_rotation(matrix, names, clock, None) if runs <= _HALF or back > _MANY else None)
+
+
+def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | None) -> Rotation | None:
+    """The rotation that the most rows have, of those that bring a clock into its place: of a step, or of its own."""
+    best: Rotation | None = None
+    ours: Values = matrix[:, clock]
+    for shift in range(1, len(names)):
+        column = (clock + shift) % len(names)
+        if not _COUNTERS & set(words_of(names[column])):
+            theirs: Values = matrix[:, column]
+            usual = _usual_step(theirs) if step is None else step
+            where = _rotated_rows(ours, theirs, usual, is_partial=step is not None)
+            if where.any() and (best is None or where.sum() > best.where.sum()):
+                best = Rotation(shift, where)
+    return best
+
+
+def _usual_step(values: Values) -> float:
+    """Median of the steps upwards."""
+    steps = np.diff(values)
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+
+
+def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: bool) -> NDArray[np.bool_]:
+    """Rows in which a column runs like a clock while the clock does not."""
+    where = np.zeros(len(clock), dtype=np.bool_)
+    if not step:
+        return where
+    own, theirs, usual = np.diff(clock), np.diff(column), _usual_step(clock)
+    with np.errstate(invalid="ignore"):
+        runs = np.abs(theirs - step) <= _EVEN * step
+        own_runs = (np.abs(own - usual) <= _EVEN * usual) | (np.abs(own - step) <= _EVEN * step)
+        if is_partial:  # where the clock runs in most rows, it is known how evenly
+            away = np.abs(own[own_runs] - usual)
+            own_runs &= np.abs(own - usual) <= max(_ROUNDING * usual, 3 * float(np.percentile(away, 75)))
+    better = fill_holes(runs, _HOLE)
+    edges = np.flatnonzero(np.diff(np.r_[0, better.astype(np.int8), 0]))
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        first, last = _edges(_missed(theirs[begin:end], step), _missed(own[begin:end], step))
+        first, last = begin + first, begin + last
+        steps = own[first:last]
+        back, is_even = np.sum(steps < 0) / max(len(steps), 1), np.sum(own_runs[first:last]) >= _HALF * len(steps)
+        is_clock = last - first >= SHORTEST and runs[first:last].mean() >= _MOSTLY
+        # A clock that is merely slow or coarse stands still at times, but hardly ever goes back.
+        if is_clock and (back > (_MANY if is_even else _FEW) or not np.any(steps)):
+            where[first : last + 1] = True
+    return where
+
+
+def _edges(theirs: Values, ours: Values) -> tuple[int, int]:
+    """First step of a stretch that is rotated, and the one behind its last.
+
+    A column may run evenly by chance where the clock is in its place. So both ends are cut where the least is missed:
+    by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
+
+    Parameters
+    ----------
+    theirs, ours : float64 array, shape (n,)
+        By what share of a clock's step each step of the column, and of the clock, misses it.
+    """
+    n, cut = len(theirs), 1.0 - np.minimum(theirs, ours)
+    inside, outside = np.r_[0.0, np.cumsum(theirs)], np.r_[0.0, np.cumsum(ours), float(ours.sum())]
+    last = n - int(np.argmin((inside + np.r_[cut, 0.0] + outside[n] - outside[1:])[::-1]))
+    before = np.r_[0.0, outside[:last] + cut[:last]]
+    return int(np.argmin(before - inside[: last + 1])), last
+
+
+def _missed(steps: Values, step: float) -> Values:
+    """By what share of a clock's step each of its steps misses it, 1 at most."""
+    return np.nan_to_num(np.minimum(np.abs(steps - step) / step, 1.0), nan=1.0)
+
+
+def _head(table: RawTable, matrix: Values, clock: int, shift: int) -> BrokenRow | None:
+    """The short row before the first, if the cells missing there are the ones that the next row has in front."""
+    count = matrix.shape[1]
+    step = _usual_step(matrix[:, (clock + shift) % count])
+    for broken in table.broken:
+        is_before = broken.row == table.rows[0] - 1 and len(broken.cells) == count - shift > clock
+        if is_before and None not in broken.cells:
+            gone = matrix[0, (clock + shift) % count] - (broken.cells[clock] or 0.0)
+            return broken if abs(gone - step) <= _EVEN * step else None
+    return None
+
+
+def _reflow(table: RawTable, matrix: Values, shift: int, head: BrokenRow) -> Values:
+    """Rows whose first cells go to the row before: one row more than before, unless the last lacks its last cells."""
+    rows = np.r_[head.row, table.rows]
+    count = matrix.shape[1]
+    whole = np.full((len(rows), count), np.nan)
+    whole[0, : count - shift] = np.array(head.cells, dtype=np.float64)
+    whole[1:, : count - shift] = matrix[:, shift:]
+    follows = np.flatnonzero(np.diff(rows) == 1)
+    whole[follows, count - shift :] = matrix[follows, :shift]
+    table.broken.remove(head)
+    tail = next((row for row in table.broken if row.row == rows[-1] + 1), None)
+    if tail is not None and len(tail.cells) == shift and None not in tail.cells:
+        whole[-1, count - shift :] = np.array(tail.cells, dtype=np.float64)
+        table.broken.remove(tail)
+    table.rows = rows
+    return whole
+
+
+def _tell(  # noqa: PLR0913 - the parts of a sentence
+    table: RawTable, names: list[str], time: str, found: Rotation, rows: NDArray[np.int64], more: str = ""
+) -> None:
+    """Note what was found."""
+    column = names[(names.index(time) + found.shift) % len(names)]
+    unit = "column" if found.shift == 1 else "columns"
+    text = (
+        f'the clock runs in "{short(column)}", not in "{short(time)}": cells stand {found.shift} {unit} too far right'
+    )
+    finding = Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text + more, Action.REORDERED, "", Severity.WARNING)
+    table.findings.append(finding)

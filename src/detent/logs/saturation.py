@@ -1,0 +1,75 @@
+"""Drives at their limit, and sensors at the end of their range."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.logs.differences import runs_of
+from detent.logs.draft import Draft, tell_count
+from detent.logs.log import Action, Kind, Severity, Values
+
+LIMITED = ("command", "voltage", "current", "force", "torque")
+"""Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus."""
+
+SHORTEST = 3
+"""Rows at the extreme value from which it is a plateau."""
+
+FEWEST = 10
+"""Rows at the extreme value, in plateaus, from which the signal is cut off there."""
+
+FEWEST_LEVELS = 20
+"""Different numbers below which a signal is one of levels, such as a square wave or a staircase."""
+
+PILED = 3.0
+"""Rows at the extreme value, in those at any one of the `NEIGHBOURS` numbers next to it, from which values are piled
+up: a sine that was rounded has 1.4 times as many."""
+
+NEIGHBOURS = 5
+
+_FULL_SCALES = frozenset(
+    {float(value) for bits in (8, 10, 12, 14, 15, 16) for value in (2**bits - 1, 2 ** (bits - 1))}
+    | {1.0, 100.0, 1000.0}
+)
+
+
+def find_saturation(draft: Draft) -> None:
+    """Find signals that stay at their largest or smallest value.
+
+    A cut-off signal piles up at one number: it stays there for `SHORTEST` rows and more, and is there far more often
+    than at any number beside it. That it is cut off, and not commanded so, is certain where the number is a full scale
+    (255, 1023, 100) or both ends lie at the same distance from zero; otherwise it is noted only.
+
+    Parameters
+    ----------
+    draft : Draft
+        In SI units.
+    """
+    for role in LIMITED:
+        if role in draft.values:
+            _find(draft, role)
+
+
+def _find(draft: Draft, role: str) -> None:
+    values = draft.values[role]
+    if len(np.unique(values)) < FEWEST_LEVELS:
+        return
+    ends = {float(end): _plateaus(values, side) for end, side in ((values.max(), 1.0), (values.min(), -1.0))}
+    piled = {end: where for end, where in ends.items() if len(where)}
+    factor = abs(draft.sources[role].factor)
+    for end, where in piled.items():
+        is_symmetric = bool(np.isclose(values.max(), -values.min(), rtol=1e-3))
+        is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)
+        severity = Severity.WARNING if is_symmetric or is_full else Severity.NOTE
+        why = "as far as the other end" if is_symmetric else "a full scale" if is_full else "cut off, or commanded so"
+        shown = f"{end:.4g} {draft.unit(role)}".rstrip()
+        text = f"stays at {shown} ({why}) in {tell_count(len(where), 'row')}"
+        advice = "leave these rows out of a fit of the loop; a fit of the axis may keep them"
+        draft.note(Kind.SATURATED, role, where, text, Action.LEFT, advice, severity)
+
+
+def _plateaus(values: Values, side: float) -> NDArray[np.intp]:
+    """Samples at the largest number, or at the smallest for side -1; none unless values are piled up there."""
+    levels, counts = np.unique(side * values, return_counts=True)
+    where = np.flatnonzero(side * values == levels[-1])
+    runs = runs_of(side * values == levels[-1])
+    is_piled = counts[-1] >= max(FEWEST, PILED * float(counts[-1 - NEIGHBOURS : -1].max(initial=0)))
+    return where if is_piled and (runs[:, 1] - runs[:, 0]).max() >= SHORTEST else where[:0]

@@ -1,0 +1,128 @@
+"""Signals that are shifted against each other in time."""
+
+import numpy as np
+
+from detent.logs.differences import FARTHEST, correlation_curve
+from detent.logs.draft import Draft
+from detent.logs.effort import Motion, find_motion, smoothed, terms
+from detent.logs.log import Action, Kind, Values
+
+SMALLEST = 1.5
+"""Rows by which signals may be apart: a difference of neighbours lies half a row beside them, rounding adds to it."""
+
+BETTER = 0.5
+"""Share of the disagreement that must be left once the shift is taken out: a filter makes a delay, too, but does not
+vanish with it."""
+
+ALIKE = 0.9
+_AS_GOOD = 0.02
+_FEWEST = 200
+
+
+def find_shifts(draft: Draft) -> None:
+    """Find signals that lie beside one another in time.
+
+    A velocity that comes later or earlier than the derivative of the position is moved by whole rows. A second encoder
+    is left where it is. A position that runs ahead of its reference, and a force, torque or current that comes after
+    the acceleration that it makes, are against nature: then one of the two was recorded with a delay. That a position
+    follows its reference with a delay is what loops do, and no finding.
+
+    Parameters
+    ----------
+    draft : Draft
+        In SI units, changed in place.
+    """
+    motion = find_motion(draft)
+    if motion is None or len(draft) < _FEWEST:
+        return
+    if "velocity" in draft.values and draft.unit("velocity").partition("/")[0] == draft.unit("position"):
+        _move_velocity(draft, motion)
+        motion = find_motion(draft) or motion
+    position = smoothed(draft.values["position"], draft, motion)
+    for role, text in (
+        ("reference", "comes after the position that follows it"),
+        ("position_load", "is beside the position"),
+    ):
+        if role in draft.values:
+            other = smoothed(draft.values[role], draft, motion)
+            lag = find_lag(other, position, prefers_earlier=role == "reference")
+            if abs(lag) >= SMALLEST and (role != "reference" or lag > 0):
+                _tell(draft, role, f"{text} by {abs(lag):.1f} rows", lag)
+    for role in ("force", "torque", "current"):
+        if role in draft.values:
+            lag = _late_effort(smoothed(draft.values[role], draft, motion), motion)
+            if lag >= SMALLEST:
+                _tell(draft, role, f"comes {lag} rows after the acceleration that it makes", float(lag))
+
+
+def _tell(draft: Draft, role: str, text: str, lag: float) -> None:
+    period = float(np.median(np.diff(draft.t)))
+    advice = f'if {role} was recorded late, state delay = "{lag * period * 1e3:.3g} ms" in [columns.{role}]'
+    draft.note(Kind.SHIFTED, role, [], text, Action.LEFT, advice)
+
+
+def find_lag(ours: Values, theirs: Values, *, prefers_earlier: bool = False) -> float:
+    """By how many rows one series comes after another, by the peak of their correlation.
+
+    Parameters
+    ----------
+    ours, theirs : ndarray
+        Shape (n,).
+    prefers_earlier : bool
+        Of a periodic motion, whose shifts are alike a period apart, take one by which the first comes earlier.
+
+    Returns
+    -------
+    float
+        Rows, with a fraction; 0 where the series are not alike, or the shift explains too little.
+    """
+    most = min(FARTHEST, len(ours) // 4)
+    curve = correlation_curve(ours, theirs, most)
+    peak = _nearest_peak(curve, most, prefers_earlier=prefers_earlier)
+    if peak is None or curve[peak] < ALIKE or 1 - curve[peak] > BETTER * (1 - curve[most]):
+        return 0.0
+    left, top, right = curve[peak - 1 : peak + 2]
+    bend = left - 2 * top + right
+    return peak - most + (0.5 * float(left - right) / float(bend) if bend else 0.0)
+
+
+def _nearest_peak(curve: Values, middle: int, *, prefers_earlier: bool) -> int | None:
+    """Index of the peak nearest to no shift among those that are as good as the highest: a periodic motion has many."""
+    inner = curve[1:-1]
+    peaks = np.flatnonzero((inner >= curve[:-2]) & (inner >= curve[2:])) + 1
+    if not len(peaks):
+        return None
+    good = peaks[1 - curve[peaks] <= 2 * (1 - curve[peaks].max()) + _AS_GOOD]
+    if prefers_earlier and np.any(good <= middle):
+        good = good[good <= middle]
+    return int(good[np.argmin(np.abs(good - middle))])
+
+
+def _move_velocity(draft: Draft, motion: Motion) -> None:
+    """Move a velocity onto the derivative of the position, by whole rows."""
+    lag = find_lag(smoothed(draft.values["velocity"], draft, motion), motion.v)
+    rows = int(np.rint(lag))
+    if abs(lag) < SMALLEST:
+        return
+    text = f"comes {abs(lag):.1f} rows {'after' if lag > 0 else 'before'} the derivative of the position"
+    draft.note(Kind.SHIFTED, "velocity", [], f"{text}; moved by {abs(rows)} rows", Action.MOVED)
+    draft.values["velocity"] = np.roll(draft.values["velocity"], -rows)
+    inside = np.ones(len(draft), dtype=np.bool_)
+    inside[slice(-rows, None) if rows > 0 else slice(0, -rows)] = False
+    draft.keep(inside)
+
+
+def _late_effort(effort: Values, motion: Motion) -> int:
+    """Rows by which an effort fits the motion best when it is taken from later; 0 where it fits as well as it is."""
+    columns = terms(motion)
+    most = min(20, len(effort) // 10)
+    errors: dict[int, float] = {}
+    for lag in range(-most, most + 1):
+        ours = effort[most + lag : len(effort) - most + lag]
+        fit, *_ = np.linalg.lstsq(columns[most:-most], ours, rcond=None)
+        errors[lag] = float(np.var(ours - columns[most:-most] @ fit)) / (float(np.var(ours)) or 1.0)
+    best = min(errors, key=lambda lag: errors[lag])
+    causal = min(error for lag, error in errors.items() if lag <= 0)
+    is_clear = errors[best] < 1 - ALIKE and errors[best] < BETTER * causal
+    # Smoothing blurs the moments at which friction turns round: a shift small beside the windows is not believed.
+    return best if is_clear and motion.rows / 4 <= best < most else 0

@@ -1,0 +1,1 @@
+"""Control methods: what each of them brings, a package each."""

@@ -1,0 +1,134 @@
+"""From a checked specification to the parameters of the cascade axis, in the coordinate of the axis."""
+
+import math
+
+from detent.control.cascade_law import FeedForwardParams
+from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, DirectionTable, EncoderTable, FrictionTable
+from detent.methods.cascade.system import CascadeParams, fill_clocks, smoothing
+from detent.planning.profile import MotionLimits
+from detent.plant.stribeck import DirectionFriction, StribeckFriction
+from detent.plant.two_mass import TwoMassParams, fastest_rate
+from detent.sensing.position_sensor import PositionSensorParams
+
+LARGEST_ANGLE = 0.5
+"""Fastest rate of the plant times the tick: a swing of that rate then loses 0.02 % of its amplitude per radian."""
+
+LONGEST_TICK = 1e-4
+"""Longest tick [s]: a push begins, and a record is written, at whole ticks."""
+
+
+def build_cascade(spec: CascadeSpec) -> CascadeParams:
+    """Parameters of the cascade axis.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    CascadeParams
+        Complete, its clocks included; those of a rotary axis in rad, N*m and kg*m^2.
+    """
+    p = CascadeParams()
+    _fill_machine(p.machine, spec)
+    _fill_source(p, spec)
+    _fill_sensor(p.motor_sensor, spec.encoder, spec.method.sample_period)
+    _fill_sensor(p.load_sensor, spec.load_encoder or IDEAL_ENCODER, spec.method.sample_period)
+    p.feedback.position_on_load = spec.method.feedback.position == "load"
+    p.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
+    _fill_law(p, spec)
+    ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.machine))
+    tick = spec.method.sample_period / ticks
+    push = spec.disturbance.push
+    if push is not None:
+        p.push.force = push.force
+        p.push.begin, p.push.end = round(push.at / tick), round((push.at + push.duration) / tick)
+    fill_clocks(p, tick, ticks)
+    return p
+
+
+def sample_ticks(sample_period: float, rate: float) -> int:
+    """Ticks in a sample.
+
+    Parameters
+    ----------
+    sample_period : float
+        [s].
+    rate : float
+        Fastest rate of the plant [1/s].
+    """
+    return max(1, math.ceil(sample_period * max(rate / LARGEST_ANGLE, 1 / LONGEST_TICK) * (1 - 1e-9)))
+
+
+def start_position(spec: CascadeSpec) -> float:
+    """Position of motor and load at power-on [m]."""
+    return spec.mechanics.start_position
+
+
+def motion_limits(spec: CascadeSpec) -> MotionLimits:
+    """What a move may do."""
+    limits = spec.limits
+    return MotionLimits(limits.speed, limits.acceleration, math.inf if limits.jerk is None else limits.jerk)
+
+
+def _fill_machine(p: TwoMassParams, spec: CascadeSpec) -> None:
+    mechanics, coupling, motor = spec.mechanics, spec.mechanics.coupling, spec.motor
+    p.motor.mass, p.load.mass = spec.motor_mass, mechanics.load_mass
+    _fill_friction(p.motor.friction, mechanics.friction)
+    _fill_friction(p.load.friction, mechanics.load_friction)
+    if coupling is not None:
+        p.stiffness, p.damping, p.half_gap = coupling.stiffness, coupling.damping, 0.5 * coupling.backlash
+    p.weight, p.pendulum, p.loss = mechanics.weight, mechanics.pendulum, mechanics.transmission_loss
+    if motor is not None and spec.drive.input == "voltage":
+        w = p.winding
+        w.used, w.max_current = True, spec.max_current
+        w.resistance, w.inductance = motor.resistance, motor.inductance
+        w.force_constant, w.emf_constant = spec.force_constant, spec.emf_constant
+
+
+def _fill_friction(p: StribeckFriction, table: FrictionTable) -> None:
+    p.offset = table.offset
+    _fill_direction(p.positive, table.positive)
+    _fill_direction(p.negative, table.negative)
+
+
+def _fill_direction(p: DirectionFriction, table: DirectionTable) -> None:
+    p.coulomb, p.static, p.stribeck, p.viscous = table.coulomb, table.static, table.stribeck, table.viscous
+
+
+def _fill_source(p: CascadeParams, spec: CascadeSpec) -> None:
+    drive = spec.drive
+    p.source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
+    p.source.step, p.source.limit, p.source.delay = drive.command_step, spec.largest_command, drive.delay
+
+
+def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:
+    p.resolution, p.delay, p.span = table.resolution, table.delay, table.velocity_span
+    p.smoothing = smoothing(table.velocity_filter, sample_period)
+
+
+def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:
+    law, method = p.law, spec.method
+    law.position_pid = method.structure == "pid"
+    law.max_command = spec.largest_command
+    law.cascade.position_gain, law.cascade.max_velocity = method.position_gain, method.velocity_limit
+    law.cascade.velocity_gain, law.cascade.integral_gain = method.velocity_gain, method.velocity_integral
+    law.pid.proportional, law.pid.integral = method.proportional, method.integral
+    law.pid.derivative = method.derivative
+    law.pid.smoothing = smoothing(method.derivative_filter, method.sample_period)
+    _fill_feed_forward(law.feed_forward, spec)
+
+
+def _fill_feed_forward(p: FeedForwardParams, spec: CascadeSpec) -> None:
+    shares, mechanics = spec.method.feed_forward, spec.mechanics
+    per_command, frictions = spec.effort_per_command, (mechanics.friction, mechanics.load_friction)
+    viscous = sum(0.5 * (f.positive.viscous + f.negative.viscous) for f in frictions)
+    p.velocity = shares.velocity
+    p.acceleration = shares.acceleration * spec.mass / per_command
+    p.viscous = shares.viscous * (viscous + spec.back_emf_drag) / per_command
+    p.coulomb_positive = shares.coulomb * sum(f.positive.coulomb + f.offset for f in frictions) / per_command
+    p.coulomb_negative = shares.coulomb * sum(f.negative.coulomb - f.offset for f in frictions) / per_command
+    p.dead_band = shares.dead_band
+    p.weight = shares.weight * mechanics.weight / per_command
+    p.pendulum = shares.weight * mechanics.pendulum / per_command

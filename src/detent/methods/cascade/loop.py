@@ -1,0 +1,377 @@
+"""Exact linear model of the cascade axis: plant, dead times, velocity by differences and both loops, at the samples.
+
+    x(k+1) = Ad x(k) + Bd u(k)       plant between two samples, the amplifier's output u held
+    v(k)   = v(k-1) + a [(q(k-d) - q(k-d-n)) / (n T) - v(k-1)]
+    c(k)   = law of `control.cascade_law` on q(k-d), v(k)
+    u(k)   = gain c(k-D)
+
+x : current (where the winding has inductance), position and velocity of the motor, and of the load on its coupling
+q, v, c : position and velocity read, command       d, D : delays of encoder and amplifier [samples]
+n, a : span and filter of the velocity              T : sample period [s]
+
+The command is not limited, counts are not rounded, both masses move, the flanks of a backlash touch, and a load that
+hangs does so near its lowest place.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable, FrictionTable
+
+Numbers = NDArray[np.float64]
+Phasors = NDArray[np.complex128]
+
+GRID = 4000
+"""Frequencies at which an open loop is looked at, evenly spaced on a logarithmic scale."""
+
+DECADES = 6
+"""Of frequency, below half the sample rate."""
+
+LARGEST_MARGIN = 1e3
+"""Largest gain margin that is looked for."""
+
+MARGIN_STEP = 1.2
+"""Steps in which the limit of stability is approached."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """Motor, coupling and load as linear equations x' = A x + b u.
+
+    Attributes
+    ----------
+    a : ndarray
+        Shape (n, n), n = 2 to 5.
+    b : ndarray
+        Shape (n,); the input is what the amplifier puts out, a voltage [V] or a force [N].
+    motor, load : int
+        Places of both positions in x; the same where the coupling is rigid.
+    """
+
+    a: Numbers
+    b: Numbers
+    motor: int
+    load: int
+
+
+def plant_of(spec: CascadeSpec, drags: tuple[float, float]) -> Plant:
+    """Linear equations of the plant.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+    drags : (float, float)
+        Slope of the friction over speed of motor and load [N*s/m].
+    """
+    winding = spec.drive.input == "voltage" and spec.motor is not None and spec.motor.inductance > 0
+    first, coupled = int(winding), spec.mechanics.coupling is not None
+    size = first + (4 if coupled else 2)
+    a, b = np.zeros((size, size)), np.zeros(size)
+    load = first + 2 if coupled else first
+    for position in {first, load}:
+        a[position, position + 1] = 1.0
+    mass = spec.motor_mass if coupled else spec.mass
+    a[first + 1, first + 1] = -(drags[0] + (0.0 if winding else spec.back_emf_drag)) / mass
+    if spec.mechanics.coupling is not None:
+        k, d = spec.mechanics.coupling.stiffness, spec.mechanics.coupling.damping
+        twist = np.array([-k, -d, k, d])
+        a[first + 1, first:] += twist / mass
+        a[load + 1, first:] -= twist / spec.mechanics.load_mass
+    load_mass = spec.mechanics.load_mass if coupled else mass
+    a[load + 1, load + 1] -= drags[1] / load_mass
+    a[load + 1, load] -= spec.mechanics.pendulum / load_mass
+    _drive(spec, a, b, first, mass)
+    return Plant(a, b, first, load)
+
+
+def _drive(spec: CascadeSpec, a: Numbers, b: Numbers, first: int, mass: float) -> None:
+    """Put in how the amplifier's output acts; `first` is the place of the motor's position."""
+    motor = spec.motor
+    if spec.drive.input != "voltage" or motor is None:
+        b[first + 1] = 1.0 / mass
+    elif first == 0:
+        b[1] = spec.force_constant / motor.resistance / mass
+    else:
+        a[0, 0], a[0, 2] = -motor.resistance / motor.inductance, -spec.emf_constant / motor.inductance
+        a[2, 0], b[0] = spec.force_constant / mass, 1.0 / motor.inductance
+
+
+def fastest_rate(spec: CascadeSpec) -> float:
+    """Largest magnitude of the plant's eigenvalues, with the steepest friction [1/s]; as `plant.two_mass` has it."""
+    mechanics = spec.mechanics
+    plant = plant_of(spec, (steepest(mechanics.friction), steepest(mechanics.load_friction)))
+    return float(np.max(np.abs(np.linalg.eigvals(plant.a))))
+
+
+def steepest(table: FrictionTable) -> float:
+    """Largest slope of a friction over speed, that of a falling Stribeck curve included [N*s/m]."""
+    slopes = [0.0]
+    for d in (table.positive, table.negative):
+        # The curve falls steepest at vs / sqrt(2).
+        falls = (d.static - d.coulomb) * math.sqrt(2.0 / math.e) / d.stribeck if d.stribeck > 0.0 else 0.0
+        slopes.append(max(d.viscous, falls - d.viscous))
+    return max(slopes)
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """Where an open loop crosses a gain of 1.
+
+    Attributes
+    ----------
+    crossover : float
+        Frequency at which the gain first falls below 1 [Hz]; 0 where it never does.
+    phase : float
+        Smallest phase margin over all crossings [rad].
+    """
+
+    crossover: float
+    phase: float
+
+
+class LinearLoop:
+    """The closed loop.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+    """
+
+    def __init__(self, spec: CascadeSpec) -> None:
+        self.spec = spec
+        self.period = spec.method.sample_period
+        frictions = (spec.mechanics.friction, spec.mechanics.load_friction)
+        drags = [min(f.positive.viscous, f.negative.viscous) for f in frictions]
+        self.plant = plant_of(spec, (drags[0], drags[1]))
+        self.gain = spec.drive.voltage_gain if spec.drive.input == "voltage" else spec.effort_per_command
+        feedback = spec.method.feedback
+        self.position_sensor, self.position_place = self._sensor(on_load=feedback.position == "load")
+        self.velocity_sensor, self.velocity_place = self._sensor(on_load=feedback.velocity == "load")
+
+    def _sensor(self, *, on_load: bool) -> tuple[EncoderTable, int]:
+        """An encoder, and the place of the position that it reads."""
+        if on_load:
+            return self.spec.load_encoder or IDEAL_ENCODER, self.plant.load
+        return self.spec.encoder, self.plant.motor
+
+    @cached_property
+    def held(self) -> tuple[Numbers, Numbers]:
+        """Ad and Bd: the plant from sample to sample."""
+        expm: Any = import_module("scipy.linalg").expm
+        size = len(self.plant.b)
+        a = np.zeros((size + 1, size + 1))
+        a[:size, :size], a[:size, size] = self.plant.a, self.plant.b
+        whole = expm(a * self.period)
+        return whole[:size, :size], whole[:size, size]
+
+    @property
+    def velocity_share(self) -> float:
+        """Share of a new velocity that its filter takes over."""
+        return smoothing(self.velocity_sensor.velocity_filter, self.period)
+
+    @property
+    def derivative_share(self) -> float:
+        """Share of a new velocity error that the filter of a PID's derivative takes over."""
+        return smoothing(self.spec.method.derivative_filter, self.period)
+
+    # ----------------------------------------------------------------------------------------------- modes
+
+    def transition(self, more: float = 1.0) -> Numbers:
+        """State from sample to sample, the reference at 0.
+
+        Parameters
+        ----------
+        more : float
+            Factor of the whole loop's gain.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, n); the state is that of the plant, what encoders and amplifier remember, filters and integral.
+        """
+        rows = _Rows(len(self.plant.b), self._memories())
+        position = rows.late("position", rows.plant(self.position_place), self.position_sensor.delay)
+        read = self.velocity_sensor
+        place = rows.plant(self.velocity_place)
+        newest = rows.late("velocity", place, read.delay)
+        difference = newest - rows.late("velocity", place, read.delay + read.velocity_span)
+        share = self.velocity_share
+        velocity = rows.part("speed")
+        velocity = velocity + share * (difference / (read.velocity_span * self.period) - velocity)
+        error, integral = self._law(rows, position, velocity)
+        command = error + integral
+        output = more * self.gain * rows.late("command", command, self.spec.drive.delay)
+        held, driven = self.held
+        after = [held @ rows.plant_rows + np.outer(driven, output)]
+        after += [rows.shifted("position", rows.plant(self.position_place)), rows.shifted("velocity", place)]
+        after += [rows.shifted("command", command), velocity[None], integral[None], rows.filtered[None]]
+        return np.vstack(after)
+
+    def _memories(self) -> dict[str, int]:
+        read = self.velocity_sensor
+        past = {"position": self.position_sensor.delay, "velocity": read.delay + read.velocity_span}
+        return past | {"command": self.spec.drive.delay, "speed": 1, "integral": 1, "filter": 1}
+
+    def _law(self, rows: "_Rows", position: Numbers, velocity: Numbers) -> tuple[Numbers, Numbers]:
+        """Command without its integral part, and that; sets the filter of the derivative.
+
+        An integral that is not used stays 0: its own mode would be one that does not decay.
+        """
+        m = self.spec.method
+        if m.structure == "cascade":
+            error = -m.position_gain * position - velocity
+            fast, rate = m.velocity_gain * error, m.velocity_integral * error
+        else:
+            share = self.derivative_share
+            rows.filtered = (1.0 - share) * rows.part("filter") - share * velocity
+            fast, rate = -m.proportional * position + m.derivative * rows.filtered, -m.integral * position
+        integrates = m.velocity_integral if m.structure == "cascade" else m.integral
+        return fast, rows.part("integral") + self.period * rate if integrates > 0 else np.zeros_like(fast)
+
+    @cached_property
+    def spectral_radius(self) -> float:
+        """Largest factor by which a mode changes from sample to sample: below 1 the loop is stable."""
+        return _radius(self.transition())
+
+    @cached_property
+    def gain_margin(self) -> float:
+        """By how much the loop's gain may grow until it no longer settles; below 1 it does not settle now.
+
+        At most `LARGEST_MARGIN`, at least its inverse, 0 where no gain so low lets it settle. An integral in both
+        loops makes a loop that settles neither with much nor with little gain.
+        """
+        settles = self.spectral_radius < 1.0
+        step = MARGIN_STEP if settles else 1.0 / MARGIN_STEP
+        near = 1.0
+        while 1.0 / LARGEST_MARGIN < near < LARGEST_MARGIN:
+            far = near * step
+            if (_radius(self.transition(far)) < 1.0) != settles:
+                break
+            near = far
+        else:
+            return LARGEST_MARGIN if settles else 0.0
+        low, high = min(near, far), max(near, far)
+        while high > low * 1.0001:
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if _radius(self.transition(middle)) < 1.0 else (low, middle)
+        return low
+
+    # ----------------------------------------------------------------------------------------------- frequency
+
+    @cached_property
+    def frequencies(self) -> Numbers:
+        """At which the open loops are looked at [Hz]."""
+        highest = math.log10(0.5 / self.period)
+        return np.logspace(highest - DECADES, highest, GRID, endpoint=False)
+
+    @cached_property
+    def _responses(self) -> tuple[Phasors, Phasors, Phasors]:
+        """Position and velocity read per command, and z of each frequency."""
+        z: Any = np.exp(2j * np.pi * self.frequencies * self.period)
+        held, driven = self.held
+        size = len(driven)
+        through = z[:, None, None] * np.eye(size) - held
+        x = np.linalg.solve(through, np.broadcast_to(driven[:, None], (GRID, size, 1)).astype(np.complex128))[:, :, 0]
+        x = x * (self.gain * z ** -float(self.spec.drive.delay))[:, None]
+        position = x[:, self.position_place] * z ** -float(self.position_sensor.delay)
+        read = self.velocity_sensor
+        span = float(read.velocity_span)
+        velocity = x[:, self.velocity_place] * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
+        return position, velocity * _filter(z, self.velocity_share), z
+
+    @cached_property
+    def velocity_loop(self) -> Margin:
+        """Margin of the velocity loop; of a PID, which has none, a crossover of 0."""
+        m = self.spec.method
+        return _margin(self.frequencies, self._inner) if m.structure == "cascade" else Margin(0.0, math.pi)
+
+    def velocity_level(self, frequency: float) -> float:
+        """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""
+        return float(np.interp(frequency, self.frequencies, np.abs(self._inner)))
+
+    @cached_property
+    def position_loop(self) -> Margin:
+        """Margin of the position loop, the velocity loop inside it closed; of a PID, of all of it."""
+        m, (position, velocity, z) = self.spec.method, self._responses
+        summed = self.period * z / (z - 1.0)
+        if m.structure == "pid":
+            lead = m.derivative * _filter(z, self.derivative_share)
+            return _margin(self.frequencies, (m.proportional + m.integral * summed) * position + lead * velocity)
+        law = m.velocity_gain + m.velocity_integral * summed
+        return _margin(self.frequencies, m.position_gain * law * position / (1.0 + self._inner))
+
+    @cached_property
+    def _inner(self) -> Phasors:
+        """Open velocity loop."""
+        m, (_, velocity, z) = self.spec.method, self._responses
+        return (m.velocity_gain + m.velocity_integral * self.period * z / (z - 1.0)) * velocity
+
+
+class _Rows:
+    """Quantities of a sample as rows over the state at its beginning."""
+
+    def __init__(self, size: int, parts: dict[str, int]) -> None:
+        self._places: dict[str, slice] = {}
+        begin = size
+        for name, length in parts.items():
+            self._places[name] = slice(begin, begin + length)
+            begin += length
+        self._unit = np.eye(begin)
+        self.plant_rows = self._unit[:size]
+        self.filtered = np.zeros(begin)
+
+    def plant(self, place: int) -> Numbers:
+        """A state of the plant."""
+        return self._unit[place]
+
+    def part(self, name: str) -> Numbers:
+        """A state of one number."""
+        return self._unit[self._places[name]][0]
+
+    def late(self, name: str, newest: Numbers, samples: int) -> Numbers:
+        """What a memory gives that has just taken `newest`, so many samples late."""
+        return newest if samples == 0 else self._unit[self._places[name]][samples - 1]
+
+    def shifted(self, name: str, newest: Numbers) -> Numbers:
+        """A memory at the end of the sample."""
+        return np.vstack([newest[None], self._unit[self._places[name]]])[: self._unit[self._places[name]].shape[0]]
+
+
+def smoothing(time_constant: float, period: float) -> float:
+    """Share of a new value that a first-order filter takes over at a sample; as `systems.cascade` has it."""
+    return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
+
+
+def _filter(z: Phasors, share: float) -> Phasors:
+    """Response of the first-order filter."""
+    return share / (1.0 - (1.0 - share) / z)
+
+
+def _radius(transition: Numbers) -> float:
+    return float(np.max(np.abs(np.linalg.eigvals(transition))))
+
+
+def _margin(frequencies: Numbers, loop: Phasors) -> Margin:
+    """First crossover and smallest phase margin of an open loop."""
+    gain = np.log(np.maximum(np.abs(loop), 1e-300))
+    places = np.flatnonzero(np.signbit(gain[1:]) != np.signbit(gain[:-1]))
+    falling = places[gain[places] >= 0.0]
+    if not len(falling):
+        return Margin(0.0, math.pi)
+    share = gain[places] / (gain[places] - gain[places + 1])
+    phase = np.unwrap(np.angle(loop))
+    # An open loop is as far from -1 as its phase is from an odd multiple of 180 deg.
+    at = phase[places] + share * (phase[places + 1] - phase[places])
+    margins = np.mod(at, 2 * np.pi) - np.pi
+    first = falling[0]
+    lead = gain[first] / (gain[first] - gain[first + 1])
+    crossover = frequencies[first] * (frequencies[first + 1] / frequencies[first]) ** lead
+    return Margin(float(crossover), float(margins[np.argmin(np.abs(margins))]))

@@ -1,0 +1,365 @@
+"""A recording replayed on a simulated cascade axis: its reference followed, or its command put in, and both compared.
+
+The simulated axis begins where the recorded one stood and as fast as it moved. It is compared with the recording at the
+recording's own instants: what its encoders read there, and what its law commanded.
+
+References
+----------
+Janot, Gautier, Brunot: Data Set and Reference Models of EMPS. Nonlinear System Identification Benchmarks 2019 (relative
+errors of a simulation: the norm of the difference over the norm of the measurement).
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.methods.cascade.host import CHUNK, CascadeHost, Rows
+from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
+from detent.methods.cascade.replay_job import ReplayJob
+from detent.methods.cascade.run import Progress
+from detent.methods.cascade.schema import CascadeSpec
+from detent.record.machine import AnyRecorder
+from detent.units import format_quantity
+
+EFFORTS: dict[str, tuple[str, ...]] = {
+    "force": ("force", "torque", "voltage", "command"),
+    "current": ("current", "voltage", "command", "force", "torque"),
+    "voltage": ("voltage", "command"),
+}
+"""Signals that drive an axis open loop, by its ``drive.input``; the first that was recorded is taken."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Compared:
+    """One signal, as recorded and as simulated, at the instants of the recording.
+
+    Attributes
+    ----------
+    name : str
+        What it is: "position", "velocity", "force".
+    unit : str
+        SI unit.
+    measured, simulated : ndarray
+        Values [unit], shape (n,).
+    """
+
+    name: str
+    unit: str
+    measured: Numbers
+    simulated: Numbers
+
+    @property
+    def difference(self) -> Numbers:
+        """Recording less simulation."""
+        return self.measured - self.simulated
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the difference."""
+        return float(np.sqrt(np.mean(self.difference**2)))
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude of the difference."""
+        return float(np.abs(self.difference).max())
+
+    @property
+    def relative(self) -> float:
+        """Norm of the difference over that of the recording; NaN for a recording of zeros."""
+        norm = float(np.linalg.norm(self.measured))
+        return float(np.linalg.norm(self.difference)) / norm if norm else math.nan
+
+
+@dataclass(slots=True)
+class ReplayRun:
+    """A recording beside its simulation. Times [s] count from the recording's first sample.
+
+    Attributes
+    ----------
+    job : ReplayJob
+        The recording.
+    done : bool
+        The simulation came to the recording's end.
+    failure : str
+        Why not; empty if `done`.
+    warnings : list of str
+        What should be known about the comparison.
+    open_loop : str
+        Signal that drove the axis where there is no reference; empty where it followed one.
+    period : float
+        Time between two samples of the loops.
+    time_ready, time_end : float
+        Begin and end of the replay, in simulated time.
+    compared : list of Compared
+        Position first.
+    peak_following : float
+        Largest magnitude of the simulated following error; NaN open loop.
+    limited : float
+        Time with the simulated command at its limit [s].
+    """
+
+    job: ReplayJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    open_loop: str = ""
+    period: float = 0.0
+    time_ready: float = 0.0
+    time_end: float = 0.0
+    compared: list[Compared] = field(default_factory=list[Compared])
+    peak_following: float = math.nan
+    limited: float = 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: everything but the curves."""
+        names = ("done", "failure", "warnings", "open_loop", "period", "time_end", "peak_following", "limited")
+        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "samples": len(self.job.t)}
+        found |= {name: getattr(self, name) for name in names}
+        found["notes"] = list(self.job.notes)
+        found["compared"] = [
+            {"signal": one.name, "unit": one.unit, "rms": one.rms, "peak": one.peak, "relative": one.relative}
+            for one in self.compared
+        ]
+        return found
+
+
+def run_cascade_replay(
+    spec: CascadeSpec, job: ReplayJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> ReplayRun:
+    """Replay a recording on the axis of `spec`.
+
+    The loops follow the recorded reference; without one the amplifier gets the recorded effort. The drive does not go
+    off: what it would have gone off for is a warning.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+    job : ReplayJob
+        The recording.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    ReplayRun
+        Figures and curves of what was recorded and simulated.
+
+    Raises
+    ------
+    DetentError
+        The recording drives the axis by a signal that it cannot take, or is too long.
+    """
+    host = _start(spec, job, recorder)
+    result = ReplayRun(job, period=host.period)
+    samples = math.floor(job.seconds / host.period + 1e-6) + 1
+    if job.reference is not None:
+        host.follow(recorded_profile(job.t, job.reference, host.period))
+    else:
+        result.open_loop, command = _open_loop(spec, job)
+        # What was put out holds until the next sample of the recording.
+        at = float(job.t[0]) + (np.arange(samples) + 1e-6) * host.period
+        rows = np.searchsorted(job.t, at, side="right") - 1
+        host.drive(np.ascontiguousarray(command[rows]))
+    try:
+        seen = _watch(host, samples, progress)
+    finally:
+        host.machine.close()
+    result.time_end = host.time
+    _judge(spec, result, host, seen)
+    return result
+
+
+def _start(spec: CascadeSpec, job: ReplayJob, recorder: AnyRecorder | None) -> CascadeHost:
+    """The axis where the recorded one stood, moving as it moved."""
+    host = CascadeHost(spec, recorder, position=float(job.position[0]))
+    speed = starting_velocity(job.t, job.position)
+    if speed:
+        host.set_off(speed)
+    return host
+
+
+def _watch(host: CascadeHost, samples: int, progress: Progress | None) -> Rows:
+    """Every sample of the replay."""
+    kept: list[Rows] = []
+    for begin in range(0, samples, CHUNK):
+        host.pass_samples(min(CHUNK, samples - begin), kept.append)
+        if progress is not None:
+            progress(min(begin + CHUNK, samples) / samples, "replaying the recording")
+    return np.concatenate(kept)
+
+
+# ---- what drove the axis
+
+
+def per_command(spec: CascadeSpec) -> dict[str, float]:
+    """Each effort that a recording can hold, per volt of this axis's command.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+
+    Returns
+    -------
+    dict of str to float
+        Efforts that follow from the command alone, by the roles of a log.
+    """
+    found = {"command": 1.0}
+    if spec.drive.input == "voltage":
+        return found | {"voltage": spec.drive.voltage_gain}
+    force = "torque" if spec.axis.motion == "rotary" else "force"
+    found |= {"voltage": 1.0, force: spec.effort_per_command}
+    if spec.drive.input == "current":
+        found["current"] = spec.drive.current_per_volt
+    return found
+
+
+def _open_loop(spec: CascadeSpec, job: ReplayJob) -> tuple[str, Numbers]:
+    """Signal that drives the axis, and the command that it comes from [V]."""
+    gains = per_command(spec)
+    for name in EFFORTS[spec.drive.input]:
+        if name in job.efforts and name in gains:
+            return name, job.efforts[name] / gains[name]
+    allowed = " or ".join(name for name in EFFORTS[spec.drive.input] if name in gains)
+    raise DetentError(
+        f"{job.name}: came {', '.join(job.efforts)} and no reference; allowed: a reference, or {allowed}, for an axis "
+        f'with drive.input = "{spec.drive.input}"; name the column, or change drive.input'
+    )
+
+
+# ---- what came out
+
+
+def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) -> None:
+    """Compare, and say what should be known."""
+    job = result.job
+    finite = np.isfinite(seen["machine.load.position"]) & np.isfinite(seen["law.command"])
+    result.done = bool(finite.all())
+    if not result.done:
+        first = int(np.argmin(finite)) * host.period
+        result.failure = (
+            f"the simulated axis ran away {format_quantity(first, 's')} after the begin: its loops are unstable; "
+            "correct the gains, or the plant"
+        )
+        return
+    at = job.t[0] + np.arange(len(seen)) * host.period
+
+    def simulated(column: str) -> Numbers:
+        return at_stamps(job.t, at, seen[column])
+
+    efforts = [one for one in _efforts(spec, job, simulated) if one.name != result.open_loop]
+    result.compared = [*_motion(spec, job, simulated), *efforts]
+    at_limit = seen["law.limited"] > 0
+    if result.open_loop:
+        at_limit = np.abs(seen["source.command"]) >= host.params.source.limit * (1 - 1e-12)
+    result.limited = float(np.count_nonzero(at_limit)) * host.period
+    result.warnings = _cautions(spec, result, seen)
+
+
+def at_stamps(t: Numbers, at: Numbers, values: Numbers) -> Numbers:
+    """Simulated values at the stamps of a recording.
+
+    Parameters
+    ----------
+    t : ndarray
+        Stamps [s], shape (n,). The last may lie a part of a period behind the last sample of the loops, which is as
+        far as a reference is known: there the last slope goes on.
+    at, values : ndarray
+        Time [s] and value of each sample of the loops, shape (m,).
+
+    Returns
+    -------
+    ndarray
+        Shape (n,).
+    """
+    found = np.interp(t, at, values)
+    if len(at) < 2:
+        return found
+    slope = (values[-1] - values[-2]) / (at[-1] - at[-2])
+    return np.asarray(found + np.maximum(t - at[-1], 0.0) * slope, np.float64)
+
+
+def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
+    """Positions, velocity and acceleration."""
+    way, speed = spec.unit("m"), spec.unit("m/s")
+    # The one encoder that was recorded is the one that the position loop uses.
+    on_load = spec.method.feedback.position == "load" and job.load_position is None
+    place = simulated("load_sensor.position" if on_load else "motor_sensor.position")
+    found = [Compared(name="position", unit=way, measured=job.position, simulated=place)]
+    if job.load_position is not None:
+        load = simulated("load_sensor.position")
+        found.append(Compared(name="position of the load", unit=way, measured=job.load_position, simulated=load))
+    if job.velocity is not None and not on_load:
+        velocity = simulated("motor_sensor.velocity")
+        found.append(Compared(name="velocity", unit=speed, measured=job.velocity, simulated=velocity))
+    else:
+        measured, came = (smooth_velocity(job.t, values) for values in (job.position, place))
+        found.append(Compared(name="velocity", unit=speed, measured=measured, simulated=came))
+    measured, came = (np.gradient(smooth_velocity(job.t, values), job.t) for values in (job.position, place))
+    found.append(Compared(name="acceleration", unit=spec.unit("m/s^2"), measured=measured, simulated=came))
+    return found
+
+
+def _efforts(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
+    """Every recorded effort that this axis has too."""
+    units: Mapping[str, str] = {"force": "N", "torque": "N*m", "current": "A", "voltage": "V", "command": "V"}
+    came = {name: gain * simulated("source.command") for name, gain in per_command(spec).items()}
+    if spec.drive.input == "voltage":
+        current = simulated("machine.current")
+        came |= {
+            "current": current,
+            "torque" if spec.axis.motion == "rotary" else "force": spec.force_constant * current,
+        }
+    return [
+        Compared(name=name, unit=units[name], measured=values, simulated=came[name])
+        for name, values in job.efforts.items()
+        if name in came
+    ]
+
+
+def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:
+    """What this axis would not have done, and what could not be compared."""
+    found: list[str] = []
+    way, limit = spec.unit("m"), spec.method.following_error
+    if not result.open_loop:
+        errors = np.abs(seen["law.position_error"])
+        result.peak_following = float(errors.max())
+        if result.peak_following > limit:
+            first = int(np.argmax(errors > limit)) * result.period
+            found.append(
+                f"the simulated following error went beyond {format_quantity(limit, way)}, method.following_error, "
+                f"{format_quantity(first, 's')} after the begin: in a run of moves the drive would have gone off"
+            )
+    place, limits = seen["machine.load.position"], spec.limits
+    if place.min() < limits.lowest or place.max() > spec.highest:
+        ends = f"{format_quantity(limits.lowest, way)} to {format_quantity(spec.highest, way)}"
+        found.append(f"the simulated load left the way of the axis, {ends}; widen limits.travel, or look at the log")
+    if result.limited > 0:
+        whose = f"the recorded {result.open_loop}" if result.open_loop else "the simulated command"
+        found.append(
+            f"{whose} is cut off at the limit of this axis, {spec.largest_command:.4g} V of command, for "
+            f"{format_quantity(result.limited, 's')}; look at limits.effort and drive.command_limit"
+        )
+    have = {one.name for one in result.compared} | {result.open_loop}
+    if not result.job.efforts:
+        found.append(
+            "the log states no force, current, voltage or command that could be compared; if it holds one, name its "
+            "column and unit: --column 'voltage=COLUMN [V]'"
+        )
+    missing = [name for name in result.job.efforts if name not in have]
+    if missing:
+        found.append(
+            f'{" and ".join(missing)}: recorded, but an axis with drive.input = "{spec.drive.input}" '
+            f"{'and no [motor] ' if spec.motor is None else ''}has no such figure; not compared"
+        )
+    return found

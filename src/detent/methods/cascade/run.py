@@ -1,0 +1,380 @@
+"""A list of moves on a simulated cascade axis, from power-on: what its drive sees, and an observer beside the load."""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from detent.errors import FileProblem, InputError
+from detent.methods.cascade.build import motion_limits
+from detent.methods.cascade.guard import Arrival, Guard
+from detent.methods.cascade.host import CascadeHost, Peaks
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.moves.job import MOST_PROBLEMS, Move, MoveJob
+from detent.planning.profile import MotionLimits, plan_move
+from detent.record.machine import AnyRecorder
+from detent.sensing.gauge import set_gauge
+from detent.units import format_quantity
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
+
+COAST = 0.1
+"""Time that a run goes on after the drive has gone off [s]."""
+
+CASCADE_SIGNALS = (
+    "reference.position", "reference.velocity", "motor_sensor.position", "motor_sensor.velocity",
+    "load_sensor.position", "law.position_error", "law.integral", "law.feed_forward", "law.command", "law.limited",
+    "source.command", "source.output", "machine.current", "machine.motor.position", "machine.motor.velocity",
+    "machine.load.position", "machine.load.velocity", "gauge.target",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CascadeMove:
+    """How one move went; lengths [m] or angles [rad], times in seconds since power-on.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    label : str
+        What the move is for.
+    begin : float
+        When its reference began.
+    arrived : float
+        When its reference had come to the target; NaN if the drive went off before.
+    ready : float
+        When the axis was in position: the loop's error within the window for its time; NaN if it was not.
+    settled : float
+        When the load was outside the window for the last time; NaN if it stayed outside.
+    end : float
+        End of the dwell, or when the drive went off.
+    start, target, position : float
+        Where the load stood, where it had to go, and where it stood at the end.
+    overshoot : float
+        How far the load went beyond the target, 0 if it did not.
+    peak_speed : float
+        Largest speed of the load [m/s].
+    peak_following : float
+        Largest magnitude of the position loop's error.
+    peak_command : float
+        Largest magnitude of the command [V].
+    limited : float
+        Time with the command at its limit [s].
+    in_position : bool
+        The axis was in position in time.
+    """
+
+    number: int
+    label: str
+    begin: float
+    arrived: float
+    ready: float
+    settled: float
+    end: float
+    start: float
+    target: float
+    position: float
+    overshoot: float
+    peak_speed: float
+    peak_following: float
+    peak_command: float
+    limited: float
+    in_position: bool
+
+    @property
+    def error(self) -> float:
+        """Target less position of the load at the end."""
+        return self.target - self.position
+
+    @property
+    def settling(self) -> float:
+        """From the end of the reference until the load stayed within the window [s]; NaN if it did not."""
+        return max(self.settled - self.arrived, 0.0) if self.in_position else math.nan
+
+    @property
+    def move_time(self) -> float:
+        """From the begin of the reference until the load stayed within the window [s]; NaN if it did not."""
+        return max(self.settled - self.begin, 0.0) if self.in_position else math.nan
+
+
+@dataclass(slots=True)
+class CascadeRun:
+    """Outcome of a list of moves on a cascade axis. Times [s], lengths [m] or angles [rad].
+
+    Attributes
+    ----------
+    job : MoveJob
+        What was asked.
+    done : bool
+        Every move was in position in time.
+    failure : str
+        Why not, and what to do; empty if `done`. The drive is off then.
+    warnings : list of str
+        What the drive cannot see.
+    time_ready, time_off, time_end : float
+        When the axis was in position after power-on, when its drive went off (NaN if it did not), and the end of the
+        run, since power-on.
+    moves : list of CascadeMove
+        Moves made, in order; the last one may have failed.
+    tolerance : float
+        Error that counts as in position.
+    max_command : float
+        Limit of the command [V].
+    """
+
+    job: MoveJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    time_ready: float = 0.0
+    time_off: float = math.nan
+    time_end: float = 0.0
+    moves: list[CascadeMove] = field(default_factory=list[CascadeMove])
+    tolerance: float = 0.0
+    max_command: float = 0.0
+
+    @property
+    def worst_following(self) -> float:
+        """Largest following error."""
+        return max((move.peak_following for move in self.moves), default=0.0)
+
+    @property
+    def worst_error(self) -> float:
+        """Largest magnitude of the error of the load at the end of a move that was in position."""
+        return max((abs(move.error) for move in self.moves if move.in_position), default=0.0)
+
+    @property
+    def worst_overshoot(self) -> float:
+        """Largest overshoot."""
+        return max((move.overshoot for move in self.moves), default=0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``."""
+        names = (
+            "done", "failure", "warnings", "time_ready", "time_off", "time_end", "tolerance", "max_command",
+            "worst_following", "worst_error", "worst_overshoot",
+        )  # fmt: skip
+        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind}
+        found |= {name: getattr(self, name) for name in names}
+        found["moves"] = [asdict(m) | {"error": m.error, "settling": m.settling} for m in self.moves]
+        return found
+
+
+def run_cascade_moves(
+    spec: CascadeSpec, job: MoveJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> CascadeRun:
+    """Make a list of moves on the axis of `spec`, from power-on.
+
+    A move begins when the one before has been in position and its dwell is over.
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+    job : MoveJob
+        The moves; those of a rotary axis in rad.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    CascadeRun
+        What the axis did; a fault, or a move that was not in position, is in `failure`, not raised.
+
+    Raises
+    ------
+    InputError
+        A move cannot be commanded to this axis.
+    DetentError
+        A move is too slow for a profile of its samples.
+    """
+    targets = check_cascade_job(spec, job)
+    host = CascadeHost(spec, recorder)
+    result = CascadeRun(job, tolerance=spec.method.in_position, max_command=spec.largest_command)
+    mover = _Mover(spec, host, result)
+    try:
+        result.failure = mover.power_on()
+        place = spec.mechanics.start_position
+        for done, (move, target) in enumerate(zip(job.moves, targets, strict=True), 1):
+            if result.failure:
+                break
+            result.failure = mover.make(move, place, target)
+            place = target
+            if progress is not None:
+                progress(done / len(targets), f"move {done} of {len(targets)}")
+        if result.failure:
+            result.time_off = host.time
+            host.switch_off()
+            host.pass_samples(math.ceil(COAST / host.period), lambda _rows: None)
+    finally:
+        host.machine.close()
+    result.time_end = host.time
+    result.done = not result.failure
+    result.warnings += _unseen(spec, result)
+    return result
+
+
+class _Mover:
+    """Makes one move after the other on a host."""
+
+    def __init__(self, spec: CascadeSpec, host: CascadeHost, result: CascadeRun) -> None:
+        self.spec, self.host, self.result = spec, host, result
+        self.guard = Guard(spec, host.period)
+        self.most = math.ceil(spec.method.timeout / host.period)
+
+    def power_on(self) -> str:
+        """Wait until the axis stands in position where it was switched on; what went wrong, or nothing."""
+        ready = self._arrive()
+        self.result.time_ready = self.host.time
+        if isinstance(ready, str):
+            return f"after power-on: {ready or self._late()}"
+        return ""
+
+    def make(self, move: Move, place: float, target: float) -> str:
+        """One move from `place` [m] and its dwell; what went wrong, or nothing."""
+        host, limits = self.host, motion_limits(self.spec)
+        if move.speed is not None:
+            limits = MotionLimits(move.speed, limits.acceleration, limits.jerk)
+        profile = plan_move(place, target, limits, host.period)
+        begin, start, host.peaks = host.time, host.position, Peaks()
+        set_gauge(host.state.gauge, host.state.tick, start, target, self.result.tolerance)
+        host.follow(profile)
+        stop = host.pass_samples(profile.count - 1, self.guard)
+        arrived = host.time
+        ready: float | str = stop.cause if stop else self._arrive()
+        failed = ready if isinstance(ready, str) else ""
+        if isinstance(ready, float) and move.dwell > 0:
+            stop = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9), self.guard)
+            failed = stop.cause if stop else ""
+        self._note(move, (begin, math.nan if stop and isinstance(ready, str) else arrived, ready), (start, target))
+        if isinstance(ready, str) and not failed:
+            failed = self._late()
+        return f"move {move.number} to {self._text(target, 6)}: {failed}" if failed else ""
+
+    def _arrive(self) -> float | str:
+        """When the axis was in position [s]; else why the drive went off, empty if the time was over."""
+        arrival = Arrival(self.spec, self.host.period, self.guard)
+        stop = self.host.pass_samples(self.most, arrival)
+        if stop is None:
+            return ""
+        return stop.cause or self.host.time
+
+    def _note(self, move: Move, times: tuple[float, float, float | str], way: tuple[float, float]) -> None:
+        """Put the move into the result."""
+        host, gauge, peaks = self.host, self.host.state.gauge, self.host.peaks
+        begin, arrived, ready = times
+        outside = abs(way[1] - host.position) > self.result.tolerance
+        self.result.moves.append(
+            CascadeMove(
+                number=move.number,
+                label=move.label,
+                begin=begin,
+                arrived=arrived,
+                ready=ready if isinstance(ready, float) else math.nan,
+                settled=math.nan if outside else gauge.outside * host.tick,
+                end=host.time,
+                start=way[0],
+                target=way[1],
+                position=host.position,
+                overshoot=max(float(gauge.beyond), 0.0),
+                peak_speed=float(gauge.peak_speed),
+                peak_following=peaks.following,
+                peak_command=peaks.command,
+                limited=peaks.limited * host.period,
+                in_position=isinstance(ready, float),
+            )
+        )
+
+    def _late(self) -> str:
+        """The axis was not in position in time."""
+        method = self.spec.method
+        error = self._text(abs(float(self.host.state.law.position_error)))
+        return (
+            f"not in position within {format_quantity(method.timeout, 's')} of the end of the reference "
+            f"(method.timeout): its error is {error}, method.in_position is "
+            f"{self._text(method.in_position)}; the drive is off; give the velocity loop an "
+            "integral or feed-forward against what holds the axis off, or widen the window"
+        )
+
+    def _text(self, value: float, digits: int = 4) -> str:
+        return format_quantity(value, self.spec.unit("m"), digits)
+
+
+def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
+    """What the sensors of the loops do not show: a load that stands elsewhere."""
+    off = [move for move in run.moves if move.in_position and abs(move.error) > run.tolerance]
+    if not off:
+        return []
+    worst = max(off, key=lambda move: abs(move.error))
+    text = format_quantity(abs(worst.error), spec.unit("m"), 3)
+    return [
+        (
+            f"{len(off)} of {len(run.moves)} moves were in position while the load stood beside its target, move "
+            f"{worst.number} by {text}: the encoder of the position loop does not see coupling and backlash, or the "
+            'velocity loop has no integral; state method.feedback.position = "load", or widen method.in_position'
+        )
+    ]
+
+
+# ---- the job
+
+
+def check_cascade_job(spec: CascadeSpec, job: MoveJob) -> list[float]:
+    """Where each move of a job goes [m].
+
+    Parameters
+    ----------
+    spec : CascadeSpec
+        The axis.
+    job : MoveJob
+        The moves.
+
+    Returns
+    -------
+    list of float
+        Targets, in order.
+
+    Raises
+    ------
+    InputError
+        Targets beyond the travel, speeds beyond the limit, sample periods: all of them, with their lines.
+    """
+    problems: list[FileProblem] = []
+    targets: list[float] = []
+    place = spec.mechanics.start_position
+    for move in job.moves:
+        place = place + move.by if move.by is not None else float(move.target or 0.0)
+        targets.append(place)
+        if len(problems) < MOST_PROBLEMS:
+            problems += _bad_move(spec, job.name, move, place)
+    if problems:
+        raise InputError(problems)
+    return targets
+
+
+def _bad_move(spec: CascadeSpec, name: str, move: Move, place: float) -> list[FileProblem]:
+    """What is wrong with one move."""
+    found: list[FileProblem] = []
+
+    def problem(key: str, came: str, allowed: str, remedy: str) -> None:
+        found.append(FileProblem(name, move.row, 1 if move.row else 0, key, came, allowed, remedy))
+
+    way, speed = spec.unit("m"), spec.unit("m/s")
+    low, high, slack = spec.limits.lowest, spec.highest, 1e-9 * spec.limits.travel
+    if not low - slack <= place <= high + slack:
+        ends = f"{format_quantity(low, way, 5)} to {format_quantity(high, way, 5)}"
+        key = "target" if move.by is None else "by"
+        allowed = f"a position from limits.lowest to limits.lowest + limits.travel, {ends}"
+        problem(key, format_quantity(place, way, 6), allowed, "keep the move between the two ends")
+    if move.speed is not None and not 0 < move.speed <= spec.limits.speed * (1 + 1e-9):
+        allowed = f"up to limits.speed, {format_quantity(spec.limits.speed, speed)}"
+        problem("speed", format_quantity(move.speed, speed), allowed, "lower it, or raise limits.speed")
+    if move.sample_period is not None:
+        own = format_quantity(spec.method.sample_period, "s")
+        allowed = f"no sample_period: the loops of this axis have a fixed one, {own}"
+        problem("sample_period", format_quantity(move.sample_period, "s"), allowed, "leave it out")
+    return found

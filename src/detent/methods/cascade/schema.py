@@ -1,0 +1,366 @@
+"""What an axis file of the cascade method may say: every key with its unit, bounds, default and meaning.
+
+The keys are written for an axis that slides. Where ``axis.motion = "rotary"`` the same keys hold with rad for m, N*m
+for N and kg*m^2 for kg (`axisfile.motion`): a mass is then a moment of inertia, a force a torque.
+"""
+
+import math
+from typing import Any, Literal
+
+from pydantic import Field
+
+from detent.axisfile.motion import unit_in
+from detent.axisfile.tables import AxisSpec, AxisTable, MotorTable
+from detent.files.fields import Table, optional, required
+from detent.files.quantities import (
+    Acceleration,
+    Current,
+    CurrentPerVoltage,
+    Force,
+    ForcePerVoltage,
+    Inductance,
+    Jerk,
+    Length,
+    Mass,
+    Stiffness,
+    Time,
+    Torque,
+    Velocity,
+    Viscosity,
+    Voltage,
+    VoltagePerLength,
+    VoltagePerLengthTime,
+    VoltagePerVelocity,
+)
+
+MOST_SAMPLES = 63
+"""Samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)."""
+
+
+class CascadeAxisTable(AxisTable, frozen=True):
+    """Name and method of the axis."""
+
+    method: Literal["cascade"] = required("control method", '"cascade"')
+    motion: Literal["linear", "rotary"] = optional(
+        "whether the axis slides or turns; a rotary one has rad for m, N*m for N and kg*m^2 for kg in every key",
+        "linear",
+    )
+
+
+class LimitsTable(Table, frozen=True):
+    """What the axis must never exceed."""
+
+    travel: Length = required("free way between both ends", '"0.5 m"', gt=0.0, le=1e5)
+    lowest: Length = optional("position of the lower end", 0.0, ge=-1e5, le=1e5)
+    speed: Velocity = required("largest speed ever commanded", '"0.5 m/s"', gt=0.0, le=1e4)
+    acceleration: Acceleration = required("largest acceleration ever commanded", '"5 m/s^2"', gt=0.0, le=1e7)
+    jerk: Jerk | None = optional(
+        "largest jerk ever commanded; without it moves are trapezoids of the speed", None, gt=0.0, le=1e10
+    )
+    effort: Force = required("largest force (rotary: torque) of the drive on the axis", '"500 N"', ge=1e-9, le=1e7)
+
+
+class CascadeMotorTable(MotorTable, frozen=True):
+    """Constants of the DC motor, from a catalogue or stated; the winding's inductance may be neglected."""
+
+    inductance: Inductance = optional(
+        "winding; 0 lets the current follow voltage and speed at once", 0.0, ge=0.0, le=10.0
+    )
+
+
+class DriveTable(Table, frozen=True):
+    """Converter and amplifier."""
+
+    input: Literal["force", "current", "voltage"] = optional(
+        "what the amplifier imposes: a force (rotary: a torque), the current of the motor, or its voltage", "force"
+    )
+    effort_per_volt: ForcePerVoltage = optional("input force: force per volt of command", 1.0, ge=1e-9, le=1e9)
+    current_per_volt: CurrentPerVoltage = optional("input current: current per volt of command", 1.0, ge=1e-9, le=1e6)
+    voltage_gain: float = optional("input voltage: volts at the motor per volt of command", 1.0, ge=1e-6, le=1e6)
+    command_limit: Voltage = optional("largest command that the converter puts out", 10.0, ge=1e-6, le=1e6)
+    command_step: Voltage = optional("step of the converter; 0: none", 0.0, ge=0.0, le=1e3)
+    delay: int = optional("samples until a command acts; 0: in the instant of its sample", 0, ge=0, le=MOST_SAMPLES)
+    max_current: Current | None = optional(
+        "inputs current and voltage: limit of the amplifier; without it limits.effort decides", None, gt=0.0, le=1e6
+    )
+
+
+def _usual_stiction(data: dict[str, Any]) -> float:
+    """Static friction by default: 1.15 times Coulomb, as for the other axes."""
+    return 1.15 * float(data.get("coulomb", math.nan))
+
+
+class DirectionTable(Table, frozen=True):
+    """Friction in one direction of motion."""
+
+    coulomb: Force = optional("friction while moving, at any speed", 0.0, ge=0.0, le=1e7)
+    static: Force = optional("force that breaks loose", _usual_stiction, derived="1.15 x coulomb", ge=0.0, le=2e7)
+    stribeck: Velocity = optional(
+        "velocity at which 1/e of the difference of both is left; 0: it ends as motion begins", 0.0, ge=0.0, le=1e3
+    )
+    viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e8)
+
+
+class FrictionTable(Table, frozen=True):
+    """Friction of one mass, each direction for itself."""
+
+    offset: Force = optional(
+        "force against the positive direction that does not turn round with the motion", 0.0, ge=-1e6, le=1e6
+    )
+    positive: DirectionTable = Field(default_factory=DirectionTable)
+    negative: DirectionTable = Field(default_factory=DirectionTable)
+
+
+class CouplingTable(Table, frozen=True):
+    """Compliant coupling between motor and load."""
+
+    stiffness: Stiffness = required("force per twist", '"20 N/um"', gt=0.0, le=1e12)
+    damping: Viscosity = optional("force per difference of the velocities", 0.0, ge=0.0, le=1e8)
+    backlash: Length = optional("free way between both flanks", 0.0, ge=0.0, le=1e3)
+
+
+class MechanicsTable(Table, frozen=True):
+    """Motor, coupling and load in the coordinate of the axis."""
+
+    travel_per_revolution: Length | None = optional(
+        "travel of the axis per motor turn, such as the lead of a screw; rotary: 360 deg without a gear",
+        None, derived="rotary with a motor: 360 deg; needed where a linear axis has a motor", ge=1e-6, le=1e3,
+    )  # fmt: skip
+    motor_mass: Mass = optional(
+        "what moves on the motor's side of the coupling, without [motor]'s rotor; rotary: moment of inertia",
+        0.0, ge=0.0, le=1e7,
+    )  # fmt: skip
+    load_mass: Mass = optional(
+        "what moves on the load's side of the coupling; rotary: moment of inertia", 0.0, ge=0.0, le=1e7
+    )
+    weight: Force = optional(
+        "weight of the load along the axis, positive pulls in the negative direction", 0.0, ge=-1e7, le=1e7
+    )
+    pendulum: Torque = optional("rotary: weight of a load that hangs down at position 0, m g l", 0.0, ge=0.0, le=1e7)
+    transmission_loss: float = optional(
+        "share of the motor's force that the transmission takes as friction, in motion and at rest",
+        0.0,
+        ge=0.0,
+        le=0.95,
+    )
+    start_position: Length = optional(
+        "where the axis stands at power-on", math.nan, derived="0, or the end of the way nearest to it",
+        ge=-1e5, le=1e5,
+    )  # fmt: skip
+    friction: FrictionTable = Field(default_factory=FrictionTable)
+    load_friction: FrictionTable = Field(default_factory=FrictionTable)
+    coupling: CouplingTable | None = None
+
+
+class EncoderTable(Table, frozen=True):
+    """Encoder that is read once per sample."""
+
+    resolution: Length = required("travel per count; 0: the position itself", '"1 um"', ge=0.0, le=1e3)
+    delay: int = optional("samples until a position is read", 0, ge=0, le=MOST_SAMPLES - 1)
+    velocity_span: int = optional("samples that the velocity is a difference over", 1, ge=1, le=MOST_SAMPLES)
+    velocity_filter: Time = optional("time constant of the filter behind it; 0: none", 0.0, ge=0.0, le=10.0)
+
+
+IDEAL_ENCODER = EncoderTable.model_validate({"resolution": "0 m"})
+"""What reads the position itself, in the place of an encoder that is not there."""
+
+
+class FeedbackTable(Table, frozen=True):
+    """Which encoder the loops use."""
+
+    position: Literal["motor", "load"] = optional("encoder of the position loop", "motor")
+    velocity: Literal["motor", "load"] = optional("encoder of the velocity loop", "motor")
+
+
+class FeedForwardTable(Table, frozen=True):
+    """Shares of what the reference needs by the constants of this file; 0: none, 1: all of it."""
+
+    velocity: float = optional(
+        "share of the reference's velocity in the velocity demand (PID: 1 lets the derivative act on the error)",
+        0.0, ge=0.0, le=2.0,
+    )  # fmt: skip
+    acceleration: float = optional("share of the command that accelerates all masses", 0.0, ge=0.0, le=2.0)
+    viscous: float = optional(
+        "share of the command against viscous friction, back-EMF included; of both directions the mean",
+        0.0, ge=0.0, le=2.0,
+    )  # fmt: skip
+    coulomb: float = optional("share of the command against Coulomb friction and its offset", 0.0, ge=0.0, le=2.0)
+    dead_band: Velocity = optional(
+        "speed of the reference up to which there is none against Coulomb friction", 0.0, ge=0.0, le=1e4
+    )
+    weight: float = optional("share of the command that holds weight and pendulum", 0.0, ge=0.0, le=2.0)
+
+
+class MethodTable(Table, frozen=True):
+    """Structure, gains and supervision."""
+
+    structure: Literal["cascade", "pid"] = optional(
+        "position P over velocity P or PI, or one PID of the position", "cascade"
+    )
+    sample_period: Time = optional("period of the loops", 1e-3, ge=1e-6, le=0.1)
+    position_gain: float = optional(
+        "cascade: velocity demand per position error [1/s]; must be stated", 0.0, ge=0.0, le=1e6
+    )
+    velocity_gain: VoltagePerVelocity = optional(
+        "cascade: command per velocity error; must be stated", 0.0, ge=0.0, le=1e9
+    )
+    velocity_integral: VoltagePerLength = optional(
+        "cascade: command per velocity error and time; 0: P, not PI", 0.0, ge=0.0, le=1e12
+    )
+    velocity_limit: Velocity = optional(
+        "cascade: largest velocity demand", math.nan, derived="1.25 x limits.speed", gt=0.0, le=1e5
+    )
+    proportional: VoltagePerLength = optional("PID: command per position error; must be stated", 0.0, ge=0.0, le=1e12)
+    integral: VoltagePerLengthTime = optional("PID: command per position error and time", 0.0, ge=0.0, le=1e15)
+    derivative: VoltagePerVelocity = optional("PID: command per velocity error", 0.0, ge=0.0, le=1e9)
+    derivative_filter: Time = optional("PID: time constant of the filter of that error; 0: none", 0.0, ge=0.0, le=10.0)
+    in_position: Length = optional(
+        "error that counts as in position", math.nan,
+        derived="1e-4 x limits.travel, but at least 2 encoder counts", gt=0.0, le=1e5,
+    )  # fmt: skip
+    in_position_time: Time = optional("how long it must last", 50e-3, gt=0.0, le=10.0)
+    timeout: Time = optional(
+        "time from the end of the reference until a move that is not in position has failed", 2.0, gt=0.0, le=1000.0
+    )
+    following_error: Length = optional(
+        "position error beyond which the drive goes off", math.nan, derived="0.1 x limits.travel", gt=0.0, le=1e6
+    )
+    feedback: FeedbackTable = Field(default_factory=FeedbackTable)
+    feed_forward: FeedForwardTable = Field(default_factory=FeedForwardTable)
+
+
+class PushTable(Table, frozen=True):
+    """A force on the load for a while."""
+
+    force: Force = required("force on the load, + in the positive direction", '"30 N"', ge=-1e7, le=1e7)
+    at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
+    duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)
+
+
+class DisturbanceTable(Table, frozen=True):
+    """What the axis does not know of."""
+
+    push: PushTable | None = None
+
+
+class CascadeSpec(AxisSpec, frozen=True):
+    """A cascade axis as its file describes it, in SI units."""
+
+    axis: CascadeAxisTable
+    limits: LimitsTable
+    motor: CascadeMotorTable | None = None
+    drive: DriveTable = Field(default_factory=DriveTable)
+    mechanics: MechanicsTable = Field(default_factory=MechanicsTable)
+    encoder: EncoderTable
+    load_encoder: EncoderTable | None = None
+    method: MethodTable = Field(default_factory=MethodTable)
+    disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
+
+    def unit(self, linear: str) -> str:
+        """Unit of a quantity of this axis, by that of a linear axis: ``spec.unit("N")`` is ``"N*m"`` if it turns."""
+        return unit_in(self.axis.motion, linear)
+
+    @property
+    def highest(self) -> float:
+        """Position of the upper end [m]."""
+        return self.limits.lowest + self.limits.travel
+
+    @property
+    def radius(self) -> float:
+        """Travel per radian of the motor [m]; infinite without a motor, whose quantities then vanish."""
+        per_revolution = self.mechanics.travel_per_revolution
+        return math.inf if per_revolution is None else per_revolution / (2 * math.pi)
+
+    @property
+    def motor_mass(self) -> float:
+        """All that moves on the motor's side of the coupling [kg]."""
+        rotor = 0.0 if self.motor is None else self.motor.rotor_inertia / self.radius**2
+        return self.mechanics.motor_mass + rotor
+
+    @property
+    def mass(self) -> float:
+        """All that moves [kg]."""
+        return self.motor_mass + self.mechanics.load_mass
+
+    @property
+    def force_constant(self) -> float:
+        """Force on the axis per current of the motor [N/A]; 0 without a motor."""
+        return 0.0 if self.motor is None else self.motor.torque_constant / self.radius
+
+    @property
+    def emf_constant(self) -> float:
+        """Back-EMF per velocity of the axis [V*s/m]; 0 without a motor."""
+        return 0.0 if self.motor is None else self.motor.back_emf_constant / self.radius
+
+    @property
+    def max_current(self) -> float:
+        """Largest current of the motor: of the amplifier, or of limits.effort if that is less [A]."""
+        most = self.limits.effort / self.force_constant if self.force_constant > 0 else math.inf
+        return most if self.drive.max_current is None else min(most, self.drive.max_current)
+
+    @property
+    def effort_per_command(self) -> float:
+        """Force at standstill per volt of command, limits aside [N/V]."""
+        drive = self.drive
+        if drive.input == "force" or self.motor is None:
+            return drive.effort_per_volt
+        if drive.input == "current":
+            return drive.current_per_volt * self.force_constant
+        return drive.voltage_gain * self.force_constant / self.motor.resistance
+
+    @property
+    def back_emf_drag(self) -> float:
+        """Force per velocity by which back-EMF brakes [N*s/m]; 0 unless the motor is driven by a voltage."""
+        if self.drive.input != "voltage" or self.motor is None:
+            return 0.0
+        return self.force_constant * self.emf_constant / self.motor.resistance
+
+    @property
+    def largest_command(self) -> float:
+        """Largest magnitude of the command: of the converter, or what current and effort are limited to [V]."""
+        limit = self.drive.command_limit
+        if self.drive.input == "force":
+            return min(limit, self.limits.effort / self.effort_per_command)
+        return min(limit, self.max_current / self.drive.current_per_volt) if self.drive.input == "current" else limit
+
+    @property
+    def position_encoder(self) -> EncoderTable:
+        """Encoder of the position loop."""
+        return self._encoder(self.method.feedback.position)
+
+    @property
+    def velocity_encoder(self) -> EncoderTable:
+        """Encoder of the velocity loop."""
+        return self._encoder(self.method.feedback.velocity)
+
+    def _encoder(self, side: str) -> EncoderTable:
+        return self.encoder if side == "motor" else self.load_encoder or IDEAL_ENCODER
+
+    @property
+    def largest_effort(self) -> float:
+        """Largest force at standstill [N]."""
+        return min(self.limits.effort, self.largest_command * self.effort_per_command, self._by_current)
+
+    @property
+    def _by_current(self) -> float:
+        """Force of the largest current [N]."""
+        return self.max_current * self.force_constant if self.force_constant > 0 else math.inf
+
+
+def fill_derived(spec: CascadeSpec) -> CascadeSpec:
+    """Fill the defaults that depend on another key, as their `derived` texts say."""
+    limits, mechanics, method = spec.limits, spec.mechanics, spec.method
+    filled: dict[str, float] = {}
+    if math.isnan(mechanics.start_position):
+        filled["start_position"] = min(max(0.0, limits.lowest), spec.highest)
+    if mechanics.travel_per_revolution is None and spec.motor is not None and spec.axis.motion == "rotary":
+        filled["travel_per_revolution"] = 2 * math.pi
+    counts = 2 * max(spec.encoder.resolution, spec.load_encoder.resolution if spec.load_encoder else 0.0)
+    derived = {
+        "velocity_limit": 1.25 * limits.speed,
+        "in_position": max(1e-4 * limits.travel, counts),
+        "following_error": 0.1 * limits.travel,
+    }
+    stated = {name: value for name, value in derived.items() if math.isnan(getattr(method, name))}
+    tables = {"mechanics": mechanics.model_copy(update=filled), "method": method.model_copy(update=stated)}
+    return spec.model_copy(update=tables)

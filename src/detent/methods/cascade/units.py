@@ -1,0 +1,92 @@
+"""How the pages of a cascade axis write its quantities: a linear axis in mm and µm, a rotary one in degrees."""
+
+import math
+from dataclasses import dataclass
+
+from detent.methods.moves.summary import length
+from detent.methods.rotary_table.summary import ARCSEC, SMALL, angle, degrees
+from detent.page.words import GAP, number
+
+MICRO = 1e-3
+"""Lengths below this are drawn in micrometres [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A unit of a plot area.
+
+    Attributes
+    ----------
+    factor : float
+        From SI units.
+    name : str
+        Of the unit.
+    """
+
+    factor: float
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """Units of an axis.
+
+    Attributes
+    ----------
+    rotary : bool
+        It turns.
+    """
+
+    rotary: bool
+
+    @property
+    def place(self) -> Scale:
+        """Of positions."""
+        return Scale(180 / math.pi, "deg") if self.rotary else Scale(1e3, "mm")
+
+    @property
+    def speed(self) -> Scale:
+        """Of velocities."""
+        return Scale(180 / math.pi, "deg/s") if self.rotary else Scale(1e3, "mm/s")
+
+    def small(self, peak: float) -> Scale:
+        """Of errors, by the largest of them [m]."""
+        if self.rotary:
+            return Scale(1 / ARCSEC, "arcsec") if abs(peak) < SMALL else self.place
+        return Scale(1e6, "µm") if abs(peak) < MICRO else self.place
+
+    def error(self, value: float) -> str:
+        """Write an error with its unit.
+
+        Examples
+        --------
+        >>> Units(rotary=False).error(5.69e-6).replace(GAP, " "), Units(rotary=True).error(0.1).replace(GAP, " ")
+        ('5.7 µm', '5.73 deg')
+        """
+        if math.isnan(value):
+            return "\u2013"
+        return angle(value) if self.rotary else length(value)
+
+    def position(self, value: float) -> str:
+        """Write a position, without its unit."""
+        scaled = round(value * self.place.factor, 4)
+        return f"{scaled:.3f}".replace("-", "\u2212")
+
+    def speed_text(self, value: float) -> str:
+        """Write a speed with its unit."""
+        text = degrees(value) if self.rotary else number(round(value * 1e3, 6))
+        return f"{text}{GAP}{self.speed.name}"
+
+
+def percent(share: float) -> str:
+    """Write a share in percent, with three digits.
+
+    Examples
+    --------
+    >>> percent(1.556e-5).replace(GAP, " "), percent(0.0574).replace(GAP, " ")
+    ('0.0016 %', '5.74 %')
+    """
+    if math.isnan(share):
+        return "\u2013"
+    value = 100 * share
+    return f"{number(value, 3 if value >= 0.1 else 2)}{GAP}%"

@@ -1,0 +1,97 @@
+"""What `detent check` shows: every value in effect, what follows from them, and what looks wrong.
+
+Data only; the command line prints it.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+from detent.files.fields import held_leaves
+from detent.files.findings import Caution, Derived
+from detent.files.problems import dotted, format_value
+from detent.methods.load import AxisFile
+from detent.methods.registry import METHODS
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class EffectiveRow:
+    """One value in effect.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key.
+    value : str
+        Value with its SI unit (prefixed).
+    written : str
+        Value as it was written; empty for a default.
+    origin : str
+        "FILE line 12", "default", "catalogue NAME" or "--set".
+    doc : str
+        Meaning of the key.
+    """
+
+    key: str
+    value: str
+    written: str
+    origin: str
+    doc: str
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class CheckReport:
+    """Everything `detent check` has to show.
+
+    Attributes
+    ----------
+    file, name, method : str
+        The file as the user named it, the axis's name and its control method.
+    rows : tuple of EffectiveRow
+        Every value in effect, in the order of the schema.
+    derived : tuple of Derived
+        What follows from them.
+    warnings : tuple of Caution
+        What looks wrong; empty for a sound axis.
+    """
+
+    file: str
+    name: str
+    method: str
+    rows: tuple[EffectiveRow, ...]
+    derived: tuple[Derived, ...]
+    warnings: tuple[Caution, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the report as plain data for ``--json``."""
+        return dataclasses.asdict(self)
+
+
+def check_spec(axis: AxisFile) -> CheckReport:
+    """Look an axis over.
+
+    Parameters
+    ----------
+    axis : AxisFile
+        As `read_axis` returns it: without problems.
+
+    Returns
+    -------
+    CheckReport
+        Values in effect with their origin, derived figures, warnings.
+    """
+    header = axis.spec.axis
+    method = METHODS[header.method]
+    warnings = tuple(method.cautions(axis.spec))
+    return CheckReport(axis.file, header.name, header.method, tuple(_rows(axis)), method.derive(axis.spec), warnings)
+
+
+def _rows(axis: AxisFile) -> Iterator[EffectiveRow]:
+    """Every value in effect."""
+    for path, field, held in held_leaves(axis.spec):
+        key = dotted(path)
+        origin = axis.origins.get(key, "default")
+        if origin.startswith("line "):
+            origin = f"{axis.file} {origin}"
+        value = format_value(field, held)
+        yield EffectiveRow(key, value, axis.texts.get(key, ""), origin, field.description or "")

@@ -1,0 +1,90 @@
+"""From a checked specification to the parameters of the filtered servo: SI values to pulses, counts and ticks."""
+
+import math
+
+from detent.axisfile.interference import fill_interference, fill_push
+from detent.control.pulse_generator import PER_PULSE
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.filtered_servo.system import TICK, FilteredServoParams
+from detent.plant.drive_train import DriveTrainParams, fill_period
+from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
+
+SUBSTEP_SHARE = 0.25
+"""Longest substep of the power series, as a share of the fastest time constant."""
+
+
+def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
+    """Parameters of the filtered servo.
+
+    Parameters
+    ----------
+    spec : FilteredServoSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    FilteredServoParams
+    """
+    p = FilteredServoParams()
+    method, drive = spec.method, spec.drive
+    p.generator.ticks_per_second = 1 / TICK
+    p.generator.acceleration = method.command_acceleration / spec.pulse * TICK * PER_PULSE
+    p.deviation.gain = method.position_gain
+    p.deviation.range = (1 << (method.position_bits - 1)) - 1
+    full = 1 << (drive.word_bits - 1)
+    p.deviation.word_limit = spec.word_limit
+    p.deviation.whole_words = drive.whole_words
+    p.speed.half = 1 << (method.counter_bits - 1)
+    _fill_filter(p.filter, spec)
+    p.amplifier.voltage_drive = drive.amplifier == "voltage"
+    p.amplifier.per_count = drive.supply / full if p.amplifier.voltage_drive else drive.current_per_count
+    p.amplifier.carrier_ticks = round(1 / (drive.pwm_frequency * TICK))
+    p.encoder.edge_pitch = spec.pulse
+    # Zero lies between two edges: on one, rounding alone would make a pulse at power-on.
+    p.encoder.origin = -spec.pulse / 2
+    p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
+    p.encoder.missing = spec.encoder.missing_edges
+    _fill_drive_train(p.train, spec)
+    fill_interference(p.interference, spec.disturbance.lines, TICK)
+    fill_push(p.push, spec.disturbance.push, TICK)
+    p.window = method.in_position
+    p.window_ticks = round(method.in_position_time / TICK)
+    return p
+
+
+def sample_microseconds(spec: FilteredServoSpec) -> int:
+    """Period of the sample clock in clocks of the decoder."""
+    return round(spec.method.sample_period * 1e6)
+
+
+def _fill_filter(f: SpeedFilterParams, spec: FilteredServoSpec) -> None:
+    method = spec.method
+    f.kind = {"none": NONE, "float": FLOAT, "fixed": FIXED}[method.filter]
+    f.scale, f.coefficient = method.scale, method.coefficient
+    f.shift = round(-math.log2(method.coefficient))
+    f.fraction_bits = method.fraction_bits
+
+
+def _fill_drive_train(t: DriveTrainParams, spec: FilteredServoSpec) -> None:
+    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
+    t.inductance = spec.motor.inductance
+    t.force_constant = spec.motor.torque_constant / spec.radius
+    t.emf_constant = spec.motor.back_emf_constant / spec.radius
+    t.mass = spec.mass
+    for side in ("right", "left"):
+        friction = getattr(spec.mechanics.friction, side)
+        for kind in ("coulomb", "static", "viscous"):
+            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind))
+    t.left_end, t.right_end = 0.0, spec.limits.travel
+    t.period = TICK
+    t.substep = SUBSTEP_SHARE / _fastest_rate(t)
+    fill_period(t)
+
+
+def _fastest_rate(t: DriveTrainParams) -> float:
+    """Bound of the system matrix [1/s], in scaled coordinates."""
+    viscous = max(t.friction.viscous_right, t.friction.viscous_left) / t.mass
+    damping = t.force_constant * t.emf_constant / (t.resistance * t.mass)
+    if t.inductance == 0.0:
+        return 1.0 + viscous + damping
+    return t.resistance / t.inductance + viscous + math.sqrt(damping * t.resistance / t.inductance)

@@ -1,0 +1,296 @@
+"""What the filter does to a counted speed: this servo beside its alternatives (filtered-servo tests 11, 20, 21, 23).
+
+The conventional servo has the same window and multiplier but no filter. The other two ways to a finer drive word are a
+longer window, with a multiplier of 1, and the multiplier alone. All four drive the same motor at the same rate, and
+stop.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.analysis.arguments import require_positive
+from detent.control.deviation_counter import FAULT
+from detent.control.pulse_generator import PER_PULSE
+from detent.methods.filtered_servo.derive import Machine as Figures
+from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
+from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
+from detent.methods.moves.run import Progress
+from detent.record.machine import Machine, filtered_servo_machine
+from detent.record.recorder import Recorder, make_trace
+from detent.record.trace import Trace
+
+RATE = 1037.0
+"""Rate of the specification [pulses/s]: not a whole number of pulses in a window of 5 ms."""
+
+WINDOW = 20e-3
+"""B TS of the worked example [s]. The times below are for it; an axis whose B TS is longer gets longer ones."""
+
+STEADY_TIME = 8.0
+"""Length of the run at constant rate [s]; figures are taken from its second half."""
+
+RAMP = 1.0
+"""The command is at its rate after this time at the latest [s], whatever its acceleration."""
+
+STOP_AFTER = 2.0
+STOP_TIME = 2.0
+"""When the command stops, and how long the axis is watched after that [s]."""
+
+SHOWN = 10
+"""Length of the curves, in windows B TS."""
+
+LONGEST = 50.0
+"""Longest run, as a multiple of the times above."""
+
+MOST_ROWS = 400_000
+
+SETTLED = 4
+"""An axis has settled when its following error swings by no more pulses in the last quarter after a stop."""
+
+WIDE_COUNTER = 16
+"""Width of the speed counter for the long window [bit]."""
+
+ENDLESS = 10**12
+"""Pulses that no run gets to the end of."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeedbackCase:
+    """One way to feed the counted speed back. Figures of a case that has failed with a fault are NaN.
+
+    Attributes
+    ----------
+    name : str
+        Such as "with filter".
+    sample_period : float
+        TS, window of the counter [s].
+    scale : int
+        B, multiplier of the count.
+    coefficient : float
+        A of the filter; 1 for none.
+    kv : float
+        Velocity-error constant K1/(B TS) [1/s].
+    std_speed, std_error : float
+        Standard deviation of the speed word y and of the error E at constant rate [count].
+    force_ripple : float
+        Standard deviation of the motor's force at constant rate [N].
+    error_range : (float, float)
+        Smallest and largest E at constant rate [count].
+    stop_overshoot : float
+        How far the axis runs beyond the place where the command has stopped [count]; NaN if it does not settle there.
+    stable : bool
+        It settles, and without a fault.
+    gain_limit : float
+        Gain K at which the loop becomes unstable, by the exact sampled-loop model [1/s^2]; infinite if there is none.
+    gain_margin : float
+        `gain_limit` over the gain of the axis.
+    t : ndarray, shape (n,)
+        Time since power-on [s]: the end of the run at constant rate.
+    error, speed_word : ndarray, shape (n,)
+        E and y [count].
+    """
+
+    name: str
+    sample_period: float
+    scale: int
+    coefficient: float
+    kv: float
+    std_speed: float
+    std_error: float
+    force_ripple: float
+    error_range: tuple[float, float]
+    stop_overshoot: float
+    stable: bool
+    gain_limit: float
+    gain_margin: float
+    t: Numbers
+    error: Numbers
+    speed_word: Numbers
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
+        names = (
+            "name", "sample_period", "scale", "coefficient", "kv", "std_speed", "std_error", "force_ripple",
+            "stop_overshoot", "stable", "gain_limit", "gain_margin",
+        )  # fmt: skip
+        found = {name: _finite(getattr(self, name)) for name in names}
+        return found | {"error_range": [_finite(value) for value in self.error_range]}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeedbackComparison:
+    """Result of `compare_feedback`.
+
+    Attributes
+    ----------
+    cases : tuple of FeedbackCase
+        Conventional, with filter, long window, small multiplier.
+    rate : float
+        Rate of the command pulses [1/s].
+    gain : float
+        K, drive word to acceleration [1/s^2].
+    tau_m : float
+        Mechanical time constant of back-EMF and viscous friction [s]; infinite without both.
+    """
+
+    cases: tuple[FeedbackCase, ...]
+    rate: float
+    gain: float
+    tau_m: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
+        found = {name: _finite(getattr(self, name)) for name in ("rate", "gain", "tau_m")}
+        return found | {"cases": [case.to_dict() for case in self.cases]}
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no words for infinity and NaN."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def compare_feedback(
+    spec: FilteredServoSpec, *, rate: float = RATE, progress: Progress | None = None
+) -> FeedbackComparison:
+    """Drive the axis at constant rate and stop it, with each way of feeding the counted speed back.
+
+    Parameters
+    ----------
+    spec : FilteredServoSpec
+        The axis; its ``[disturbance]`` is left out.
+    rate : float
+        Command pulses per second; lowered to `limits.speed` where that is less.
+    progress : callable, optional
+        Told the share done.
+
+    Raises
+    ------
+    DetentError
+        The rate is not above 0.
+    """
+    require_positive("compare_feedback: rate", rate, "pulses/s", "the rate of the command pulses")
+    rate = min(rate, spec.limits.speed / spec.pulse)
+    variants = list(feedback_variants(spec))
+    stretch = min(max(1.0, spec.method.scale * spec.method.sample_period / WINDOW), LONGEST)
+    cases: list[FeedbackCase] = []
+    for name, variant in variants:
+        if progress is not None:
+            progress(len(cases) / len(variants), name)
+        cases.append(_measure(name, variant, rate, stretch))
+    return FeedbackComparison(cases=tuple(cases), rate=rate, gain=spec.gain, tau_m=Figures(spec).tau_m)
+
+
+def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredServoSpec]]:
+    """The same axis with each of the four kinds of speed feedback."""
+    method = spec.method
+    window = method.scale * method.sample_period
+    changes: dict[str, dict[str, object]] = {
+        "conventional": {"filter": "none"},
+        "with filter": {"filter": "float" if method.filter == "none" else method.filter},
+        "long window": {"filter": "none", "scale": 1, "sample_period": window, "counter_bits": WIDE_COUNTER},
+        "small multiplier": {"filter": "none", "scale": 1},
+    }
+    for name, change in changes.items():
+        yield name, spec.model_copy(update={"method": method.model_copy(update=change)})
+
+
+def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) -> FeedbackCase:
+    """One case: figures of a run at constant rate, of a stop, and of the model."""
+    trace = _run_steadily(spec, rate, STEADY_TIME * stretch)
+    overshoot = _stop(spec, rate, stretch)
+    failed = not len(trace) or math.isnan(overshoot)
+    model = Figures(spec).loop
+    limit = model.stability_limit()
+    error, speed = trace["deviation.error"], trace["filter.output"]
+    force = trace["train.current"] * (spec.motor.torque_constant / spec.radius)
+    shown = trace.time >= STEADY_TIME * stretch - SHOWN * WINDOW * stretch
+    return FeedbackCase(
+        name=name,
+        sample_period=spec.method.sample_period,
+        scale=spec.method.scale,
+        coefficient=model.coefficient,
+        kv=model.velocity_error_constant,
+        std_speed=_std(speed),
+        std_error=_std(error),
+        force_ripple=_std(force),
+        error_range=(float(error.min()), float(error.max())) if len(error) else (math.nan, math.nan),
+        stop_overshoot=overshoot,
+        stable=not failed,
+        gain_limit=limit,
+        gain_margin=limit / spec.gain,
+        t=trace.time[shown],
+        error=error[shown],
+        speed_word=speed[shown],
+    )
+
+
+def _std(values: Numbers) -> float:
+    """Standard deviation; NaN of nothing."""
+    return float(np.std(values)) if len(values) else math.nan
+
+
+class _Bench:
+    """An axis after reset, with way enough, commanded to a rate without end."""
+
+    def __init__(self, spec: FilteredServoSpec, rate: float, seconds: float, recorder: Recorder | None = None) -> None:
+        half = math.ceil(2 * rate * seconds) + 100_000  # pulses to either side, more than an unstable axis swings
+        limits = spec.limits.model_copy(update={"travel": 2 * half * spec.pulse})
+        mechanics = spec.mechanics.model_copy(update={"start_position": half * spec.pulse})
+        stated = spec.method.command_acceleration
+        acceleration = max(stated, rate * spec.pulse / RAMP) if stated > 0 else 0.0  # 0 jumps to the rate
+        method = spec.method.model_copy(update={"command_acceleration": acceleration})
+        update = {"limits": limits, "mechanics": mechanics, "method": method, "disturbance": DisturbanceTable()}
+        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(
+            spec.model_copy(update=update), recorder
+        )
+        self.state = self.machine.state
+        self.machine.pass_ticks(1)  # leaves the reset
+        self.state.generator.rate, self.state.generator.goal = round(rate * PER_PULSE), ENDLESS
+
+    def run(self, seconds: float) -> bool:
+        """Let time pass, up to a fault; False when there was one."""
+        left = round(seconds / TICK)
+        while left > 0 and self.state.deviation.state != FAULT:
+            left -= self.machine.pass_ticks(left)
+            self.state.event = 0
+        return self.state.deviation.state != FAULT
+
+
+def _run_steadily(spec: FilteredServoSpec, rate: float, seconds: float) -> Trace:
+    """Second half of a run at constant rate; no rows if the axis fails."""
+    blocks: list[NDArray[np.void]] = []
+
+    def keep(block: NDArray[np.void]) -> None:
+        late: Any = block["t"] >= seconds / 2
+        blocks.append(block[late])
+
+    every = max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS))
+    signals = ("deviation.error", "filter.output", "train.current")
+    recorder = Recorder(FilteredServo, signals, every=every, period=TICK, sink=keep)
+    bench = _Bench(spec, rate, seconds, recorder)
+    done = bench.run(seconds)
+    bench.machine.close()
+    return make_trace(recorder, blocks if done else [], {})
+
+
+def _stop(spec: FilteredServoSpec, rate: float, stretch: float) -> float:
+    """Overshoot after a stop from constant rate [count]; NaN for an axis that does not settle."""
+    blocks: list[NDArray[np.void]] = []
+    every = max(1, math.ceil(stretch))
+    recorder = Recorder(FilteredServo, ("deviation.deviation",), every=every, period=TICK, sink=blocks.append)
+    bench = _Bench(spec, rate, STOP_AFTER * stretch, recorder)
+    bench.run(STOP_AFTER * stretch)
+    bench.state.generator.goal = bench.state.generator.command
+    settled = bench.run(STOP_TIME * stretch)
+    bench.machine.close()
+    trace = make_trace(recorder, blocks, {})
+    after = trace["deviation.deviation"][trace.time > STOP_AFTER * stretch]
+    if not settled or np.ptp(after[-len(after) // 4 :]) > SETTLED:
+        return math.nan
+    return float(max(0, -int(after.min())))

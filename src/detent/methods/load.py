@@ -1,0 +1,337 @@
+"""From an axis file to a checked specification: `load_spec`, or `read_axis` where the origin of each value matters."""
+
+import copy
+import difflib
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+
+from detent.axisfile.catalogue import Catalogue
+from detent.errors import FileProblem, InputError
+from detent.files.fields import (
+    AnyName,
+    Table,
+    example_of,
+    held_leaves,
+    is_named,
+    leaf_fields,
+    table_of,
+    unit_of,
+)
+from detent.files.findings import Contradiction
+from detent.files.locate import Path
+from detent.files.overrides import apply_overrides, as_table, put_value
+from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path, nearest_key
+from detent.files.source import Source, read_source
+from detent.methods.registry import METHODS, AnySpec, Method
+from detent.units import QuantityError, parse_quantity
+
+METHOD_KEY: Path = ("axis", "method")
+MOTION_KEY: Path = ("axis", "motion")
+
+
+@dataclass(frozen=True, slots=True)
+class AxisFile:
+    """A specification and where each of its values came from.
+
+    Attributes
+    ----------
+    file : str
+        The file as the user named it.
+    spec : AxisSpec
+        The specification of its method, in SI units.
+    origins : dict
+        By dotted key: "line 12", "--set" or "catalogue NAME"; keys left to their default are absent.
+    texts : dict
+        By dotted key: the value as written, where it was written.
+    """
+
+    file: str
+    spec: AnySpec
+    origins: dict[str, str]
+    texts: dict[str, str]
+
+
+@dataclass(slots=True)
+class _Layers:
+    """What the file, the catalogue and the overrides say together."""
+
+    tables: dict[str, Any]
+    overrides: dict[Path, str] = field(default_factory=dict[Path, str])
+    catalogue: dict[Path, str] = field(default_factory=dict[Path, str])
+    problems: list[FileProblem] = field(default_factory=list[FileProblem])
+    doubtful: set[Path] = field(default_factory=set[Path])
+
+
+def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> AnySpec:
+    """Load an axis file.
+
+    Parameters
+    ----------
+    path : Path or str
+        The axis file (TOML).
+    overrides : sequence of str
+        Values that replace the file's, such as ``"drive.supply=34 V"`` or ``"method.span=steady"``.
+
+    Returns
+    -------
+    AxisSpec
+        The specification of the method the file names: all values, defaults filled, in SI units.
+
+    Raises
+    ------
+    InputError
+        With every problem of the file and of the overrides.
+    """
+    return read_axis(path, overrides).spec
+
+
+def read_axis(path: FilePath | str, overrides: Sequence[str] = ()) -> AxisFile:
+    """Load an axis file and keep where each value came from; parameters and errors as `load_spec`."""
+    return axis_of(read_source(path), overrides)
+
+
+def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
+    """Check a source that has been read; parameters and errors as `load_spec`."""
+    if not source.is_readable:
+        raise InputError(source.problems)
+    method = _method_of(source, overrides)
+    model = method.spec
+    tables = copy.deepcopy(source.tables)
+    overridden = apply_overrides(tables, overrides, model)
+    layers = _Layers(tables, overridden.texts, problems=overridden.problems)
+    reporter = Reporter(source.file, source.places, layers.overrides, model)
+    _apply_catalogue(layers, reporter, method)
+    layers.problems += [reporter.wrong_name(path, field) for path, field in bad_names(model, layers.tables)]
+    spec = _validated(layers, reporter, method, is_whole=source.is_whole)
+    problems = [*source.problems, *layers.problems]
+    if problems:
+        raise InputError(problems)
+    return AxisFile(source.file, spec, *_origins(source, layers, spec))
+
+
+def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
+    """Method the file names, for its motion; without a name, the first, so that the rest is checked all the same."""
+    name, stated = _stated(source, overrides, METHOD_KEY)
+    if not isinstance(name, str):
+        return next(iter(METHODS.values()))
+    if name in METHODS:
+        method = METHODS[name]
+        turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
+        return replace(method, spec=method.rotary) if turns else method
+    near = difflib.get_close_matches(name.lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
+    remedy = f'did you mean "{near[0]}"?' if near else f'write method = "{next(iter(METHODS))}"'
+    overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
+    reporter = Reporter(source.file, source.places, overridden, Table)
+    # Nothing else can be said: another method would have other keys.
+    problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
+    raise InputError([*source.problems, problem])
+
+
+def _stated(source: Source, overrides: Sequence[str], path: Path) -> tuple[object, bool]:
+    """Value of a key that decides how the others are read, and whether an override gives it."""
+    parts = [text.partition("=") for text in overrides]
+    values = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == dotted(path)]
+    return (values[-1], True) if values else (_value_at(source.tables, path), False)
+
+
+def _all_methods() -> str:
+    """Every word that ``axis.method`` may be."""
+    return " or ".join(f'"{known}"' for known in METHODS)
+
+
+def _apply_catalogue(layers: _Layers, reporter: Reporter, method: Method[Any]) -> None:
+    """Put a catalogue motor's constants under the stated ones, for every motor of the file that names one."""
+    if method.catalogue is None:
+        return
+    known = [path for path, _ in leaf_fields(method.spec)]
+    pattern = next(path for path in known if path[-2:] == ("motor", "catalogue"))
+    keys = {path[-1] for path in known if path[:-1] == pattern[:-1]}
+    for path in list(_paths_like(layers.tables, pattern)):
+        _apply_motor(layers, reporter, method.catalogue, path, keys)
+
+
+def _paths_like(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:
+    """Paths of the file that a path of the schema stands for, with a value."""
+    first, *rest = pattern
+    for key in tables if isinstance(first, AnyName) else [first] if first in tables else []:
+        if not rest:
+            yield (*done, key)
+        else:
+            yield from _paths_like(as_table(tables[key]), tuple(rest), (*done, key))
+
+
+def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: set[str]) -> None:
+    """One motor: `path` is that of its key ``catalogue``, `keys` are those of its table."""
+    name = _value_at(layers.tables, path)
+    if not name:
+        return
+    around = path[:-1]
+    if not isinstance(name, str):
+        # Validation refuses it; without the motor it names, missing constants are no news.
+        layers.doubtful.add(around)
+        return
+    constants = catalogue.constants(name)
+    if constants is None:
+        names = list(catalogue.entries())
+        near = difflib.get_close_matches(name.lower(), {known.lower(): known for known in names}, n=1, cutoff=0.4)
+        nearest = next((known for known in names if near and known.lower() == near[0]), None)
+        constants_there = f"choose one of these, or state the constants in [{dotted(around)}]"
+        remedy = f'did you mean "{nearest}"?' if nearest else constants_there
+        layers.problems.append(
+            reporter.problem(path, reporter.came(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
+        )
+        layers.doubtful.add(around)
+        return
+    motor = as_table(_value_at(layers.tables, around))
+    for key, value in constants.items():
+        if key not in motor and key in keys:
+            motor[key] = value
+            layers.catalogue[(*around, key)] = name
+
+
+def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AnySpec:
+    """Validate all layers together; what is wrong joins ``layers.problems``."""
+    tables = layers.tables
+    # Rules between keys need a whole specification: keys with problems are replaced by ones that are allowed, and the
+    # rules that look at them are passed over. Each round can uncover keys below a table that was replaced.
+    for round_number in range(8):
+        try:
+            spec = method.fill(method.spec.model_validate(tables))
+        except ValidationError as error:
+            found: list[dict[str, Any]] = [dict(entry) for entry in error.errors(include_url=False)]
+            if round_number == 0:
+                layers.problems += _tell(found, layers, reporter, method, is_whole=is_whole)
+            layers.doubtful |= {key_path(entry["loc"]) for entry in found}
+            tables = _patched(tables, found, method.spec)
+        else:
+            found_together = (contradiction for rule in method.rules for contradiction in rule(spec))
+            layers.problems += _contradictions(found_together, layers, reporter)
+            return spec
+    raise InputError(layers.problems)
+
+
+def _tell(
+    found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool
+) -> list[FileProblem]:
+    """Problems of one validation, without those that only follow from others."""
+    by_key: dict[Path, list[dict[str, Any]]] = {}
+    for entry in found:
+        by_key.setdefault(key_path(entry["loc"]), []).append(entry)
+    unknown = [path for path, entries in by_key.items() if entries[0]["type"] == "extra_forbidden"]
+    misspelt = {(*path[:-1], nearest_key(method.spec, path)) for path in unknown}
+    problems: list[FileProblem] = []
+    for path, entries in by_key.items():
+        kind = entries[0]["type"]
+        follows = path[:-1] in layers.doubtful or path in misspelt or not is_whole
+        # A default that is made from another key cannot be made when that key is wrong.
+        if kind == "default_factory_not_called" or (kind == "missing" and follows):
+            continue
+        problem = reporter.from_errors(entries)
+        if kind == "quantity":
+            problem = replace(problem, remedy=problem.remedy + _other_motion(method, path, entries[0]["input"]))
+        # The model knows the one method it was made for; a file may name any.
+        problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
+    return problems
+
+
+def _other_motion(method: Method[Any], path: Path, value: object) -> str:
+    """What to add to a remedy where a quantity would do for an axis of the other motion; empty where it would not."""
+    if method.rotary is None or not isinstance(value, str):
+        return ""
+    turns = method.spec is method.rotary
+    other = METHODS[method.name].spec if turns else method.rotary
+    try:
+        parse_quantity(value, unit_of(field_at(other, path)))
+    except QuantityError:
+        return ""
+    return f', or set axis.motion = "{"linear" if turns else "rotary"}"'
+
+
+def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> list[FileProblem]:
+    """Problems between keys that are each right for themselves."""
+    problems: list[FileProblem] = []
+    for contradiction in found:
+        paths = contradiction.paths
+        if any(_overlap(path, doubtful) for path in paths for doubtful in layers.doubtful):
+            continue
+        # What the user changed last is to blame first.
+        stated = [path for path in paths if path in layers.overrides] or [
+            path for path in paths if reporter.is_stated(path)
+        ]
+        blamed = stated[0] if stated else paths[0]
+        came = reporter.came(blamed) if stated else "the default"
+        problems.append(
+            reporter.problem(blamed, came, _allowed_at(blamed, contradiction, reporter), contradiction.remedy)
+        )
+    return problems
+
+
+def _allowed_at(blamed: Path, contradiction: Contradiction, reporter: Reporter) -> str:
+    """What is allowed; told at another key than the rule is about, it names that key and its value."""
+    ruled = contradiction.paths[0]
+    if blamed == ruled:
+        return contradiction.allowed
+    value = reporter.came(ruled) if reporter.is_stated(ruled) else "its default"
+    return f"{contradiction.keys[0]} ({value}) {contradiction.allowed}"
+
+
+def _overlap(one: Path, other: Path) -> bool:
+    """True when one path is the other or lies inside it."""
+    length = min(len(one), len(other))
+    return one[:length] == other[:length]
+
+
+def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Table]) -> dict[str, Any]:
+    """Copy of the tables in which keys with problems are left out or replaced by an allowed value."""
+    patched = copy.deepcopy(tables)
+    for entry in found:
+        path = key_path(entry["loc"])
+        if entry["type"] == "extra_forbidden" or not field_at(model, path).is_required():
+            _drop(patched, path)
+        elif is_named(field_at(model, path)):
+            put_value(patched, path, {example_of(field_at(model, path)): {}})
+        elif table_of(field_at(model, path)) is not None:
+            put_value(patched, path, {})
+        else:
+            put_value(patched, path, _example_value(example_of(field_at(model, path))))
+    return patched
+
+
+def _drop(tables: dict[str, Any], path: Path) -> None:
+    """Remove a key from nested tables."""
+    for key in path[:-1]:
+        tables = tables[key]
+    tables.pop(path[-1], None)
+
+
+def _value_at(tables: dict[str, Any], path: Path) -> object:
+    """Value of a key in nested tables; None where there is none."""
+    for key in path[:-1]:
+        tables = as_table(tables.get(key))
+    return tables.get(path[-1])
+
+
+def _example_value(example: str) -> object:
+    """Value of an example, which is TOML."""
+    return tomllib.loads(f"value = {example}")["value"]
+
+
+def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, str], dict[str, str]]:
+    """Where each value came from, and how it was written there."""
+    origins: dict[str, str] = {}
+    texts: dict[str, str] = {}
+    for path, _, _ in held_leaves(spec):
+        key = dotted(path)
+        if path in layers.overrides:
+            origins[key], texts[key] = "--set", layers.overrides[path]
+        elif path in source.places:
+            origins[key], texts[key] = f"line {source.places[path].line}", source.places[path].text.strip("\"'")
+        elif path in layers.catalogue:
+            origins[key] = f"catalogue {layers.catalogue[path]}"
+            texts[key] = str(_value_at(layers.tables, path))
+    return origins, texts

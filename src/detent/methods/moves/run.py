@@ -1,0 +1,261 @@
+"""A list of moves on a simulated servo axis, from power-on: what an observer beside the carriage sees."""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from detent.errors import AxisError
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.moves.host import Destination, FilteredHost, Host, PhaseHost, check_job
+from detent.methods.moves.job import MoveJob
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.record.machine import AnyRecorder
+from detent.sensing.gauge import set_gauge
+from detent.units import format_quantity
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
+
+ServoSpec = PhaseServoSpec | FilteredServoSpec
+
+PHASE_SIGNALS = (
+    "train.position", "train.velocity", "train.current", "sequencer.mode", "sequencer.state", "sequencer.distance",
+    "sequencer.ready", "sequencer.stop", "law.setpoint", "law.integral", "law.word", "speed.word",
+    "converters.absolute.word", "gauge.target",
+)  # fmt: skip
+FILTERED_SIGNALS = (
+    "train.position", "train.velocity", "train.current", "generator.command", "deviation.deviation", "deviation.error",
+    "deviation.word", "speed.word", "filter.output", "clock.period", "gauge.target",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class MoveRecord:
+    """How one move went; lengths in metres, times in seconds since power-on.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    label : str
+        The character, in a text.
+    begin : float
+        When it was commanded.
+    start, target : float
+        Where the axis stood, and where it had to go.
+    switched : float
+        When position mode was entered; NaN for an axis of one mode.
+    ready : float
+        When the axis said that it had arrived.
+    settled : float
+        When it was outside the tolerance for the last time.
+    end : float
+        End of the dwell.
+    overshoot : float
+        How far it went beyond the target, 0 if it did not.
+    error : float
+        Target less position at the end of the dwell.
+    peak_speed : float
+        Largest speed [m/s].
+    """
+
+    number: int
+    label: str
+    begin: float
+    start: float
+    target: float
+    switched: float
+    ready: float
+    settled: float
+    end: float
+    overshoot: float
+    error: float
+    peak_speed: float
+
+    @property
+    def move_time(self) -> float:
+        """From the command until the axis stayed within the tolerance [s]."""
+        return max(self.settled - self.begin, 0.0)
+
+
+@dataclass(slots=True)
+class MoveRun:
+    """Outcome of a list of moves. Times [s], lengths [m], current [A], energy [J].
+
+    Attributes
+    ----------
+    done : bool
+        Every move arrived and stood within the tolerance.
+    failure : str
+        Why not, and what to do; empty if `done`.
+    time_ready, time_end : float
+        First readiness and end of the job, since power-on.
+    moves : list of MoveRecord
+        Moves made, in order.
+    tolerance, grid : float
+        Distance that counts as arrived; step of the positions the axis can be sent to.
+    faults : dict
+        Pulses put in and taken away, samples lost and corrupted by interference.
+    """
+
+    job: MoveJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    time_ready: float = 0.0
+    time_end: float = 0.0
+    moves: list[MoveRecord] = field(default_factory=list[MoveRecord])
+    tolerance: float = 0.0
+    grid: float = 0.0
+    peak_current: float = 0.0
+    energy: float = 0.0
+    faults: dict[str, int] = field(default_factory=dict[str, int])
+
+    @property
+    def worst_error(self) -> float:
+        """Largest magnitude of the error at the end of a dwell."""
+        return max((abs(move.error) for move in self.moves), default=0.0)
+
+    @property
+    def worst_overshoot(self) -> float:
+        """Largest overshoot."""
+        return max((move.overshoot for move in self.moves), default=0.0)
+
+    @property
+    def moves_per_second(self) -> float:
+        """Moves, dwells included, per second after the first readiness."""
+        span = self.time_end - self.time_ready
+        return len(self.moves) / span if span > 0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``."""
+        names = (
+            "done", "failure", "warnings", "time_ready", "time_end", "tolerance", "grid", "peak_current", "energy",
+            "faults", "worst_error", "worst_overshoot", "moves_per_second",
+        )  # fmt: skip
+        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind}
+        found |= {name: getattr(self, name) for name in names}
+        found["moves"] = [asdict(move) for move in self.moves]
+        return found
+
+
+def make_host(spec: ServoSpec, recorder: AnyRecorder | None = None) -> Host:
+    """Host of the axis, at power-on."""
+    return PhaseHost(spec, recorder) if isinstance(spec, PhaseServoSpec) else FilteredHost(spec, recorder)
+
+
+def run_moves(
+    spec: ServoSpec, job: MoveJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> MoveRun:
+    """Make a list of moves on the axis of `spec`, from power-on.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec or FilteredServoSpec
+        The axis.
+    job : MoveJob
+        The moves.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    MoveRun
+        What the axis did; a fault, or a move that ended elsewhere, is in `failure`, not raised.
+
+    Raises
+    ------
+    InputError
+        A move cannot be commanded to this axis.
+    """
+    host = make_host(spec, recorder)
+    result = MoveRun(job, tolerance=host.tolerance, grid=host.grid)
+    destinations = check_job(host, job)
+    try:
+        host.start()
+        result.time_ready = host.machine.time
+        for done, to in enumerate(destinations):
+            result.failure = _make_move(host, to, result)
+            if result.failure:
+                break
+            if progress is not None:
+                progress((done + 1) / len(destinations), f"move {done + 1} of {len(destinations)}")
+    except AxisError as error:
+        result.failure = str(error)
+    finally:
+        host.machine.close()
+    _finish(host, result)
+    return result
+
+
+def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
+    """One move and its dwell; what went wrong, or nothing."""
+    state, begin = host.state, host.machine.time
+    start = float(state.train.position)
+    set_gauge(state.gauge, state.tick, start, to.position, host.tolerance)
+    host.command(to)
+    arrived = host.wait(host.time_limit(to))
+    ready = host.machine.time if arrived else math.nan
+    if arrived and to.move.dwell > 0:
+        host.stands(to.move.dwell)
+    error = to.position - float(state.train.position)
+    result.moves.append(
+        MoveRecord(
+            number=to.move.number,
+            label=to.move.label,
+            begin=begin,
+            start=start,
+            target=to.position,
+            switched=host.switched,
+            ready=ready,
+            settled=state.gauge.outside * host.machine.tick,
+            end=host.machine.time,
+            overshoot=max(float(state.gauge.beyond), 0.0),
+            error=error,
+            peak_speed=float(state.gauge.peak_speed),
+        )
+    )
+    return _verdict(host, to, error, arrived=arrived)
+
+
+def _verdict(host: Host, to: Destination, error: float, *, arrived: bool) -> str:
+    """Why a move failed; empty if it did not."""
+    where = f"move {to.move.number} to {format_quantity(to.position, 'm', 6)}"
+    if host.failure:
+        return f"{where}: {host.failure}"
+    if not arrived:
+        limit = format_quantity(host.time_limit(to), "s")
+        return f"{where}: did not arrive within {limit}; it stands {_away(host, error)}; look at the report's figures"
+    if abs(error) > host.tolerance:
+        return (
+            f"{where}: the axis says that it has arrived and stands {_away(host, error)}; look for pulses that noise "
+            "has added or removed, or for a force it cannot hold"
+        )
+    return ""
+
+
+def _away(host: Host, error: float) -> str:
+    """How far from the target, in the unit of the axis too."""
+    side = "short of it to the left" if error > 0 else "to the right of it"
+    counts = abs(error) / (host.spec.step if isinstance(host, PhaseHost) else host.grid)
+    name = "steps" if isinstance(host, PhaseHost) else "pulses"
+    text = f"{format_quantity(abs(error), 'm')} ({counts:.1f} {name}) {side}"
+    pitches = error / host.grid
+    if isinstance(host, PhaseHost) and abs(pitches) > 0.5 and abs(pitches - round(pitches)) < 0.1:
+        text += (
+            f", on the positioning point {abs(round(pitches))} {'pitch' if abs(round(pitches)) == 1 else 'pitches'} off"
+        )
+    return text
+
+
+def _finish(host: Host, result: MoveRun) -> None:
+    """Totals."""
+    state = host.state
+    result.time_end = host.machine.time
+    result.peak_current, result.energy = float(state.train.peak_current), float(state.train.energy)
+    n = state.interference
+    result.faults = {"inserted": n.inserted, "removed": n.removed, "lost samples": n.lost, "corrupted": n.corrupted}
+    result.done = not result.failure and len(result.moves) == len(result.job.moves)

@@ -1,0 +1,109 @@
+"""From a checked specification to the parameters of the phase servo: SI values to counts, masks and phases."""
+
+import math
+
+from detent.axisfile.interference import fill_interference, fill_push
+from detent.control.phase_law import LawParams
+from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
+from detent.kernel.turn_table import TURN
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.methods.phase_servo.system import ConverterParams, PhaseServoParams
+from detent.plant.drive_train import DriveTrainParams, fill_period
+from detent.sensing.phase_detector import DetectorParams, fill_errors
+
+SUBSTEP = 1e-5
+"""Longest substep of the power series that makes the whole-period matrices [s]; a tick is shorter than this."""
+
+
+def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
+    """Parameters of the phase servo.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    PhaseServoParams
+    """
+    p = PhaseServoParams()
+    p.clocks.integrate_mask = (1 << spec.clock.integrate_tap) - 1
+    p.clocks.sample_mask = (1 << spec.clock.sample_tap) - 1
+    _fill_converters(p.converters, spec)
+    _fill_detector(p.detector, spec)
+    _fill_sequencer(p.sequencer, spec)
+    _fill_law(p.law, spec)
+    p.speed.half = 1 << (spec.method.speed_bits - 1)
+    p.pwm.half = 1 << (spec.drive.pwm_bits - 1)
+    p.bridge.supply, p.bridge.limit = spec.drive.supply, spec.limits.effort
+    _fill_drive_train(p.train, spec)
+    fill_interference(p.interference, spec.disturbance.lines, spec.tick)
+    fill_push(p.push, spec.disturbance.push, spec.tick)
+    return p
+
+
+def velocity_table(spec: PhaseServoSpec) -> list[int]:
+    """Reference velocity against distance [pulses per sample], up to the entry that all larger distances take (7).
+
+    See `PhaseServoSpec.table_velocity`.
+    """
+    table: list[int] = []
+    while not table or (table[-1] < spec.peak_count and len(table) < TABLE):
+        table.append(spec.table_velocity(len(table)))
+    return table
+
+
+def _fill_converters(c: ConverterParams, spec: PhaseServoSpec) -> None:
+    bits = spec.detector.counts.bit_length() - 1
+    c.carrier.mask = c.tracking.mask = c.absolute.mask = spec.detector.counts - 1
+    c.tracking.top = c.absolute.top = bits - 1
+    c.carrier.shift = bits - 3
+    c.tracking.leave_antiphase = spec.method.leave_antiphase
+
+
+def _fill_detector(d: DetectorParams, spec: PhaseServoSpec) -> None:
+    table, carrier = spec.detector, 1 / (spec.tick * spec.detector.counts)
+    d.turns_per_metre = TURN / spec.pitch
+    d.offset = -table.lag_counts * TURN // table.counts % TURN
+    d.carrier_shift = 32 - (table.counts.bit_length() - 1)
+    d.jitter = spec.edge_jitter * carrier * TURN
+    fill_errors(d, table.gain_error, table.quadrature_error, spec.offset_share)
+
+
+def _fill_sequencer(s: SequencerParams, spec: PhaseServoSpec) -> None:
+    method = spec.method
+    table = velocity_table(spec)
+    s.threshold, s.last = method.threshold, len(table) - 1
+    for n, velocity in enumerate(table):
+        s.table[n] = velocity
+    s.ready_ticks = round(method.ready_time / spec.tick)
+    s.stop_ticks = NEVER // 2 if method.stop_always_off else round(method.stop_time / spec.tick)
+    # Silence for more than half a turn of the reference counter against the carrier, and a step to spare (4).
+    s.quiet_ticks = spec.detector.counts // 2 * spec.detector.counts
+    s.incremental = method.final == "incremental"
+
+
+def _fill_law(law: LawParams, spec: PhaseServoSpec) -> None:
+    method = spec.method
+    law.speed_k1, law.speed_k2, law.speed_k3 = method.speed_gains
+    law.position_k1, law.position_k2, law.position_k3 = method.position_gains
+    law.dead_band, law.integral_limit = method.dead_band, method.integral_limit
+    law.corrector, law.integrator = method.corrector, method.integrator
+    law.word_limit = 1 << (spec.drive.pwm_bits - 1)
+
+
+def _fill_drive_train(t: DriveTrainParams, spec: PhaseServoSpec) -> None:
+    radius = spec.mechanics.pulley_circumference / (2 * math.pi)
+    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
+    t.inductance = spec.motor.inductance
+    t.force_constant = spec.motor.torque_constant / radius
+    t.emf_constant = spec.motor.back_emf_constant / radius
+    t.mass = spec.mechanics.carriage_mass + (spec.motor.rotor_inertia + spec.mechanics.pulley_inertia) / radius**2
+    for side in ("right", "left"):
+        friction = getattr(spec.mechanics.friction, side)
+        for kind in ("coulomb", "static", "viscous"):
+            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind))
+    t.left_end, t.right_end = 0.0, spec.limits.travel
+    t.period, t.substep = spec.tick, SUBSTEP
+    fill_period(t)

@@ -1,0 +1,288 @@
+"""What follows from a phase-servo specification: the consistency arithmetic of section 7, as figures.
+
+Symbols: ``r`` pulley radius, ``R`` resistance of motor and bridge, ``m`` moving mass, ``k`` force per ampere, ``N``
+steps per pitch, ``M`` bits of the drive word, ``Tv`` speed sample period, ``f`` reference clock, ``a`` deceleration of
+the velocity table; sections are those of the phase-servo specification.
+"""
+
+import math
+from collections.abc import Iterator
+from functools import cached_property
+
+from detent.files.findings import Derived, count_figure, quantity_figure
+from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
+from detent.units import format_quantity
+
+STIFFEST = 1e3
+"""Steps per sample that a step of error may be worth for the exact model of the loop to be worth its numbers."""
+
+
+class Machine:
+    """The machine behind a specification, in the units of its logic.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec
+        The axis.
+    """
+
+    def __init__(self, spec: PhaseServoSpec) -> None:
+        motor, mechanics, friction = spec.motor, spec.mechanics, spec.mechanics.friction
+        self.spec = spec
+        self.radius = mechanics.pulley_circumference / (2 * math.pi)
+        self.resistance = motor.resistance + spec.drive.bridge_resistance
+        self.mass = mechanics.carriage_mass + (motor.rotor_inertia + mechanics.pulley_inertia) / self.radius**2
+        self.force_per_ampere = motor.torque_constant / self.radius
+        self.volts_per_speed = motor.back_emf_constant / self.radius
+        self.coulomb = max(friction.right.coulomb, friction.left.coulomb)
+        self.static = max(friction.right.static, friction.left.static)
+        # One count of the drive word changes the mean of a sawtooth between -ES and +ES by this (3.9).
+        self.volts_per_count = 2 * spec.drive.supply / (1 << spec.drive.pwm_bits)
+
+    # ---------------------------------------------------------------------------------------------- electrical side
+
+    @property
+    def pwm_hz(self) -> float:
+        """Frequency of the sawtooth [Hz]."""
+        return self.spec.clock.oscillator / (1 << self.spec.drive.pwm_bits)
+
+    @property
+    def corner_hz(self) -> float:
+        """Electrical corner R/(2 pi L) [Hz]."""
+        return self.resistance / (2 * math.pi * self.spec.motor.inductance)
+
+    @property
+    def stall_current(self) -> float:
+        """Current of one side of the supply at standstill [A]."""
+        return self.spec.drive.supply / self.resistance
+
+    @property
+    def force_limit(self) -> float:
+        """Largest force at standstill [N]: that of the current limit, or of the stall current if that is less."""
+        return min(self.spec.limits.effort, self.stall_current) * self.force_per_ampere
+
+    @property
+    def current_per_tick(self) -> float:
+        """Largest change of the current within a tick [A]: full supply and back-EMF together on the winding."""
+        volts = self.spec.drive.supply + self.volts_per_speed * self.spec.limits.speed
+        return volts / self.spec.motor.inductance * self.spec.tick
+
+    # ---------------------------------------------------------------------------------------------- table and counts
+
+    @property
+    def speed_per_count(self) -> float:
+        """Speed of one pulse per sample [m/s]."""
+        return self.spec.step / self.spec.sample_period
+
+    @property
+    def peak_speed(self) -> float:
+        """Largest velocity of the table [m/s]."""
+        return self.spec.peak_count * self.speed_per_count
+
+    @property
+    def slew_forward(self) -> float:
+        """Fastest motion to the right that the tracker follows [m/s] (3.4)."""
+        return self.spec.step / self.spec.tick / (self.spec.detector.counts - 1)
+
+    @property
+    def slew_backward(self) -> float:
+        """Fastest motion to the left that the tracker follows [m/s]; guaranteed both ways."""
+        return self.spec.step / self.spec.tick / (self.spec.detector.counts + 1)
+
+    @cached_property
+    def peak_distance(self) -> int:
+        """Smallest distance at which the table is at its peak [steps]."""
+        low, high = 0, TABLE_ENTRIES - 1
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (
+                (low, middle) if self.spec.table_velocity(middle) >= self.spec.peak_count else (middle + 1, high)
+            )
+        return low
+
+    # ---------------------------------------------------------------------------------------------- motion
+
+    @property
+    def acceleration(self) -> float:
+        """What the largest force does against friction [m/s^2]; below 0 if it does not overcome it."""
+        return (self.force_limit - self.coulomb) / self.mass
+
+    @property
+    def top_speed(self) -> float:
+        """Speed at which back-EMF and friction take all of the supply [m/s]; below 0 if friction alone does."""
+        left = self.spec.drive.supply - self.coulomb / self.force_per_ampere * self.resistance
+        return left / self.volts_per_speed
+
+    @property
+    def switch_speed(self) -> float:
+        """Speed at the change of mode [m/s]: the entry before it, and half a count that the speed word cannot tell."""
+        return (self.spec.table_velocity(self.spec.method.threshold + 1) + 0.5) * self.speed_per_count
+
+    @property
+    def switch_distance(self) -> float:
+        """Way that is left at the change of mode [m]."""
+        return self.spec.method.threshold * self.spec.step
+
+    @property
+    def switch_deceleration(self) -> float:
+        """Even deceleration from there to the target [m/s^2]."""
+        return self.switch_speed**2 / (2 * self.switch_distance)
+
+    @property
+    def switch_time(self) -> float:
+        """Time of that deceleration [s]."""
+        return 2 * self.switch_distance / self.switch_speed
+
+    # ---------------------------------------------------------------------------------------------- loops
+
+    @property
+    def gain(self) -> float:
+        """Acceleration per count of the drive word [steps/s^2]."""
+        return self.volts_per_count / self.resistance * self.force_per_ampere / self.mass / self.spec.step
+
+    @property
+    def decay(self) -> float:
+        """Rate at which back-EMF and viscous friction alone bring the carriage to rest [1/s]."""
+        friction = self.spec.mechanics.friction
+        viscous = min(friction.right.viscous, friction.left.viscous)
+        return (self.force_per_ampere * self.volts_per_speed / self.resistance + viscous) / self.mass
+
+    @property
+    def velocity_loop(self) -> float:
+        """Bandwidth in speed mode [rad/s], without the delay of the sample."""
+        _, k2, k3 = self.spec.method.speed_gains
+        return k2 * k3 * self.gain * self.spec.sample_period
+
+    @property
+    def position_loop(self) -> float:
+        """Natural frequency in position mode [rad/s], without the delay of the sample."""
+        k1, _, k3 = self.spec.method.position_gains
+        return math.sqrt(k1 * k3 * self.gain)
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio in position mode, without the delay of the sample."""
+        _, k2, k3 = self.spec.method.position_gains
+        rate = k2 * k3 * self.gain * self.spec.sample_period + self.decay
+        return rate / (2 * self.position_loop)
+
+    @cached_property
+    def gain_margin(self) -> float:
+        """By how much the gain may grow until position mode no longer settles, the winding's lag neglected."""
+        from detent.analysis.sampled_loop import SampledLoop
+
+        k1, k2, k3 = self.spec.method.position_gains
+        window = self.spec.sample_period
+        gain = k3 * self.gain
+        if k1 * gain * window * min(window, 1 / self.decay) > STIFFEST:
+            return 0.0
+        loop = SampledLoop(gain=gain, sample_period=window, scale=k2, position_gain=k1, tau_m=1 / self.decay)
+        return loop.stability_limit() / gain
+
+    @property
+    def breakaway_counts(self) -> float:
+        """Drive word that breaks the carriage loose [counts]."""
+        return self.static / self.force_per_ampere * self.resistance / self.volts_per_count
+
+    @property
+    def integral_rate(self) -> float:
+        """Steps by which a running integral moves the carriage within 1 rad of the position loop."""
+        clock = self.spec.clock
+        per_second = clock.oscillator / 2**clock.integrate_tap
+        return per_second / self.spec.method.position_gains[0] / self.position_loop
+
+
+def derive(spec: PhaseServoSpec) -> tuple[Derived, ...]:
+    """Compute all derived figures, in the order they are read."""
+    machine = Machine(spec)
+    return (*_scales(machine), *_tracker(machine), *_table(machine), *_motor(machine), *_loops(machine))
+
+
+def _speed(name: str, value: float, formula: str, step: float) -> Derived:
+    text = f"{format_quantity(value, 'm/s')} ({value / step:.5g} steps/s)"
+    return Derived(name, value, "m/s", text, formula)
+
+
+def _scales(machine: Machine) -> Iterator[Derived]:
+    """Lengths, clocks, and what one count of each word is."""
+    spec = machine.spec
+    yield quantity_figure("pitch", spec.pitch, "m", "pulley circumference / pitches per revolution")
+    yield quantity_figure("step", spec.step, "m", "pitch / N")
+    yield quantity_figure("reference clock", 1 / spec.tick, "Hz", "oscillator / 2, the base tick")
+    yield quantity_figure("carrier", 1 / spec.tick / spec.detector.counts, "Hz", "reference clock / N")
+    yield quantity_figure("speed sample period", spec.sample_period, "s", f"2^{spec.clock.sample_tap} / oscillator")
+    period = 2**spec.clock.integrate_tap / spec.clock.oscillator
+    yield quantity_figure("integration period", period, "s", f"2^{spec.clock.integrate_tap} / oscillator")
+    yield quantity_figure("one count of the drive word", machine.volts_per_count, "V", "2 ES / 2^M")
+    k3 = spec.method.position_gains[2]
+    yield quantity_figure("one unit of the integral", k3 * machine.volts_per_count, "V", "KP3 counts of the drive word")
+    yield _speed("one count of the speed word", machine.speed_per_count, "step / Tv", spec.step)
+
+
+def _tracker(machine: Machine) -> Iterator[Derived]:
+    """How fast the carriage may be, and how far it may go."""
+    spec = machine.spec
+    yield _speed("slew limit, right", machine.slew_forward, "f / (N - 1) steps/s", spec.step)
+    yield _speed("slew limit, left", machine.slew_backward, "f / (N + 1) steps/s", spec.step)
+    share = machine.peak_speed / machine.slew_backward
+    formula = f"{spec.peak_count} counts x step / Tv, {100 * share:.3g} % of the slew limit"
+    yield _speed("peak speed", machine.peak_speed, formula, spec.step)
+    bits = spec.peak_count.bit_length() + 1
+    yield Derived("speed word", bits, "bit", f"{bits} of {spec.method.speed_bits} bits", "peak and sign")
+    steps = spec.limits.travel / spec.step
+    text = f"{steps:.6g} steps ({math.floor(spec.limits.travel / spec.pitch + 1e-9)} pitches) of 65535"
+    yield Derived("longest way", steps, "step", text, "limits.travel / step")
+    spare = spec.detector.counts // 2 - spec.method.threshold - 1
+    yield Derived("spurious pulses it stands", spare, "count", f"up to {spare} in a move", "below N/2 - threshold")
+
+
+def _table(machine: Machine) -> Iterator[Derived]:
+    """The velocity table and what happens at its end."""
+    spec = machine.spec
+    distance = machine.peak_distance
+    formula = f"floor(sqrt(2 a n step) / step x Tv + 1/2), n up to {TABLE_ENTRIES - 1}"
+    text = f"{spec.peak_count} counts from {distance} steps on"
+    yield Derived("peak of the velocity table", distance, "step", text, formula)
+    formula = "entry above the threshold + 1/2 count"
+    yield _speed("speed at the change of mode", machine.switch_speed, formula, spec.step)
+    way = format_quantity(machine.switch_distance, "m")
+    yield quantity_figure(
+        "deceleration from there", machine.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
+    )
+    yield quantity_figure("time from there", machine.switch_time, "s", f"2 x {way} / v, braking evenly")
+
+
+def _motor(machine: Machine) -> Iterator[Derived]:
+    """Forces, voltages, and how fast things happen."""
+    supply, resistance = machine.spec.drive.supply, machine.resistance
+    yield quantity_figure("moving mass", machine.mass, "kg", "carriage + (rotor + pulley) / r^2")
+    yield quantity_figure("force at the current limit", machine.force_limit, "N", "limits.effort x k")
+    yield quantity_figure("acceleration against friction", machine.acceleration, "m/s^2", "(force - coulomb) / m")
+    yield quantity_figure("stall current", machine.stall_current, "A", "supply / R")
+    emf = machine.volts_per_speed * machine.peak_speed
+    yield quantity_figure("back-EMF at peak speed", emf, "V", f"Ke / r x peak speed, of {format_quantity(supply, 'V')}")
+    constant = machine.spec.motor.inductance / resistance
+    yield quantity_figure("electrical time constant", constant, "s", "L / R")
+    ratio = machine.pwm_hz / machine.corner_hz
+    text = f"{format_quantity(machine.pwm_hz, 'Hz')} ({ratio:.3g} x the electrical corner)"
+    formula = f"oscillator / 2^M, corner R / (2 pi L) = {format_quantity(machine.corner_hz, 'Hz')}"
+    yield Derived("PWM frequency", machine.pwm_hz, "Hz", text, formula)
+
+
+def _loops(machine: Machine) -> Iterator[Derived]:
+    """Bandwidths and what friction is worth."""
+    text = "{:.4g} rad/s"
+    value = machine.velocity_loop
+    formula = "KS2 KS3 x (count of the drive word) k / (R m) / (count of the speed word)"
+    yield Derived("velocity loop", value, "rad/s", text.format(value), formula)
+    value = machine.position_loop
+    formula = "sqrt(KP1 KP3 x (count of the drive word) k / (R m) / step)"
+    yield Derived("position loop", value, "rad/s", text.format(value), formula)
+    value = machine.damping
+    formula = "(KP2 KP3 velocity feedback + back-EMF) / (2 x position loop), without delays"
+    yield Derived("damping of the position loop", value, "", f"{value:.3g}", formula)
+    yield count_figure(
+        "drive that breaks loose", machine.breakaway_counts, "static x R / k / (count of the drive word)"
+    )
+    k1, _, k3 = machine.spec.method.position_gains
+    yield count_figure("drive of one step", k1 * k3, "KP1 x KP3")

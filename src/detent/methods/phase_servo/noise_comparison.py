@@ -1,0 +1,191 @@
+"""What spurious pulses do to the stop: this servo beside one that stops by counted pulses (phase-servo tests 25, 26).
+
+The same move is made again and again on the same axis, each time with some pulses put in on the counting lines on the
+way; once with the absolute word as the position error of the final approach, once with the signed count of pulses still
+to come. Everything else is equal.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.axisfile.tables import BurstTable, InterferenceTable
+from detent.errors import DetentError
+from detent.methods.moves.run import Progress
+from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench, change_method
+from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
+from detent.sensing.interference import ENTRIES
+
+PULSES = (0, 1, 2, 5, 8, 12, 16, 20, 30)
+"""Numbers of spurious pulses of tests 25 and 26."""
+
+FIRST_PULSE = 5e-3
+"""When the first one comes [s]; the others follow 24 us apart."""
+
+SETTLING = 30e-3
+"""Time given to the integrator after the stop [s]."""
+
+LONGEST_STOP = 0.1
+"""A one-shot 109 that is longer is not waited for [s]: the carriage has come to rest long before."""
+
+READINGS = 20
+READING = 0.5e-3
+"""The rest point is the mean of so many readings so far apart [s]: more than a period of the limit cycle."""
+
+SIGNS = ("+", "-")
+DIRECTIONS = ("right", "left")
+MOST_STEPS = 65_535
+"""Longest move that the distance word can command [steps]."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseComparison:
+    """Result of `compare_noise`.
+
+    Attributes
+    ----------
+    pulses : tuple of int
+        Numbers of spurious pulses in one move, rising.
+    absolute, incremental : ndarray, shape (len(pulses), 2, 2)
+        Rest point less target [steps], of this servo and of the one that stops by counted pulses; for + and for -
+        pulses, in moves to the right and to the left.
+    step : float
+        Travel per step [m].
+    counts : int
+        Steps per pitch, N.
+    margin : int
+        Pulses that the method bears, N/2 - threshold: with more the servo stops at another positioning point.
+    pitches : int
+        Length of the move.
+    """
+
+    pulses: tuple[int, ...]
+    absolute: Numbers
+    incremental: Numbers
+    step: float
+    counts: int
+    margin: int
+    pitches: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: a row for each number of pulses, sign and direction."""
+        rows = [
+            {
+                "pulses": count,
+                "sign": sign,
+                "direction": direction,
+                "absolute": float(self.absolute[k, i, j]),
+                "incremental": float(self.incremental[k, i, j]),
+            }
+            for k, count in enumerate(self.pulses)
+            for i, sign in enumerate(SIGNS)
+            for j, direction in enumerate(DIRECTIONS)
+        ]
+        return {name: getattr(self, name) for name in ("step", "counts", "margin", "pitches")} | {"rest": rows}
+
+
+def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress | None = None) -> NoiseComparison:
+    """Find where the axis stops after spurious pulses, and where it would stop by counted pulses.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec
+        The axis; its ``[disturbance]`` is left out.
+    pitches : int
+        Length of the move.
+    progress : callable, optional
+        Told the share done.
+
+    Raises
+    ------
+    DetentError
+        The move is shorter than a pitch, or longer than the distance word can say.
+    """
+    most = MOST_STEPS // spec.detector.counts
+    if not 1 <= pitches <= most:
+        raise DetentError(
+            f"comparison of noise: came a move of {pitches} pitches; allowed: 1 to {most}; choose another"
+        )
+    servos = [change_method(spec, final=final) for final in ("absolute", "incremental")]
+    margin = spec.detector.counts // 2 - spec.method.threshold
+    pulses = pulse_counts(margin)
+    begin = _first_pulse(servos[0], pitches)
+    rest = np.zeros((2, len(pulses), 2, 2))
+    runs = product(range(2), range(len(pulses)), range(2), range(2))
+    for done, (servo, k, sign, side) in enumerate(runs):
+        if progress is not None:
+            progress(done / rest.size, f"{pulses[k]} spurious pulses")
+        way = pitches if side == 0 else -pitches
+        rest[servo, k, sign, side] = rest_point(servos[servo], way, pulses[k], SIGNS[sign], begin)
+    return NoiseComparison(
+        pulses=pulses,
+        absolute=rest[0],
+        incremental=rest[1],
+        step=spec.step,
+        counts=spec.detector.counts,
+        margin=margin,
+        pitches=pitches,
+    )
+
+
+def pulse_counts(margin: int) -> tuple[int, ...]:
+    """Numbers of pulses to try: those of the specification, and one below and one above the axis's own `margin`.
+
+    Examples
+    --------
+    >>> pulse_counts(24)
+    (0, 1, 2, 5, 8, 12, 16, 20, 30)
+    >>> pulse_counts(5)
+    (0, 1, 2, 4, 5, 6, 8, 12, 16, 20, 30)
+    """
+    own = {margin * 5 // 6, margin + max(1, margin // 4)}
+    return tuple(sorted({*PULSES, *(n for n in own if 0 <= n <= ENTRIES)}))
+
+
+def rest_point(spec: PhaseServoSpec, pitches: int, count: int, sign: str, begin: float) -> float:
+    """Where a move ends that `count` spurious pulses disturb.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec
+        The axis.
+    pitches : int
+        The move, positive to the right.
+    count : int
+        Spurious pulses, 0..64.
+    sign : "+" or "-"
+        Their sign.
+    begin : float
+        When the first comes [s]; the strobe comes at 0.25 ms.
+
+    Returns
+    -------
+    float
+        Rest point less target [steps].
+    """
+    disturbance = UNDISTURBED
+    if count:
+        # Values in SI already: nothing is to be read from text.
+        burst = BurstTable.model_construct(kind=sign, at=begin, count=count)
+        disturbance = DisturbanceTable(lines=InterferenceTable(burst=burst))
+    bench = PhaseBench(spec, pitches, disturbance)
+    entered = bench.move()
+    if np.isnan(entered):
+        return bench.displacement
+    end = entered + min(spec.method.stop_time, LONGEST_STOP) + SETTLING
+    readings: list[float] = []
+    for k in range(READINGS):
+        bench.run_until(end - (READINGS - 1 - k) * READING)
+        readings.append(bench.displacement)
+    return float(np.mean(readings))
+
+
+def _first_pulse(spec: PhaseServoSpec, pitches: int) -> float:
+    """When the pulses begin [s]: at 5 ms, but within the first quarter of a quicker traverse."""
+    entered = PhaseBench(spec, pitches).move()
+    return FIRST_PULSE if np.isnan(entered) else min(FIRST_PULSE, START + (entered - START) / 4)

@@ -1,0 +1,95 @@
+"""A phase servo on the bench, for comparisons: one move by whole pitches, from lock, with a chosen disturbance alone.
+
+Nothing random of the axis file's ``[disturbance]`` table is left, and the way is as long as the move needs, so that two
+runs differ in what is compared and in nothing else.
+"""
+
+import math
+
+from detent.control.phase_sequencer import POSITION_MODE
+from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
+from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready
+from detent.record.machine import Machine, phase_servo_machine
+from detent.record.recorder import Recorder
+
+START = 0.25e-3
+"""Time of the set strobe, as in the tests of specification 6 [s]."""
+
+ROOM = 8
+"""Pitches of free way on both sides of the move."""
+
+LOOK = 1e-3
+"""How often the bench looks whether position mode has been entered [s]."""
+
+UNDISTURBED = DisturbanceTable()
+
+
+def change_method(spec: PhaseServoSpec, **values: object) -> PhaseServoSpec:
+    """Axis with other values in its ``[method]`` table."""
+    return spec.model_copy(update={"method": spec.method.model_copy(update=values)})
+
+
+class PhaseBench:
+    """An axis that stands at a positioning point, locked and ready, before a move by whole pitches.
+
+    Parameters
+    ----------
+    spec : PhaseServoSpec
+        The axis.
+    pitches : int
+        The move, positive to the right; not 0.
+    disturbance : DisturbanceTable
+        All that disturbs the run; what the file says is left out.
+    recorder : Recorder, optional
+        Records registers on the way.
+    """
+
+    def __init__(
+        self,
+        spec: PhaseServoSpec,
+        pitches: int,
+        disturbance: DisturbanceTable = UNDISTURBED,
+        recorder: Recorder | None = None,
+    ) -> None:
+        begin = ROOM if pitches > 0 else ROOM - pitches
+        limits = spec.limits.model_copy(update={"travel": (abs(pitches) + 2 * ROOM) * spec.pitch})
+        mechanics = spec.mechanics.model_copy(update={"start_position": begin * spec.pitch})
+        self.spec = spec.model_copy(update={"limits": limits, "mechanics": mechanics, "disturbance": disturbance})
+        self.pitches, self.target = pitches, (begin + pitches) * spec.pitch
+        self.machine: Machine[PhaseServoParams, PhaseServo] = phase_servo_machine(self.spec, recorder)
+        be_ready(self.machine.params, self.machine.state)
+
+    @property
+    def displacement(self) -> float:
+        """Position less target [steps]."""
+        return (self.machine.state.train.position - self.target) / self.spec.step
+
+    def run_until(self, moment: float) -> None:
+        """Let time pass up to a moment since power-on [s], whatever the axis says."""
+        left = round(moment / self.machine.tick) - self.machine.state.tick
+        while left > 0:
+            left -= self.machine.pass_ticks(left)
+            self.machine.state.sequencer.event = 0
+
+    def move(self) -> float:
+        """Make the move up to the beginning of position mode.
+
+        Returns
+        -------
+        float
+            When position mode was entered [s]; NaN for an axis that does not get there in three times the time that
+            its velocity table gives it, and half a second.
+        """
+        self.run_until(START)
+        s = self.machine.state.sequencer
+        s.command, s.backward, s.strobe = abs(self.pitches) * self.spec.detector.counts, self.pitches < 0, 1
+        limit = self._time_limit()
+        while self.machine.time < limit:
+            self.run_until(self.machine.time + LOOK)
+            if s.mode == POSITION_MODE:
+                return s.switched * self.machine.tick
+        return math.nan
+
+    def _time_limit(self) -> float:
+        way, a = abs(self.pitches) * self.spec.pitch, self.spec.method.table_acceleration
+        return START + 0.5 + 3 * (way / self.spec.limits.speed + 2 * math.sqrt(way / a))

@@ -1,0 +1,128 @@
+"""From a checked specification to the parameters of the axis: SI values to counts, emitters and microseconds."""
+
+import math
+
+from detent.methods.print_head.schema import (
+    COLUMN,
+    EMITTER,
+    FULL_DRIVE_COUNTS,
+    SPEED_STEP,
+    PrintHeadSpec,
+    speed_value,
+)
+from detent.methods.print_head.system import AVERAGED, PERIOD_US, SWITCH_LEVEL, PrintHeadParams
+from detent.plant.drive_train import DriveTrainParams, fill_period
+from detent.plant.switched_motor import fill_pulse_table
+
+CALIBRATION_MARGIN = 400
+"""Emitters between a frame and the stop target of an identification pass: the stop distance of 40 in/s again, so that a
+machine a third faster than its nameplate still stops before the frame."""
+
+SLOW_PASS = 60
+"""Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
+speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit."""
+
+SUBSTEP_SHARE = 0.25
+"""Longest substep of the power series, as a share of the fastest time constant."""
+
+
+def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
+    """Parameters of the print-head axis.
+
+    Parameters
+    ----------
+    spec : PrintHeadSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    PrintHeadParams
+        Parameters of the true machine (with its disturbances) and of the axis computer (which does not know of them).
+    """
+    p = PrintHeadParams()
+    p.fidelity = SWITCH_LEVEL if spec.axis.fidelity == "switch-level" else AVERAGED
+    p.supply = spec.disturbance.supply
+    _fill_drive_train(p.train, spec)
+    fill_pulse_table(p.train, p.switched)
+    p.encoder.edge_pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
+    # The left frame lies halfway between two emitters: on one, any error of its edge would move the zero by an emitter.
+    p.encoder.origin = -EMITTER / 2
+    p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
+    p.encoder.missing = spec.encoder.missing_edges
+    _fill_options(p, spec)
+    _fill_limits(p, spec)
+    _fill_columns(p, spec)
+    push = spec.disturbance.push
+    if push is not None:
+        p.push.force = push.force
+        p.push.begin = round(push.at / (PERIOD_US * 1e-6))
+        p.push.end = round((push.at + push.duration) / (PERIOD_US * 1e-6))
+    return p
+
+
+def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
+    radius = spec.mechanics.pulley_circumference / (2 * math.pi)
+    drift = 1 + spec.disturbance.motor_constant
+    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
+    t.inductance = spec.motor.inductance
+    t.force_constant = spec.motor.torque_constant * drift / radius
+    t.emf_constant = spec.motor.back_emf_constant * drift / radius
+    t.mass = spec.mechanics.carriage_mass + spec.mechanics.belt_mass + spec.motor.rotor_inertia / radius**2
+    for side, change in (("right", spec.disturbance.friction_right), ("left", spec.disturbance.friction_left)):
+        friction = getattr(spec.mechanics.friction, side)
+        for kind in ("coulomb", "static", "viscous"):
+            # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
+            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind) * (1 + change) * drift)
+    t.left_end, t.right_end = 0.0, spec.limits.travel
+    obstacle = spec.disturbance.obstacle
+    if obstacle is not None and spec.mechanics.start_position < obstacle.position:
+        t.right_end = obstacle.position
+    elif obstacle is not None:
+        t.left_end = obstacle.position
+    t.period = PERIOD_US * 1e-6
+    t.substep = SUBSTEP_SHARE / _fastest_rate(t)
+    fill_period(t)
+
+
+def _fastest_rate(t: DriveTrainParams) -> float:
+    """Bound of the system matrix [1/s], in scaled coordinates."""
+    viscous = max(t.friction.viscous_right, t.friction.viscous_left)
+    coupling = math.sqrt(t.force_constant * t.emf_constant / (t.mass * t.inductance))
+    return t.resistance / t.inductance + viscous / t.mass + coupling
+
+
+def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
+    h, m = p.head, spec.method
+    h.span_steady = m.span == "steady"
+    h.plausible.literal_intercept = m.intercept == "literal"
+    h.plausible.slope_min, h.plausible.slope_max = m.slope_min, m.slope_max
+    h.plausible.friction_max = m.friction_max_counts
+    h.slope_default, h.friction_default, h.ir = m.default_slope, m.default_friction_counts, m.ir_counts
+    for option in ("ack_last", "transition", "friction_jump", "trim", "overspeed_test", "memory"):
+        setattr(h, option, getattr(m, option))
+
+
+def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
+    h = p.head
+    h.drive_limit = min(
+        FULL_DRIVE_COUNTS, math.floor(spec.limits.effort / spec.drive.supply * FULL_DRIVE_COUNTS + 1e-9)
+    )
+    h.zero_speed_us = round(spec.method.zero_speed_timeout * 1e6)
+    h.contact_us = round(spec.homing.contact_timeout * 1e6)
+    h.homing_speed = speed_value(spec.homing.speed)
+    h.homing_limit = min(spec.homing.drive_limit_counts, h.drive_limit)
+    h.run_speed = speed_value(spec.limits.speed)
+    h.print_speed = min(speed_value(spec.method.max_print_speed), h.run_speed)
+    h.expected_width = round(spec.limits.travel / EMITTER)
+    h.width_tolerance = round(spec.homing.width_tolerance / EMITTER)
+    h.calibration_margin = CALIBRATION_MARGIN
+    h.plausible.rise_min = (h.run_speed - SLOW_PASS) // 3
+
+
+def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
+    c = p.head.columns
+    c.column_zero = round(spec.printing.left_margin / EMITTER * 256)
+    c.column_pitch = round(COLUMN / EMITTER * 256)
+    c.flight_time = spec.printing.flight_time
+    c.lead_per_speed = round(SPEED_STEP * c.flight_time / EMITTER * 65536)
+    c.metres_per_unit = EMITTER / 256

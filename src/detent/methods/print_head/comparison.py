@@ -1,0 +1,317 @@
+"""Three ways of choosing the drive value, compared on one drifted machine (print-head specification, tests 24 and 25).
+
+The power-on default, a table computed from the nameplate, and the constants the axis identified on the machine itself.
+Every way drives the same machine open loop at several speeds, and starts it with the slow trim running.
+"""
+
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.control.head_computer import HIGH_STEADY, IDLE
+from detent.control.speed_selection import HIGH_SPEED
+from detent.errors import AxisError, DetentError, describe_sb1
+from detent.files.quantities import INCH
+from detent.methods.print_head.build import build_print_head
+from detent.methods.print_head.derive import Machine as Figures
+from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
+from detent.methods.print_head.system import TICK, PrintHead, advance, switch_on
+
+SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
+
+BENCH_EMITTERS = 65_535
+"""Length of the line the machine is measured on: the longest the protocol can count, so that every start has room."""
+
+FROM_FRAME = 200
+"""Emitters between a frame and the start or the target of a measuring run."""
+
+SETTLING = 15
+"""Mechanical time constants until a speed counts as steady: what is left is below 1e-6."""
+
+READING = 0.05
+"""Length of the speed reading at the end of an open-loop run [s]."""
+
+START_TIME = 1.2
+"""Recorded length of a start [s]."""
+
+FIRST_LINE = 0.30
+"""What a line of 13.2 in lasts at 40 in/s, a little less [s]: the mean error over it says how the first line prints."""
+
+CALCULATION_TIME = 120.0
+CODE_CALCULATE, CODE_CONTROLLED, CODE_SPEED, OK = 0x01, 0xA2, 0x99, 0x00
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveConstants:
+    """Constants the axis computer works with.
+
+    Attributes
+    ----------
+    slope_right, slope_left : int
+        Slope K [1/256 count per speed value].
+    friction_right, friction_left : int
+        Friction-equivalent drive Vf [count].
+    """
+
+    slope_right: int
+    slope_left: int
+    friction_right: int
+    friction_left: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveStart:
+    """A start to the right at top speed, with the trim running.
+
+    Attributes
+    ----------
+    t, velocity : ndarray
+        Time since the move began [s] and carriage speed [m/s].
+    steady_from : float
+        When the acceleration ramp ended [s].
+    mean_error : float
+        Speed error over the first 0.30 s of steady motion, as a fraction of the commanded speed.
+    time_to_band : float
+        From the end of the ramp until the speed first is within 1 % of the commanded one [s]; infinite if it never is.
+    """
+
+    t: Numbers
+    velocity: Numbers
+    steady_from: float
+    mean_error: float
+    time_to_band: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveComparison:
+    """Result of `compare_drives`.
+
+    Attributes
+    ----------
+    methods : tuple of str
+        Names, in the order of everything below.
+    constants : tuple of DriveConstants
+        What each method drives with.
+    speeds : tuple of float
+        Commanded speeds [m/s].
+    errors : ndarray, shape (methods, speeds, 2)
+        Open-loop speed error as a fraction of the commanded speed, measured - commanded; right, then left. -1 where the
+        drive did not move the head.
+    starts : tuple of DriveStart
+        Starts at `target`.
+    target : float
+        Commanded speed of the starts [m/s].
+    """
+
+    methods: tuple[str, ...]
+    constants: tuple[DriveConstants, ...]
+    speeds: tuple[float, ...]
+    errors: Numbers
+    starts: tuple[DriveStart, ...]
+    target: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``: everything but the curves."""
+        return {
+            "target": self.target,
+            "speeds": list(self.speeds),
+            "methods": [
+                {
+                    "method": method,
+                    "constants": asdict(constants),
+                    "errors_right": errors[:, 0].tolist(),
+                    "errors_left": errors[:, 1].tolist(),
+                    "mean_error": start.mean_error,
+                    "time_to_band": start.time_to_band if isfinite(start.time_to_band) else None,
+                }
+                for method, constants, errors, start in zip(
+                    self.methods, self.constants, self.errors, self.starts, strict=True
+                )
+            ],
+        }
+
+
+def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> DriveComparison:
+    """Compare the power-on default, the nominal table and the identified drive on the machine of `spec`.
+
+    Parameters
+    ----------
+    spec : PrintHeadSpec
+        The axis; its ``[disturbance]`` is what the nameplate does not know.
+    speeds : tuple of float
+        Speeds to compare at [m/s]; those above the limit of the axis are left out.
+
+    Raises
+    ------
+    DetentError
+        No speed is left, or one belongs to the low-speed class, which has no open-loop steady phase to compare.
+    AxisError
+        The identification failed.
+    """
+    chosen = tuple(v for v in speeds if v <= spec.limits.speed * (1 + 1e-9))
+    low = [v for v in chosen if speed_value(v) < HIGH_SPEED]
+    if low or not chosen:
+        came = ", ".join(f"{v / INCH:.4g} in/s" for v in low or speeds)
+        raise DetentError(
+            f"comparison of drives: came {came}; allowed: 10 in/s to {spec.limits.speed / INCH:.4g} in/s "
+            "(limits.speed); choose speeds of the high-speed class, or raise limits.speed"
+        )
+    ways = {
+        "power-on default": default_constants(spec),
+        "nominal table": nominal_constants(spec),
+        "identified": identified_constants(spec),
+    }
+    bench = MeasuringBench(spec)
+    errors = [[[bench.open_loop_error(way, v, d) for d in (1, -1)] for v in chosen] for way in ways.values()]
+    return DriveComparison(
+        methods=tuple(ways),
+        constants=tuple(ways.values()),
+        speeds=chosen,
+        errors=np.array(errors),
+        starts=tuple(bench.start(way, spec.limits.speed) for way in ways.values()),
+        target=spec.limits.speed,
+    )
+
+
+def default_constants(spec: PrintHeadSpec) -> DriveConstants:
+    """What the axis computer assumes at power-on, both directions."""
+    m = spec.method
+    return DriveConstants(
+        slope_right=m.default_slope,
+        slope_left=m.default_slope,
+        friction_right=m.default_friction_counts,
+        friction_left=m.default_friction_counts,
+    )
+
+
+def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
+    """The table of a conventional printer: computed from the description of the machine, without its disturbances."""
+    nameplate = spec.disturbance.model_copy(
+        update={"motor_constant": 0.0, "friction_right": 0.0, "friction_left": 0.0, "supply": spec.drive.supply}
+    )
+    figures = Figures(spec.model_copy(update={"disturbance": nameplate}))
+    return DriveConstants(
+        slope_right=round(figures.slope["right"]),
+        slope_left=round(figures.slope["left"]),
+        friction_right=round(figures.coulomb_counts["right"]),
+        friction_left=round(figures.coulomb_counts["left"]),
+    )
+
+
+def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
+    """Run CALCULATE PARAMETERS on the machine of `spec` and read what it found.
+
+    Raises
+    ------
+    AxisError
+        The axis answered with an error, or not at all.
+    """
+    p, r = build_print_head(spec), PrintHead()
+    switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
+    _put_byte(p, r, CODE_CALCULATE)
+    code = _next_status(p, r, CALCULATION_TIME)
+    if code != OK:
+        text = "no answer" if code is None else describe_sb1(code)
+        raise AxisError(f"comparison of drives: CALCULATE PARAMETERS failed: {text}")
+    head = r.head
+    return DriveConstants(
+        slope_right=head.right.slope,
+        slope_left=head.left.slope,
+        friction_right=head.right.friction,
+        friction_left=head.left.friction,
+    )
+
+
+class MeasuringBench:
+    """The machine of a specification on a line of 218 in, where the steady speed of any drive can be measured.
+
+    Parameters
+    ----------
+    spec : PrintHeadSpec
+        The axis; an obstacle and a push in it are left out.
+    """
+
+    def __init__(self, spec: PrintHeadSpec) -> None:
+        limits = spec.limits.model_copy(update={"travel": BENCH_EMITTERS * EMITTER})
+        disturbance = spec.disturbance.model_copy(update={"obstacle": None, "push": None})
+        self.spec = spec.model_copy(update={"limits": limits, "disturbance": disturbance})
+        self.params = build_print_head(self.spec)
+        leaves = {leaf.path: leaf for leaf in PrintHead.leaves()}
+        picked = [leaves["train.velocity"], leaves["head.state"]]
+        self._picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
+        self._row: Any = np.dtype([("velocity", "<f8"), ("state", "<u1")])
+
+    def open_loop_error(self, constants: DriveConstants, speed: float, direction: int) -> float:
+        """Error of the steady speed without trim, as a fraction of `speed` [m/s]; -1 if the head does not move."""
+        seconds = min(0.2 + SETTLING * Figures(self.spec).mechanical_time_constant, 4.0)
+        rows = self._run(constants, speed, direction, seconds, trim=False)
+        if len(rows) < round(seconds / TICK):
+            return -1.0
+        reading = rows["velocity"][-round(READING / TICK) :]
+        return float(np.mean(reading)) * direction / speed - 1.0
+
+    def start(self, constants: DriveConstants, speed: float) -> DriveStart:
+        """A start to the right at `speed` [m/s] with the trim running."""
+        rows = self._run(constants, speed, 1, START_TIME, trim=True)
+        t = np.arange(1, len(rows) + 1, dtype=np.float64) * TICK
+        velocity = rows["velocity"].copy()
+        steady = np.flatnonzero(rows["state"] == HIGH_STEADY)
+        if len(steady) == 0:
+            return DriveStart(t=t, velocity=velocity, steady_from=np.inf, mean_error=-1.0, time_to_band=np.inf)
+        first = int(steady[0])
+        error = velocity[first:] / speed - 1.0
+        good = np.flatnonzero(np.abs(error) <= 0.01)
+        return DriveStart(
+            t=t,
+            velocity=velocity,
+            steady_from=float(t[first]),
+            mean_error=float(np.mean(error[: round(FIRST_LINE / TICK)])),
+            time_to_band=float(good[0] * TICK) if len(good) else np.inf,
+        )
+
+    def _run(self, way: DriveConstants, speed: float, direction: int, seconds: float, *, trim: bool) -> NDArray[Any]:
+        """Rows of a move from its first tick on; fewer than `seconds` of them if the axis gave up."""
+        p, r = self.params, PrintHead()
+        p.head.trim = trim
+        begin, target = FROM_FRAME, BENCH_EMITTERS - FROM_FRAME
+        if direction < 0:
+            begin, target = target, begin
+        switch_on(p, r, (begin + 0.5) * EMITTER, self.spec.encoder.seed)
+        head = r.head
+        head.emitter, head.width, head.homed, head.state = begin, BENCH_EMITTERS, 1, IDLE
+        head.right.slope, head.right.friction = way.slope_right, way.friction_right
+        head.left.slope, head.left.friction = way.slope_left, way.friction_left
+        for byte in (CODE_SPEED, speed_value(speed), CODE_CONTROLLED, target >> 8):
+            _put_byte(p, r, byte)
+            _next_status(p, r, 0.01)  # an acknowledge, or for the speed value the answer
+        head.command_latch.byte, head.command_latch.flag = target & 0xFF, 1
+        ticks, before = round(seconds / TICK), r.tick
+        rows = np.zeros((ticks, len(self._picks)), np.uint8)
+        done = advance(p, r, ticks, rows, self._picks, 1)
+        order = np.arange(before + 1, before + done + 1) % ticks
+        return rows[order].view(self._row)[:, 0]
+
+
+def _put_byte(p: Any, r: PrintHead, byte: int) -> None:
+    """Write the command latch and let the computer take the byte."""
+    r.head.command_latch.byte, r.head.command_latch.flag = byte, 1
+    advance(p, r, 1, *_NO_ROWS, 0)
+
+
+def _next_status(p: Any, r: PrintHead, seconds: float) -> int | None:
+    """Take the next status byte; None if none comes within `seconds`."""
+    latch = r.head.status.latch
+    if not latch.flag:
+        advance(p, r, round(seconds / TICK), *_NO_ROWS, 0)
+    if not latch.flag:
+        return None
+    latch.flag = 0
+    return latch.byte
+
+
+_NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))

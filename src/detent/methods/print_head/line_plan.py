@@ -1,0 +1,357 @@
+"""The supervisor's choices: for each line a direction, a speed, and where the carriage turns around.
+
+A line is printed in the steady state (spec print-head 3.4): the axis needs a run-up of 1.05 x Dstop(s) before the
+first emitter of PRINT, and comes to rest Dstop(s) = s x s/144 beyond the last one. It keeps the preselected speed s
+only if 2.5 x Dstop(s) is less than the way from the present to the new stop. Where the next line goes the other way
+at the same speed, the axis turns around without stopping (3.13); so the end of each line is moved outwards until
+the run-up of the next one is already there. White space at the ends of a line is never travelled for its own sake.
+
+Names: d is +1 for a line printed to the right, -1 to the left; "along d" means that the coordinate grows in the
+direction of printing, so that one set of inequalities serves both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, floor
+
+from detent.errors import FileProblem, InputError
+from detent.methods.print_head.printed_page import PrintLine
+
+MIN_SPEED = 18
+"""Lowest speed value, 3 in/s [1/6 in/s]."""
+
+MAX_SPEED = 240
+"""Highest speed value, 40 in/s [1/6 in/s]."""
+
+HIGH_SPEED = 60
+"""From 10 in/s on the axis ramps, and can turn around [1/6 in/s]."""
+
+LOWEST_TRIAL_SPEED = 30
+"""Where the axis stops halving its trial speed, 5 in/s [1/6 in/s]."""
+
+_ACCELERATION = 3600  # speed values per second: 600 in/s^2
+_RATE = 50  # emitters per second and speed value
+_ZERO_SPEED_TIMEOUT = 5e-3  # [s] the axis waits before it calls the head at rest (spec 7.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """What a line has to fit into.
+
+    Attributes
+    ----------
+    width_emitters : int
+        Way between the two frames [emitter = 1/300 in].
+    column0_emitters : float
+        Carriage position at column 0 of the paper [emitter].
+    emitters_per_column : float
+        2.5 for columns of 1/120 in.
+    max_speed : int
+        Highest speed value to use, 18..240 [1/6 in/s].
+    reserve : int
+        Way that stays free at each frame [emitter].
+    stop_tolerance : int
+        How far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45).
+    """
+
+    width_emitters: int
+    column0_emitters: float
+    emitters_per_column: float = 2.5
+    max_speed: int = MAX_SPEED
+    reserve: int = 12
+    stop_tolerance: int = 8
+
+    def __post_init__(self) -> None:
+        if not MIN_SPEED <= self.max_speed <= MAX_SPEED:
+            raise ValueError(f"max_speed is {self.max_speed}/6 in/s, must be {MIN_SPEED}..{MAX_SPEED} (3..40 in/s)")
+        if self.emitters_per_column <= 0:
+            raise ValueError(f"emitters_per_column is {self.emitters_per_column}, must be above 0")
+
+    def emitter(self, column: float) -> float:
+        """Carriage position [emitter] at a column of the paper [1/120 in]."""
+        return self.column0_emitters + column * self.emitters_per_column
+
+
+@dataclass(frozen=True, slots=True)
+class LinePlan:
+    """How one line is printed.
+
+    Attributes
+    ----------
+    line : PrintLine
+        What is printed.
+    direction : int
+        +1 to the right, -1 to the left.
+    speed : int
+        Speed value s to preselect [1/6 in/s].
+    run_to : int or None
+        Where to RUN before this line [emitter]; None where the head already stands far enough back. A CONTROLLED
+        RUN keeps to the highest speed of the geometry, as the estimate does.
+    start : int
+        Where the head is expected at rest, or turning, before the line [emitter].
+    print_from : int
+        First place of PRINT [1/256 emitter], the beginning of the ink in the direction of printing.
+    print_to : int
+        Last place of PRINT [emitter], at or beyond the end of the ink.
+    stop : int
+        Where the head is expected to come to rest, or to turn [emitter].
+    turn_around : bool
+        The axis can turn around from the line before, without a stop.
+    seconds : float
+        Estimated time from rest to rest, with the RUN before it [s].
+    """
+
+    line: PrintLine
+    direction: int
+    speed: int
+    run_to: int | None
+    start: int
+    print_from: int
+    print_to: int
+    stop: int
+    turn_around: bool
+    seconds: float
+
+
+def stop_distance(s: int) -> float:
+    """Way from steady speed to rest [emitter]: s x s/144, equation (7)."""
+    return s * s / 144
+
+
+def run_up(s: int, tolerance: int = 0) -> int:
+    """Way from rest to the first printed place [emitter]: the stop distance and 5 %, with room for a missed stop."""
+    return -(-21 * s * s // 2880) + tolerance  # 1.05/144 = 21/2880, rounded up
+
+
+def shortest_way(s: int, tolerance: int = 0) -> int:
+    """Shortest way from rest to rest for which the axis keeps speed s [emitter]: above 2.5 stop distances."""
+    # 5 s^2 < 288 D; both ends of the way may miss their place.
+    return 5 * s * s // 288 + 1 + 2 * tolerance
+
+
+def run_speed(distance: float, maximum: int = MAX_SPEED) -> int:
+    """Speed value the axis takes for a way [emitter]: the maximum, halved until 2.5 stop distances fit (spec 3.4)."""
+    s = maximum
+    while 5 * s * s >= 288 * distance:
+        s //= 2
+        if s <= LOWEST_TRIAL_SPEED:
+            return min(LOWEST_TRIAL_SPEED, maximum)
+    return s
+
+
+def motion_time(distance: float, s: int) -> float:
+    """Time from rest to rest over a distance [emitter] at speed s, ramps of 600 in/s^2 [s]."""
+    return 2 * s / _ACCELERATION + max(0.0, distance - 2 * stop_distance(s)) / (_RATE * s)
+
+
+def estimated_time(plans: Sequence[LinePlan]) -> float:
+    """Time to print all lines, with the RUNs between them [s]."""
+    return sum(plan.seconds for plan in plans)
+
+
+def plan_lines(
+    lines: Sequence[PrintLine],
+    geometry: Geometry,
+    *,
+    head: int | None = None,
+    bidirectional: bool = True,
+    job_name: str = "job",
+) -> tuple[LinePlan, ...]:
+    """Choose direction, speed and turning points of every line so that the whole job takes least time.
+
+    Each line runs at the highest speed that fits between the frames in its direction. The directions are chosen
+    together, by dynamic programming over the job.
+
+    Parameters
+    ----------
+    lines : sequence of PrintLine
+        The lines in the order of printing.
+    geometry : Geometry
+        What they have to fit into.
+    head : int or None
+        Where the head stands [emitter]; None for the right frame, where calibration leaves it (spec 3.2, 3.3).
+    bidirectional : bool
+        False prints every line to the right.
+    job_name : str
+        Name of the job for messages.
+
+    Returns
+    -------
+    tuple of LinePlan
+        One per line, in the same order.
+
+    Raises
+    ------
+    InputError
+        Lines that fit at no speed, each with its width and what would fit.
+    """
+    directions = (1, -1) if bidirectional else (1,)
+    choices = [_passes(line, geometry, directions) for line in lines]
+    misfits = [_misfit(line, geometry, job_name) for line, passes in zip(lines, choices, strict=True) if not passes]
+    if misfits:
+        raise InputError(misfits)
+    place = geometry.width_emitters if head is None else head
+    return tuple(_plans(lines, _cheapest(choices, place, geometry.max_speed), place, geometry.max_speed))
+
+
+@dataclass(frozen=True, slots=True)
+class _Pass:
+    """One line in one direction at its speed; places along d (`start` < `end`), as if nothing followed."""
+
+    d: int
+    s: int
+    ink: float  # where the ink begins [emitter], along d
+    start: int  # nearest place to begin from
+    end: int  # nearest place to come to rest
+
+    def extended(self, following: _Pass | None) -> int:
+        """Where this pass ends, along d, so that a following one the other way finds its run-up."""
+        if following is None or following.d == self.d:
+            return self.end
+        return max(self.end, -following.start)
+
+    def time(self, start: int, end: int) -> float:
+        """Time from rest to rest between two places along d [s]."""
+        return motion_time(end - start, self.s)
+
+
+def _passes(line: PrintLine, geometry: Geometry, directions: tuple[int, ...]) -> tuple[_Pass, ...]:
+    """Give the line in each direction in which it fits, at the highest speed that does."""
+    left = geometry.emitter(line.first_column)
+    right = geometry.emitter(line.last_column)
+    found = [_fastest(left, right, d, geometry) for d in directions]
+    return tuple(each for each in found if each is not None)
+
+
+@lru_cache(maxsize=4096)
+def _fastest(left: float, right: float, d: int, geometry: Geometry) -> _Pass | None:
+    """Find the highest speed at which ink from `left` to `right` [emitter] fits; speeds below it fit too."""
+    ink, end = (left, right) if d > 0 else (-right, -left)
+    low, high = MIN_SPEED - 1, geometry.max_speed
+    best: _Pass | None = None
+    while low < high:
+        s = (low + high + 1) // 2
+        fitting = _fit(ink, end, d, s, geometry)
+        if fitting is None:
+            high = s - 1
+        else:
+            low, best = s, fitting
+    return best
+
+
+def _fit(ink: float, ink_end: float, d: int, s: int, geometry: Geometry) -> _Pass | None:
+    """Place the turning points of one pass at speed s, or None if they do not lie between the frames."""
+    inside = (geometry.reserve, geometry.width_emitters - geometry.reserve)
+    first, last = inside if d > 0 else (-inside[1], -inside[0])
+    start = floor(ink) - run_up(s, geometry.stop_tolerance)
+    end = ceil(ink_end) + ceil(stop_distance(s))
+    # A short line needs a longer way for its speed: take it before the line, and after it what does not fit there.
+    start = max(min(start, end - shortest_way(s, geometry.stop_tolerance)), min(start, first))
+    end = max(end, start + shortest_way(s, geometry.stop_tolerance))
+    return _Pass(d, s, ink, start, end) if first <= start and end <= last else None
+
+
+def _misfit(line: PrintLine, geometry: Geometry, job_name: str) -> FileProblem:
+    """Say of a line that fits at no speed how wide it is and what would fit."""
+    per_inch = 120 * geometry.emitters_per_column
+    nearest = geometry.reserve + run_up(MIN_SPEED, geometry.stop_tolerance)
+    farthest = geometry.width_emitters - geometry.reserve - ceil(stop_distance(MIN_SPEED))
+    first = max(0.0, nearest - geometry.column0_emitters) / per_inch
+    last = (farthest - geometry.column0_emitters) / per_inch
+    return FileProblem(
+        file=job_name,
+        line=0,
+        column=0,
+        key=f"printed line {line.number}",
+        came=f"ink from {line.first_column / 120:.2f} in to {line.last_column / 120:.2f} in",
+        allowed=f"ink between {first:.2f} in and {last:.2f} in from column 0, with room to stop before both frames",
+        remedy="shorten the line, or change limits.travel or print.left_margin of the axis",
+    )
+
+
+def _needs_run(before: _Pass | None, following: _Pass, place: int) -> bool:
+    """Whether the head, at `place`, stands too near the line to start it; after a turn it never does."""
+    if before is not None and before.d != following.d:
+        return False
+    return following.d * place > following.start
+
+
+def _transition(before: _Pass | None, following: _Pass, place: int, max_speed: int) -> tuple[int, float]:
+    """Where `following` starts, along its d, when the head rests at `place`, and the time to get there [s]."""
+    if not _needs_run(before, following, place):
+        return following.d * place, 0.0
+    way = abs(following.d * following.start - place)
+    return following.start, motion_time(way, run_speed(way, max_speed)) + _ZERO_SPEED_TIMEOUT
+
+
+def _turns_around(before: _Pass | None, following: _Pass) -> bool:
+    """Whether the axis goes from one pass into the next without stopping (spec 3.13)."""
+    return before is not None and before.d != following.d and before.s == following.s >= HIGH_SPEED
+
+
+def _cheapest(choices: Sequence[tuple[_Pass, ...]], head: int, max_speed: int) -> list[_Pass]:
+    """Choose a pass for every line so that the sum of all times is least.
+
+    The time of a line depends on its neighbours through its two turning points only, and linearly; so the cost of
+    a sequence is a sum over pairs of neighbours, which dynamic programming minimises exactly.
+    """
+    costs = [0.0]
+    previous: tuple[_Pass | None, ...] = (None,)
+    came_from: list[list[int]] = []  # for each line and pass, the pass of the line before on the cheapest way
+    for passes in choices:
+        ways = [
+            [cost + _pair_cost(before, this, head, max_speed) for cost, before in zip(costs, previous, strict=True)]
+            for this in passes
+        ]
+        came_from.append([way.index(min(way)) for way in ways])
+        costs = [min(way) for way in ways]
+        previous = passes
+    chosen: list[_Pass] = []
+    index = costs.index(min(costs))
+    for passes, sources in zip(reversed(choices), reversed(came_from), strict=True):
+        chosen.append(passes[index])
+        index = sources[index]
+    return chosen[::-1]
+
+
+def _pair_cost(before: _Pass | None, following: _Pass, head: int, max_speed: int) -> float:
+    """Time that two neighbours cost beyond what each costs alone, and what the second costs alone [s]."""
+    place, cost = head, 0.0
+    if before is not None:
+        end = before.extended(following)
+        place = before.d * end
+        cost = (end - before.end) / (_RATE * before.s)
+    start, run = _transition(before, following, place, max_speed)
+    cost += run + following.time(start, following.end)
+    return cost if _turns_around(before, following) else cost + _ZERO_SPEED_TIMEOUT
+
+
+def _plans(lines: Sequence[PrintLine], chosen: Sequence[_Pass], head: int, max_speed: int) -> list[LinePlan]:
+    """Turn the chosen passes into plans with places in emitters from the left frame."""
+    plans: list[LinePlan] = []
+    before: _Pass | None = None
+    place = head
+    for index, (line, this) in enumerate(zip(lines, chosen, strict=True)):
+        following = chosen[index + 1] if index + 1 < len(chosen) else None
+        start, run = _transition(before, this, place, max_speed)
+        end = this.extended(following)
+        pause = 0.0 if _turns_around(before, this) else _ZERO_SPEED_TIMEOUT
+        plans.append(
+            LinePlan(
+                line=line,
+                direction=this.d,
+                speed=this.s,
+                run_to=this.d * start if _needs_run(before, this, place) else None,
+                start=this.d * start,
+                print_from=round(256 * this.d * this.ink),
+                print_to=this.d * (end - ceil(stop_distance(this.s))),
+                stop=this.d * end,
+                turn_around=_turns_around(before, this),
+                seconds=run + this.time(start, end) + pause,
+            )
+        )
+        before, place = this, this.d * end
+    return plans

@@ -1,0 +1,207 @@
+"""Print jobs: read a file, find out what it is, and say which character stands where.
+
+Two kinds of job are read: plain text (ten characters and six lines per inch), and streams for the Diablo 630
+daisy-wheel printer (`diablo630`). The content decides, not the name of the file.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+
+from detent.errors import InputError
+from detent.methods.print_head.diablo630 import parse_diablo
+from detent.methods.print_head.paper import LINE, Paper
+from detent.methods.print_head.printed_page import (
+    WHEEL_PITCH,
+    AcceptedCode,
+    ByteAccount,
+    JobNote,
+    PrintedCharacter,
+    PrintJob,
+    PrintLine,
+    Sheet,
+)
+
+__all__ = [
+    "AcceptedCode",
+    "ByteAccount",
+    "JobNote",
+    "PrintJob",
+    "PrintLine",
+    "PrintedCharacter",
+    "load_job",
+    "parse_diablo",
+    "parse_text",
+]
+
+TAB_WIDTH = 8
+"""Characters between the tab stops of plain text."""
+
+# Tab, line feed, form feed and carriage return occur in text; a CP/M text ends in SUB. Anything else is a code.
+_CONTROL_BYTE = re.compile(rb"[\x00-\x08\x0b\x0e-\x1f]")
+
+# Share of bytes without meaning above which a file is taken for something else. Real streams have none at all.
+_MAX_MEANINGLESS_SHARE = 0.1
+
+_WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
+
+
+def load_job(path: str | PathLike[str]) -> PrintJob:
+    """Read a print job.
+
+    Parameters
+    ----------
+    path : str or path
+        A text file (UTF-8, or Latin-1 where it is not UTF-8) or a Diablo 630 stream. Escape sequences or other
+        control bytes make it a stream.
+
+    Returns
+    -------
+    PrintJob
+        At least one line.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, prints nothing, or is neither text nor a stream.
+    """
+    file = Path(path)
+    try:
+        data = file.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError.of_file(str(path), reason, _WHAT_A_JOB_IS, "check the name after --job") from None
+    if _CONTROL_BYTE.search(data.rstrip(b"\x1a")):
+        job = parse_diablo(data, file.name)
+        _refuse_rubbish(job, data, str(path))
+    else:
+        job = _parse_text_bytes(data, file.name)
+    if not job.lines:
+        came = "an empty file" if not data else f"{len(data)} bytes that print nothing"
+        raise InputError.of_file(
+            str(path), came, "a job with at least one character to print", "put some text into it, or name another file"
+        )
+    return job
+
+
+def _refuse_rubbish(job: PrintJob, data: bytes, file: str) -> None:
+    """Raise for a stream that has no meaning to a printer, or only at its beginning."""
+    notes = [note for note in job.notes if note.code != "SUB"]
+    unread = job.length_bytes - next((note.offset for note in job.notes if note.code == "SUB"), job.length_bytes)
+    meaningless = max(job.account.noted - unread, sum(byte >= 0x80 for byte in data))
+    fillers = data.count(0)  # NUL is filler in a stream, and half of a UTF-16 text
+    if meaningless <= _MAX_MEANINGLESS_SHARE * (len(data) - fillers):
+        return
+    first = f", the first at byte {notes[0].offset} ({notes[0].code})" if notes else ""
+    raise InputError.of_file(
+        file,
+        f"{meaningless} of {len(data)} bytes that mean nothing to a printer{first}",
+        _WHAT_A_JOB_IS,
+        "name a text file or a printer stream; save a document of a word processor as plain text first",
+    )
+
+
+def _parse_text_bytes(data: bytes, name: str) -> PrintJob:
+    try:
+        return parse_text(data.decode("utf-8"), name)
+    except UnicodeDecodeError:
+        return parse_text(data.decode("latin-1"), name, encoding="latin-1")
+
+
+def parse_text(text: str, name: str = "job", *, encoding: str = "utf-8") -> PrintJob:
+    r"""Lay out plain text at ten characters and six lines per inch on eleven-inch pages.
+
+    Tab stops stand every eight characters, a form feed begins a page, a carriage return without line feed goes
+    back to overstrike the line, a combining accent is struck over the letter before it.
+
+    Parameters
+    ----------
+    text : str
+        The whole text.
+    name : str
+        Name for messages and reports.
+    encoding : str
+        How the text stands in its file; offsets of notes count its bytes.
+
+    Returns
+    -------
+    PrintJob
+        Without lines if nothing was printed. Never raises: what cannot be printed is noted.
+
+    Examples
+    --------
+    >>> job = parse_text("ab\n\n\tc")
+    >>> [(line.baseline, line.first_column, line.text) for line in job.lines]
+    [(0, 0, 'ab'), (16, 96, 'c')]
+    """
+    typist = _Typist()
+    for char in text:
+        length = 1 if char < "\x80" else len(char.encode(encoding, errors="replace"))
+        kind = typist.type(char)
+        typist.account[kind] = typist.account.get(kind, 0) + length
+        typist.offset += length
+    lines = typist.sheet.lines()
+    return PrintJob(
+        name=name,
+        kind="text",
+        lines=lines,
+        pages=lines[-1].page if lines else 0,
+        notes=tuple(typist.notes),
+        accepted=(),
+        length_bytes=typist.offset,
+        account=ByteAccount(**typist.account),
+    )
+
+
+@dataclass(slots=True)
+class _Typist:
+    """Types text onto a sheet, character by character."""
+
+    offset: int = 0  # [byte]
+    column: int = 0  # [1/120 in]
+    paper: Paper = field(default_factory=Paper)
+    sheet: Sheet = field(default_factory=Sheet)
+    notes: list[JobNote] = field(default_factory=list[JobNote])
+    account: dict[str, int] = field(default_factory=dict[str, int])
+
+    def type(self, char: str) -> str:
+        """Type one character; gives what its bytes count as."""
+        if unicodedata.combining(char):
+            self._strike(char, max(0, self.column - WHEEL_PITCH))
+            return "printed"
+        if char.isprintable() and char != " ":
+            self._strike(char, self.column)
+            self.column += WHEEL_PITCH
+            return "printed"
+        return self._move(char)
+
+    def _strike(self, char: str, column: int) -> None:
+        self.sheet.strike(self.paper.page, self.paper.baseline, PrintedCharacter(char, column, WHEEL_PITCH))
+
+    def _move(self, char: str) -> str:
+        if char == "\n":
+            self.column = 0
+            self.paper.feed(LINE)
+        elif char == "\r":
+            self.column = 0
+        elif char == "\f":
+            self.column = 0
+            self.paper.form_feed()
+        elif char == "\t":
+            tab = TAB_WIDTH * WHEEL_PITCH
+            self.column = (self.column // tab + 1) * tab
+        elif unicodedata.category(char) == "Zs":
+            self.column += WHEEL_PITCH
+        else:
+            self.notes.append(JobNote(self.offset, _name(char), "not a printable character; ignored"))
+            return "noted"
+        return "interpreted"
+
+
+def _name(char: str) -> str:
+    """Name a character that cannot be shown: a control code by its byte, another by its code point."""
+    return f"{ord(char):02X} hex" if ord(char) < 0x100 else f"U+{ord(char):04X}"

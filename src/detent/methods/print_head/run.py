@@ -1,0 +1,405 @@
+"""Printing a job on the simulated axis, from power-on: home, identify, print line by line (issue words: the main job).
+
+The supervisor plans the lines, sends the commands with one waiting behind the running one, and loads the columns of the
+next line while the present one prints.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.control.column_timer import COLUMNS
+from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
+from detent.errors import AxisError, describe_sb1
+from detent.files.quantities import INCH
+from detent.methods.print_head.derive import Machine as TrueMachine
+from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
+from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
+from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
+from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
+from detent.record.machine import AnyRecorder, print_head_machine
+
+NOT_FIRED = -(1 << 31)
+EMITTERS_PER_COLUMN = 2.5
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineRecord:
+    """How one line was printed; lengths in metres, times in seconds since power-on."""
+
+    number: int
+    direction: int
+    speed_value: int
+    turn_around: bool
+    start: float
+    stop: float
+    characters: int
+    columns: int
+    missed: int
+    worst_error: float
+    rms_error: float
+
+    @property
+    def speed(self) -> float:
+        """Commanded print speed [m/s]."""
+        return self.speed_value * SPEED_STEP
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """Identification of one direction: what the axis found and what is true."""
+
+    slope: int
+    friction: int
+    speed_fast: int
+    speed_slow: int
+    drive_fast: int
+    drive_slow: int
+    true_slope: float
+    true_friction: float
+    default_slope: int
+    default_friction: int
+
+
+@dataclass(frozen=True, slots=True)
+class Strike:
+    """One printed character and where its middle landed, right of its place [m]; NaN when it was not fired."""
+
+    character: PrintedCharacter
+    line: int
+    offset: float
+
+
+@dataclass(slots=True)
+class PrintRun:
+    """Outcome of a print job. Times [s], lengths [m], current [A], energy [J].
+
+    Attributes
+    ----------
+    done : bool
+        Every inked column of the job is on paper.
+    failure : str
+        Why not, and what to do; empty if `done`.
+    time_ready, time_end : float
+        End of identification, end of the job, since power-on.
+    lines : list of LineRecord
+        Lines that were printed.
+    strikes : list of Strike
+        Characters printed, in the order of the lines; bounded by `MOST_STRIKES`.
+    characters, columns, missed : int
+        Characters printed (one struck twice in place counts once), columns of dots fired, and inked ones passed by.
+    worst_error, rms_error : float
+        Of where the columns landed, as far as they were printed.
+    errors_right, errors_left : ndarray of int, shape (ERROR_BINS,)
+        Columns per bin of `ERROR_BIN`, right of their place positive, by direction of printing.
+    identified : dict
+        By "right" and "left".
+    """
+
+    job: PrintJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    time_ready: float = 0.0
+    time_end: float = 0.0
+    lines: list[LineRecord] = field(default_factory=list[LineRecord])
+    strikes: list[Strike] = field(default_factory=list[Strike])
+    characters: int = 0
+    columns: int = 0
+    missed: int = 0
+    worst_error: float = 0.0
+    rms_error: float = 0.0
+    errors_right: NDArray[np.int64] = field(default_factory=lambda: np.zeros(ERROR_BINS, np.int64))
+    errors_left: NDArray[np.int64] = field(default_factory=lambda: np.zeros(ERROR_BINS, np.int64))
+    turn_arounds: int = 0
+    repositions: int = 0
+    peak_current: float = 0.0
+    energy: float = 0.0
+    width: float = 0.0
+    identified: dict[str, Direction] = field(default_factory=dict[str, Direction])
+
+    @property
+    def print_time(self) -> float:
+        """Time from the end of identification to the end of the job [s]."""
+        return self.time_end - self.time_ready
+
+    @property
+    def characters_per_second(self) -> float:
+        """Characters printed per second of print time."""
+        return self.characters / self.print_time if self.print_time > 0 else 0.0
+
+    @property
+    def speeds(self) -> dict[int, int]:
+        """Lines printed per speed value [1/6 in/s]."""
+        found: dict[int, int] = {}
+        for line in self.lines:
+            found[line.speed_value] = found.get(line.speed_value, 0) + 1
+        return dict(sorted(found.items(), reverse=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``."""
+        names = (
+            "done", "failure", "warnings", "time_ready", "time_end", "print_time", "characters",
+            "characters_per_second", "columns", "missed", "worst_error", "rms_error", "turn_arounds", "repositions",
+            "peak_current", "energy", "width",
+        )  # fmt: skip
+        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "pages": self.job.pages}
+        found |= {name: getattr(self, name) for name in names}
+        found["speeds"] = {str(s): n for s, n in self.speeds.items()}
+        found["identified"] = {side: asdict(line) for side, line in self.identified.items()}
+        found["lines"] = [asdict(line) for line in self.lines]
+        found["notes"] = [asdict(note) for note in self.job.notes]
+        return found
+
+
+ERROR_BIN = 1e-7
+"""Width of a bin of the column errors [m]."""
+
+ERROR_BINS = 6001
+"""Bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins."""
+
+MOST_STRIKES = 20_000
+"""Characters kept one by one for the picture of the pages; the figures count all."""
+
+
+def print_job(
+    spec: PrintHeadSpec, job: PrintJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> PrintRun:
+    """Print a job on the axis of `spec`, from power-on.
+
+    Parameters
+    ----------
+    spec : PrintHeadSpec
+        The axis.
+    job : PrintJob
+        What to print.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    PrintRun
+        What the axis did; an obstruction or a refusal of the axis is in `failure`, not raised.
+
+    Raises
+    ------
+    InputError
+        A line does not fit between the frames at any speed.
+    """
+    runner = _Runner(spec, job, recorder, progress or (lambda _share, _text: None))
+    try:
+        runner.prepare()
+        if not runner.result.failure:
+            runner.print_all()
+    except AxisError as error:
+        runner.result.failure = str(error)
+    finally:
+        runner.machine.close()
+    return runner.finish()
+
+
+class _Runner:
+    """The supervisor's program for one job."""
+
+    def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: AnyRecorder | None, progress: Progress) -> None:
+        self.spec, self.job, self.progress = spec, job, progress
+        self.machine = print_head_machine(spec, recorder)
+        self.state = self.machine.state
+        self.result = PrintRun(job)
+        self.supervisor = Supervisor(
+            self.state.head, self.machine.pass_time, self.on_answer, ack_last=spec.method.ack_last
+        )
+        buffer: Any = self.state.buffer
+        self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(buffer.ink)
+        self.landed: NDArray[np.int32] = np.ctypeslib.as_array(buffer.landed)
+        self.plans: tuple[LinePlan, ...] = ()
+        self.sum_squares = 0.0
+        self.began = 0.0
+
+    def prepare(self) -> None:
+        """CALCULATE PARAMETERS, then plan the lines between the frames found."""
+        self.progress(0.0, "homing and identification")
+        self.supervisor.send(calculate_parameters())
+        self.supervisor.finish()
+        head = self.state.head
+        self.result.time_ready = self.began = self.machine.time
+        self.result.width = head.width * EMITTER
+        self.result.identified = {"right": self._direction("right"), "left": self._direction("left")}
+        if self.result.failure:
+            return
+        geometry = Geometry(
+            width_emitters=head.width,
+            column0_emitters=self.machine.params.head.columns.column_zero / 256,
+            emitters_per_column=EMITTERS_PER_COLUMN,
+            max_speed=head.maximum,
+        )
+        self.plans = plan_lines(self.job.lines, geometry, head=int(head.emitter), job_name=self.job.name)
+
+    def print_all(self) -> None:
+        """Send the lines, one waiting behind the running one."""
+        preselected = int(self.state.head.maximum)
+        for index, plan in enumerate(self.plans):
+            while self.supervisor.outstanding and self.supervisor.outstanding[0].tag != index - 1:
+                self.supervisor.await_answer()
+            if self.result.failure:
+                return
+            self.load_line(index, plan.line)
+            if plan.speed != preselected:
+                self.supervisor.send(set_speed(plan.speed))
+                preselected = plan.speed
+            if plan.run_to is not None:
+                self.supervisor.send(run_to(plan.run_to))
+            self.supervisor.send(print_from(plan.print_from, plan.print_to, tag=index))
+        self.supervisor.finish()
+
+    def load_line(self, index: int, line: PrintLine) -> None:
+        """Fill the bank that this line will print from; banks alternate with every PRINT, the first is bank 1."""
+        bank = self._bank(index)
+        self.ink[bank] = 0
+        self.landed[bank] = NOT_FIRED
+        for character in line.characters:
+            first, last = _ink_span(character)
+            self.ink[bank.start + first : bank.start + last] = 1
+
+    def on_answer(self, answer: Answer) -> None:
+        """Book the end of a command."""
+        if answer.command.tag >= 0 and answer.byte == 0:
+            self.book_line(answer.command.tag)
+        elif answer.byte == IMPLAUSIBLE:
+            self.result.warnings.append(f"{answer.command.text}: {describe_sb1(answer.byte)}")
+        elif answer.byte and not self.result.failure:
+            where = f" (line {self.plans[answer.command.tag].line.number})" if answer.command.tag >= 0 else ""
+            self.result.failure = f"{answer.command.text}{where}: {describe_sb1(answer.byte)}{self._place(answer.byte)}"
+        self.began = self.machine.time
+
+    def _place(self, code: int) -> str:
+        """Where an obstruction is, as far as the axis knows."""
+        head = self.state.head
+        if not code & OBSTRUCTION or head.width <= 0:
+            return ""
+        expected = self.machine.params.head.expected_width
+        if head.width < expected - self.machine.params.head.width_tolerance:
+            return f" (the way found is {_both(head.width)}, limits.travel is {_both(expected)})"
+        return f" (the head stopped {_both(head.emitter)} from the left frame)"
+
+    def book_line(self, index: int) -> None:
+        """Read what a finished line left in its bank."""
+        line, bank, result = self.plans[index].line, self._bank(index), self.result
+        inked = self.ink[bank] != 0
+        landed = self.landed[bank]
+        buffer: Any = self.state.buffer  # ctypes gives the elements of an array no type
+        fired = inked & (landed != NOT_FIRED)
+        errors: NDArray[np.float64] = landed[fired].astype(np.float64) * 1e-9
+        squares = float(errors @ errors)
+        worst = float(np.max(np.abs(errors), initial=0.0))
+        number = bank.start // COLUMNS
+        counted = result.errors_right if buffer.direction[number] > 0 else result.errors_left
+        counted += count_errors(errors)
+        count, missed = int(fired.sum()), int(inked.sum() - fired.sum())
+        result.lines.append(
+            LineRecord(
+                number=line.number,
+                direction=int(buffer.direction[number]),
+                speed_value=int(buffer.speed[number]),
+                turn_around=bool(buffer.turned[number]),
+                start=self.began,
+                stop=self.machine.time,
+                characters=len(line.characters),
+                columns=count,
+                missed=missed,
+                worst_error=worst,
+                rms_error=math.sqrt(squares / count) if count else math.nan,
+            )
+        )
+        self._book_strikes(line, landed)
+        result.characters += len(line.characters)
+        result.columns += count
+        result.missed += missed
+        result.worst_error = max(result.worst_error, worst)
+        self.sum_squares += squares
+        self.progress((index + 1) / len(self.plans), f"line {index + 1} of {len(self.plans)}")
+
+    def finish(self) -> PrintRun:
+        """Fill in the totals."""
+        result, head, train = self.result, self.state.head, self.state.train
+        result.time_end = self.machine.time
+        result.turn_arounds, result.repositions = int(head.turn_arounds), int(head.repositions)
+        result.peak_current, result.energy = train.peak_current, train.energy
+        result.rms_error = math.sqrt(self.sum_squares / result.columns) if result.columns else 0.0
+        if not result.failure and result.missed:
+            result.failure = (
+                f"{result.missed} of {result.columns + result.missed} columns were not fired; look at the encoder "
+                "(missing edges, jitter)"
+            )
+        result.done = not result.failure and len(result.lines) == len(self.job.lines)
+        return result
+
+    def _bank(self, index: int) -> slice:
+        start = COLUMNS * ((index + 1) & 1)
+        return slice(start, start + COLUMNS)
+
+    def _book_strikes(self, line: PrintLine, landed: NDArray[np.int32]) -> None:
+        if len(self.result.strikes) + len(line.characters) > MOST_STRIKES:
+            return
+        for character in line.characters:
+            first, last = _ink_span(character)
+            found = landed[first:last]
+            found = found[found != NOT_FIRED]
+            offset = float(found.mean()) * 1e-9 if found.size else math.nan
+            self.result.strikes.append(Strike(character, line.number, offset))
+
+    def _direction(self, side: str) -> Direction:
+        line = getattr(self.state.head, side)
+        p = self.machine.params.head
+        true = TrueMachine(self.spec)
+
+        def default_drive(s: int) -> int:
+            return ((p.slope_default * s) >> 8) + p.friction_default
+
+        return Direction(
+            slope=line.slope,
+            friction=line.friction,
+            speed_fast=line.speed_fast,
+            speed_slow=line.speed_slow,
+            drive_fast=default_drive(p.run_speed),
+            drive_slow=default_drive(60),
+            true_slope=true.slope[side],
+            true_friction=true.coulomb_counts[side],
+            default_slope=p.slope_default,
+            default_friction=p.friction_default,
+        )
+
+
+def count_errors(errors: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Columns per bin of `ERROR_BIN`, the middle bin centred on zero; errors beyond the ends count in the end bins."""
+    bins = np.clip(np.round(errors / ERROR_BIN).astype(np.int64) + ERROR_BINS // 2, 0, ERROR_BINS - 1)
+    return np.bincount(bins, minlength=ERROR_BINS).astype(np.int64)
+
+
+def _both(emitters: int) -> str:
+    """A length in the two units people use."""
+    return f"{emitters * EMITTER * 1e3:.1f} mm = {emitters * EMITTER / INCH:.2f} in"
+
+
+def _ink_span(character: PrintedCharacter) -> tuple[int, int]:
+    """Columns of a character that carry ink: its cell less a blank column at each side, first and one past the last."""
+    first = min(character.column + 1, COLUMNS - 1)
+    return first, min(max(first + 1, character.column + character.ink_columns - 1), COLUMNS)
+
+
+def default_signals() -> Sequence[str]:
+    """Registers a run records unless told otherwise: enough for the report's figures and most questions."""
+    return (
+        "train.position", "train.velocity", "train.current", "train.voltage", "train.energy", "head.state",
+        "head.drive_cmd", "head.out.transition", "head.out.right_left", "head.emitter", "head.speed",
+        "head.direction", "head.columns.active", "head.columns.fired",
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""From a checked specification to the parameters of the rotary table: SI values to counts, words and ticks."""
+
+import math
+
+from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
+from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
+from detent.control.table_positioner import ATOMIC, BY_ACTUAL, BY_THEORETICAL, FLAG_FIRST, REMAINING_FIRST
+from detent.kernel.turn_table import FRACTION, TURN
+from detent.methods.rotary_table.schema import CoarseTable, FineTable, RotaryTableSpec
+from detent.methods.rotary_table.system import TICK, RotaryTableParams
+from detent.plant.gearing import GearParams, fill_eccentricity
+from detent.plant.rotary_motor import fill_motor
+from detent.sensing.resolver_counter import ResolverParams, fill_resolver
+
+FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
+JUDGES = {"theoretical": BY_THEORETICAL, "actual": BY_ACTUAL}
+UPDATES = {"atomic": ATOMIC, "flag first": FLAG_FIRST, "remaining first": REMAINING_FIRST}
+DIRECTIONS = {"shortest": SHORTEST, "positive": POSITIVE, "negative": NEGATIVE, "as commanded": AS_COMMANDED}
+
+
+def build_rotary_table(spec: RotaryTableSpec) -> RotaryTableParams:
+    """Parameters of the rotary table.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        As `load_spec` returns it.
+
+    Returns
+    -------
+    RotaryTableParams
+    """
+    p = RotaryTableParams()
+    method = spec.method
+    p.clocks.strobe_ticks, p.clocks.delay_ticks = ticks(method.strobe_period), ticks(method.interrupt_delay)
+    p.clocks.task_ticks = ticks(method.task_period)
+    _fill_detector(p, spec)
+    _fill_positioner(p, spec)
+    _fill_positions(p, spec)
+    _fill_machine(p, spec)
+    load = spec.disturbance.load
+    if load is not None:
+        p.machine.load.torque = load.torque / spec.ratio
+        p.machine.load.begin, p.machine.load.end = ticks(load.at), ticks(load.at) + ticks(load.duration)
+    return p
+
+
+def ticks(seconds: float) -> int:
+    """A time in base ticks."""
+    return round(seconds / TICK)
+
+
+def start_turns(spec: RotaryTableSpec) -> float:
+    """Motor angle at power-on [turn]: in the middle of the count that `mechanics.start_angle` lies in.
+
+    On the border of two counts rounding alone would decide which of them is read.
+    """
+    counts = math.floor(spec.mechanics.start_angle / spec.count + 1e-6)
+    return (counts + 0.5) / spec.detector.fine.counts
+
+
+def _phase(angle: float) -> int:
+    """An angle [rad] as a phase [turn/2^32]."""
+    return round(angle / (2 * math.pi) * TURN) & FRACTION
+
+
+def _word(angle: float, counts: int) -> int:
+    """Word of a comparator at an electrical angle [rad]."""
+    return (_phase(angle) * counts) >> 32
+
+
+def _fill_detector(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
+    fine, coarse = spec.detector.fine, spec.detector.coarse
+    _fill_resolver(p.detector.fine, fine)
+    _fill_resolver(p.detector.coarse, coarse)
+    p.detector.coarse.offset = _phase(coarse.mounting + coarse.alignment_error)
+    c = p.detector.composition
+    c.ratio, c.fine, c.coarse = spec.ratio, fine.counts, coarse.counts
+    c.fine_zero, c.coarse_zero = _word(fine.mounting, fine.counts), _word(coarse.mounting, coarse.counts)
+    c.truncating = spec.detector.composition == "truncated"
+
+
+def _fill_resolver(p: ResolverParams, table: FineTable) -> None:
+    p.counts, p.offset = table.counts, _phase(table.mounting)
+    if table.gain_error or table.quadrature_error or table.offset_error:
+        fill_resolver(p, table.gain_error, table.quadrature_error, table.offset_error)
+    p.noise = table.noise / (2 * math.pi) * TURN
+
+
+def _fill_positioner(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
+    q, method = p.positioner, spec.method
+    one = 1 << method.fraction_bits
+    q.angle.period, q.angle.form = spec.period, FORMS[method.form]
+    q.interpolator.fraction = method.fraction_bits
+    q.interpolator.acceleration = round(spec.acceleration_word)
+    q.interpolator.max_speed = round(spec.per_interrupt(spec.limits.speed))
+    q.gain = method.position_gain * spec.count / one / spec.speed_per_word
+    q.speed_gain = spec.count / one / method.strobe_period / spec.speed_per_word
+    q.max_word = spec.largest_word
+    q.window = method.in_position
+    q.window_interrupts = max(1, round(method.in_position_time / method.strobe_period))
+    q.judge, q.update = JUDGES[method.judge], UPDATES[method.update]
+    q.inclusive, q.guarded = method.inclusive, method.guarded
+    q.unsigned_remaining, q.open_loop = not method.signed_remaining, not method.position_control
+
+
+def _fill_positions(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
+    pdt = p.positioner.pdt
+    for name, entry in spec.position.items():
+        number = int(name)
+        pdt.angle[number] = round(entry.angle / spec.count)
+        pdt.speed[number] = round(spec.per_interrupt(entry.speed))
+        pdt.policy[number] = DIRECTIONS[entry.direction]
+        pdt.entries = max(pdt.entries, number + 1)
+    pdt.tolerance = round(spec.method.short_way / spec.count)
+
+
+def _fill_machine(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
+    a, m, mechanics = p.amplifier, p.machine.motor, spec.mechanics
+    # Stiffness plus viscous friction give the time constant, their shares the droop.
+    damping = spec.inertia / spec.drive.time_constant
+    a.stiffness, a.max_torque = (1 - spec.drive.droop) * damping, spec.limits.effort
+    a.speed_per_count = spec.speed_per_word * spec.ratio
+    m.inertia, m.viscous, m.period = spec.inertia, spec.drive.droop * damping, TICK
+    m.coulomb, m.static = mechanics.coulomb, mechanics.static
+    fill_motor(m, a.stiffness)
+    _fill_gear(p.machine.gear, spec.ratio, mechanics.backlash, mechanics.eccentricity, mechanics.eccentricity_angle)
+    coarse: CoarseTable = spec.detector.coarse
+    _fill_gear(p.machine.reduction, spec.ratio, coarse.backlash, coarse.eccentricity, coarse.eccentricity_angle)
+
+
+def _fill_gear(p: GearParams, ratio: int, backlash: float, eccentricity: float, angle: float) -> None:
+    """A gear whose faults are stated at its output [rad]."""
+    p.ratio, p.half_backlash = ratio, 0.5 * backlash * ratio
+    if eccentricity:
+        fill_eccentricity(p, eccentricity, angle)

@@ -1,0 +1,313 @@
+"""What follows from a rotary-table specification: counts and words, drive, following error, jog, detector.
+
+Symbols: ``G`` motor turns per table turn, ``T`` period of the absolute angle, ``v`` limits.speed, ``a``
+limits.acceleration, ``J`` inertia at the motor, ``tau`` time constant of the velocity loop, ``Kp`` position gain;
+sections are those of the rotary-table specification. Angles are those of the table.
+"""
+
+import math
+from collections.abc import Iterator
+from functools import cached_property
+
+from detent.files.findings import Derived, count_figure, quantity_figure
+from detent.methods.rotary_table.loop import HeldLoop
+from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
+from detent.units import format_quantity
+
+FULL_TURN = 2 * math.pi
+
+POINTS = 256
+"""Places of a turn at which the errors of a resolver are looked at, those of its table (`kernel.turn_table`)."""
+
+
+class Machine:
+    """The machine behind a specification.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        The axis.
+    """
+
+    def __init__(self, spec: RotaryTableSpec) -> None:
+        self.spec = spec
+        damping = spec.inertia / spec.drive.time_constant
+        self.stiffness = (1 - spec.drive.droop) * damping
+        self.viscous = spec.drive.droop * damping
+        self.gain = spec.method.position_gain
+        self.speed = spec.limits.speed
+
+    # ---------------------------------------------------------------------------------------------- loop
+
+    @cached_property
+    def loop(self) -> HeldLoop:
+        """Exact model of the position loop."""
+        drive, method = self.spec.drive, self.spec.method
+        return HeldLoop(self.gain, 1 - drive.droop, drive.time_constant, method.strobe_period, method.interrupt_delay)
+
+    @cached_property
+    def is_stable(self) -> bool:
+        """Whether every mode of the loop decays."""
+        return self.loop.spectral_radius < 1.0
+
+    @cached_property
+    def largest_gain(self) -> float:
+        """Kp at which the loop no longer settles [1/s]."""
+        return self.loop.largest_gain(0.0)
+
+    def overshoot(self, speed: float) -> float:
+        """Way by which the table passes a target that it comes to at this speed [rad]."""
+        acceleration = self.spec.limits.acceleration
+        return acceleration * self.loop.stop(speed / acceleration)[0]
+
+    @cached_property
+    def peak_acceleration(self) -> float:
+        """Largest acceleration of the table over that of its command."""
+        return self.loop.stop(math.inf)[1]
+
+    # ---------------------------------------------------------------------------------------------- drive
+
+    def word_at(self, speed: float) -> float:
+        """Speed word that holds a speed of the table [rad/s] against droop and friction [count]."""
+        against = self.spec.mechanics.coulomb / self.stiffness / self.spec.ratio
+        return (speed / (1 - self.spec.drive.droop) + against) / self.spec.speed_per_word
+
+    def following_error(self, speed: float) -> float:
+        """Deviation with which the table follows at a steady speed [rad]."""
+        return self.word_at(speed) * self.spec.speed_per_word / self.gain
+
+    @property
+    def resisting_torque(self) -> float:
+        """What droop and friction take at limits.speed [N m]."""
+        return self.viscous * self.speed * self.spec.ratio + self.spec.mechanics.coulomb
+
+    @property
+    def accelerating_torque(self) -> float:
+        """Largest torque while the table is accelerated to limits.speed [N m]."""
+        motor = self.spec.limits.acceleration * self.peak_acceleration * self.spec.ratio
+        return self.spec.inertia * motor + self.resisting_torque
+
+    def peak_word(self, speed: float) -> float:
+        """Largest speed word after an acceleration to a speed of the table [rad/s] [count]."""
+        return self.word_at(speed) + self.overshoot(speed) * self.gain / self.spec.speed_per_word
+
+    def deviation(self, torque: float) -> float:
+        """Deviation that holds a torque at the motor [rad]: neither loop has an integral part."""
+        return torque / self.stiffness / self.spec.ratio / self.gain
+
+    # ---------------------------------------------------------------------------------------------- rest
+
+    @property
+    def breaking_word(self) -> int:
+        """Least speed word whose torque at standstill is above static friction [count]."""
+        per_word = self.stiffness * self.spec.speed_per_word * self.spec.ratio
+        return math.floor(self.spec.mechanics.static / per_word) + 1
+
+    @property
+    def resting_error(self) -> int:
+        """Largest deviation at which the table stays at rest [count]: S4 is rounded to a word too small."""
+        least = (self.breaking_word - 0.5) * self.spec.speed_per_word / self.gain / self.spec.count
+        return max(0, math.ceil(least * (1 - 1e-9)) - 1)
+
+    @property
+    def noise(self) -> int:
+        """Largest error of an angle by the noise of the fine resolver [count]."""
+        return math.ceil(self.spec.detector.fine.noise / FULL_TURN * self.spec.detector.fine.counts)
+
+    # ---------------------------------------------------------------------------------------------- jog
+
+    @property
+    def latency_way(self) -> float:
+        """Way in a period of the timer task at limits.speed [rad]."""
+        return self.speed * self.spec.method.task_period
+
+    def jog_reserve_at(self, speed: float) -> float:
+        """Way from the rollover's limit within which the rollover comes at last [rad]."""
+        method = self.spec.method
+        # The actual angle lags, and so does a crossing that has to be waited for.
+        lag = self.following_error(speed) if method.judge == "actual" or method.guarded else 0.0
+        return speed * method.task_period + lag
+
+    # ---------------------------------------------------------------------------------------------- detector
+
+    @property
+    def allowed_coarse_error(self) -> float:
+        """Largest sum of errors with which the motor turns still come out right [rad] (3.1)."""
+        spec = self.spec
+        return math.pi / spec.ratio - FULL_TURN / spec.detector.coarse.counts - spec.count
+
+    @property
+    def coarse_errors(self) -> dict[str, float]:
+        """Largest errors of the coarse word against the fine one, by their source [rad]."""
+        fine, coarse = self.spec.detector.fine, self.spec.detector.coarse
+        errors = {
+            "backlash": 0.5 * coarse.backlash,
+            "eccentricity": coarse.eccentricity,
+            "alignment": abs(coarse.alignment_error),
+            "windings and comparator": resolver_error(coarse),
+            "noise": coarse.noise,
+            "fine resolver": (resolver_error(fine) + fine.noise) / self.spec.ratio,
+        }
+        return {name: error for name, error in errors.items() if error > 0}
+
+    @property
+    def table_error(self) -> float:
+        """Largest error of the table against the fine resolver's angle, which no loop sees [rad]."""
+        mechanics = self.spec.mechanics
+        fine = resolver_error(self.spec.detector.fine) / self.spec.ratio
+        return 0.5 * mechanics.backlash + mechanics.eccentricity + fine
+
+
+def resolver_error(table: FineTable) -> float:
+    """Largest error of a resolver's angle by its windings and comparator [rad].
+
+    As `sensing.phase_detector.fill_errors` has it, on the same places of a turn.
+    """
+    if not (table.gain_error or table.quadrature_error or table.offset_error):
+        return 0.0
+    worst = 0.0
+    for k in range(POINTS):
+        x = FULL_TURN * k / POINTS
+        a = (1 + table.gain_error) * math.cos(x) - math.sin(table.quadrature_error) * math.sin(x)
+        b = math.cos(table.quadrature_error) * math.sin(x)
+        late = math.asin(max(-1.0, min(1.0, table.offset_error / math.hypot(a, b))))
+        worst = max(worst, abs(math.remainder(math.atan2(b, a) - x, FULL_TURN) + late))
+    return worst
+
+
+def weakest_output(table: FineTable) -> float:
+    """Smallest amplitude of a resolver's output over a turn, of the nominal one.
+
+    The smaller singular value of the matrix with which the windings give sine and cosine.
+    """
+    gain, q = 1 + table.gain_error, table.quadrature_error
+    # Squares of the singular values add up to (1 + g)^2 + 1, their product is (1 + g) cos q.
+    total, product = gain**2 + 1, gain * math.cos(q)
+    return math.sqrt(max(0.0, total - math.sqrt(max(0.0, total**2 - 4 * product**2))) / 2)
+
+
+def arc_seconds(angle: float) -> str:
+    """Write a small angle [rad] in degrees and in seconds of arc."""
+    return f"{format_quantity(angle, 'rad')} ({3600 * math.degrees(angle):.4g} seconds of arc)"
+
+
+def counted(counts: int) -> str:
+    """Write a number of counts."""
+    return f"{counts} count{'' if counts == 1 else 's'}"
+
+
+def derive(spec: RotaryTableSpec) -> tuple[Derived, ...]:
+    """Compute all derived figures, in the order they are read."""
+    machine = Machine(spec)
+    groups = [_words(machine), _clocks(machine), _drive(machine), _jog(machine), _rest(machine), _detector(machine)]
+    if spec.method.position_control:
+        groups.insert(3, _loop(machine))
+    return tuple(figure for group in groups for figure in group)
+
+
+def _words(machine: Machine) -> Iterator[Derived]:
+    """What a count is, and a word."""
+    spec, method = machine.spec, machine.spec.method
+    yield Derived("period T", spec.period, "count", f"{spec.period} counts", "G x fine counts: a turn of the table")
+    yield Derived("count", spec.count, "rad", arc_seconds(spec.count), "360 deg / T")
+    formula = "full speed / largest word / G"
+    yield quantity_figure("speed of one word", spec.speed_per_word, "rad/s", formula)
+    formula = "motor.max_speed or drive.full_speed, the lower one, / G"
+    yield quantity_figure("largest table speed", spec.largest_speed, "rad/s", formula)
+    per_interrupt = machine.speed * method.strobe_period / spec.count
+    text = f"{per_interrupt:.4g} counts in an interrupt"
+    yield Derived("way of an interrupt at limits.speed", per_interrupt, "count", text, "v x strobe period / count")
+    least = spec.count / method.strobe_period
+    formula = "count / 2^(fraction bits) / strobe period"
+    yield quantity_figure("slowest jog", least / (1 << method.fraction_bits), "rad/s", formula)
+    formula = "count / strobe period: below it D stands still in some interrupts"
+    yield quantity_figure("slowest jog with a count in each interrupt", least, "rad/s", formula)
+
+
+def _clocks(machine: Machine) -> Iterator[Derived]:
+    """Strobe, interrupt and task."""
+    method = machine.spec.method
+    passes = method.task_period / method.strobe_period
+    yield Derived("interrupts in a pass of the task", passes, "", f"{passes:.4g}", "task period / strobe period")
+    turn = FULL_TURN / machine.speed / method.strobe_period
+    yield Derived("interrupts in a turn at limits.speed", turn, "", f"{turn:.4g}", "360 deg / v / strobe period")
+
+
+def _drive(machine: Machine) -> Iterator[Derived]:
+    """Inertia, stiffness, acceleration."""
+    spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
+    yield quantity_figure("inertia at the motor J", spec.inertia, "kg*m^2", "rotor + gear + table / G^2")
+    formula = "(1 - droop) x J / tau"
+    yield quantity_figure("stiffness of the velocity loop", machine.stiffness, "N*m*s/rad", formula)
+    yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a")
+    formula = "v^2 / (2 a), to limits.speed or from it to rest"
+    yield quantity_figure("way of an acceleration", speed**2 / (2 * acceleration), "rad", formula)
+    if machine.spec.method.position_control and machine.is_stable:
+        formula = f"J x G x {machine.peak_acceleration:.3g} a, as the loop swings, + droop and friction at limits.speed"
+        yield quantity_figure("torque of an acceleration", machine.accelerating_torque, "N*m", formula)
+
+
+def _loop(machine: Machine) -> Iterator[Derived]:
+    """How the table follows, and how the loop settles."""
+    loop = machine.loop
+    error = machine.following_error(machine.speed)
+    formula = "(v / (1 - droop) + Coulomb friction / (stiffness x G)) / Kp"
+    yield quantity_figure("following error at limits.speed", error, "rad", formula)
+    ideal = 1 / (2 * math.sqrt(loop.gain * loop.share * loop.time_constant))
+    formula = "1 / (2 sqrt(Kp (1 - droop) tau))"
+    yield Derived("damping without sampling", ideal, "", f"{ideal:.3g}", formula)
+    formula = "least damped mode that swings, with strobe period and interrupt delay"
+    yield Derived("damping of the loop", loop.damping, "", f"{loop.damping:.3g}", formula)
+    limit = machine.largest_gain
+    text = f"Kp = {limit:.4g} 1/s, {limit / loop.gain:.3g} x the gain"
+    yield Derived("stability limit", limit, "1/s", text, "lowest Kp at which a mode does not decay")
+    if machine.is_stable:
+        passed = machine.overshoot(machine.speed)
+        formula = "at a stop from limits.speed; by as much the following error grows after an acceleration"
+        yield quantity_figure("overshoot", passed, "rad", formula)
+
+
+def _jog(machine: Machine) -> Iterator[Derived]:
+    """Cycle and rollover of a jog."""
+    yield quantity_figure("cycle of a jog", FULL_TURN / machine.speed, "s", "T / v: one rollover in each")
+    way = machine.latency_way
+    formula = "v x task period: the pass that sees less than T comes up to that late"
+    yield Derived("latency of a rollover", way, "rad", f"0 to {format_quantity(way, 'rad')}", formula)
+
+
+def _rest(machine: Machine) -> Iterator[Derived]:
+    """What is in position, and how the table rests."""
+    spec, method = machine.spec, machine.spec.method
+    window = method.in_position * spec.count
+    text = f"+-{arc_seconds(window)} for {format_quantity(method.in_position_time, 's')}"
+    yield Derived("in position", window, "rad", text, "in_position x count")
+    if method.position_control:
+        error = machine.resting_error
+        formula = "S4 rounded below the least word that moves the table, over Kp"
+        yield Derived("deviation at rest", error, "count", f"up to {counted(error)}", formula)
+    load = spec.disturbance.load
+    if load is not None and method.position_control:
+        error = abs(machine.deviation(load.torque / spec.ratio))
+        yield quantity_figure("deviation under the load", error, "rad", "torque / G / (stiffness x G x Kp)")
+
+
+def _detector(machine: Machine) -> Iterator[Derived]:
+    """Composition and conversion (3.1)."""
+    spec, detector = machine.spec, machine.spec.detector
+    allowed = machine.allowed_coarse_error
+    text = f"+-{format_quantity(allowed, 'rad')}"
+    yield Derived("allowed coarse error", allowed, "rad", text, "180 deg / G - 360 deg / coarse counts - count")
+    errors = machine.coarse_errors
+    if errors:
+        total = sum(errors.values())
+        yield Derived("coarse error", total, "rad", f"up to {format_quantity(total, 'rad')}", " + ".join(errors))
+    if machine.table_error > 0:
+        formula = "gear's backlash / 2 + eccentricity + fine resolver / G: no loop sees it"
+        yield quantity_figure("error of the table", machine.table_error, "rad", formula)
+    fine, coarse = detector.fine.counts / detector.clock, detector.coarse.counts / detector.clock
+    yield quantity_figure("fine conversion", fine, "s", "fine counts / clock: a period of the excitation")
+    if coarse != fine:
+        yield quantity_figure("coarse conversion", coarse, "s", "coarse counts / clock: a period of the excitation")
+    way = machine.speed * fine / spec.count
+    formula = "v x fine conversion: the word of a strobe is up to that old"
+    yield count_figure("way of a conversion at limits.speed", way, formula)

@@ -1,0 +1,227 @@
+"""The host of a rotary table: its sequence controller with the panel. It sees what the lines show, no more.
+
+The lines to the positioner are position number and start, the buttons + and - and the speed dial; the lines from it
+say that the table has come to rest, that a start was refused, and whether the table is within its window.
+"""
+
+import math
+from typing import Any
+
+from detent.control.table_positioner import HOLD, POWER_ON
+from detent.errors import TABLE_REFUSAL_TEXT, FileProblem, InputError
+from detent.files.nearest import at_least, at_most
+from detent.methods.rotary_table.schema import RotaryTableSpec
+from detent.methods.rotary_table.sequence_faults import StepFault, find_faults
+from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
+from detent.record.machine import AnyRecorder, rotary_table_machine
+from detent.units import format_quantity
+
+MOST_PROBLEMS = 20
+
+MARGIN = 0.5
+"""What a step may take longer than twice the time of its way [s]."""
+
+SETTLING = 10.0
+"""Time that the position loop is given to settle, in units of 1 / Kp."""
+
+
+class TableHost:
+    """Lines of a rotary table, and the passing of time.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        The axis.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+
+    Attributes
+    ----------
+    machine : Machine
+        The simulated axis.
+    """
+
+    def __init__(self, spec: RotaryTableSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec = spec
+        self.machine = rotary_table_machine(spec, recorder)
+        # ctypes gives every register its type at run time only.
+        self._lines: Any = self.machine.state.positioner
+        self._refused_before = 0
+
+    @property
+    def tick(self) -> int:
+        """Base ticks since power-on."""
+        return self.machine.state.tick
+
+    def start(self) -> None:
+        """Wait for the first interrupt, which takes the angle over and holds the table there."""
+        while self._lines.state == POWER_ON:
+            self.machine.pass_ticks(1)
+
+    # ------------------------------------------------------------------------------------------------------ lines
+
+    @property
+    def at_rest(self) -> bool:
+        """The table has come to rest: the line that the host has to acknowledge."""
+        return bool(self._lines.event)
+
+    def acknowledge(self) -> None:
+        """Clear the line."""
+        self._lines.event = 0
+
+    @property
+    def is_moving(self) -> bool:
+        """A jog, a stop or a positioning is under way."""
+        return self._lines.state != HOLD
+
+    @property
+    def in_position(self) -> bool:
+        """The table is within its window about the target."""
+        return abs(self._lines.oar - self._lines.angle.aar) <= self.spec.method.in_position
+
+    @property
+    def refused(self) -> int:
+        """Starts that were refused since power-on."""
+        return self._lines.refused
+
+    def press(self, direction: int, speed: float) -> None:
+        """Set the dial to a table speed [rad/s] and hold a button down: 1 for +, -1 for -."""
+        self._lines.dial = dial_of(self.spec, speed)
+        self._lines.plus, self._lines.minus = direction > 0, direction < 0
+
+    def release(self) -> None:
+        """No button."""
+        self._lines.plus = self._lines.minus = 0
+
+    def begin(self, number: int) -> None:
+        """Set the position number and start; the positioner takes it in its next task."""
+        self._refused_before = self._lines.refused
+        self._lines.number, self._lines.start = number, 1
+
+    @property
+    def is_pending(self) -> bool:
+        """A start has not been taken yet."""
+        return bool(self._lines.start)
+
+    @property
+    def refusal(self) -> str:
+        """Why the last start was refused, and what to do; empty if it was not."""
+        refused = self._lines.refused != self._refused_before
+        return TABLE_REFUSAL_TEXT[self._lines.reason] if refused else ""
+
+    @property
+    def way(self) -> float:
+        """Distance of the table from its target [rad], not signed."""
+        return abs(self._lines.oar - self._lines.angle.aar) * self.spec.count
+
+    # ------------------------------------------------------------------------------------------------------ times
+
+    def stop_time(self, speed: float) -> float:
+        """Time after which a released jog is at rest at the latest, with a margin [s]."""
+        return MARGIN + 2 * (self.spec.method.task_period + speed / self.spec.limits.acceleration)
+
+    def move_time(self, way: float, speed: float) -> float:
+        """Time after which a positioning has ended at the latest, with a margin [s]."""
+        method = self.spec.method
+        ramps = 2 * math.sqrt(way / self.spec.limits.acceleration)
+        return MARGIN + self.settling_time + method.in_position_time + 2 * (way / speed + ramps)
+
+    @property
+    def settling_time(self) -> float:
+        """Time in which the position loop settles, with a margin [s]."""
+        return SETTLING / self.spec.method.position_gain
+
+
+def dial_of(spec: RotaryTableSpec, speed: float) -> int:
+    """Register of the dial for a speed of the table [rad/s]."""
+    return round(spec.per_interrupt(speed))
+
+
+def dial_speed(spec: RotaryTableSpec, speed: float | None) -> float:
+    """Speed of a jog [rad/s], as the steps of the dial give it; None asks for the axis's largest."""
+    return dial_of(spec, speed or spec.limits.speed) / spec.per_interrupt(1.0)
+
+
+# ---------------------------------------------------------------------------------------------- before anything moves
+
+
+def check_sequence(spec: RotaryTableSpec, job: SequenceJob) -> None:
+    """Refuse a sequence that the axis cannot do, before anything moves.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        The axis.
+    job : SequenceJob
+        The sequence.
+
+    Raises
+    ------
+    InputError
+        Steps that do not go together (`find_faults`), position numbers without an entry, speeds of a jog above
+        ``limits.speed`` or below a step of the dial, jogs too short to be seen; all of them, with their lines.
+    """
+    if not job.steps:
+        raise InputError.of_file(job.name, "no steps", "a sequence of at least one step", "add a step")
+    faults = find_faults(job.steps, job.inputs)
+    for index, step in enumerate(job.steps):
+        faults += _step_faults(spec, index, step)
+    if faults:
+        raise InputError([_problem(job, fault) for fault in faults[:MOST_PROBLEMS]])
+
+
+def _problem(job: SequenceJob, fault: StepFault) -> FileProblem:
+    """A fault of a step with its line; a job that comes from no file names the step by its number."""
+    row = job.steps[fault.index].row
+    step = "step" if row else f"step[{fault.index + 1}]"
+    key = f"{step}.{fault.key}" if fault.key else step
+    return FileProblem(job.name, row, 1 if row else 0, key, fault.came, fault.allowed, fault.remedy)
+
+
+def _step_faults(spec: RotaryTableSpec, index: int, step: Step) -> list[StepFault]:
+    """What this axis cannot do of a step."""
+    if isinstance(step, Go) and str(step.number) not in spec.position:
+        numbers = describe_numbers(sorted(int(number) for number in spec.position))
+        remedy = f"name one of these, or add [position.{step.number}] to the axis file"
+        return [StepFault(index, "go", f"position number {step.number}", numbers, remedy)]
+    return _jog_faults(spec, index, step) if isinstance(step, Jog) else []
+
+
+def _jog_faults(spec: RotaryTableSpec, index: int, jog: Jog) -> list[StepFault]:
+    """Speed and time of a jog against dial and timer task."""
+    found: list[StepFault] = []
+    top, least = spec.limits.speed, 1.0 / spec.per_interrupt(1.0)
+    if jog.speed is not None and jog.speed > top * (1 + 1e-9):
+        allowed = f"up to limits.speed, {format_quantity(top, 'rad/s')}"
+        remedy = f"write speed = {at_most(top, 'rad/s')}, or raise limits.speed"
+        found.append(StepFault(index, "speed", format_quantity(jog.speed, "rad/s"), allowed, remedy))
+    if jog.speed is not None and dial_of(spec, jog.speed) < 1:
+        allowed = f"a step of the dial, {format_quantity(least, 'rad/s')}, or more"
+        remedy = f"write speed = {at_least(least, 'rad/s')}, or raise method.fraction_bits"
+        found.append(StepFault(index, "speed", format_quantity(jog.speed, "rad/s"), allowed, remedy))
+    task = spec.method.task_period
+    if jog.duration is not None and jog.duration < task * (1 - 1e-9):
+        allowed = f"method.task_period, {format_quantity(task, 's')}, or longer: the button is looked at so often"
+        remedy = f"write for = {at_least(task, 's')}, or shorten method.task_period"
+        found.append(StepFault(index, "for", format_quantity(jog.duration, "s"), allowed, remedy))
+    return found
+
+
+def describe_numbers(numbers: list[int]) -> str:
+    """Position numbers for people, in order.
+
+    Examples
+    --------
+    >>> describe_numbers([0, 1, 2, 3, 7, 8])
+    'the position numbers of the axis: 0 to 3, 7, 8'
+    """
+    if not numbers:
+        return "no number: the axis has no positions"
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(str(number) for number in run) for run in runs]
+    return f"the position numbers of the axis: {', '.join(texts)}"

@@ -1,0 +1,372 @@
+"""A sequence on a simulated rotary table, from power-on: what an observer beside the table sees."""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from detent.errors import AxisError
+from detent.methods.rotary_table.host import TableHost, check_sequence, dial_speed
+from detent.methods.rotary_table.schema import RotaryTableSpec
+from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
+from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob, Wait
+from detent.methods.rotary_table.table_observer import FULL_TURN, TableObserver
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder
+from detent.sensing.angle_gauge import set_angle_gauge
+from detent.units import format_quantity
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
+
+SEQUENCE_SIGNALS = (
+    "machine.motor.velocity", "table", "detector.absolute.theta", "positioner.state", "positioner.z",
+    "positioner.angle.aar", "positioner.angle.dar", "positioner.angle.flg", "positioner.angle.turn",
+    "positioner.angle.position", "positioner.oar", "positioner.arr", "positioner.interpolator.irr",
+    "positioner.interpolator.speed", "positioner.dr", "positioner.s4", "amplifier.torque",
+)  # fmt: skip
+"""Registers that a run records unless told otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord:
+    """How one step went; times in seconds since power-on, angles of the table in radians.
+
+    The angles are those of the table itself, endless: they go on beyond a turn.
+
+    Attributes
+    ----------
+    number : int
+        Counted from 1, repeats counted.
+    index : int
+        Of the step in the job, from 0.
+    kind : str
+        "go", "jog", "wait" or "output".
+    text : str
+        What was asked, for people.
+    begin, end : float
+        When it began and ended.
+    start, stop : float
+        Angle of the table at both.
+    target : float
+        Where it was sent, or is held after a jog; NaN for waits and outputs, and for a jog that did not end.
+    error : float
+        Target less angle at the end; NaN without a target.
+    travel : float
+        Way from start to stop, positive to larger angles.
+    peak_speed : float
+        Largest speed, at the interrupts [rad/s].
+    peak_deviation : float
+        Largest magnitude of the deviation dR, at the interrupts.
+    crossings, rollovers : int
+        Ends of the turn that were crossed, and rollovers of the positioner.
+    """
+
+    number: int
+    index: int
+    kind: str
+    text: str
+    begin: float
+    end: float
+    start: float
+    stop: float
+    target: float
+    error: float
+    travel: float
+    peak_speed: float
+    peak_deviation: float
+    crossings: int
+    rollovers: int
+
+
+@dataclass(slots=True)
+class SequenceRun:
+    """Outcome of a sequence. Times since power-on [s], angles of the table [rad].
+
+    Attributes
+    ----------
+    job : SequenceJob
+        What was asked.
+    done : bool
+        Every step came to its end.
+    failure : str
+        Why not, and what to do; empty if `done`.
+    warnings : list of str
+        What a user of the axis should know though the sequence was done.
+    time_ready, time_end : float
+        The axis holds its table, and the sequence begins; the end of the last step.
+    steps : list of StepRecord
+        Steps made, in order.
+    outputs, inputs : list of (float, str, bool)
+        Output signals as they were switched, and input signals as they came: (time, name, on). All are off before.
+    count : float
+        Angle of the table per count of the axis.
+    in_position : float
+        Deviation that counts as in position.
+    travel : float
+        Way of all steps, in either direction.
+    turns : int
+        Whole turns from where the table stood first to where it stands at the end, signed.
+    crossings, rollovers : int
+        Of all steps.
+    position : int
+        Position of record at the end [count].
+    refused : int
+        Starts of a positioning that the axis has refused.
+    """
+
+    job: SequenceJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    time_ready: float = 0.0
+    time_end: float = 0.0
+    steps: list[StepRecord] = field(default_factory=list[StepRecord])
+    outputs: list[Change] = field(default_factory=list[Change])
+    inputs: list[Change] = field(default_factory=list[Change])
+    count: float = 0.0
+    in_position: float = 0.0
+    travel: float = 0.0
+    turns: int = 0
+    crossings: int = 0
+    rollovers: int = 0
+    position: int = 0
+    refused: int = 0
+
+    @property
+    def peak_deviation(self) -> float:
+        """Largest magnitude of the deviation dR in all steps."""
+        return max((step.peak_deviation for step in self.steps), default=0.0)
+
+    @property
+    def worst_error(self) -> float:
+        """Largest magnitude of the error at the end of a positioning."""
+        return max((abs(step.error) for step in self.steps if step.kind == "go"), default=0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``; null for what is not a number."""
+        names = (
+            "done", "failure", "warnings", "time_ready", "time_end", "count", "in_position", "travel", "turns",
+            "crossings", "rollovers", "position", "refused", "peak_deviation", "worst_error",
+        )  # fmt: skip
+        found: dict[str, Any] = {"job": self.job.name, "kind": "sequence"}
+        found |= {name: getattr(self, name) for name in names}
+        found["steps"] = [{key: _finite(value) for key, value in asdict(step).items()} for step in self.steps]
+        for name in ("outputs", "inputs"):
+            found[name] = [{"time": time, "name": signal, "on": on} for time, signal, on in getattr(self, name)]
+        return found
+
+
+def _finite(value: Any) -> Any:
+    """JSON has no word for NaN."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def run_sequence(
+    spec: RotaryTableSpec, job: SequenceJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> SequenceRun:
+    """Run a sequence on the rotary table of `spec`, from power-on.
+
+    The sequence, and the time of its inputs, begins when the axis holds its table. Each step ends before the next
+    begins: a positioning when the table is in position, a jog when it has come to rest and the loop has settled.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        The axis.
+    job : SequenceJob
+        The steps and the inputs.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    SequenceRun
+        What the table did. A step that does not end within the time its way can take, a table that runs away, a signal
+        that does not come any more: such a run ends, and its `failure` says why.
+
+    Raises
+    ------
+    InputError
+        The axis cannot do the sequence, see `host.check_sequence`.
+    """
+    check_sequence(spec, job)
+    result = SequenceRun(job, count=spec.count, in_position=spec.method.in_position * spec.count)
+    host = TableHost(spec, recorder)
+    try:
+        host.start()
+        result.time_ready = host.machine.time
+        watched = _WatchedTable(host, job, result, progress)
+        for number, (index, step) in enumerate(job.actions(), start=1):
+            result.failure = watched.do(number, index, step)
+            if result.failure:
+                break
+        watched.finish()
+    finally:
+        host.machine.close()
+    return result
+
+
+class _WatchedTable:
+    """Controller and table with an observer beside it, who writes the records."""
+
+    def __init__(self, host: TableHost, job: SequenceJob, result: SequenceRun, progress: Progress | None) -> None:
+        self._host, self._result, self._progress = host, result, progress
+        self._count = job.count
+        self._state: Any = host.machine.state
+        self._observer = TableObserver(host.spec, host.machine)
+        self._number = self._told = 0
+        self._start = self._first = self._observer.angle
+        self._controller = SequenceController(host, job.inputs, self._watch)
+
+    def do(self, number: int, index: int, step: Action) -> str:
+        """Do a step and record it; what went wrong, or nothing."""
+        self._number = number
+        self._tell()
+        set_angle_gauge(self._state.gauge)
+        self._start = self._observer.angle
+        begin, counters = self._host.machine.time, self._counters
+        try:
+            self._controller.do(step)
+            failure = self._verdict(step)
+        except AxisError as error:
+            failure = str(error)
+        record = self._make_record(index, step, begin, counters)
+        self._result.steps.append(record)
+        if not failure:
+            return ""
+        line = f" (line {step.row})" if step.row else ""
+        return f"step {number} of {self._count}{line}, {record.text}: {failure}"
+
+    def _tell(self) -> None:
+        """Tell what is being done."""
+        self._told = self._host.tick
+        if self._progress is not None:
+            text = f"step {self._number} of {self._count}, {self._host.machine.time:.0f} s"
+            self._progress((self._number - 1) / self._count, text)
+
+    @property
+    def _counters(self) -> tuple[int, int]:
+        positioner = self._state.positioner
+        return positioner.angle.crossings, positioner.rollovers
+
+    @property
+    def _travel(self) -> float:
+        """Of the present step [rad]."""
+        return self._observer.angle - self._start
+
+    def _watch(self, asked: float) -> None:
+        """A table that goes a turn farther than it was asked has run away."""
+        if self._host.tick - self._told > LONGEST_STRETCH:
+            self._tell()
+        if abs(self._travel) > asked + self._controller.latency + FULL_TURN:
+            raise AxisError(
+                f"the table has run away: it has turned {_degrees(self._travel)} where {_degrees(asked)} were asked, "
+                f"and turns on at {format_quantity(self._observer.speed, 'rad/s')}; {suspect(self._host)}"
+            )
+
+    def _verdict(self, step: Action) -> str:
+        """Why a step that has ended did not do what it was asked; empty if it did."""
+        if isinstance(step, Jog):
+            lost = step.direction * self._controller.asked - self._travel
+            if abs(lost) > FULL_TURN / 2 + self._controller.latency:
+                asked = _degrees(step.direction * self._controller.asked)
+                return f"the table has turned {_degrees(self._travel)} where {asked} were asked; {suspect(self._host)}"
+        elif isinstance(step, Go) and abs(self._observer.miss) > 0.5:
+            spec, turns = self._host.spec, self._observer.miss
+            return (
+                f"the axis says that it is in position, but stands {_degrees(abs(turns) * FULL_TURN / spec.ratio)} "
+                f"{'below' if turns > 0 else 'above'} it, {abs(turns):.1f} turns of the motor: the detected angle is "
+                f"wrong; {_detector_remedy(spec)}"
+            )
+        return ""
+
+    def _make_record(self, index: int, step: Action, begin: float, counters: tuple[int, int]) -> StepRecord:
+        """The record of the step that has ended."""
+        spec, gauge = self._host.spec, self._state.gauge
+        stop = self._observer.angle
+        # During a jog the target is two turns ahead: it is nowhere to be held.
+        is_held = isinstance(step, Go) or (isinstance(step, Jog) and not self._host.is_moving)
+        target = self._observer.target if is_held else math.nan
+        crossings, rollovers = self._counters
+        return StepRecord(
+            number=self._number,
+            index=index,
+            kind=_KINDS[type(step)],
+            text=describe_step(spec, step),
+            begin=begin,
+            end=self._host.machine.time,
+            start=self._start,
+            stop=stop,
+            target=target,
+            error=target - stop,
+            travel=stop - self._start,
+            peak_speed=gauge.peak_speed / spec.ratio,
+            peak_deviation=gauge.peak_deviation * spec.count / (1 << spec.method.fraction_bits),
+            crossings=crossings - counters[0],
+            rollovers=rollovers - counters[1],
+        )
+
+    def finish(self) -> None:
+        """Totals."""
+        result, controller = self._result, self._controller
+        result.time_end = self._host.machine.time
+        result.inputs, result.outputs = controller.inputs, controller.outputs
+        result.warnings = list(controller.warnings)
+        result.travel = sum(abs(step.travel) for step in result.steps)
+        net = self._observer.angle - self._first
+        # A turn is whole that ends where it began, within the window.
+        result.turns = int(math.copysign(abs(net) + result.in_position + result.count, net) / FULL_TURN)
+        result.crossings = sum(step.crossings for step in result.steps)
+        result.rollovers = sum(step.rollovers for step in result.steps)
+        result.position = self._state.positioner.angle.position
+        result.refused = self._host.refused
+        result.done = not result.failure
+        if result.done and controller.coming:
+            names = ", ".join(f'"{name}"' for name in controller.coming)
+            result.warnings.append(f"the sequence ended before all of these inputs had come: {names}")
+
+
+_KINDS: dict[type, str] = {Go: "go", Jog: "jog", Wait: "wait", Output: "output"}
+
+
+def describe_step(spec: RotaryTableSpec, step: Action) -> str:
+    """What a step asks for, for people.
+
+    Parameters
+    ----------
+    spec : RotaryTableSpec
+        The axis.
+    step : Go, Jog, Wait or Output
+        The step.
+    """
+    if isinstance(step, Go):
+        entry = spec.position[str(step.number)]
+        # Only the turn counter knows other ways.
+        direction = entry.direction if spec.method.form == "turn counter" else "as commanded"
+        return f"go to position {step.number} ({_degrees(entry.angle)}, {direction})"
+    if isinstance(step, Jog):
+        speed = format_quantity(dial_speed(spec, step.speed), "rad/s")
+        held = f'while "{step.signal}"' if step.signal else f"for {format_quantity(step.duration or 0.0, 's')}"
+        return f"jog {'+' if step.direction > 0 else '-'} at {speed} {held}"
+    if isinstance(step, Output):
+        return f'{"set" if step.on else "clear"} "{step.signal}"'
+    if step.signal:
+        return f'wait {"for" if step.level else "for the end of"} "{step.signal}"'
+    return f"wait {format_quantity(step.duration or 0.0, 's')}"
+
+
+def _degrees(angle: float) -> str:
+    return format_quantity(angle, "rad", 6)
+
+
+def _detector_remedy(spec: RotaryTableSpec) -> str:
+    """What to do about a coarse word that names the wrong turn of the motor."""
+    if spec.detector.composition != "rounded":
+        return 'set detector.composition = "rounded"'
+    most = format_quantity(math.pi / spec.ratio, "rad", 3)
+    return (
+        f"keep the errors of the coarse side together (alignment, backlash, eccentricity) below half a turn of the "
+        f"motor, {most} of the table"
+    )

@@ -1,0 +1,227 @@
+"""The sequence controller of a rotary table: does one step after the other, by the lines of its host."""
+
+from collections.abc import Callable
+from itertools import islice
+
+from detent.errors import AxisError
+from detent.methods.rotary_table.build import ticks
+from detent.methods.rotary_table.host import TableHost, dial_speed
+from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Stretches, Wait, join_stretches
+from detent.units import format_quantity
+
+Change = tuple[float, str, bool]
+"""A signal that was switched: time since power-on [s], its name, on or off."""
+
+Watch = Callable[[float], None]
+"""Looks at the table, which was asked to go so far since the step began [rad], not signed; raises `AxisError`."""
+
+CHECKED = 2500
+"""Ticks after which the table is looked at again at the latest."""
+
+
+class SequenceController:
+    """Steps, inputs and outputs.
+
+    Parameters
+    ----------
+    host : TableHost
+        Lines of the table, which is held.
+    inputs : dict
+        Stretches in which the input signals are on [s from now].
+    watch : callable
+        Called again and again while time passes.
+
+    Attributes
+    ----------
+    inputs, outputs : list of Change
+        Input signals as they came, and output signals as they were switched.
+    warnings : dict of str
+        What went otherwise than a reader of the job expects; each text once, as a key.
+    """
+
+    def __init__(self, host: TableHost, inputs: dict[str, Stretches], watch: Watch) -> None:
+        self.host = host
+        self.inputs: list[Change] = []
+        self.outputs: list[Change] = []
+        self.warnings: dict[str, None] = {}
+        self._edges = input_edges(inputs, host.tick)
+        self._taken = 0  # edges that have come
+        self._on: set[str] = set()
+        self._watch = watch
+        self._way = 0.0  # asked for by a positioning [rad]
+        self._pressed = self._released = 0  # ticks of the button
+        self._speed = 0.0  # of the jog [rad/s]
+        self._take_edges()
+
+    @property
+    def asked(self) -> float:
+        """Way that the present step has asked for so far [rad], not signed; a stop makes up for the start."""
+        held = ((self._released or self.host.tick) - self._pressed) * self.host.machine.tick if self._speed else 0.0
+        return self._way + held * min(self._speed, held * self.host.spec.limits.acceleration)
+
+    @property
+    def latency(self) -> float:
+        """Way that the present step may go more or less than it asked for [rad]: the button is seen in the task."""
+        return 2 * self._speed * self.host.spec.method.task_period
+
+    @property
+    def coming(self) -> list[str]:
+        """Input signals of which something has not come yet."""
+        return list(dict.fromkeys(name for _, name, _ in self._edges[self._taken :]))
+
+    def do(self, step: Action) -> None:
+        """Do one step to its end.
+
+        Raises
+        ------
+        AxisError
+            It does not end, and why.
+        """
+        self._way = self._speed = 0.0
+        self.host.acknowledge()
+        if isinstance(step, Go):
+            self._go(step)
+        elif isinstance(step, Jog):
+            self._jog(step)
+        elif isinstance(step, Wait):
+            self._wait(step)
+        else:
+            self._switch(step)
+
+    # ------------------------------------------------------------------------------------------------------ steps
+
+    def _go(self, step: Go) -> None:
+        host = self.host
+        host.begin(step.number)
+        while host.is_pending:
+            self._pass_until(host.tick + ticks(host.spec.method.strobe_period), rest=True)
+        if host.refusal:
+            raise AxisError(f"the positioner refused the start: {host.refusal}")
+        self._way = host.way
+        speed = min(host.spec.position[str(step.number)].speed, host.spec.limits.speed)
+        limit = host.move_time(host.way, speed)
+        self._pass_until(host.tick + ticks(limit), rest=True)
+        if not host.at_rest:
+            raise AxisError(
+                f"it was not in position within {format_quantity(limit, 's')}; it is "
+                f"{format_quantity(host.way, 'rad')} away; {suspect(host)}"
+            )
+
+    def _jog(self, step: Jog) -> None:
+        host = self.host
+        if step.signal is not None:
+            self._await(step.signal, level=True)
+        self._speed, self._pressed, self._released = dial_speed(host.spec, step.speed), host.tick, 0
+        host.press(step.direction, self._speed)
+        if step.signal is not None:
+            self._await(step.signal, level=False)
+        else:
+            self._pass_until(host.tick + ticks(step.duration or 0.0))
+        host.release()
+        self._released = host.tick
+        if not host.is_moving:
+            task = format_quantity(host.spec.method.task_period, "s")
+            self._warn(step, f'"{step.signal}" was on for less than the task period, {task}: the table did not move')
+            return
+        limit = host.stop_time(self._speed)
+        self._pass_until(host.tick + ticks(limit), rest=True)
+        if not host.at_rest:
+            raise AxisError(f"it did not come to rest within {format_quantity(limit, 's')}; {suspect(host)}")
+        host.acknowledge()
+        if not self._settle():
+            self._warn(
+                step,
+                "after the jog the table did not come within its window of where it is held: look at the step's error; "
+                "friction, a load or noise of the detector keeps it away",
+            )
+
+    def _warn(self, step: Action, text: str) -> None:
+        """Note a warning, once for each step of the job."""
+        self.warnings.setdefault(f"line {step.row}: {text}" if step.row else text)
+
+    def _settle(self) -> bool:
+        """Let the loop take the table to where it is held; False if it does not get there."""
+        host, method = self.host, self.host.spec.method
+        end, inside = host.tick + ticks(host.settling_time), 0
+        while host.tick < end and inside * method.strobe_period < method.in_position_time:
+            self._pass_until(host.tick + ticks(method.strobe_period))
+            inside = inside + 1 if host.in_position else 0
+        return host.in_position
+
+    def _wait(self, step: Wait) -> None:
+        if step.signal is not None:
+            self._await(step.signal, level=step.level)
+        else:
+            self._pass_until(self.host.tick + ticks(step.duration or 0.0))
+
+    def _switch(self, step: Output) -> None:
+        self.outputs.append((self.host.machine.time, step.signal, step.on))
+
+    # ------------------------------------------------------------------------------------------------------- time
+
+    def _await(self, name: str, *, level: bool) -> None:
+        """Let time pass until an input signal has a level."""
+        while (name in self._on) != level:
+            coming = next((edge[0] for edge in islice(self._edges, self._taken, None) if edge[1] == name), None)
+            if coming is None:
+                last = max(time for time, signal, _ in self.inputs if signal == name)
+                raise AxisError(
+                    f'"{name}" went off for good at {format_quantity(last, "s")}, before the step began: it would wait '
+                    f'for ever; let "{name}" be on later, or shorten the steps before'
+                )
+            self._pass_until(coming)
+
+    def _pass_until(self, tick: int, *, rest: bool = False) -> None:
+        """Let time pass up to a tick; `rest` ends it when the table comes to rest."""
+        host = self.host
+        while host.tick < tick and not (rest and host.at_rest):
+            host.acknowledge()
+            edge = self._edges[self._taken][0] if self._taken < len(self._edges) else tick
+            host.machine.pass_ticks(min(tick, edge, host.tick + CHECKED) - host.tick)
+            self._take_edges()
+            self._watch(self.asked)
+
+    def _take_edges(self) -> None:
+        """Take over the input signals that change now."""
+        while self._taken < len(self._edges) and self._edges[self._taken][0] <= self.host.tick:
+            _, name, on = self._edges[self._taken]
+            self._taken += 1
+            (self._on.add if on else self._on.discard)(name)
+            self.inputs.append((self.host.machine.time, name, on))
+
+
+def input_edges(inputs: dict[str, Stretches], start: int) -> list[tuple[int, str, bool]]:
+    """Changes of the input signals in order: (tick, name, on).
+
+    Parameters
+    ----------
+    inputs : dict
+        Stretches of each signal [s since the start of the sequence].
+    start : int
+        Tick of that start.
+    """
+    edges: list[tuple[int, str, bool]] = []
+    for name, stretches in inputs.items():
+        # A pulse lasts a tick at least; two that touch in the same tick are one.
+        in_ticks = ((ticks(begin), max(ticks(end), ticks(begin) + 1)) for begin, end in stretches)
+        for begin, end in join_stretches(in_ticks):
+            edges += [(start + int(begin), name, True), (start + int(end), name, False)]
+    return sorted(edges)
+
+
+def suspect(host: TableHost) -> str:
+    """What to look at when a table does not do what it is told."""
+    spec = host.spec
+    method = spec.method
+    if not method.position_control:
+        return "nothing corrects the table's angle: set method.position_control = true"
+    if not method.signed_remaining:
+        return "beyond its target the unsigned remaining angle drives it on: set method.signed_remaining = true"
+    if method.form != "turn counter":
+        return f'the form "{method.form}" loses a turn at the boundary: set method.form = "turn counter"'
+    if spec.detector.composition != "rounded":
+        return 'the detected angle jumps by motor turns: set detector.composition = "rounded"'
+    return (
+        "look at deviation and torque in the report: a load, friction, limits.effort too low for the acceleration, or "
+        "noise of the detector keeps the table away"
+    )

@@ -1,0 +1,259 @@
+"""What each control method shows: the report of a run, its summary, the comparison with its alternatives."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from detent.methods.cascade.comparison import ProfileComparison
+from detent.methods.cascade.replay import ReplayRun
+from detent.methods.cascade.run import CascadeRun
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.compared import AnyComparison
+from detent.methods.filtered_servo.comparison import FeedbackComparison
+from detent.methods.moves.run import MoveRun, ServoSpec
+from detent.methods.moves.summary import move_summary_rows
+from detent.methods.moves.summary import summary_rows as print_summary_rows
+from detent.methods.phase_servo.hold_comparison import HoldComparison
+from detent.methods.phase_servo.noise_comparison import NoiseComparison
+from detent.methods.print_head.comparison import DriveComparison
+from detent.methods.print_head.run import PrintRun
+from detent.methods.print_head.schema import PrintHeadSpec
+from detent.methods.registry import AnySpec
+from detent.methods.rotary_table.comparison import AngleComparison
+from detent.methods.rotary_table.run import SequenceRun
+from detent.methods.rotary_table.schema import RotaryTableSpec
+from detent.methods.simulated import AnyResult
+from detent.methods.stepper_envelope.comparison import JerkComparison, StepComparison
+from detent.methods.stepper_envelope.run import StageRun
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.page.page import Page
+from detent.record.trace import Trace
+from detent.units import format_quantity
+
+Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
+"""Title, heads and rows."""
+
+Comparisons = tuple[AnyComparison, ...]
+C = TypeVar("C")
+
+
+def summary_rows(spec: AnySpec, result: AnyResult) -> list[tuple[str, str]]:
+    """The figures of a run that a person wants first."""
+    if isinstance(result, PrintRun):
+        return print_summary_rows(result)
+    if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
+        from detent.methods.rotary_table.summary import sequence_summary_rows
+
+        return sequence_summary_rows(spec, result)
+    if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
+        from detent.methods.stepper_envelope.summary import stage_summary_rows
+
+        return stage_summary_rows(spec, result)
+    if isinstance(spec, CascadeSpec):
+        return _cascade_summary(spec, result)
+    return move_summary_rows(*_servo(spec, result))
+
+
+def _cascade_summary(spec: CascadeSpec, result: AnyResult) -> list[tuple[str, str]]:
+    from detent.methods.cascade.report import cascade_summary_rows, replay_summary_rows
+
+    if isinstance(result, ReplayRun):
+        return replay_summary_rows(spec, result)
+    assert isinstance(result, CascadeRun)  # noqa: S101 - a cascade axis makes no other run
+    return cascade_summary_rows(spec, result)
+
+
+def _servo(spec: AnySpec, result: AnyResult) -> tuple[ServoSpec, MoveRun]:
+    """A run of moves with its axis, which no other axis makes."""
+    assert isinstance(result, MoveRun)  # noqa: S101
+    assert not isinstance(spec, PrintHeadSpec | RotaryTableSpec | StepperEnvelopeSpec | CascadeSpec)  # noqa: S101
+    return spec, result
+
+
+def report_of(
+    spec: AnySpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Page:
+    """The report of a run."""
+    if isinstance(spec, PrintHeadSpec) and isinstance(result, PrintRun):
+        from detent.methods.print_head.page import make_print_page
+        from detent.methods.print_head.report import print_report
+
+        page = print_report(spec, result, trace, settings={"fidelity": spec.axis.fidelity} | settings)
+        return make_print_page(page)
+    if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
+        from detent.methods.rotary_table.page import make_table_page
+        from detent.methods.rotary_table.report import sequence_report
+
+        table = sequence_report(spec, result, trace, comparison=_first(comparisons, AngleComparison), settings=settings)
+        return make_table_page(table)
+    if isinstance(spec, StepperEnvelopeSpec) and isinstance(result, StageRun):
+        return _stage_report(spec, result, trace, comparisons, settings)
+    if isinstance(spec, CascadeSpec):
+        return _cascade_report(spec, result, trace, comparisons, settings)
+    return _servo_report(*_servo(spec, result), trace, comparisons, settings)
+
+
+def _cascade_report(
+    spec: CascadeSpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Page:
+    from detent.methods.cascade.page import make_cascade_page
+    from detent.methods.cascade.replay_page import make_replay_page
+    from detent.methods.cascade.report import cascade_report, replay_report
+
+    if isinstance(result, ReplayRun):
+        replay = replay_report(spec, result, settings=settings)
+        return make_replay_page(replay)
+    assert isinstance(result, CascadeRun)  # noqa: S101 - see above
+    found = _first(comparisons, ProfileComparison)
+    data = cascade_report(spec, result, trace, comparison=found, settings=settings)
+    return make_cascade_page(data)
+
+
+def _stage_report(
+    spec: StepperEnvelopeSpec,
+    result: StageRun,
+    trace: Trace | None,
+    comparisons: Comparisons,
+    settings: dict[str, str],
+) -> Page:
+    from detent.methods.stepper_envelope.page import make_stage_page
+    from detent.methods.stepper_envelope.report import stage_report
+
+    steps = tuple(found for found in comparisons if isinstance(found, StepComparison))
+    data = stage_report(spec, result, trace, steps=steps, jerk=_first(comparisons, JerkComparison), settings=settings)
+    return make_stage_page(data)
+
+
+def _servo_report(
+    spec: ServoSpec, result: MoveRun, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
+) -> Page:
+    from detent.methods.moves.page import make_servo_page
+    from detent.methods.moves.report import servo_report
+
+    data = servo_report(
+        spec,
+        result,
+        trace,
+        noise=_first(comparisons, NoiseComparison),
+        hold=_first(comparisons, HoldComparison),
+        feedback=_first(comparisons, FeedbackComparison),
+        settings=settings,
+    )
+    return make_servo_page(data)
+
+
+def _first(found: Sequence[object], kind: type[C]) -> C | None:
+    """The comparison of a kind, if there is one."""
+    return next((one for one in found if isinstance(one, kind)), None)
+
+
+def plot_comparison_of(spec: AnySpec, comparison: AnyComparison, path: Path) -> None:
+    """Draw one comparison into a PNG, SVG or PDF file."""
+    if isinstance(comparison, DriveComparison):
+        from detent.methods.print_head import report as print_report
+        from detent.page import plots as figures
+
+        assert isinstance(spec, PrintHeadSpec)  # noqa: S101 - only a print head compares drives
+        figures.plot_comparison(print_report.comparison_figure(comparison, spec), path)
+        return
+    _plotter(comparison)(comparison, path)
+
+
+def _plotter(comparison: AnyComparison) -> Callable[[Any, Path], None]:
+    """What draws a comparison."""
+    from detent.methods.cascade import comparison_section as cascade_comparisons
+    from detent.methods.rotary_table import comparison_section as table_comparisons
+    from detent.methods.stepper_envelope import stage_figures
+    from detent.page import plot_looks as comparison_figures
+
+    plotters: dict[type, Callable[[Any, Path], None]] = {
+        NoiseComparison: comparison_figures.plot_noise,
+        HoldComparison: comparison_figures.plot_hold,
+        FeedbackComparison: comparison_figures.plot_feedback,
+        AngleComparison: table_comparisons.plot_angle,
+        StepComparison: stage_figures.plot_steps,
+        JerkComparison: stage_figures.plot_jerk,
+        ProfileComparison: cascade_comparisons.plot_profiles,
+    }
+    return plotters[type(comparison)]
+
+
+def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
+    """One comparison as a table for the terminal."""
+    if isinstance(comparison, DriveComparison):
+        assert isinstance(spec, PrintHeadSpec)  # noqa: S101 - see above
+        return _drive_table(spec, comparison)
+    from detent.methods.cascade import comparison_section as cascade_comparisons
+    from detent.methods.rotary_table import comparison_section as table_comparisons
+    from detent.methods.stepper_envelope import stage_figures
+
+    tables: dict[type, Callable[[Any], Table]] = {
+        NoiseComparison: _noise_table,
+        HoldComparison: _hold_table,
+        FeedbackComparison: _feedback_table,
+        AngleComparison: table_comparisons.angle_table,
+        StepComparison: stage_figures.steps_table,
+        JerkComparison: stage_figures.jerk_table,
+        ProfileComparison: cascade_comparisons.profiles_table,
+    }
+    return tables[type(comparison)](comparison)
+
+
+def _drive_table(spec: PrintHeadSpec, found: DriveComparison) -> Table:
+    from detent.methods.print_head.report import drift_text
+
+    rows = [
+        (f"{speed / 0.0254:.4g} in/s", *(f"{right:+.1%} / {left:+.1%}" for right, left in found.errors[:, k, :]))
+        for k, speed in enumerate(found.speeds)
+    ]
+    return f"Steady speed error, right / left ({drift_text(spec)})", ("speed", *found.methods), rows
+
+
+def _noise_table(found: NoiseComparison) -> Table:
+    heads = ("pulses put in", "this servo, + pulses", "- pulses", "incremental servo, + pulses", "- pulses")
+    rows = [
+        (str(n), *(_range(rest[k, sign]) for rest in (found.absolute, found.incremental) for sign in (0, 1)))
+        for k, n in enumerate(found.pulses)
+    ]
+    title = (
+        f"Where a move of {found.pitches} pitches ends, in steps of {format_quantity(found.step, 'm')} from its target "
+        f"(right / left; a pitch off from {found.margin} pulses on)"
+    )
+    return title, heads, rows
+
+
+def _range(pair: Any) -> str:
+    """Right and left, as whole numbers where they are far, else with two digits."""
+    return " / ".join(f"{value:+.0f}" if abs(value) >= 10 else f"{value:+.2f}" for value in pair)
+
+
+def _hold_table(found: HoldComparison) -> Table:
+    rows: list[tuple[str, ...]] = []
+    for case in (*found.still, *found.loaded):
+        late = case.t > case.t[-1] - 0.1
+        last = case.displacement[late]
+        rows.append((case.name, f"{last.max() - last.min():.2f}", f"{last.mean():+.2f}", f"{case.integral[-1]:g}"))
+    return "Standing still, last 0.1 s, in steps", ("servo", "peak to peak", "mean displacement", "integral"), rows
+
+
+def _feedback_table(found: FeedbackComparison) -> Table:
+    heads = (
+        "speed feedback", "window", "B", "A", "KV", "std of speed word", "std of E", "force ripple", "stop overshoot",
+        "gain margin",
+    )  # fmt: skip
+    rows = [
+        (
+            case.name,
+            format_quantity(case.sample_period, "s"),
+            str(case.scale),
+            "none" if case.coefficient == 1 else f"{case.coefficient:g}",
+            f"{case.kv:.0f}/s",
+            f"{case.std_speed:.3g}",
+            f"{case.std_error:.3g}",
+            format_quantity(case.force_ripple, "N", 3),
+            "does not settle" if not case.stable else f"{case.stop_overshoot:.0f} pulses",
+            f"{case.gain_margin:.2f}",
+        )
+        for case in found.cases
+    ]
+    return f"At {found.rate:g} pulses/s", heads, rows

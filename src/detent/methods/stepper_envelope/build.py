@@ -1,0 +1,194 @@
+"""From a checked specification to ramp, zones and parameters of each motor: SI values to steps and timer words."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable, ZoneTable
+from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
+from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
+from detent.planning.step_ramp import (
+    StepperLoad,
+    StepperMotor,
+    StepRamp,
+    acceleration_limit,
+    make_ramp,
+    natural_frequency,
+    start_frequency,
+    total_inertia,
+)
+
+if TYPE_CHECKING:
+    from detent.methods.stepper_envelope.system import StepperParams
+
+ROTOR_STEP = 2e-6
+"""Time step of the rotor's equation of motion (7.2) [s], rounded down to whole ticks of the timer; at least one."""
+
+DAMPING = 0.4
+"""Damping of the rotor against its field, over sqrt(teeth T_hold J): a fifth of the critical one (7.2)."""
+
+UNLOADED_STARTS = 3.0
+"""Start frequency of a bare rotor over its natural one where no data sheet states it; 3.1 with the defaults of 7.1."""
+
+
+def instant_ticks(spec: StepperEnvelopeSpec) -> int:
+    """Time step of the rotors in whole ticks of the step timer."""
+    return max(1, math.floor(ROTOR_STEP * spec.controller.timer + 1e-6))
+
+
+def instant(spec: StepperEnvelopeSpec) -> float:
+    """Time step of the rotors [s]."""
+    return instant_ticks(spec) / spec.controller.timer
+
+
+def stepper_motor(table: StepperTable) -> StepperMotor:
+    """What the motor of a table can do with its drive, current and supply included."""
+    motor, held = table.motor, table.held_torque
+    start = motor.start_frequency
+    if start is None:
+        start = UNLOADED_STARTS * natural_frequency(motor.steps_per_turn, held, motor.rotor_inertia)
+    return StepperMotor(motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start)
+
+
+def pull_out(table: StepperTable) -> PullOut:
+    """Pull-out torque of a motor against step frequency, in the way the file states it.
+
+    Raises
+    ------
+    ValueError
+        Constants of that way are missing; the rules of the file find it first.
+    """
+    motor, drive = table.motor, table.drive
+    if motor.pull_out == "points":
+        return MeasuredPullOut(tuple(motor.curve_frequency), tuple(motor.curve_torque))
+    if motor.pull_out == "first order":
+        return FirstOrderPullOut(_given(motor.pull_out_torque), _given(motor.corner_frequency))
+    return WindingPullOut(
+        holding_torque=motor.holding_torque,
+        rated_current=_given(motor.rated_current),
+        current=_given(drive.current),
+        supply=drive.supply,
+        resistance=_given(motor.resistance) + drive.bridge_resistance,
+        inductance=_given(motor.inductance),
+        teeth=motor.steps_per_turn / 4,
+    )
+
+
+def _given(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def stepper_load(table: StepperTable) -> StepperLoad:
+    """What hangs on the shaft."""
+    m = table.mechanics
+    return StepperLoad(
+        pitch=m.travel_per_revolution,
+        mass=m.moving_mass,
+        spindle_inertia=m.screw_inertia,
+        coupling_inertia=m.coupling_inertia,
+        friction_torque=m.friction_torque,
+    )
+
+
+def start_hz(table: StepperTable) -> float:
+    """Frequency at which the loaded motor starts and stops, reserve included [Hz]; never above the largest one."""
+    return min(start_frequency(stepper_motor(table), stepper_load(table), table.drive.start_safety), table.max_hz)
+
+
+def make_step_ramp(table: StepperTable) -> StepRamp:
+    """Ramp list of a motor with its load."""
+    motor, load = stepper_motor(table), stepper_load(table)
+    limit = acceleration_limit(motor, load, table.limits.acceleration / table.step, table.drive.torque_safety)
+    return make_ramp(start_hz(table), table.max_hz, limit)
+
+
+def zone_maps(table: StepperTable) -> tuple[ZoneMap, ZoneMap]:
+    """Speed limits upwards and downwards; both number their limits alike, for one control unit."""
+    limits = [table.max_hz, *(table.hz(zone.speed) for zone in table.zone.values())]
+    up = _apart(_zone(table, zone) for zone in table.zone.values() if zone.direction != "down")
+    down = _apart(_zone(table, zone) for zone in table.zone.values() if zone.direction != "up")
+    return ZoneMap(table.steps, table.max_hz, up, limits), ZoneMap(table.steps, table.max_hz, down, limits)
+
+
+def _zone(table: StepperTable, zone: ZoneTable) -> Zone:
+    """A zone in whole steps: every step that it touches is inside."""
+    lower, step = table.mechanics.lower_end, table.step
+    begin = math.floor((zone.begin - lower) / step + 1e-6)
+    end = math.ceil((zone.end - lower) / step - 1e-6)
+    return Zone(max(begin, 0), min(end, table.steps), table.hz(zone.speed))
+
+
+def _apart(zones: Iterable[Zone]) -> list[Zone]:
+    """Zones of which each step is in one only: a step that two of them touch is the slower one's."""
+    found: list[Zone] = []
+    for zone in sorted(zones, key=lambda one: (one.begin, one.end)):
+        rest = zone
+        while found and rest.begin < found[-1].end and rest.max_hz < found[-1].max_hz:
+            faster = found.pop()
+            if faster.begin < rest.begin:
+                found.append(replace(faster, end=rest.begin))
+        if found and rest.begin < found[-1].end:
+            rest = replace(rest, begin=found[-1].end)
+        if rest.begin < rest.end:
+            found.append(rest)
+    return found
+
+
+@dataclass(slots=True)
+class MotorTables:
+    """Ramp and tables of one motor, as they are at power-on: between its extremes.
+
+    Attributes
+    ----------
+    ramp : StepRamp
+        Frequencies of a run-up.
+    up, down : StepEnvelope
+        Table of each direction.
+    """
+
+    ramp: StepRamp
+    up: StepEnvelope
+    down: StepEnvelope
+
+
+def make_tables(table: StepperTable) -> MotorTables:
+    """Ramp and tables of one motor."""
+    ramp, extremes = make_step_ramp(table), table.extremes
+    start, turn, stop = (table.step_inside(place) for place in (extremes.start, extremes.turn, extremes.stop))
+    up, down = zone_maps(table)
+    return MotorTables(ramp, StepEnvelope(ramp, up, 1, start, turn), StepEnvelope(ramp, down, -1, turn, stop))
+
+
+def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> "StepperParams":
+    """Parameters of one motor.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        As `load_spec` returns it.
+    name : str
+        The motor.
+    tables : MotorTables
+        As `make_tables` gives them: their limits are numbered.
+
+    Returns
+    -------
+    StepperParams
+    """
+    from detent.methods.stepper_envelope.system import StepperParams, load_rule
+    from detent.plant.stepper_rotor import fill_curve
+
+    p, table = StepperParams(), spec.stepper[name]
+    motor, load = stepper_motor(table), stepper_load(table)
+    reload = spec.controller.words == "reload"
+    load_rule(p, tables.ramp, tables.up.zones.limits, round(spec.controller.timer), reload=reload)
+    p.rule.literal = table.method.rule == "literal"
+    p.pause = table.drive.reversal_pause
+    p.instant_ticks, p.tolerance = instant_ticks(spec), spec.controller.tolerance
+    r, inertia = p.rotor, total_inertia(motor, load)
+    r.dt, r.teeth, r.step_angle, r.inertia = instant(spec), motor.steps_per_turn / 4, motor.step_angle, inertia
+    r.torque, r.friction = motor.holding_torque, load.friction_torque
+    r.damping = DAMPING * math.sqrt(r.teeth * motor.holding_torque * inertia)
+    fill_curve(r, motor.pull_out, table.max_hz)
+    return p

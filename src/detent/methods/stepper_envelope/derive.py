@@ -1,0 +1,291 @@
+"""What follows from a stepper-envelope specification: steps, torque, ramp, times and memory of each motor.
+
+Symbols: ``J`` total inertia, ``T_po`` pull-out torque, ``SF`` drive.torque_safety, ``a`` acceleration; sections are
+those of the stepper-envelope specification.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.files.findings import Derived, quantity_figure
+from detent.methods.stepper_envelope.build import (
+    DAMPING,
+    make_step_ramp,
+    start_hz,
+    stepper_load,
+    stepper_motor,
+    zone_maps,
+)
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
+from detent.planning.step_ramp import natural_frequency, total_inertia
+from detent.units import format_quantity
+
+HIGHEST_HZ = 1e6
+"""Frequency up to which the end of the torque is looked for [Hz]."""
+
+PLACES = 1000
+"""Places of that range at which a curve is looked at first, evenly on a logarithmic scale."""
+
+PULL_OUT_FORMULA = {
+    "winding": "from winding, current and supply",
+    "first order": "T_po0 / sqrt(1 + (f / f_c)^2)",
+    "points": "between the points of the curve",
+}
+
+
+class MotorFigures:
+    """Figures of one motor.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        The axis.
+    name : str
+        The motor.
+    """
+
+    def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
+        self.spec, self.name, self.table = spec, name, spec.stepper[name]
+        self.motor, self.load = stepper_motor(self.table), stepper_load(self.table)
+        self.inertia = total_inertia(self.motor, self.load)
+        self.start_hz, self.max_hz = start_hz(self.table), self.table.max_hz
+        self.ramp = make_step_ramp(self.table)
+        self.linear = self.table.limits.acceleration / self.table.step
+        """Limit a_lin of the linear part of the ramp [step/s^2]."""
+
+    # -------------------------------------------------------------------------------------------------------- torque
+
+    @property
+    def natural_hz(self) -> float:
+        """Frequency at which the loaded rotor swings about its step [Hz]."""
+        return natural_frequency(self.motor.steps_per_turn, self.motor.holding_torque, self.inertia)
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio of that swing (7.2)."""
+        return DAMPING / 2
+
+    def torque_left(self, hz: float) -> float:
+        """Torque that is left to accelerate with at a frequency [N m]."""
+        return self.motor.pull_out(hz) / self.table.drive.torque_safety - self.load.friction_torque
+
+    def acceleration_torque(self, acceleration: float) -> float:
+        """Torque that an acceleration [step/s^2] takes [N m]."""
+        return self.inertia * self.motor.step_angle * acceleration
+
+    @property
+    def linear_end(self) -> float | None:
+        """Frequency from which the torque limits the ramp [Hz]; None where it never does."""
+        needed = self.acceleration_torque(self.linear)
+        return first_crossing(lambda hz: self.torque_left(hz) - needed, self.start_hz)
+
+    @property
+    def torque_end(self) -> float | None:
+        """Frequency at which no torque is left to accelerate with [Hz]; None where there always is."""
+        return first_crossing(self.torque_left, self.start_hz)
+
+    def torque_there(self, hz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Largest torque of rotor and field at some frequencies: it falls as the pull-out torque does (7.2) [N m]."""
+        pull_out = np.array([self.motor.pull_out(f) for f in hz.tolist()])
+        return pull_out * (self.motor.holding_torque / self.motor.pull_out(0.0))
+
+    @cached_property
+    def torque_used(self) -> tuple[float, float]:
+        """Largest share of that torque which a step of the ramp takes, and its frequency [Hz].
+
+        Friction and twice the torque that accelerates: where the limit of a zone lies between two entries of the ramp,
+        the step to the entry above it is almost as large as two.
+        """
+        hz = self.ramp.hz
+        twice = self.acceleration_torque(1.0) * np.diff(hz**2, append=hz[-1] ** 2)
+        following = np.append(hz[1:], hz[-1])
+        share = (self.load.friction_torque + twice) / self.torque_there(following)
+        worst = int(np.argmax(share))
+        return float(share[worst]), float(following[worst])
+
+    @property
+    def rest_error(self) -> float:
+        """Distance from its step at which friction can hold a resting rotor [step]."""
+        return math.asin(min(self.load.friction_torque / self.motor.holding_torque, 1.0)) * 2 / math.pi
+
+    # ---------------------------------------------------------------------------------------------------------- ways
+
+    @property
+    def braking_steps(self) -> int:
+        """Steps to come down from the largest frequency."""
+        return len(self.ramp) - 1
+
+    @property
+    def shortest_way(self) -> int:
+        """Steps of the shortest move that reaches the largest frequency."""
+        return 2 * len(self.ramp) - 1
+
+    @cached_property
+    def travel_time(self) -> float:
+        """Time from end to end, upwards, zones included [s]."""
+        zones = zone_maps(self.table)[0]
+        # A travel has millions of steps and few different entries; the last one is the sentinel.
+        many = np.bincount(StepEnvelope(self.ramp, zones).entries[:-1])
+        entries = np.flatnonzero(many)
+        hz = np.minimum(self.ramp.hz[entries & INDEX_MASK], np.array(zones.limits)[entries >> INDEX_BITS])
+        return float(np.sum(many[entries] / hz))
+
+    @property
+    def constant_time(self) -> float:
+        """Time for the same way at the start frequency [s]."""
+        return self.table.steps / self.start_hz
+
+    def rounding(self, clock: float, words: str) -> float:
+        """Largest relative error of the ramp's frequencies, stored as `words` and made by a timer's clock [Hz]."""
+        stored = self.ramp.hz if words == "reload" else np.rint(self.ramp.hz)
+        made = clock / np.rint(clock / stored)
+        return float(np.max(np.abs(made / self.ramp.hz - 1)))
+
+    # ---------------------------------------------------------------------------------------------------- the winding
+
+    @property
+    def resistance(self) -> float | None:
+        """Winding and switches, per phase [ohm]; None where the winding is not known."""
+        own = self.table.motor.resistance
+        return None if own is None else own + self.table.drive.bridge_resistance
+
+    @property
+    def rise_time(self) -> float | None:
+        """Time constant of the current [s]; None where the winding is not known."""
+        inductance = self.table.motor.inductance
+        return None if self.resistance is None or inductance is None else inductance / self.resistance
+
+    @property
+    def dissipation(self) -> float | None:
+        """Heat of both windings at rest [W]; None where it is not known."""
+        own, current = self.table.motor.resistance, self.table.drive.current
+        return None if own is None or current is None else 2 * own * current**2
+
+
+def first_crossing(function: Callable[[float], float], low: float) -> float | None:
+    """Find where a function of frequency first falls to 0.
+
+    Parameters
+    ----------
+    function : callable
+        Of a frequency [Hz].
+    low : float
+        Where to begin [Hz].
+
+    Returns
+    -------
+    float or None
+        The frequency; `low` where the function is 0 or less from there on, None where it never is up to 1 MHz.
+    """
+    places = np.geomspace(low, HIGHEST_HZ, PLACES).tolist()
+    below = next((k for k, hz in enumerate(places) if function(hz) <= 0), None)
+    if below is None or below == 0:
+        return None if below is None else low
+    above, under = places[below - 1], places[below]
+    for _ in range(40):
+        middle = (above + under) / 2
+        above, under = (middle, under) if function(middle) > 0 else (above, middle)
+    return under
+
+
+def derive(spec: StepperEnvelopeSpec) -> tuple[Derived, ...]:
+    """Compute all derived figures, motor by motor, in the order they are read."""
+    return tuple(figure for name in spec.stepper for figure in _of_motor(MotorFigures(spec, name)))
+
+
+def _of_motor(m: MotorFigures) -> Iterator[Derived]:
+    for part in (_steps, _rotor, _torque, _ramp, _times, _words, _winding):
+        for figure in part(m):
+            yield Derived(f"{m.name}: {figure.name}", figure.value, figure.unit, figure.text, figure.formula)
+
+
+def _steps(m: MotorFigures) -> Iterator[Derived]:
+    """What a step is, and how many there are."""
+    table = m.table
+    yield quantity_figure("step", table.step, "m", "travel per revolution / steps per turn")
+    yield quantity_figure("step angle", m.motor.step_angle, "rad", "1 turn / steps per turn")
+    whole = table.steps * table.step
+    text = f"{table.steps} steps"
+    if table.limits.travel - whole > 1e-6 * table.step:
+        text += f", {format_quantity(whole, 'm', 7)}"
+    yield Derived("travel", table.steps, "count", text, "limits.travel / step, rounded down")
+    hz = f"{format_quantity(m.max_hz, 'Hz')}, {m.max_hz / m.motor.steps_per_turn * 60:.4g} rpm"
+    yield Derived("largest frequency f_max", m.max_hz, "Hz", hz, "limits.speed / step")
+
+
+def _rotor(m: MotorFigures) -> Iterator[Derived]:
+    """How the rotor with its load swings and starts."""
+    ratio = m.load.inertia / m.motor.rotor_inertia
+    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {ratio:.3g} x rotor"
+    yield Derived("inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2")
+    formula = "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
+    yield quantity_figure("natural frequency", m.natural_hz, "Hz", formula)
+    speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.natural_hz
+    text = f"{format_quantity(m.start_hz, 'Hz')} ({speed}), {relative:.3g} x natural"
+    formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
+    yield Derived("start frequency", m.start_hz, "Hz", text, formula)
+    text = f"{m.rest_error:.3g} steps, {format_quantity(m.rest_error * m.table.step, 'm')}"
+    yield Derived("error at rest", m.rest_error, "count", text, "asin(friction / holding torque) / 90 deg, at most")
+
+
+def _torque(m: MotorFigures) -> Iterator[Derived]:
+    """Where the torque goes (3.1)."""
+    way = PULL_OUT_FORMULA[m.table.motor.pull_out]
+    yield quantity_figure("pull-out torque at standstill", m.motor.pull_out(0.0), "N*m", way)
+    yield quantity_figure("pull-out torque at f_max", m.motor.pull_out(m.max_hz), "N*m", way)
+    yield quantity_figure("torque left at f_max", m.torque_left(m.max_hz), "N*m", "T_po(f_max) / SF - friction")
+    if m.linear_end is not None:
+        formula = "T_po(f) / SF - friction = J x step angle x a_lin"
+        yield quantity_figure("end of the linear ramp", m.linear_end, "Hz", formula)
+    if m.torque_end is not None:
+        yield quantity_figure("end of the torque", m.torque_end, "Hz", "T_po(f) / SF = friction")
+    share, hz = m.torque_used
+    formula = "(friction + 2 J x step angle x a) / holding torque at f: the zones may double a step of the ramp"
+    yield Derived("torque used", share, "", f"{share:.2f} of it, at {format_quantity(hz, 'Hz')}", formula)
+
+
+def _ramp(m: MotorFigures) -> Iterator[Derived]:
+    """The ramp list and the ways it needs."""
+    step, down, way = m.table.step, m.braking_steps, m.shortest_way
+    text = f"{len(m.ramp)} entries, {format_quantity(m.ramp.duration, 's')}"
+    yield Derived("ramp", len(m.ramp), "count", text, "f^2 grows by 2 a(f) per step (3.1)")
+    text = f"{down} steps, {format_quantity(down * step, 'm')}"
+    yield Derived("braking distance from f_max", down, "count", text, "entries of the ramp - 1")
+    text = f"{way} steps, {format_quantity(way * step, 'm')}"
+    yield Derived("shortest way that reaches f_max", way, "count", text, "2 x entries of the ramp - 1")
+
+
+def _times(m: MotorFigures) -> Iterator[Derived]:
+    """The whole travel."""
+    slow, fast = m.constant_time, m.travel_time
+    text = f"{format_quantity(fast, 's')}, {slow / fast:.3g} x as fast as at the start frequency"
+    yield Derived("time for the whole travel", fast, "s", text, "sum of the periods of all steps, zones included")
+
+
+def _words(m: MotorFigures) -> Iterator[Derived]:
+    """Memory and rounding."""
+    memory = envelope_memory(m.ramp, zone_maps(m.table)[0])
+    text = f"{memory.tables} bytes"
+    if memory.compact:
+        text += f" (as 8-bit indices {2 * memory.compact})"
+    formula = "2 bytes per step and direction; extremes and zones of the comparison methods take "
+    yield Derived("memory of the tables", memory.tables, "byte", text, f"{formula}{memory.conventional}")
+    yield Derived("memory of the ramp", memory.ramp, "byte", f"{memory.ramp} bytes", "2 bytes per entry")
+    controller = m.spec.controller
+    error = m.rounding(controller.timer, controller.words)
+    formula = f"of the ramp's frequencies, as {controller.words} words at controller.timer"
+    yield quantity_figure("largest rounding error", error, "%", formula)
+
+
+def _winding(m: MotorFigures) -> Iterator[Derived]:
+    """Electrical figures, where the winding is known."""
+    if m.rise_time is not None:
+        yield quantity_figure("current rise time L / R", m.rise_time, "s", "inductance / (winding + bridge)")
+    if m.dissipation is not None:
+        text = f"{m.dissipation:.3g} W"
+        yield Derived("heat of the windings", m.dissipation, "W", text, "2 x resistance x current^2, both phases on")

@@ -1,0 +1,171 @@
+"""Figure of a stepper's envelope: the permissible step frequency along the travel, both directions in one picture."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
+from detent.page.parts import Numbers
+from detent.page.plots import COLOURS, check_figure_path, new_figure
+from detent.planning.step_envelope import StepEnvelope
+from detent.units import format_quantity
+
+# matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
+Axes = Any
+
+BLUE, ORANGE = COLOURS[:2]
+GREY = "#7d8996"
+INK = "#17202a"
+
+MM = 1e-3
+HEADROOM = 1.32
+"""Height of each half over its largest limit: room for the limits in figures, and further out for the direction."""
+
+UPRIGHT, NONE = 0.07, 0.015
+"""A zone narrower than the first part of the travel has its limit written upright, below the second not at all."""
+
+BESIDE = 0.17
+"""Part of the travel that the name of an extreme may take, beside its point."""
+
+LABEL: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+
+
+def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
+    """Draw the permissible frequency over the position: upwards above the axis, downwards below it.
+
+    The run between a direction's extremes is filled; outside of them a dashed line shows what the table allows there.
+    What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and above.
+
+    Parameters
+    ----------
+    tables : EnvelopeTables
+        Both tables of a motor.
+    path : str or Path
+        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    path = check_figure_path(path)
+    top = HEADROOM * max(tables.up.zones.limits)
+    with new_figure(path, 9.0, 5.4) as figure:
+        area = figure.subplots()
+        outside = False
+        for table, colour in ((tables.up, BLUE), (tables.down, ORANGE)):
+            _shade_zones(area, table, top)
+            outside = _draw_table(area, table, colour) or outside
+            _name_direction(area, table, colour)
+        if outside:
+            area.plot([], [], "--", color=INK, linewidth=0.9, label="permissible outside of the run")
+        area.axhline(0, color=INK, linewidth=0.9)
+        _mark_extremes(area, tables)
+        area.set_xlim(0, tables.steps)
+        area.set_ylim(-top, top)
+        area.xaxis.get_major_locator().set_params(integer=True)
+        area.set_xlabel("position [step]")
+        area.set_ylabel("permissible step frequency [Hz]")
+        _add_scales(area, tables)
+        area.set_title(f"How fast may every step be? Motor {tables.motor}, axis {tables.axis}", pad=12)
+        figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+
+
+def _shade_zones(area: Axes, table: StepEnvelope, top: float) -> None:
+    """Grey over the frequencies that a zone forbids, and the zone's limit in figures."""
+    zones, sign = table.zones, table.direction
+    hz = np.array(zones.limits)[zones.numbers]
+    name = "faster than the zone allows" if sign > 0 else None
+    area.stairs(sign * hz, zones.edges, baseline=sign * top, fill=True, color=GREY, alpha=0.22, linewidth=0, label=name)
+    area.stairs(sign * hz, zones.edges, baseline=None, color=GREY, linewidth=0.9)
+    for begin, end, limit in zip(zones.edges[:-1], zones.edges[1:], hz, strict=True):
+        part = (end - begin) / zones.steps
+        if part >= NONE:
+            area.annotate(
+                f"{limit:g} Hz", ((begin + end) / 2, sign * limit), (0, 4 * sign), textcoords="offset points",
+                ha="center", va="bottom" if sign > 0 else "top", fontsize=9, color="#3d4751",
+                rotation=0 if part >= UPRIGHT else 90,
+            )  # fmt: skip
+
+
+def _draw_table(area: Axes, table: StepEnvelope, colour: str) -> bool:
+    """The steps of the run filled, all others as a thin dashed line; True if there are others."""
+    hz = table.direction * table.permissible_hz()
+    low, high = sorted((table.start, table.stop))
+    if (table.stop - table.start) * table.direction <= 0:
+        low = high = 0
+    for begin, end in ((0, low), (high, table.steps)):
+        if begin < end:
+            values, edges = _corners(hz[begin:end], begin)
+            area.stairs(values, edges, baseline=None, color=colour, linewidth=0.9, alpha=0.6, linestyle="--")
+    if low < high:
+        values, edges = _corners(hz[low:high], low)
+        area.stairs(values, edges, fill=True, color=colour, alpha=0.16, linewidth=0)
+        area.stairs(values, edges, color=colour, linewidth=1.8)
+    return high - low < table.steps
+
+
+def _corners(hz: Numbers, first: int) -> tuple[Numbers, NDArray[np.int64]]:
+    """Values that follow one another, each once, and the places where they begin and the last one ends."""
+    begins = np.concatenate(([0], np.flatnonzero(np.diff(hz)) + 1)).astype(np.int64)
+    return hz[begins], np.append(begins, len(hz)) + first
+
+
+def _name_direction(area: Axes, table: StepEnvelope, colour: str) -> None:
+    """Name the half and show which way the motor moves there."""
+    name = "up →" if table.direction > 0 else "← down"
+    area.text(
+        0.008, 0.5 + 0.468 * table.direction, name, transform=area.transAxes, color=colour, fontsize=11,
+        fontweight="bold", va="center", bbox=LABEL,
+    )  # fmt: skip
+
+
+def _mark_extremes(area: Axes, tables: EnvelopeTables) -> None:
+    """Points on the axis where a run begins, turns and ends, each named in its own half, outside of the run."""
+    up, down = tables.up, tables.down
+    turns = up.stop == down.start
+    if up.start == down.stop:
+        _mark(area, up.start / tables.steps, f"start and stop {up.start}", (1, -1))
+    else:
+        _mark(area, up.start / tables.steps, f"start {up.start}", (1, -1))
+        _mark(area, down.stop / tables.steps, f"stop {down.stop}", (-1, -1))
+    _mark(area, up.stop / tables.steps, f"{'turn' if turns else 'stop'} {up.stop}", (1, 1))
+    if not turns:
+        _mark(area, down.start / tables.steps, f"start {down.start}", (-1, 1))
+
+
+def _mark(area: Axes, place: float, text: str, towards: tuple[int, int]) -> None:
+    """One point at a part of the travel; `towards` is 1 or -1 for a name above or below, and right or left."""
+    vertical, side = towards
+    if not BESIDE < place < 1 - BESIDE:
+        side = 1 if place < 0.5 else -1
+    area.plot(place, 0, "o", color=INK, markersize=7, clip_on=False, zorder=5, transform=area.get_yaxis_transform())
+    area.annotate(
+        text, (place, 0), (4 * side, 8 * vertical), xycoords=area.get_yaxis_transform(), textcoords="offset points",
+        ha="left" if side > 0 else "right", va="bottom" if vertical > 0 else "top", fontsize=9, fontweight="bold",
+        bbox=LABEL, zorder=6,
+    )  # fmt: skip
+
+
+def _add_scales(area: Axes, tables: EnvelopeTables) -> None:
+    """The same in mm and mm/s."""
+    step, first = tables.travel_per_step / MM, tables.first_position / MM
+    above = area.secondary_xaxis("top", functions=_line(first, step))
+    above.set_xlabel("position [mm]")
+    right = area.secondary_yaxis("right", functions=_line(0.0, step))
+    right.set_ylabel(f"speed [mm/s], {format_quantity(tables.travel_per_step, 'm', 4).replace('um', 'µm')} a step")
+
+
+def _line(begin: float, slope: float) -> tuple[Callable[[Numbers], Numbers], Callable[[Numbers], Numbers]]:
+    """A straight line, there and back, as matplotlib wants a second scale."""
+
+    def there(values: Numbers) -> Numbers:
+        return begin + slope * np.asarray(values)
+
+    def back(values: Numbers) -> Numbers:
+        return (np.asarray(values) - begin) / slope
+
+    return there, back

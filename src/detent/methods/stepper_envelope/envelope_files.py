@@ -1,0 +1,359 @@
+"""What of a stepper's envelope leaves for other tools and for firmware: the table as CSV, table and rule as a C header.
+
+The header's registers, numbers and words are those of the control unit and the step timer that run here: they are taken
+from the same declarations, so firmware and simulation cannot drift apart. Its text is template/step_rule.h.in.
+"""
+
+import csv
+import ctypes
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import resources
+from math import isfinite
+from pathlib import Path
+from string import Template
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent import __version__
+from detent.control import step_rule
+from detent.control.step_rule import StepRule
+from detent.drive.step_timer import StepTimer
+from detent.errors import DetentError
+from detent.kernel.registers import Field, Registers
+from detent.methods.stepper_envelope.system import StepperParams, load_rule
+from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
+from detent.record.trace_store import part_of, writing
+from detent.units import format_quantity
+
+Words = NDArray[np.int64]
+
+CSV_ROWS = 8192
+"""Rows of text made at once: bounds the memory of a CSV file of any length."""
+
+LINE = 110
+"""Longest line of a comment in the header."""
+
+PER_LINE = 16
+"""Numbers of up to five digits in a line of the header; of longer ones, half as many."""
+
+MAX_CLOCK_HZ = 2**31 - 1
+"""Fastest timer whose periods fit the control unit's 32-bit words."""
+
+MAX_PAUSE = 255
+
+METRE_DIGITS = 12
+"""Decimals of a position in metres: a picometre, far below any step."""
+
+STATES = ("REST", "ACCEL", "CRUISE", "DECEL", "TURN", "FAULT")
+OUTCOMES = ("IDLE", "STEP", "PAUSE")
+CAUSES = ("INFEASIBLE", "OUT_OF_RANGE")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnvelopeTables:
+    """Both tables of one motor, and what firmware must know to use them.
+
+    Attributes
+    ----------
+    motor : str
+        Name of the motor; `motor_identifier` makes the prefix of all names in C from it.
+    axis : str
+        Name of the axis, for people.
+    up, down : StepEnvelope
+        Tables towards growing and towards falling positions: one ramp, one travel, one numbering of the zone limits.
+    clock_hz : int
+        Ticks of the step timer per second [Hz].
+    reload : bool
+        Words are periods of the timer in ticks instead of frequencies in Hz.
+    travel_per_step : float
+        Travel of the moved mass per step [m].
+    first_position : float
+        Place of step boundary 0 [m].
+    pause : int
+        Waiting time of a reversal, in periods of the start frequency, 0..255.
+
+    Raises
+    ------
+    DetentError
+        The tables do not belong together, or timer, travel or pause cannot be.
+    """
+
+    motor: str
+    axis: str
+    up: StepEnvelope
+    down: StepEnvelope
+    clock_hz: int
+    reload: bool
+    travel_per_step: float
+    first_position: float = 0.0
+    pause: int = 1
+
+    def __post_init__(self) -> None:
+        up, down = self.up, self.down
+        if (up.direction, down.direction) != (1, -1):
+            self._refuse("directions of up and down", (up.direction, down.direction), "1 and -1")
+        if up.steps != down.steps:
+            self._refuse("steps of up and down", (up.steps, down.steps), "one travel")
+        if up.zones.limits != down.zones.limits:
+            self._refuse("zone limits of up and down", (up.zones.limits, down.zones.limits), "one numbering")
+        if not np.array_equal(up.ramp.hz, down.ramp.hz):
+            self._refuse("ramps of up and down", (len(up.ramp), len(down.ramp)), "the same ramp list")
+        if not up.ramp.hz[-1] <= self.clock_hz <= MAX_CLOCK_HZ:
+            allowed = f"{up.ramp.hz[-1]:g}..{MAX_CLOCK_HZ} Hz, the largest step frequency and what 32 bits hold"
+            self._refuse("clock_hz", self.clock_hz, allowed)
+        if not 0 <= self.pause <= MAX_PAUSE:
+            self._refuse("pause", self.pause, f"0..{MAX_PAUSE} periods")
+        if not (isfinite(self.travel_per_step) and self.travel_per_step > 0):
+            self._refuse("travel_per_step", self.travel_per_step, "above 0 m and finite")
+        if not isfinite(self.first_position):
+            self._refuse("first_position", self.first_position, "a finite number of m")
+
+    def _refuse(self, what: str, came: object, allowed: str) -> None:
+        raise DetentError(f"envelope of motor {self.motor!r}: {what}: came {came}; allowed: {allowed}")
+
+    @property
+    def steps(self) -> int:
+        """N, steps of the whole travel."""
+        return self.up.steps
+
+    def ramp_words(self) -> Words:
+        """Word of each ramp index as the control unit holds it, shape (L,) [Hz, or tick with reload words]."""
+        return np.array(self._loaded().rule.ramp[: len(self.up.ramp)], np.int64)
+
+    def limit_words(self) -> Words:
+        """Word of each zone limit as the control unit holds it, shape (Z,) [Hz, or tick with reload words]."""
+        return np.array(self._loaded().rule.limit[: len(self.up.zones.limits)], np.int64)
+
+    @property
+    def word_bytes(self) -> int:
+        """Memory of a word of the ramp list or of a zone limit in firmware: 2, or 4 where a period needs it."""
+        return 2 if max(*self.ramp_words(), *self.limit_words()) <= 0xFFFF else 4
+
+    def periods(self, table: StepEnvelope) -> Words:
+        """Period that the timer loads for every step i of one of the tables, 0 at a sentinel, shape (N,) [tick]."""
+        entries = (table.entries[:-1] if table.direction > 0 else table.entries[1:]).astype(np.int64)
+        kept = entries[entries >= 0]
+        ramp, limit = self.ramp_words()[kept & INDEX_MASK], self.limit_words()[kept >> INDEX_BITS]
+        found = np.zeros(self.steps, np.int64)
+        if self.reload:
+            found[entries >= 0] = np.maximum(ramp, limit)
+        else:
+            words = np.minimum(ramp, limit)
+            found[entries >= 0] = (self.clock_hz + words // 2) // words
+        return found
+
+    def _loaded(self) -> StepperParams:
+        """Parameters of the motor's control unit, as a simulation has them."""
+        p = StepperParams()
+        load_rule(p, self.up.ramp, self.up.zones.limits, self.clock_hz, reload=self.reload)
+        return p
+
+
+def motor_identifier(name: str) -> str:
+    """Make a C identifier of a motor's name: the prefix of every name in its header.
+
+    Two motors of one firmware need different ones; "Zoom A" and "zoom-a" have the same.
+
+    Parameters
+    ----------
+    name : str
+        Any text.
+
+    Returns
+    -------
+    str
+        Lower-case letters a to z, digits and single underscores, beginning with a letter.
+
+    Examples
+    --------
+    >>> [motor_identifier(name) for name in ("Zoom A", "2nd stage", "Schärfe", "")]
+    ['zoom_a', 'motor_2nd_stage', 'scharfe', 'motor']
+    """
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    words = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
+    if not words:
+        return "motor"
+    return words if words[0].isalpha() else f"motor_{words}"
+
+
+# ---- CSV
+
+
+def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
+    """Write both tables as CSV, one row per step.
+
+    Step i lies between the boundaries i and i + 1; `position` is that of boundary i. `permissible` is the frequency
+    that ramp and zone allow; `period` is what the timer loads for it, words rounded. A step that is not allowed (a
+    sentinel) has index -1, and 0 for permissible and period.
+
+    Parameters
+    ----------
+    tables : EnvelopeTables
+        What to write.
+    path : str or Path
+        Target; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    path = Path(path)
+    columns = _csv_columns(tables)
+    part = part_of(path)
+    with writing(path):
+        with part.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerow(columns)
+            for first in range(0, tables.steps, CSV_ROWS):
+                texts = [list(map(repr, values[first : first + CSV_ROWS].tolist())) for values in columns.values()]
+                stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
+        part.replace(path)
+
+
+def _csv_columns(tables: EnvelopeTables) -> dict[str, NDArray[Any]]:
+    """Column per heading, each of shape (N,)."""
+    steps = np.arange(tables.steps)
+    position = tables.first_position + steps * tables.travel_per_step
+    columns: dict[str, NDArray[Any]] = {"step": steps, "position [m]": np.round(position, METRE_DIGITS)}
+    for name, table in (("up", tables.up), ("down", tables.down)):
+        zones = table.zones
+        limits = np.array(zones.limits, float)
+        columns[f"{name}.index"] = table.indices()
+        columns[f"{name}.zone_limit [Hz]"] = limits[zones.spread(zones.numbers, 0, tables.steps)]
+        columns[f"{name}.permissible [Hz]"] = table.permissible_hz()
+        columns[f"{name}.period [tick]"] = tables.periods(table)
+    return columns
+
+
+# ---- C header
+
+
+def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
+    """Write tables, ramp list, registers and step rule of one motor as a C99 header that needs only <stdint.h>.
+
+    Every name in it begins with `motor_identifier` of the motor, so that one firmware can include several. The rule is
+    the ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
+    arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
+
+    Parameters
+    ----------
+    tables : EnvelopeTables
+        What to write.
+    path : str or Path
+        Target; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    path = Path(path)
+    part = part_of(path)
+    with writing(path):
+        # A name need not be valid UTF-8; the header must be.
+        part.write_text(_header(tables), encoding="utf-8", errors="replace", newline="\n")
+        part.replace(path)
+
+
+def _header(tables: EnvelopeTables) -> str:
+    prefix = motor_identifier(tables.motor)
+    ramp, limit = tables.ramp_words(), tables.limit_words()
+    template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
+    return Template(template).substitute(
+        motor=prefix,
+        MOTOR=prefix.upper(),
+        title=_comment(
+            f'Stepper envelope of motor "{tables.motor}", axis "{tables.axis}": tables and step rule in C99.'
+        ),
+        version=__version__,
+        facts="\n".join(_facts(tables)),
+        steps=tables.steps,
+        up_start=tables.up.start,
+        up_stop=tables.up.stop,
+        down_start=tables.down.start,
+        down_stop=tables.down.stop,
+        ramp_length=len(ramp),
+        limit_length=len(limit),
+        clock_hz=tables.clock_hz,
+        reload=int(tables.reload),
+        pause=tables.pause,
+        word_unit="periods of the timer [tick]" if tables.reload else "frequencies [Hz]",
+        word_type="uint16_t" if tables.word_bytes == 2 else "int32_t",
+        index_mask=f"0x{INDEX_MASK:04X}",
+        index_bits=INDEX_BITS,
+        codes="\n".join(_codes(prefix.upper())),
+        rule_registers=_struct(StepRule, f"{prefix}_rule"),
+        timer_registers=_struct(StepTimer, f"{prefix}_timer"),
+        ramp=_numbers(ramp),
+        limit=_numbers(limit),
+        up=_numbers(tables.up.entries),
+        down=_numbers(tables.down.entries),
+    )
+
+
+def _facts(tables: EnvelopeTables) -> Iterator[str]:
+    """What the numbers below mean, one fact per line of the opening comment."""
+    up, down, step = tables.up, tables.down, tables.travel_per_step
+    ramp, limits = up.ramp, up.zones.limits
+    memory = envelope_memory(ramp, up.zones)
+    lists = tables.word_bytes * (len(ramp) + len(limits))
+    registers = ctypes.sizeof(StepRule) + ctypes.sizeof(StepTimer)
+    first = format_quantity(tables.first_position, "m", 6)
+    travel = format_quantity(tables.steps * step, "m", 6)
+    rows = {
+        "Travel": f"{tables.steps} steps of {format_quantity(step, 'm', 6)}: {travel}; boundary 0 lies at {first}",
+        "Up": f"leaves {up.start}, stops at {up.stop}",
+        "Down": f"leaves {down.start}, stops at {down.stop}",
+        "Ramp": f"{len(ramp)} entries, {ramp.hz[0]:.6g} Hz to {ramp.hz[-1]:.6g} Hz",
+        "Limits": ", ".join(f"{hz:g} Hz" for hz in limits),
+        "Words": f"{'periods [tick]' if tables.reload else 'frequencies [Hz]'} of a timer at {tables.clock_hz} Hz",
+        "Memory": f"tables {memory.tables + 2 * ENTRY_BYTES} bytes, ramp and limits {lists}, registers {registers}",
+    }
+    if memory.compact:
+        rows["Memory"] += f"; with 8-bit ramp indices and no zone numbers a table would take {memory.compact}"
+    for name, text in rows.items():
+        yield _comment(text, f"{name:<7} ")
+
+
+def _comment(text: str, heading: str = "") -> str:
+    """Lines of a block comment that no name can end, begin again or continue."""
+    printable = "".join(one if one.isprintable() else " " for one in text)
+    safe = re.sub(r"[*](?=/)|/(?=[*])", r"\g<0> ", printable).replace("??", "? ?")
+    lines = wrap(safe, LINE - len(heading)) or [""]
+    return "\n".join(f" * {heading if row == 0 else ' ' * len(heading)}{line}" for row, line in enumerate(lines))
+
+
+def _codes(prefix: str) -> Iterator[str]:
+    """Names for the codes in the registers and for what the step function returns."""
+    for meaning, names in (
+        ("Register rule.state", STATES),
+        ("Register rule.cause, of the last fault", CAUSES),
+        (f"What begins, returned by {prefix.lower()}_next", OUTCOMES),
+    ):
+        yield f"\n/* {meaning}. */"
+        yield from (f"#define {prefix}_{name} {getattr(step_rule, name)}" for name in names)
+
+
+def _struct(registers: type[Registers], name: str) -> str:
+    """C declaration of a register file, with the meaning of each register."""
+    return "\n".join(["typedef struct {", *map(_member, registers.__fields__.values()), f"}} {name};"])
+
+
+def _member(field: Field) -> str:
+    width: Any = field.width
+    unit = f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
+    return f"    {width.c_name} {field.name}; /* {field.doc}{unit} */"
+
+
+def _numbers(values: NDArray[Any]) -> str:
+    """Initialiser of an array."""
+    texts = list(map(str, values.tolist()))
+    per_line = PER_LINE if max(map(len, texts)) <= 5 else PER_LINE // 2
+    rows = (texts[first : first + per_line] for first in range(0, len(texts), per_line))
+    return ",\n".join("    " + ", ".join(row) for row in rows)

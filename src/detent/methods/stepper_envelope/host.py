@@ -1,0 +1,234 @@
+"""The host of a stepper stage: it moves the extremes of the tables and gives the start signal, and waits for rest.
+
+It knows what a controller would know: the step counts. Whether the rotors followed is for an observer to say.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from detent.control.step_rule import FAULT, deflect, start_move
+from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
+from detent.methods.stepper_envelope.machine import Stage, StageMotor
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
+from detent.methods.stepper_envelope.system import NOWHERE
+from detent.planning.step_envelope import StepEnvelope
+from detent.record.machine import AnyRecorder
+from detent.units import format_quantity
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """What one motor does in a move, in steps of its own.
+
+    Attributes
+    ----------
+    start, target : int
+        Step boundaries.
+    turn : int or None
+        Where it turns on the way.
+    """
+
+    start: int
+    target: int
+    turn: int | None = None
+
+    @property
+    def steps(self) -> int:
+        """Steps made in all."""
+        via = self.target if self.turn is None else self.turn
+        return abs(via - self.start) + abs(self.target - via)
+
+
+class StageHost:
+    """Host of a stage at power-on.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        The axis.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    """
+
+    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec, self.stage = spec, Stage(spec, recorder)
+        self.goal = {name: motor.place for name, motor in self.stage.motors.items()}
+
+    def legs(self, move: StageMove) -> dict[str, Leg]:
+        """What each motor has to do for a move; motors that stand there already are left out."""
+        found: dict[str, Leg] = {}
+        for name in move.motors:
+            motor = self.stage.motors[name]
+            goal = move.targets[name] if name in move.targets else self.goal[name] + move.by[name]
+            self.goal[name] = goal
+            turn = None if move.turn is None else motor.table.step_inside(move.turn)
+            leg = Leg(motor.position, motor.table.step_inside(goal), turn)
+            if leg.steps:
+                found[name] = leg
+        return found
+
+    def start(self, legs: dict[str, Leg]) -> None:
+        """Set the extremes of each motor and give all start signals at once."""
+        for name, leg in legs.items():
+            motor = self.stage.motors[name]
+            via = leg.target if leg.turn is None else leg.turn
+            heading = 1 if via > leg.start else -1
+            first, second = _tables(motor, heading)
+            first.move_start(leg.start)
+            first.move_stop(via)
+            if leg.turn is not None:
+                second.move_start(via)
+                second.move_stop(leg.target)
+            start_move(motor.r.rule, heading, int(leg.turn is not None))
+
+    def wait(self, legs: dict[str, Leg]) -> None:
+        """Wait until all motors have come to rest.
+
+        Raises
+        ------
+        AxisError
+            One of them reports a fault, or does not come to rest.
+        """
+        limit = 1.0 + 2.0 * sum(leg.steps / self._slowest(name) for name, leg in legs.items())
+        late = self.stage.wait_for(legs, limit)
+        for name in legs:
+            rule = self.stage.motors[name].r.rule
+            if rule.state == FAULT:
+                raise AxisError(f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}")
+            if name in late:
+                raise AxisError(
+                    f"motor {name}: did not come to rest within {format_quantity(limit, 's')}; look at its table in "
+                    "the report"
+                )
+
+    def _slowest(self, name: str) -> float:
+        """A step frequency that no run stays below for long [Hz]."""
+        motor = self.stage.motors[name]
+        return min(float(motor.tables.ramp.hz[0]), *motor.tables.up.zones.limits)
+
+    def run(self, move: StageMove) -> tuple[dict[str, Leg], set[str]]:
+        """Make one move up to rest: what each motor did, and which of them could not stop where they were told to."""
+        legs = self.legs(move)
+        self.start(legs)
+        over: set[str] = set()
+        if move.change is not None and legs:
+            (name,) = legs
+            if self._change(name, move.change.at, move.change.to):
+                over.add(name)
+        self.wait(legs)
+        if over:  # the stop it was given lay behind the nearest possible one: come back to it
+            (name,) = over
+            motor = self.stage.motors[name]
+            back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
+            if back[name].steps:
+                self.start(back)
+                self.wait(back)
+        return legs, over
+
+    def _change(self, name: str, at: float, to: float) -> bool:
+        """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
+        motor = self.stage.motors[name]
+        rule = motor.r.rule
+        motor.r.stop_at = motor.table.step_inside(at)
+        late = self.stage.wait_for([name], 1.0 + 2.0 * motor.table.steps / self._slowest(name))
+        motor.r.stop_at = NOWHERE
+        if late or motor.resting:
+            rule.event = int(motor.resting)
+            return False
+        rule.event = 0
+        ahead, behind = _tables(motor, rule.direction)
+        edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
+        behind.move_start(edit.stop)
+        self.goal[name] = to
+        return edit.overrun
+
+    def jog(self, jog: StageJog) -> Leg:
+        """A manual run up to rest."""
+        motor = self.stage.motors[jog.motor]
+        start, heading = motor.position, 1 if jog.speed > 0 else -1
+        for table in (motor.tables.up, motor.tables.down):
+            lower, upper = (0, motor.table.steps) if table.direction > 0 else (motor.table.steps, 0)
+            table.move_start(lower)
+            table.move_stop(upper)
+        last = len(motor.tables.ramp) - 1
+        deflect(motor.p.rule, motor.r.rule, self._word(abs(jog.speed), motor.table), last, heading)
+        self.stage.pass_time(jog.duration)
+        deflect(motor.p.rule, motor.r.rule, 0, last, heading)
+        if not motor.resting:
+            self.wait({jog.motor: Leg(0, motor.table.steps)})
+        self.goal[jog.motor] = motor.place
+        return Leg(start, motor.position)
+
+    def _word(self, speed: float, table: StepperTable) -> int:
+        """Timer word of a speed, rounded to the slower side."""
+        hz = table.hz(speed)
+        if self.spec.controller.words == "reload":
+            return math.ceil(self.spec.controller.timer / hz - 1e-9)
+        return math.floor(hz + 1e-9)
+
+
+def _tables(motor: StageMotor, heading: int) -> tuple[StepEnvelope, StepEnvelope]:
+    """Table of the direction of motion, and of the other one."""
+    up, down = motor.tables.up, motor.tables.down
+    return (up, down) if heading > 0 else (down, up)
+
+
+def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
+    """Refuse what the axis cannot be told to do, before anything moves.
+
+    Raises
+    ------
+    InputError
+        All problems, each with the line of its move, what came, what is allowed, and a value that would do.
+    """
+    problems = list(_job_problems(spec, job))
+    if problems:
+        raise InputError(problems)
+
+
+def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[FileProblem]:
+    goal = {name: table.mechanics.start_position for name, table in spec.stepper.items()}
+    for move in job.moves:
+        for name in move.motors:
+            if name not in spec.stepper:
+                came = f"the motor {name}"
+                yield FileProblem(job.name, move.row, 1, name, came, f"one of {', '.join(spec.stepper)}", "rename it")
+                return
+        if isinstance(move, StageJog):
+            yield from _jog_problems(spec, job, move)
+            # Where a manual run ends is not known before it is made.
+            goal[move.motor] = math.nan
+            continue
+        for name in move.motors:
+            goal[name] = move.targets[name] if name in move.targets else goal[name] + move.by[name]
+            places = [goal[name]] + [place for place in (move.turn,) if place is not None]
+            if move.change is not None:
+                places += [move.change.at, move.change.to]
+                goal[name] = move.change.to
+            for place in places:
+                yield from _place_problems(spec.stepper[name], (job.name, move.row, name), place)
+
+
+def _place_problems(table: StepperTable, where: tuple[str, int, str], place: float) -> Iterator[FileProblem]:
+    # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.
+    end = max(table.steps * table.step, table.limits.travel) + table.step / 2
+    if math.isnan(place) or -table.step / 2 <= place - table.mechanics.lower_end <= end:
+        return
+    lower, upper = format_quantity(table.mechanics.lower_end, "m"), format_quantity(table.upper_end, "m")
+    nearest = lower if place < table.mechanics.lower_end else upper
+    file, row, name = where
+    remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
+    came = f"the position {format_quantity(place, 'm', 6)}"
+    yield FileProblem(file, row, 1, name, came, f"from {lower} to {upper}", remedy)
+
+
+def _jog_problems(spec: StepperEnvelopeSpec, job: StageJob, jog: StageJog) -> Iterator[FileProblem]:
+    table = spec.stepper[jog.motor]
+    least, most = table.hz(table.step), table.max_hz
+    if not 1.0 <= table.hz(abs(jog.speed)) <= most * (1 + 1e-9):
+        came, top = format_quantity(jog.speed, "m/s"), format_quantity(table.limits.speed, "m/s")
+        slowest = format_quantity(least * table.step, "m/s")
+        remedy = f"write {top}, or correct limits.speed"
+        yield FileProblem(job.name, jog.row, 1, "speed", came, f"{slowest} to {top}, either way", remedy)

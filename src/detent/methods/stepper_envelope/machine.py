@@ -1,0 +1,195 @@
+"""Several steppers in simulated time, side by side: each with its own control unit, tables and rotor.
+
+Nothing is shared but time (stepper-envelope specification 2.2): each motor is advanced for itself, up to the instant
+that all of them reach. A record of the stage is put together from records of its motors.
+"""
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from detent.control.step_rule import FAULT, REST
+from detent.kernel.registers import Registers, block, i8, register
+from detent.methods.stepper_envelope.build import MotorTables, build_stepper, instant, make_tables
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.system import Stepper, advance_on_rig, switch_on
+from detent.plant.stepper_rotor import lost_steps
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder
+
+_NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
+
+
+def stage_registers(spec: StepperEnvelopeSpec) -> type[Registers]:
+    """Class of the registers of a whole stage: ``tick``, and a block per motor of the motor's name."""
+    return _registers_of(tuple(spec.stepper))
+
+
+@cache
+def _registers_of(names: tuple[str, ...]) -> type[Registers]:
+    """One class per set of names; it has the layout of a record, the motors themselves live apart."""
+    fields: dict[str, Any] = {"tick": register("time steps of the rotors since power-on", unit="tick")}
+    fields |= {name: block(f"motor {name}") for name in names}
+    hints: dict[str, Any] = {"tick": i8} | dict.fromkeys(names, Stepper)
+    # The base's metaclass reads these to lay the structure out.
+    body = {"__module__": __name__, "__doc__": "Registers of a stage.", "__annotations__": hints, **fields}
+    make: Any = type(Registers)
+    return make("Stage", (Registers,), body)
+
+
+class StageMotor:
+    """One motor of a stage at power-on, with its tables.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        The axis.
+    name : str
+        The motor.
+    """
+
+    def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
+        self.name, self.table = name, spec.stepper[name]
+        self.tables: MotorTables = make_tables(self.table)
+        self.p = build_stepper(spec, name, self.tables)
+        # ctypes gives every register its type at run time only.
+        self.r: Any = Stepper()
+        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.rotor.step_angle)
+        self.rows, self.picks = _NO_ROWS
+        self.rested = 0.0
+        """When its last step was over [s], at the last event."""
+
+    @property
+    def position(self) -> int:
+        """Position of record [step]."""
+        return int(self.r.rule.position)
+
+    @property
+    def place(self) -> float:
+        """The same as a length [m]."""
+        return self.table.position_of(self.position)
+
+    @property
+    def resting(self) -> bool:
+        """True when it stands and no start waits to be taken."""
+        rule = self.r.rule
+        return rule.index < 0 and rule.state in {REST, FAULT} and not rule.start
+
+    @property
+    def lost(self) -> int:
+        """Steps that the rotor, at rest, is away from its field."""
+        return lost_steps(self.p.rotor, self.r.rotor)
+
+    def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
+        """Advance up to an instant, or until the control unit has an event for the host; True if it has one."""
+        r = self.r
+        while r.instant < at and not (until_event and r.rule.event):
+            if not until_event:
+                r.rule.event = 0
+            n = min(at - r.instant, LONGEST_STRETCH)
+            advance_on_rig(self.p, r, self.tables.up.entries, self.tables.down.entries, n, self.rows, self.picks, every)
+        if r.rule.event:
+            self.rested = r.timer.expires / self.p.timer.clock_hz
+        return bool(r.rule.event)
+
+
+class Stage:
+    """All motors of an axis, and the time they share.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        The axis.
+    recorder : Recorder or Capture, optional
+        Records registers on the way; its class is that of `stage_registers`.
+    """
+
+    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec, self.tick, self.recorder = spec, instant(spec), recorder
+        self.motors = {name: StageMotor(spec, name) for name in spec.stepper}
+        self.instant = 0
+        self._columns: dict[str, Any] = {}
+        if recorder is not None:
+            self._divide(recorder)
+
+    def _divide(self, recorder: AnyRecorder) -> None:
+        """Give each motor the columns of the record that are its own."""
+        for field in stage_registers(self.spec).__fields__.values():
+            if field.block is None:
+                continue
+            end = field.offset + int(field.block.dtype().itemsize)
+            columns = np.flatnonzero((recorder.picks >= field.offset) & (recorder.picks < end))
+            motor = self.motors[field.name]
+            self._columns[field.name] = columns
+            motor.picks = np.ascontiguousarray(recorder.picks[columns] - field.offset)
+            motor.rows = np.zeros((len(recorder.rows), len(columns)), np.uint8)
+
+    @property
+    def time(self) -> float:
+        """Simulated time since power-on [s]."""
+        return self.instant * self.tick
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for all motors."""
+        end = self.instant + round(seconds / self.tick)
+        while self.instant < end:
+            self._bring_to(min(end, self.instant + self._room()))
+
+    def wait_for(self, names: Iterable[str], seconds: float) -> set[str]:
+        """Wait until each of these motors has an event for the host, at most so long.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Motors.
+        seconds : float
+            Longest time [s].
+
+        Returns
+        -------
+        set of str
+            Those that had no event; empty when all had. All motors are then at the instant of the last event.
+        """
+        waiting, end = set(names), self.instant + round(seconds / self.tick)
+        reached = self.instant
+        while waiting and self.instant < end:
+            stop, every = min(end, self.instant + self._room()), self._every()
+            for name in sorted(waiting):
+                if self.motors[name].advance_to(stop, every, until_event=True):
+                    waiting.discard(name)
+                    reached = max(reached, int(self.motors[name].r.instant))
+            self._bring_to(stop if waiting else max(reached, self.instant))
+        return waiting
+
+    def _room(self) -> int:
+        """Instants that may pass before the record must be handed on."""
+        return LONGEST_STRETCH if self.recorder is None else self.recorder.room(self.instant)
+
+    def _every(self) -> int:
+        return 0 if self.recorder is None else self.recorder.every
+
+    def _bring_to(self, at: int) -> None:
+        """Bring all motors to an instant that none of them has passed."""
+        every = self._every()
+        for motor in self.motors.values():
+            motor.advance_to(at, every, until_event=False)
+        self.instant = at
+        if self.recorder is not None and self.recorder.room(at) <= 0:
+            self._flush(self.recorder)
+
+    def _flush(self, recorder: AnyRecorder) -> None:
+        """Put the motors' rows together and hand them on."""
+        for name, columns in self._columns.items():
+            recorder.rows[:, columns] = self.motors[name].rows
+        every = max(recorder.every, 1)
+        last, count = self.instant // every, len(recorder.rows)
+        numbers = np.arange(last - count + 1, last + 1, dtype=np.int64)
+        ticks = (numbers * every).astype("<i8").view(np.uint8).reshape(count, 8)
+        recorder.rows[numbers % count, :8] = ticks  # the tick is the first register of every record
+        recorder.flush(self.instant)
+
+    def close(self) -> None:
+        """Hand the last rows to the recorder's sink."""
+        if self.recorder is not None:
+            self._flush(self.recorder)

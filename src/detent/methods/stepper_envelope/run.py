@@ -1,0 +1,291 @@
+"""A job on a simulated stepper stage, from power-on: what its host commands, and what an observer of rotors sees."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from detent.errors import AxisError
+from detent.methods.stepper_envelope.build import start_hz, stepper_load, stepper_motor
+from detent.methods.stepper_envelope.host import Leg, StageHost, check_stage_job
+from detent.methods.stepper_envelope.machine import StageMotor
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
+from detent.planning.step_ramp import torque_margin
+from detent.record.machine import AnyRecorder
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
+
+MOTOR_SIGNALS = (
+    "rule.position", "rule.index", "rule.state", "rule.direction", "timer.period", "rotor.angle", "rotor.velocity",
+    "rotor.lag",
+)  # fmt: skip
+"""Registers of each motor that a run records unless told otherwise."""
+
+
+def stage_signals(spec: StepperEnvelopeSpec) -> tuple[str, ...]:
+    """Registers that a run records unless told otherwise."""
+    return tuple(f"{name}.{signal}" for name in spec.stepper for signal in MOTOR_SIGNALS)
+
+
+@dataclass(frozen=True, slots=True)
+class MotorMove:
+    """How one motor made a move; lengths in metres, times in seconds since power-on.
+
+    Attributes
+    ----------
+    start, target : float
+        Where it stood, and where it had to go.
+    stop : float
+        Position of record at the end.
+    arrived : float
+        When its last step was over.
+    settled : float
+        When the rotor was outside the tolerance for the last time.
+    steps : int
+        Steps made, both ways.
+    missed : int
+        Steps from the stop to the target.
+    lost : int
+        Steps that the rotor fell behind, or jumped ahead, in this move.
+    rest_lag : float
+        Distance of the rotor from its field when the host took the move for done [steps].
+    peak_lag : float
+        Largest distance of the rotor from its field [steps].
+    peak_hz : float
+        Largest step frequency [Hz].
+    margin : float
+        Smallest pull-out torque over torque needed; below 1 the rotor falls behind.
+    overrun : bool
+        A stop that was changed on the way lay too near and was passed.
+    naive : float
+        Time that as many steps take at the start frequency [s].
+    """
+
+    start: float
+    target: float
+    stop: float
+    arrived: float
+    settled: float
+    steps: int
+    missed: int
+    lost: int
+    rest_lag: float
+    peak_lag: float
+    peak_hz: float
+    margin: float
+    overrun: bool
+    naive: float
+
+
+@dataclass(frozen=True, slots=True)
+class StageMoveRecord:
+    """How one move went.
+
+    Attributes
+    ----------
+    number : int
+        From 1.
+    label : str
+        The tile, or what the job calls it.
+    begin, end : float
+        From the start signals to the end of the dwell, since power-on [s].
+    ready : float
+        When the host took it for done: the last step and the time to settle are over [s].
+    motors : dict of MotorMove by motor
+        Those that moved.
+    """
+
+    number: int
+    label: str
+    begin: float
+    ready: float
+    end: float
+    motors: dict[str, MotorMove]
+
+    @property
+    def seconds(self) -> float:
+        """From the start signals until all rotors were at rest [s]."""
+        rests = [max(motor.arrived, motor.settled) for motor in self.motors.values()]
+        return max(rests, default=self.begin) - self.begin
+
+
+@dataclass(slots=True)
+class StageRun:
+    """Outcome of a job on a stage.
+
+    Attributes
+    ----------
+    done : bool
+        Every move ended on its place and no rotor lost a step.
+    failure : str
+        Why not, and what to do; empty if `done`.
+    time_ready, time_end : float
+        Begin and end of the job, since power-on [s].
+    moves : list of StageMoveRecord
+        Moves made, in order.
+    lost : dict of int by motor
+        Steps lost in all.
+    """
+
+    job: StageJob
+    done: bool = False
+    failure: str = ""
+    warnings: list[str] = field(default_factory=list[str])
+    time_ready: float = 0.0
+    time_end: float = 0.0
+    moves: list[StageMoveRecord] = field(default_factory=list[StageMoveRecord])
+    lost: dict[str, int] = field(default_factory=dict[str, int])
+
+    @property
+    def made(self) -> list[tuple[StageMoveRecord, str, MotorMove]]:
+        """Every motion of every motor, with its move."""
+        return [(move, name, motor) for move in self.moves for name, motor in move.motors.items()]
+
+    @property
+    def worst_lag(self) -> float:
+        """Largest distance of a rotor from its field [steps]."""
+        return max((motor.peak_lag for _, _, motor in self.made), default=0.0)
+
+    @property
+    def least_margin(self) -> float:
+        """Smallest torque margin of all motions; infinite if nothing moved."""
+        return min((motor.margin for _, _, motor in self.made), default=float("inf"))
+
+    @property
+    def moves_per_second(self) -> float:
+        """Moves, settling and dwells included, per second."""
+        span = self.time_end - self.time_ready
+        return len(self.moves) / span if span > 0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for ``--json``."""
+        names = (
+            "done", "failure", "warnings", "time_ready", "time_end", "lost", "worst_lag", "least_margin",
+            "moves_per_second",
+        )  # fmt: skip
+        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "notes": list(self.job.notes)}
+        found |= {name: getattr(self, name) for name in names}
+        found["moves"] = [asdict(move) for move in self.moves]
+        return found
+
+
+def run_stage(
+    spec: StepperEnvelopeSpec, job: StageJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
+) -> StageRun:
+    """Do a job on the stage of `spec`, from power-on.
+
+    Parameters
+    ----------
+    spec : StepperEnvelopeSpec
+        The axis.
+    job : StageJob
+        What to do.
+    recorder : Recorder or Capture, optional
+        Records registers on the way.
+    progress : callable, optional
+        Told the share done.
+
+    Returns
+    -------
+    StageRun
+        What the stage did; lost steps are told in `failure`, not raised, and do not end the job: nothing in an
+        open-loop axis would notice them.
+
+    Raises
+    ------
+    InputError
+        A move cannot be commanded to this axis.
+    """
+    check_stage_job(spec, job)
+    host, result = StageHost(spec, recorder), StageRun(job, lost=dict.fromkeys(spec.stepper, 0))
+    try:
+        for done, move in enumerate(job.moves):
+            result.moves.append(_make_move(host, move, result))
+            if progress is not None:
+                progress((done + 1) / len(job.moves), f"move {done + 1} of {len(job.moves)}")
+    except AxisError as error:
+        result.failure = f"move {len(result.moves) + 1}: {error}"
+    finally:
+        host.stage.close()
+    result.time_end = host.stage.time
+    result.failure = result.failure or _verdict(spec, result)
+    result.done = not result.failure
+    return result
+
+
+def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) -> StageMoveRecord:
+    """One move, the time to settle and the dwell."""
+    stage = host.stage
+    begin = stage.time
+    before = {name: _counted(motor) for name, motor in stage.motors.items()}
+    for name in move.motors:
+        r = stage.motors[name].r
+        r.rotor.peak_lag, r.peak_hz, r.outside = abs(r.rotor.lag), 0.0, stage.instant
+    over: set[str] = set()
+    if isinstance(move, StageJog):
+        legs = {move.motor: host.jog(move)}
+    else:
+        legs, over = host.run(move)
+    arrived = {name: stage.motors[name].rested for name in legs}
+    stage.pass_time(stage.spec.controller.settle_time)
+    ready = stage.time
+    seen = {name: _observe(host, name, leg, before[name], over=name in over) for name, leg in legs.items()}
+    for name, found in seen.items():
+        result.lost[name] += found["lost"]
+    stage.pass_time(move.dwell)
+    motors = {name: MotorMove(arrived=arrived[name], **found) for name, found in seen.items()}
+    return StageMoveRecord(move.number, move.label, begin, ready, stage.time, motors)
+
+
+def _counted(motor: StageMotor) -> tuple[int, int]:
+    """Pulses made and steps lost so far."""
+    return int(motor.r.timer.pulses), motor.lost
+
+
+def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, over: bool) -> dict[str, Any]:
+    """What a look at the rotor tells after a motion."""
+    motor = host.stage.motors[name]
+    r, table = motor.r, motor.table
+    pulses, lost = (now - then for now, then in zip(_counted(motor), before, strict=True))
+    return {
+        "start": table.position_of(leg.start),
+        "target": host.goal[name],
+        "stop": motor.place,
+        "settled": r.outside * host.stage.tick,
+        "steps": pulses,
+        "missed": table.step_inside(host.goal[name]) - motor.position,
+        "lost": lost,
+        "rest_lag": float(r.rotor.lag),
+        "peak_lag": float(r.rotor.peak_lag),
+        "peak_hz": float(r.peak_hz),
+        "margin": _margin(motor),
+        "overrun": over,
+        "naive": pulses / start_hz(table),
+    }
+
+
+def _margin(motor: StageMotor) -> float:
+    """Smallest torque margin on the part of the ramp that the motion went up and down."""
+    ramp = motor.tables.ramp
+    used = ramp.hz[: ramp.index_of(float(motor.r.peak_hz)) + 1]
+    return float(torque_margin(stepper_motor(motor.table), stepper_load(motor.table), used).min())
+
+
+def _verdict(spec: StepperEnvelopeSpec, result: StageRun) -> str:
+    """Why the job is not done; empty if it is."""
+    for move, name, motor in result.made:
+        where = f"move {move.number}: motor {name}"
+        if motor.lost:
+            return (
+                f"{where} lost {abs(motor.lost)} steps, and every place after that is off by them; lower "
+                "limits.acceleration or limits.speed of the motor, or raise drive.supply"
+            )
+        if motor.missed:
+            return f"{where} stopped {abs(motor.missed)} steps from its place; look at its table in the report"
+        if abs(motor.rest_lag) > spec.controller.tolerance:
+            return (
+                f"{where} was still {abs(motor.rest_lag):.2g} steps from its place when the time to settle was over; "
+                "raise controller.settle_time, or lower friction_torque"
+            )
+    return ""

@@ -1,0 +1,270 @@
+"""What an axis file of the stepper-envelope method may say: every key with its unit, bounds, default and meaning.
+
+Sections in brackets are those of the stepper-envelope specification. One file describes one or several motors, each
+with its own mechanics, tables and control unit; they share the step timer's clock and nothing else. Positions count
+from `mechanics.lower_end`, upwards.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Le
+from pydantic import Field
+
+from detent.axisfile.tables import AxisSpec, AxisTable
+from detent.files.fields import Naming, Table, named, optional, required
+from detent.files.quantities import (
+    Acceleration,
+    Current,
+    Frequency,
+    Inductance,
+    Inertia,
+    Length,
+    Mass,
+    Resistance,
+    Time,
+    Torque,
+    Velocity,
+    Voltage,
+)
+
+JOB_WORDS = (
+    "tick", "tile", "label", "by", "turn", "dwell", "repeat", "jog", "speed", "duration", "changed_at", "changed_to",
+)  # fmt: skip
+"""Words of jobs and records, which no motor may have for a name."""
+
+MOTOR_NAME = Naming(
+    placeholder="NAME",
+    # Names in C are made from them, where one motor in capitals could not be told from another.
+    pattern=rf"(?!(?:{'|'.join(JOB_WORDS)})$)[a-z][a-z0-9_]{{0,30}}",
+    allowed=f"up to 31 small letters, digits and underscores, a letter first; not {', '.join(JOB_WORDS)}",
+    example="x",
+)
+ZONE_NAME = Naming(
+    placeholder="ZONE",
+    pattern="[A-Za-z0-9_-]{1,40}",
+    allowed="up to 40 letters, digits, underscores and hyphens",
+    example="fine",
+)
+MOST_MOTORS = 16
+
+
+class StepperAxisTable(AxisTable, frozen=True):
+    """Name and method of the axis."""
+
+    method: Literal["stepper_envelope"] = required("control method", '"stepper_envelope"')
+
+
+class ControllerTable(Table, frozen=True):
+    """What all motors of the file have in common: one clock for their step timers, and how the host waits."""
+
+    timer: Frequency = optional(
+        "clock of the step timers", 1e6, allowed="a frequency from 250 kHz up to 1 GHz, in whole Hz", ge=2.5e5, le=1e9
+    )
+    words: Literal["reload", "frequency"] = optional(
+        "what the ramp is stored as: timer periods, which cost no division, or frequencies", "reload"
+    )
+    settle_time: Time = optional("time a motor is given to come to rest after its last step", 50e-3, ge=0.0, le=10.0)
+    tolerance: float = optional(
+        "distance of the rotor from its step that counts as at rest, in steps", 0.5, ge=0.01, le=2.0
+    )
+
+
+class LimitsTable(Table, frozen=True):
+    """What the motor must never exceed."""
+
+    travel: Length = required("free way between its two ends", '"40 mm"', gt=0.0, le=100.0)
+    speed: Velocity = required("largest speed ever commanded", '"20 mm/s"', gt=0.0, le=100.0)
+    acceleration: Acceleration = required(
+        "acceleration of the linear part of the ramp (3.1)", '"0.2 m/s^2"', gt=0.0, le=1e4
+    )
+
+
+class MotorTable(Table, frozen=True):
+    """Constants of the stepper, from a catalogue or stated."""
+
+    catalogue: str = optional("motor of the catalogue that gives the constants not stated here", "", max_length=80)
+    steps_per_turn: int = required(
+        "full steps per turn", "200", allowed="a multiple of 4 from 4 to 10000", ge=4, le=10000
+    )
+    holding_torque: Torque = required("holding torque, both phases at the rated current", '"60 mN*m"', ge=1e-5, le=1e3)
+    rotor_inertia: Inertia = required("rotor, without load", '"9 g*cm^2"', ge=1e-10, le=1.0)
+    resistance: Resistance | None = optional("winding, per phase", None, ge=1e-3, le=1e4)
+    inductance: Inductance | None = optional("winding, per phase", None, ge=1e-6, le=10.0)
+    rated_current: Current | None = optional("per phase", None, ge=1e-3, le=1e3)
+    start_frequency: Frequency | None = optional(
+        "frequency at which the bare rotor starts without losing steps",
+        None,
+        derived="3 x the natural frequency of rotor and field",
+        ge=1.0,
+        le=65535.0,
+    )
+    pull_out: Literal["winding", "first order", "points"] = optional(
+        "torque against frequency: from the winding's constants and the supply; falling from pull_out_torque with "
+        "corner_frequency (3.1); or from points of a published curve",
+        "winding",
+    )
+    pull_out_torque: Torque | None = optional(
+        "first order: pull-out torque at standstill, with this drive and its current", None, ge=1e-6, le=1e3
+    )
+    corner_frequency: Frequency | None = optional(
+        "first order: step frequency at which it has fallen to 1/sqrt 2", None, ge=1.0, le=1e6
+    )
+    curve_frequency: list[Annotated[Frequency, Ge(0.0), Le(1e6)]] = optional(
+        "points: step frequencies, rising",
+        [],
+        allowed='a list of frequencies up to 1 MHz, such as ["500 Hz", "2 kHz"], up to 64 of them',
+        max_length=64,
+    )
+    curve_torque: list[Annotated[Torque, Ge(0.0), Le(1e3)]] = optional(
+        "points: pull-out torque at each, with this drive and its current",
+        [],
+        allowed='a list of torques up to 1 kN*m, such as ["45 mN*m", "20 mN*m"], as many as curve_frequency',
+        max_length=64,
+    )
+
+
+class DriveTable(Table, frozen=True):
+    """Chopper drive of the motor."""
+
+    supply: Voltage = optional("voltage that drives the current", 24.0, ge=0.5, le=1000.0)
+    current: Current | None = optional(
+        "current per phase that the drive is set to", None, derived="motor.rated_current", ge=1e-3, le=1e3
+    )
+    bridge_resistance: Resistance = optional("switches and wiring, per phase", 0.0, ge=0.0, le=1e4)
+    torque_safety: float = optional("SF: the pull-out torque is divided by it (3.1)", 2.0, ge=1.0, le=20.0)
+    start_safety: float = optional("the start frequency is divided by it: age and temperature", 2.1, ge=1.0, le=20.0)
+    reversal_pause: int = optional("waiting time of a reversal, in periods of the start frequency", 1, ge=0, le=255)
+
+
+class MechanicsTable(Table, frozen=True):
+    """Spindle and what it moves."""
+
+    travel_per_revolution: Length = required("lead of the spindle: travel per motor turn", '"1 mm"', ge=1e-6, le=10.0)
+    moving_mass: Mass = optional("stage, lens group or other mass that is moved", 0.0, ge=0.0, le=1e4)
+    screw_inertia: Inertia = optional("spindle", 0.0, ge=0.0, le=10.0)
+    coupling_inertia: Inertia = optional("coupling", 0.0, ge=0.0, le=10.0)
+    friction_torque: Torque = optional("Coulomb friction at the shaft", 0.0, ge=0.0, le=1e3)
+    lower_end: Length = optional("position of the lower end of the travel", 0.0, ge=-100.0, le=100.0)
+    start_position: Length = optional(
+        "where the motor stands at power-on", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
+    )
+
+
+class ExtremesTable(Table, frozen=True):
+    """Extremes of the envelope as it is at power-on (2.1): start, turn and stop; moves set their own."""
+
+    start: Length = optional(
+        "where the run upwards begins", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
+    )
+    turn: Length = optional(
+        "where it ends and the run downwards begins", math.nan, derived="upper end", ge=-100.0, le=200.0
+    )
+    stop: Length = optional(
+        "where the run downwards ends", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
+    )
+
+
+class ZoneTable(Table, frozen=True):
+    """A stretch of the travel with its own speed limit."""
+
+    begin: Length = required("lower end of the zone", '"10 mm"', ge=-100.0, le=200.0)
+    end: Length = required("upper end of the zone", '"13 mm"', ge=-100.0, le=200.0)
+    speed: Velocity = required("largest speed inside it", '"5 mm/s"', gt=0.0, le=100.0)
+    direction: Literal["both", "up", "down"] = optional("direction of motion that it holds for", "both")
+
+
+class MethodTable(Table, frozen=True):
+    """Form of the run-time rule (3.3)."""
+
+    rule: Literal["ramp-limited", "literal"] = optional(
+        "the ramp-limited rule, or the literal one of the claim, which is safe on the envelope only", "ramp-limited"
+    )
+
+
+class StepperTable(Table, frozen=True):
+    """One motor of the axis, with its mechanics and its tables."""
+
+    limits: LimitsTable
+    motor: MotorTable
+    drive: DriveTable = Field(default_factory=DriveTable)
+    mechanics: MechanicsTable
+    extremes: ExtremesTable = Field(default_factory=ExtremesTable)
+    zone: dict[str, ZoneTable] = named("a stretch with its own speed limit", ZONE_NAME, max_length=14)
+    method: MethodTable = Field(default_factory=MethodTable)
+
+    @property
+    def step(self) -> float:
+        """Travel per step [m]."""
+        return self.mechanics.travel_per_revolution / self.motor.steps_per_turn
+
+    @property
+    def held_torque(self) -> float:
+        """Holding torque at the current of the drive [N m]: torque is in proportion to current."""
+        rated, current = self.motor.rated_current, self.drive.current
+        return self.motor.holding_torque * (1.0 if rated is None or current is None else current / rated)
+
+    @property
+    def steps(self) -> int:
+        """Whole steps of the travel N."""
+        return math.floor(self.limits.travel / self.step + 1e-6)
+
+    @property
+    def max_hz(self) -> float:
+        """Step frequency of the largest speed f_max [Hz]."""
+        return self.hz(self.limits.speed)
+
+    def hz(self, speed: float) -> float:
+        """Step frequency of a speed [m/s] as [Hz]; 20 mm/s in steps of 5 um are 4000 Hz, not a rounding error less."""
+        return float(f"{speed / self.step:.12g}")
+
+    @property
+    def upper_end(self) -> float:
+        """Position of the last whole step of the travel [m]."""
+        return self.position_of(self.steps)
+
+    def position_of(self, step: int) -> float:
+        """Position of a step boundary [m]."""
+        return self.mechanics.lower_end + step * self.step
+
+    def step_at(self, position: float) -> int:
+        """Step boundary nearest to a position [m]; may lie outside 0..N."""
+        return round((position - self.mechanics.lower_end) / self.step)
+
+    def step_inside(self, position: float) -> int:
+        """Step boundary of the travel nearest to a position [m]; the end of a travel that is no whole number is N."""
+        return min(max(self.step_at(position), 0), self.steps)
+
+
+class StepperEnvelopeSpec(AxisSpec, frozen=True):
+    """An axis of one or several steppers as its file describes it, in SI units."""
+
+    axis: StepperAxisTable
+    controller: ControllerTable = Field(default_factory=ControllerTable)
+    stepper: dict[str, StepperTable] = named("a motor by its name", MOTOR_NAME, min_length=1, max_length=MOST_MOTORS)
+
+    def motors(self) -> Iterator[tuple[str, StepperTable, str]]:
+        """Each motor: its name, its table, and the beginning of its keys, such as ``stepper.x``."""
+        for name, table in self.stepper.items():
+            yield name, table, f"stepper.{name}"
+
+
+def fill_derived(spec: StepperEnvelopeSpec) -> StepperEnvelopeSpec:
+    """Fill the defaults that depend on another table, as their `derived` texts say."""
+    return spec.model_copy(update={"stepper": {name: _filled(table) for name, table in spec.stepper.items()}})
+
+
+def _filled(table: StepperTable) -> StepperTable:
+    lower, upper = table.mechanics.lower_end, table.upper_end
+    mechanics = _given(table.mechanics, start_position=lower)
+    extremes = _given(table.extremes, start=lower, turn=upper, stop=lower)
+    drive = table.drive
+    if drive.current is None:
+        drive = drive.model_copy(update={"current": table.motor.rated_current})
+    return table.model_copy(update={"mechanics": mechanics, "extremes": extremes, "drive": drive})
+
+
+def _given(table: Any, **defaults: float) -> Any:
+    """Copy of a table in which open values have their defaults."""
+    return table.model_copy(update={key: value for key, value in defaults.items() if math.isnan(getattr(table, key))})

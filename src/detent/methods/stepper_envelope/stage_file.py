@@ -1,0 +1,40 @@
+"""Jobs of stepper stages, read from files: lists of places as CSV, moves and manual runs as TOML."""
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from detent.files.job_text import read_text
+from detent.methods.stepper_envelope.stage_csv import parse_stage_csv
+from detent.methods.stepper_envelope.stage_job import StageJob
+from detent.methods.stepper_envelope.stage_rows import check_motors
+from detent.methods.stepper_envelope.stage_toml import parse_stage_toml
+
+
+def load_stage_job(path: str | PathLike[str], motors: Sequence[str]) -> StageJob:
+    """Read the job of a stepper stage; the ending of the name says what it is.
+
+    Parameters
+    ----------
+    path : str or path
+        A list of places (``.csv``), see `stage_csv`, or of moves (``.toml``), see
+        `stage_toml`; UTF-8.
+    motors : sequence of str
+        Motors of the axis, at least one.
+
+    Returns
+    -------
+    StageJob
+        With at least one move. Whether the axis can do it is not checked here.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or something in it is wrong: all of it is told, with line and column.
+    """
+    file = str(Path(path))
+    text = read_text(path, (".csv", ".toml"), "a list of places (.csv) or of moves (.toml)")
+    check_motors(file, motors)
+    if Path(path).suffix.lower() == ".csv":
+        return parse_stage_csv(file, text, motors)
+    return parse_stage_toml(file, text, motors)

@@ -1,0 +1,346 @@
+"""Charts as data for the script of a page: what to draw, in the units people read.
+
+A chart is one plot area. It is described completely, so that the script knows nothing about axes and motors.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any, Literal
+
+import numpy as np
+
+from detent.page.parts import Event, Numbers
+from detent.page.thin import thin_indices
+
+Chart = dict[str, Any]
+"""One plot area, as template/report.js reads it; its "id" is that of the element it is drawn in."""
+
+POINTS = 3000
+"""Points of one curve: three per pixel of a wide screen."""
+
+SCALES: dict[str, tuple[float, int]] = {"ms": (1e3, 3), "s": (1.0, 5)}
+"""Per unit of time: factor from seconds, and digits that a chart keeps."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """One curve of a plot area.
+
+    Attributes
+    ----------
+    label : str
+        As in the legend.
+    colour : str
+        Name of a colour of template/report.css: "speed", "drive", "current", "right", "left", "ink", "muted".
+    y : ndarray
+        Values in the unit of the plot area, shape (n,); NaN is a gap.
+    digits : int
+        Digits kept after the point.
+    width : float, optional
+        Width of the line [px]; 1.5 unless given.
+    dash : (int, int), optional
+        Length of dash and gap [px]; drawn through unless given.
+    step : bool
+        Each value holds until the next one, as the outputs of a computer do.
+    rings : int, optional
+        Diameter [px] of rings drawn at the points, instead of a line.
+    thin : int
+        Rows of a long recording that are chosen for this curve's sake; 0 if it may use those of the others.
+    fill : bool
+        Tint the ground between the curve and zero.
+    """
+
+    label: str
+    colour: str
+    y: Numbers
+    digits: int = 3
+    width: float | None = None
+    dash: tuple[int, int] | None = None
+    step: bool = False
+    rings: int | None = None
+    thin: int = POINTS
+    fill: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One plot area: its curves and what stands behind them.
+
+    Attributes
+    ----------
+    name : str
+        Id of the element it is drawn in, one of its kind on the page.
+    label : str
+        Of the vertical axis, with unit: "speed [in/s]".
+    curves : sequence of Curve
+        All of one length; the first is drawn first.
+    height : int
+        Height [px].
+    zero : bool
+        Draw a line at zero where it is in sight.
+    span : (float, float), optional
+        Lower and upper end of the vertical axis; what the curves need unless given.
+    levels : sequence of (float, str)
+        Values marked by a dashed line, with their names.
+    """
+
+    name: str
+    label: str
+    curves: Sequence[Curve]
+    height: int = 220
+    zero: bool = False
+    span: tuple[float, float] | None = None
+    levels: Sequence[tuple[float, str]] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Band:
+    """Stretches of time with a ground of their own.
+
+    Attributes
+    ----------
+    label : str
+        Written at the foot of each stretch that has room for it.
+    colour : {"good", "brake"}
+        Name of the ground.
+    spans : sequence of (float, float)
+        Begin and end of each stretch [s].
+    """
+
+    label: str
+    colour: Literal["good", "brake"]
+    spans: Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeline:
+    """Time below one or more plot areas, and what happens at its moments.
+
+    Attributes
+    ----------
+    name : str
+        Plot areas with the same name share their cursor.
+    t : ndarray
+        Moments of the curves' values [s], rising, shape (n,).
+    label : str
+        What it counts from: "time since the move began".
+    unit : {"ms", "s"}
+        Unit in which the page shows it.
+    bands : sequence of Band
+        Behind every plot area.
+    events : sequence of Event
+        Drawn across every plot area, numbered in the first one as in `page.event_table`.
+    """
+
+    name: str
+    t: Numbers
+    label: str = "time"
+    unit: Literal["ms", "s"] = "ms"
+    bands: Sequence[Band] = ()
+    events: Sequence[Event] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heap:
+    """One group of a histogram.
+
+    Attributes
+    ----------
+    label, colour : str
+        As of a curve.
+    at : ndarray
+        Places on the horizontal axis, in its unit, shape (n,).
+    counts : ndarray of int
+        How often each place occurs, shape (n,).
+    """
+
+    label: str
+    colour: str
+    at: Numbers
+    counts: Numbers
+
+
+def spans_of(t: Numbers, on: Numbers) -> list[tuple[float, float]]:
+    """Find the stretches of time in which something holds.
+
+    Parameters
+    ----------
+    t : ndarray
+        Time [s], rising, shape (n,).
+    on : ndarray of bool
+        Whether it holds, shape (n,).
+
+    Returns
+    -------
+    list of (float, float)
+        From the first moment at which it holds to the first at which it does not, or to the last of all [s].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> spans_of(np.arange(6.0), np.array([0, 1, 1, 0, 0, 1]))
+    [(1.0, 3.0), (5.0, 5.0)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], np.asarray(on, dtype=np.int8), [0]))))
+    last = len(t) - 1
+    return [(float(t[a]), float(t[min(b, last)])) for a, b in edges.reshape(-1, 2).tolist()]
+
+
+def line_chart(panel: Panel, x: Numbers, label: str, *, digits: int = 4) -> Chart:
+    """Draw one plot area over any horizontal axis, every row of it.
+
+    Parameters
+    ----------
+    panel : Panel
+        What to draw.
+    x : ndarray
+        Horizontal places of the curves' values, rising, shape (n,).
+    label : str
+        Of the horizontal axis, with unit.
+    digits : int
+        Digits of `x` kept after the point.
+
+    Returns
+    -------
+    dict
+        One chart.
+    """
+    return _chart(panel, slice(None)) | {"x": rounded(x, digits), "xLabel": label}
+
+
+def time_charts(timeline: Timeline, panels: Sequence[Panel]) -> list[Chart]:
+    """Draw plot areas above one another over the same time, with as many rows as a screen can show.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        What they share; the curves have its length.
+    panels : sequence of Panel
+        From top to bottom, at least one.
+
+    Returns
+    -------
+    list of dict
+        One chart per panel; only the last names the time.
+    """
+    scale, digits = SCALES[timeline.unit]
+    chosen = [thin_indices(curve.y, curve.thin) for panel in panels for curve in panel.curves if curve.thin]
+    kept = np.unique(np.concatenate(chosen or [thin_indices(timeline.t, POINTS)]))
+    shared: Chart = {
+        "x": rounded(timeline.t[kept] * scale, digits),
+        "xLabel": f"{timeline.label} [{timeline.unit}]",
+        "sync": timeline.name,
+        "bands": [_band(band, scale, digits) for band in timeline.bands],
+        "events": [round(event.t * scale, digits + 1) for event in timeline.events],
+    }
+    charts = [_chart(panel, kept) | shared for panel in panels]
+    charts[0]["numbered"] = True
+    for chart in charts[:-1]:
+        chart["foot"] = False
+    return charts
+
+
+def histogram_chart(
+    name: str, heaps: Sequence[Heap], labels: tuple[str, str], *, finest: float, limit: float = inf
+) -> Chart:
+    """Count values per bin, centred on zero, in one or two groups side by side.
+
+    Parameters
+    ----------
+    name : str
+        Id of the element it is drawn in.
+    heaps : sequence of Heap
+        One, or two; the first stands left.
+    labels : (str, str)
+        Of the horizontal axis, with unit, and of the vertical one.
+    finest : float
+        Narrowest bar, in the unit of the horizontal axis, > 0.
+    limit : float
+        Largest good magnitude; marked on both sides where the values come near it.
+
+    Returns
+    -------
+    dict
+        One chart.
+    """
+    seen = [float(np.abs(heap.at[heap.counts > 0]).max(initial=0.0)) for heap in heaps]
+    largest = max(*seen, finest / 2)
+    step = max(_nice_step(largest / 15), finest)
+    half = int(np.ceil(largest / step + 0.5))
+    edges = (np.arange(-half, half + 2) - 0.5) * step
+    sides = (0,) if len(heaps) == 1 else (1, -1)
+    series = [
+        {"label": heap.label, "colour": heap.colour, "bars": side,
+         "y": np.histogram(heap.at, edges, weights=heap.counts)[0].astype(int).tolist()}
+        for heap, side in zip(heaps, sides, strict=True)
+    ]  # fmt: skip
+    limits = [-limit, limit] if limit <= edges[-1] else []
+    return {
+        "id": name,
+        "x": rounded((edges[:-1] + edges[1:]) / 2, 4),
+        "xLabel": labels[0],
+        "yLabel": labels[1],
+        "height": 260,
+        "zero": True,
+        "marks": [{"x": round(value, 3), "label": "limit"} for value in limits],
+        "series": series,
+    }
+
+
+def rounded(values: Numbers, digits: int) -> list[float | None]:
+    """Round numbers for a page; what is not finite becomes a gap.
+
+    Parameters
+    ----------
+    values : ndarray
+        Numbers, shape (n,).
+    digits : int
+        Digits kept after the point.
+
+    Returns
+    -------
+    list of float or None
+        As JSON can hold them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rounded(np.array([1.2345, np.nan]), 2)
+    [1.23, None]
+    """
+    places: list[float] = np.round(np.asarray(values, dtype=np.float64), digits).tolist()
+    return [value if isfinite(value) else None for value in places]
+
+
+def _chart(panel: Panel, kept: Numbers | slice) -> Chart:
+    chart: Chart = {"id": panel.name, "yLabel": panel.label, "height": panel.height}
+    if panel.zero:
+        chart["zero"] = True
+    if panel.span:
+        chart["yRange"] = list(panel.span)
+    if panel.levels:
+        chart["levels"] = [{"y": value, "label": label} for value, label in panel.levels]
+    return chart | {"series": [_series(curve, kept) for curve in panel.curves]}
+
+
+def _series(curve: Curve, kept: Numbers | slice) -> Chart:
+    look = {"width": curve.width, "dash": curve.dash and list(curve.dash), "points": curve.rings}
+    series: Chart = {"label": curve.label, "colour": curve.colour}
+    series |= {name: value for name, value in look.items() if value is not None}
+    if curve.step:
+        series["step"] = True
+    if curve.fill:
+        series["fill"] = True
+    return series | {"y": rounded(curve.y[kept], curve.digits)}
+
+
+def _band(band: Band, scale: float, digits: int) -> Chart:
+    spans = [[round(moment * scale, digits) for moment in span] for span in band.spans]
+    return {"spans": spans, "colour": band.colour, "label": band.label}
+
+
+def _nice_step(wanted: float) -> float:
+    """Round up to 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= wanted * 0.999))

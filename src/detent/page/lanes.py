@@ -1,0 +1,103 @@
+"""Lanes of bars as data for the script of a page: what goes on when, or what holds where (a Gantt chart)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from detent.page.chart import Chart, rounded
+
+LANE_HEIGHT = 26
+"""Height of a lane [px]."""
+
+FOOT_HEIGHT = 44
+"""Height of what is above and below the lanes [px]."""
+
+PLACES = 600
+"""Places at which the cursor stops besides the ends of the bars."""
+
+DIGITS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A stretch of the horizontal axis.
+
+    Attributes
+    ----------
+    begin, end : float
+        Its ends, in the unit of the axis.
+    short : str
+        Written inside where there is room.
+    text : str
+        Told below the chart while the cursor is over it.
+    """
+
+    begin: float
+    end: float
+    short: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """Bars of one kind.
+
+    Attributes
+    ----------
+    label : str
+        Name of the lane; about ten characters have room beside it.
+    colour : str
+        As of a curve.
+    bars : sequence of Bar
+        In any order.
+    """
+
+    label: str
+    colour: str
+    bars: Sequence[Bar]
+
+
+def lane_chart(name: str, lanes: Sequence[Lane], span: tuple[float, float], label: str, *, sync: str = "") -> Chart:
+    """Draw lanes above one another.
+
+    Parameters
+    ----------
+    name : str
+        Id of the element it is drawn in.
+    lanes : sequence of Lane
+        From top to bottom, at least one.
+    span : (float, float)
+        Ends of the horizontal axis; bars are cut there.
+    label : str
+        Of the horizontal axis, with unit.
+    sync : str
+        Name of a `chart.Timeline` that is drawn below and names the axis; empty for none.
+
+    Returns
+    -------
+    dict
+        One chart without curves.
+    """
+    shown = [
+        (lane, [bar for bar in lane.bars if bar.end > span[0] and bar.begin < span[1] and bar.end > bar.begin])
+        for lane in lanes
+    ]
+    ends = [place for _, bars in shown for bar in bars for place in (bar.begin, bar.end)]
+    x = np.unique(np.clip(np.concatenate((np.linspace(*span, PLACES), ends)), *span))
+    chart: Chart = {
+        "id": name,
+        "x": rounded(x, DIGITS),
+        "xLabel": label,
+        "height": LANE_HEIGHT * len(lanes) + FOOT_HEIGHT + (0 if sync else 20),
+        "yRange": [0, len(lanes)],
+        "lanes": [
+            {"label": lane.label, "colour": lane.colour, "bars": [_bar(bar) for bar in bars]} for lane, bars in shown
+        ],
+        "series": [],
+    }
+    return chart | ({"sync": sync, "foot": False} if sync else {})
+
+
+def _bar(bar: Bar) -> list[float | str]:
+    return [round(bar.begin, DIGITS), round(bar.end, DIGITS), bar.short, bar.text]

@@ -1,0 +1,298 @@
+"""Figures as files: signals of a trace, and the comparison of ways to choose the drive value.
+
+matplotlib is loaded when a figure is drawn, never when this module is imported, and draws without a display.
+"""
+
+import importlib
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from detent.errors import DetentError
+from detent.methods.print_head.comparison_data import Comparison
+from detent.page.parts import INCH, Numbers
+from detent.page.thin import thin_indices
+from detent.record.trace import Trace
+
+# matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
+Axes = Any
+Figure = Any
+
+SUFFIXES = (".png", ".svg", ".pdf")
+
+POINTS = 8000
+"""Points of one curve: more than a printed page resolves."""
+
+# Okabe and Ito's colours, told apart by colour-blind readers, with the yellow that is too light on white left out.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+
+STYLE: dict[str, Any] = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e6ea",
+    "axes.edgecolor": "#7d8996",
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "svg.fonttype": "none",  # text stays text: searchable and editable
+    "svg.hashsalt": "detent",  # the same figure gives the same file
+    "savefig.dpi": 150,
+    "text.parse_math": False,  # a dollar sign in a name or a description is one
+}
+
+
+def plot_signals(
+    trace: Trace, signals: Sequence[str], path: str | Path, t_range: tuple[float, float] | None = None
+) -> None:
+    """Draw signals over time, one plot area per unit, above one another.
+
+    Parameters
+    ----------
+    trace : Trace
+        Where the signals are.
+    signals : sequence of str
+        Names, or patterns with ``*`` such as ``motor.*``.
+    path : str or Path
+        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
+    t_range : (float, float), optional
+        First and last moment [s]; all of the trace by default.
+
+    Raises
+    ------
+    DetentError
+        A signal is not there, the stretch holds nothing, or the file cannot be written.
+    """
+    path = check_figure_path(path)
+    names = trace.match(signals)
+    if not names:
+        raise DetentError(f"{path}: no signal was asked for; name one of: {', '.join(trace.signals)}")
+    if t_range:
+        trace = trace.between(*t_range)
+    if not len(trace):
+        raise DetentError(f"{path}: the trace holds no rows, so there is nothing to draw")
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(trace.units.get(name, ""), []).append(name)
+    with new_figure(path, 9.0, 1.0 + 2.1 * len(groups)) as figure:
+        axes: list[Axes] = list(figure.subplots(len(groups), sharex=True, squeeze=False)[:, 0])
+        scale, unit = _time_unit(trace)
+        for area, (group_unit, members) in zip(axes, groups.items(), strict=True):
+            _draw_group(area, trace, members, group_unit, scale)
+            area.margins(x=0)
+        axes[-1].set_xlabel(f"time [{unit}]")
+        title = " · ".join(str(trace.attributes[key]) for key in ("axis", "job") if key in trace.attributes)
+        if title:
+            figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        figure.align_ylabels(axes)
+
+
+def _time_unit(trace: Trace) -> tuple[float, str]:
+    """Choose ms for stretches under a second."""
+    return (1e3, "ms") if trace.time[-1] - trace.time[0] < 1.0 else (1.0, "s")
+
+
+def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale: float) -> None:
+    for index, name in enumerate(names):
+        values = trace[name]
+        kept = thin_indices(values, POINTS)
+        # Whole numbers and flags hold until they change: a slope between them would be an invention.
+        style = "steps-post" if values.dtype.kind in "biu" else "default"
+        colour = COLOURS[index % len(COLOURS)]
+        dash = ("-", "--", ":")[index // len(COLOURS) % 3]
+        drawn = np.asarray(values[kept], dtype=np.float64)
+        area.plot(
+            trace.time[kept] * scale, drawn, dash, color=colour, linewidth=1.2, label=name, drawstyle=style
+        )  # fmt: skip
+    if len(names) == 1:
+        area.set_ylabel(_broken(names[0], unit))
+    else:
+        area.set_ylabel(f"[{unit}]" if unit else "")
+        # Above the curves, never over them.
+        area.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=9, borderaxespad=0.2)
+    if all(trace[name].dtype.kind == "b" for name in names):
+        area.set_yticks([0, 1], ["off", "on"])
+
+
+def _broken(name: str, unit: str) -> str:
+    """Write a name and its unit on two lines, for the side of a low plot area."""
+    return f"{name}\n[{unit}]" if unit else name
+
+
+def plot_comparison(comparison: Comparison, path: str | Path) -> None:
+    """Draw how far off speed each way of choosing the drive value is, and how it starts.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Steady speed errors and, optionally, speed against time.
+    path : str or Path
+        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
+
+    Raises
+    ------
+    DetentError
+        The figures do not fit together, or the file cannot be written.
+    """
+    path = check_figure_path(path)
+    shape = (len(comparison.methods), len(comparison.speeds), 2)
+    if comparison.errors.shape != shape:
+        raise DetentError(
+            f"{path}: errors have shape {comparison.errors.shape}, allowed: {shape} (methods, speeds, right and left)"
+        )
+    with new_figure(path, 9.0, 8.0 if comparison.starts else 4.2) as figure:
+        areas = figure.subplots(2 if comparison.starts else 1, 1, squeeze=False)[:, 0]
+        _draw_errors(areas[0], comparison)
+        if comparison.starts:
+            _draw_starts(areas[1], comparison)
+
+
+def _draw_errors(area: Axes, comparison: Comparison) -> None:
+    """Draw bars: one group per speed and direction, one bar per method."""
+    methods, speeds, _ = comparison.errors.shape
+    width = 0.8 / methods
+    percent: Numbers = 100 * comparison.errors
+    # Right and left of one speed stand close together, the speeds further apart.
+    centres = np.array([[2.3 * row, 2.3 * row + 1.0] for row in range(speeds)])
+    for index, method in enumerate(comparison.methods):
+        at = centres + (index - (methods - 1) / 2) * width
+        bars = area.bar(
+            at.ravel(), percent[index].ravel(), width * 0.92, color=_method_colour(index, methods), label=method
+        )
+        area.bar_label(bars, fmt="%+.1f", fontsize=8, padding=2)
+    area.axhline(0, color="#17202a", linewidth=0.8)
+    names = [f"{speed / INCH:g} in/s\n{side}" for speed in comparison.speeds for side in ("right", "left")]
+    area.set_xticks(centres.ravel(), names)
+    area.grid(visible=False, axis="x")
+    area.tick_params(axis="x", length=0)
+    area.margins(y=0.12)
+    area.set_ylabel("steady speed error [%]")
+    machine = f"\nmachine: {comparison.machine}" if comparison.machine else ""
+    area.set_title(f"How far off speed is the head with each way of choosing the drive (no trim)?{machine}", pad=24)
+    area.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=methods, fontsize=9, borderaxespad=0.2)
+
+
+def _draw_starts(area: Axes, comparison: Comparison) -> None:
+    target = comparison.target / INCH
+    area.axhspan(
+        target * (1 - comparison.band), target * (1 + comparison.band), color="#009E73", alpha=0.18, linewidth=0
+    )
+    for index, start in enumerate(comparison.starts):
+        kept = thin_indices(start.velocity, POINTS)
+        colour = _method_colour(index, len(comparison.starts))
+        entry = settling_time(start.t, np.abs(start.velocity), comparison.target, comparison.band)
+        name = f"{start.name}: " + ("not reached" if entry is None else f"after {entry:.2f} s")
+        area.plot(start.t[kept], np.abs(start.velocity[kept]) / INCH, color=colour, linewidth=1.8, label=name)
+    area.set_ylim(bottom=0)
+    area.margins(x=0)
+    area.set_xlabel("time since the move began [s]")
+    area.set_ylabel("speed [in/s]")
+    band = f"±{100 * comparison.band:g} %"
+    area.set_title(f"How soon is it within {band} of {target:g} in/s for good (green band, trim on)?")
+    area.legend(loc="lower right", fontsize=9)
+
+
+def settling_time(t: Numbers, speed: Numbers, target: float, band: float) -> float | None:
+    """Find the moment from which the speed stays within a band.
+
+    Parameters
+    ----------
+    t : ndarray
+        Time [s], shape (n,).
+    speed : ndarray
+        Speed [m/s], shape (n,).
+    target : float
+        Middle of the band [m/s].
+    band : float
+        Half-width as a fraction of `target`.
+
+    Returns
+    -------
+    float or None
+        Time [s] of the first row of the last stretch inside; None if it ends outside.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> settling_time(np.arange(5.0), np.array([0.0, 1.0, 0.9, 1.0, 1.0]), 1.0, 0.01)
+    3.0
+    """
+    outside = np.flatnonzero(~(np.abs(speed - target) <= band * target))
+    if not outside.size:
+        return float(t[0])
+    last = int(outside[-1])
+    return None if last == len(t) - 1 else float(t[last + 1])
+
+
+def _method_colour(index: int, methods: int) -> str:
+    """Give the last method, the one to look at, the strong colour; the others greys and orange."""
+    others = ("#9aa6b2", "#E69F00", "#CC79A7", "#56B4E9")
+    return COLOURS[0] if index == methods - 1 else others[index % len(others)]
+
+
+def check_figure_path(path: str | Path) -> Path:
+    """Refuse a target that cannot take a figure, before any work is done.
+
+    Parameters
+    ----------
+    path : str or Path
+        Target.
+
+    Returns
+    -------
+    Path
+        The same.
+
+    Raises
+    ------
+    DetentError
+        The suffix names no kind of figure, or the folder is not there.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
+    if not path.parent.is_dir():
+        raise DetentError(f"{path}: cannot be written (no folder {path.parent}); make it, or choose another place")
+    return path
+
+
+@contextmanager
+def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
+    """Give an empty figure and write it at the end, without pyplot: no window, no global state.
+
+    Parameters
+    ----------
+    path : Path
+        Target, as `check_figure_path` has found it good; replaced if it exists.
+    width, height : float
+        Size [in].
+
+    Yields
+    ------
+    Figure
+        A matplotlib figure in the style of all figures.
+
+    Raises
+    ------
+    DetentError
+        The file cannot be written.
+    """
+    mpl: Any = importlib.import_module("matplotlib")
+    figures: Any = importlib.import_module("matplotlib.figure")
+    # Around drawing and saving: matplotlib looks some settings up only when it writes.
+    with mpl.rc_context(STYLE):
+        figure = figures.Figure(figsize=(width, height), layout="constrained")
+        yield figure
+        try:
+            # No date inside: the same figure gives the same file.
+            metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
+            figure.savefig(path, metadata=metadata)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error

@@ -1,0 +1,366 @@
+"""Timing diagrams: the signals of clocked logic above one another over one axis of time, as data sheets draw them.
+
+Flags are square waves, words are lozenges with their value inside, floats are small curves with their extremes beside
+them. matplotlib is loaded when a diagram is drawn, never when this module is imported.
+"""
+
+import importlib
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from detent.errors import DetentError
+from detent.page.plots import COLOURS, check_figure_path, new_figure
+from detent.page.thin import thin_indices
+from detent.record.waveforms import Waveform, Waveforms
+
+# matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
+Axes = Any
+
+MAX_SIGNALS = 40
+"""More rows than these do not fit a page that can be read."""
+
+WIDTH = 11.0
+"""Width of the figure [in]."""
+
+ROW = 0.30
+"""Height of one row of a flag or a word [in]."""
+
+SLOT_FLOAT = 2.0
+SLOT_HEADING = 1.0
+"""Heights of the other rows, in rows."""
+
+MARK_LINE = 0.8
+"""Height of one line of marks, in rows."""
+
+LEVEL = 0.62
+"""Height of a square wave, in rows."""
+
+SLANT = 0.003
+"""Half of a lozenge's slanted end, as a part of the window."""
+
+FINEST = 1 / 900
+"""Part of the window below which two changes cannot be told apart."""
+
+POINTS = 4000
+"""Points of one curve: more than a printed page resolves."""
+
+DOC_WIDTH = 36
+"""Characters in one of the two lines of a description."""
+
+VALUE_SIZE = 7.5
+"""Size of the values inside lozenges [pt]."""
+
+INK = "#17202a"
+GREY = "#6b7785"
+BLOCK_COLOURS = (COLOURS[0], COLOURS[2], COLOURS[1], COLOURS[3])
+
+Segment = tuple[float, float, int | None]
+"""From, to, and the value between; None where changes follow too closely to be drawn."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A signal's place: the middle of its row and half the height it may use, in rows from the top, downwards < 0."""
+
+    signal: Waveform
+    middle: float
+    half: float
+    colour: str
+
+    @property
+    def low(self) -> float:
+        return self.middle - self.half
+
+    @property
+    def high(self) -> float:
+        return self.middle + self.half
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """From picoseconds since power-on to what the axis of time shows."""
+
+    begin: int
+    end: int
+    unit_ps: int
+    unit: str
+
+    @property
+    def span(self) -> float:
+        return self.of(self.end)
+
+    def of(self, time: Any) -> Any:
+        return (time - self.begin) / self.unit_ps
+
+
+_UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
+
+
+def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
+    """Draw a timing diagram; its height grows with the signals.
+
+    Parameters
+    ----------
+    waveforms : Waveforms
+        What to show, 1 to 40 signals. Those of one block stand together, in the order in which the blocks first appear.
+    path : str or Path
+        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
+    marks : sequence of (int, str), optional
+        Moments since power-on [ps], inside the window, each marked by a line with a text above it.
+
+    Raises
+    ------
+    DetentError
+        There is no signal or there are too many, a mark lies outside the window, or the file cannot be written.
+    """
+    path = check_figure_path(path)
+    _check(waveforms, marks, path)
+    scale = _scale(waveforms)
+    rows, headings, depth = _arrange(waveforms.signals)
+    ranks = _ranks([scale.of(time) / scale.span for time, _ in marks], [text for _, text in marks])
+    above = MARK_LINE * (max(ranks, default=-1) + 1)
+    with new_figure(path, WIDTH, (depth + above) * ROW + (1.1 if waveforms.title else 0.75)) as figure:
+        area: Axes = figure.subplots()
+        if waveforms.title:
+            figure.suptitle(waveforms.title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        area.set_xlim(0, scale.span)
+        area.set_ylim(-depth, above + 0.1)
+        _label_rows(area, rows, headings)
+        _label_time(area, scale)
+        for (time, text), rank in zip(marks, ranks, strict=True):
+            _draw_mark(area, scale.of(time), text, rank, depth)
+        words = _draw_rows(area, rows, scale)
+        # Only once everything has its place is it known how much room a value has.
+        figure.draw_without_rendering()
+        inches = area.get_position().width * WIDTH
+        for row, segments in words:
+            _write_values(area, row, segments, scale.span / inches)
+
+
+def _draw_rows(area: Axes, rows: list[_Row], scale: _Scale) -> list[tuple[_Row, list[Segment]]]:
+    """Draw every signal; returns the words, whose values are still to be written."""
+    words: list[tuple[_Row, list[Segment]]] = []
+    for row in rows:
+        if row.signal.is_float:
+            _draw_curve(area, row, scale)
+        elif row.signal.bits == 1:
+            _draw_levels(area, row, _segments(row.signal, scale))
+        else:
+            segments = _segments(row.signal, scale)
+            _draw_lozenges(area, row, segments, scale)
+            words.append((row, segments))
+    return words
+
+
+def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -> None:
+    count = len(waveforms.signals)
+    if not count:
+        raise DetentError(f"{path}: there are no signals to draw; allowed: 1 to {MAX_SIGNALS}; name some to record")
+    if count > MAX_SIGNALS:
+        raise DetentError(
+            f"{path}: came {count} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be read; name those "
+            "that matter, or look at all of them in a VCD file"
+        )
+    for time, text in marks:
+        if not waveforms.begin <= time <= waveforms.end:
+            raise DetentError(
+                f"{path}: the mark {text!r} is at {time} ps; allowed: {waveforms.begin} ps to {waveforms.end} ps, the "
+                "window; move the mark or widen the window"
+            )
+
+
+def _scale(waveforms: Waveforms) -> _Scale:
+    """Choose the unit that gives the axis of time numbers from 2 to 2000."""
+    span = waveforms.end - waveforms.begin
+    unit_ps, unit = next(((size, name) for size, name in _UNITS if span >= 2 * size), (1, "ps"))
+    return _Scale(waveforms.begin, waveforms.end, unit_ps, unit)
+
+
+def _arrange(signals: Sequence[Waveform]) -> tuple[list[_Row], list[tuple[str, float, str]], float]:
+    """Stack signals by block; returns rows, headings (text, middle, colour) and the depth of all, in rows."""
+    blocks: dict[str, list[Waveform]] = {}
+    for signal in signals:
+        blocks.setdefault(signal.block, []).append(signal)
+    rows: list[_Row] = []
+    headings: list[tuple[str, float, str]] = []
+    depth = 0.0
+    for index, (block, members) in enumerate(blocks.items()):
+        colour = BLOCK_COLOURS[index % len(BLOCK_COLOURS)]
+        if block:
+            headings.append((block, -depth - SLOT_HEADING / 2, colour))
+            depth += SLOT_HEADING
+        elif index:
+            depth += SLOT_HEADING / 2
+        for signal in members:
+            slot = SLOT_FLOAT if signal.is_float else 1.0
+            rows.append(_Row(signal, -depth - slot / 2, (slot - 1 + LEVEL) / 2, colour))
+            depth += slot
+    return rows, headings, depth + 0.3
+
+
+def _segments(signal: Waveform, scale: _Scale) -> list[Segment]:
+    """Stretches of equal value; three or more in a row too short to be seen become one without value."""
+    edges = np.append(scale.of(signal.times), scale.span)
+    short = np.diff(edges) < FINEST * scale.span
+    bounds = np.flatnonzero(np.diff(short, prepend=not short[0], append=not short[-1]))
+    values: list[int] = signal.values.tolist()
+    segments: list[Segment] = []
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        if short[first] and last - first > 2:
+            segments.append((float(edges[first]), float(edges[last]), None))
+        else:
+            segments += [(float(edges[k]), float(edges[k + 1]), values[k]) for k in range(first, last)]
+    return segments
+
+
+def _draw_levels(area: Axes, row: _Row, segments: list[Segment]) -> None:
+    times: list[float] = []
+    levels: list[float] = []
+    for start, stop, value in segments:
+        level = np.nan if value is None else row.high if value else row.low
+        times += [start, stop]
+        levels += [level, level]
+    area.plot(times, levels, color=row.colour, linewidth=1.2, solid_joinstyle="miter")
+    for wanted, alpha in ((1, 0.13), (None, 0.6)):
+        bars = [(start, stop - start) for start, stop, value in segments if value == wanted]
+        area.broken_barh(bars, (row.low, 2 * row.half), facecolor=row.colour, alpha=alpha, linewidth=0)
+
+
+def _draw_lozenges(area: Axes, row: _Row, segments: list[Segment], scale: _Scale) -> None:
+    collections: Any = importlib.import_module("matplotlib.collections")
+    shapes: list[list[tuple[float, float]]] = []
+    for start, stop, _ in segments:
+        # A value that holds beyond the window is drawn as going on.
+        left = start - 0.05 * scale.span if start <= 0 else start
+        right = stop + 0.05 * scale.span if stop >= scale.span else stop
+        slant = min(SLANT * scale.span, (right - left) / 2)
+        shapes.append(
+            [
+                (left, row.middle), (left + slant, row.high), (right - slant, row.high),
+                (right, row.middle), (right - slant, row.low), (left + slant, row.low),
+            ]
+        )  # fmt: skip
+    for busy, fill in ((False, _pale(row.colour)), (True, row.colour)):
+        chosen = [shape for shape, (_, _, value) in zip(shapes, segments, strict=True) if (value is None) == busy]
+        area.add_collection(
+            collections.PolyCollection(chosen, facecolors=fill, edgecolors=row.colour, linewidths=0.9), autolim=False
+        )
+
+
+def _pale(colour: str) -> str:
+    """Mix a colour with nine parts of white."""
+    parts = [int(colour[index : index + 2], 16) for index in (1, 3, 5)]
+    return "#" + "".join(f"{round(255 - 0.1 * (255 - part)):02x}" for part in parts)
+
+
+def _write_values(area: Axes, row: _Row, segments: list[Segment], per_inch: float) -> None:
+    """Write each value that fits inside its lozenge; `per_inch` is the time that one inch shows."""
+    for start, stop, value in segments:
+        if value is None:
+            continue
+        text = _minus(str(value))
+        if _text_width(text, VALUE_SIZE) * per_inch <= 0.92 * (stop - start):
+            area.text(
+                (start + stop) / 2, row.middle, text, ha="center", va="center_baseline", fontsize=VALUE_SIZE, color=INK
+            )  # fmt: skip
+
+
+def _text_width(text: str, size: float) -> float:
+    """Width of a text [in]: a figure of matplotlib's font is 0.64 of its size wide."""
+    return 0.64 * len(text) * size / 72
+
+
+def _draw_curve(area: Axes, row: _Row, scale: _Scale) -> None:
+    """Draw a float, which holds its value as any register does, between its extremes."""
+    kept = thin_indices(row.signal.values, POINTS)
+    times = np.append(scale.of(row.signal.times[kept]), scale.span)
+    values = np.append(row.signal.values[kept], row.signal.values[-1])
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+    for level in (row.low, row.high):
+        area.axhline(level, color=GREY, linewidth=0.5, linestyle=(0, (1, 3)))
+    if low < high:
+        drawn = row.low + (values - low) / (high - low) * 2 * row.half
+        _beside(area, row.high, high)
+        _beside(area, row.low, low)
+    else:
+        drawn = np.where(np.isfinite(values), row.middle, np.nan)
+        _beside(area, row.middle, low)
+    drawn[~np.isfinite(values)] = np.nan
+    area.plot(times, drawn, color=row.colour, linewidth=1.2, drawstyle="steps-post")
+
+
+def _beside(area: Axes, y: float, value: float) -> None:
+    """Write a value to the right of the diagram."""
+    text = _minus(f"{value:.4g}") if np.isfinite(value) else "\u2013"
+    area.text(1.008, y, text, transform=area.get_yaxis_transform(), ha="left", va="center", fontsize=7.5, color=INK)
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "\u2212")
+
+
+def _label_rows(area: Axes, rows: list[_Row], headings: list[tuple[str, float, str]]) -> None:
+    """Write names to the left, descriptions to the right."""
+    places = [row.middle for row in rows] + [middle for _, middle, _ in headings]
+    area.set_yticks(places, [_shown_name(row.signal) for row in rows] + [text for text, _, _ in headings])
+    for label, (_, _, colour) in zip(area.get_yticklabels()[len(rows) :], headings, strict=True):
+        label.set(fontweight="bold", color=colour)
+    for _, middle, _ in headings:
+        area.axhline(middle + SLOT_HEADING / 2 - 0.1, color="#d5dae0", linewidth=0.8)
+    area.tick_params(axis="y", length=0, pad=4, labelsize=9)
+    side = 1.055 if any(row.signal.is_float for row in rows) else 1.008
+    for row in rows:
+        shown = textwrap.shorten(row.signal.doc, 2 * DOC_WIDTH, placeholder=" …")
+        area.text(
+            side, row.middle, textwrap.fill(shown, DOC_WIDTH), transform=area.get_yaxis_transform(), ha="left",
+            va="center", fontsize=7, color=GREY, linespacing=1.0,
+        )  # fmt: skip
+
+
+def _shown_name(signal: Waveform) -> str:
+    """Name inside the block, and the unit; that a word counts something its description says."""
+    name = signal.name.rpartition(".")[2]
+    return f"{name} [{signal.unit}]" if signal.unit not in {"", "count", "code"} else name
+
+
+def _label_time(area: Axes, scale: _Scale) -> None:
+    area.grid(visible=False, axis="y")
+    area.spines["left"].set_visible(False)
+    if scale.begin:
+        unit_ps, unit = next(((size, name) for size, name in _UNITS if scale.begin >= size), (1, "ps"))
+        begin = f"{(Decimal(scale.begin) / unit_ps).normalize():f}"
+        area.set_xlabel(f"t = {begin} {unit} + … [{scale.unit}]")
+    else:
+        area.set_xlabel(f"t, time since power-on [{scale.unit}]")
+
+
+def _ranks(places: list[float], texts: list[str]) -> list[int]:
+    """Line above the diagram in which each mark's text stands, so that no text covers another.
+
+    Places are parts of the window, and its width is not known before the layout: two thirds of the page are assumed.
+    """
+    free: list[float] = []
+    ranks = [0] * len(places)
+    for index in sorted(range(len(places)), key=places.__getitem__):
+        half = _text_width(texts[index], 8) / (0.6 * WIDTH) / 2
+        rank = next((k for k, end in enumerate(free) if end <= places[index] - half), len(free))
+        free[rank : rank + 1] = [places[index] + half]
+        ranks[index] = rank
+    return ranks
+
+
+def _draw_mark(area: Axes, at: float, text: str, rank: int, depth: float) -> None:
+    top = 0.1 + MARK_LINE * rank
+    area.plot(
+        [at, at], [-depth, top], color=COLOURS[1], linewidth=1.0, linestyle=(0, (4, 2)), zorder=0.9, clip_on=False
+    )
+    # The white ground keeps the lines of other marks out of the text.
+    ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+    area.text(at, top + 0.1, text, ha="center", va="bottom", fontsize=8, color=COLOURS[1], bbox=ground)

@@ -1,0 +1,250 @@
+"""How the page writes numbers, directions and tables."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from math import isnan
+
+from detent.page.parts import INCH
+
+GAP = "\u202f"
+"""Narrow space that does not break: between a number and its unit, and between thousands."""
+
+
+def count(value: int, word: str = "", plural: str = "") -> str:
+    """Write a whole number with groups of three digits, and the word it counts.
+
+    Parameters
+    ----------
+    value : int
+        The number.
+    word, plural : str
+        What is counted; the plural is `word` + "s" unless given.
+
+    Returns
+    -------
+    str
+        Such as "2 912 characters" or "1 page".
+
+    Examples
+    --------
+    >>> count(2912, "line").replace(GAP, " ")
+    '2 912 lines'
+    """
+    digits = f"{value:,}".replace(",", GAP)
+    if not word:
+        return digits
+    return f"{digits} {word if value == 1 else plural or word + 's'}"
+
+
+def further(value: int, word: str) -> str:
+    """Begin a sentence about what is left out.
+
+    Parameters
+    ----------
+    value : int
+        How many, at least 1.
+    word : str
+        What is counted.
+
+    Returns
+    -------
+    str
+        Such as "1 further line is" or "12 further lines are".
+
+    Examples
+    --------
+    >>> further(1, "line"), further(12, "line")
+    ('1 further line is', '12 further lines are')
+    """
+    return f"{count(value, 'further ' + word)} {'is' if value == 1 else 'are'}"
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Write a number with so many significant digits and no exponent; "-" for None and NaN.
+
+    Parameters
+    ----------
+    value : float, optional
+        The number.
+    digits : int
+        Significant digits, >= 1; digits before the point are never dropped.
+
+    Returns
+    -------
+    str
+        Such as "0.382", "170", "-60".
+
+    Examples
+    --------
+    >>> number(0.38249), number(1234.6), number(170.0), number(None)
+    ('0.382', '1235', '170', '\u2013')
+    """
+    if value is None or isnan(value):
+        return "\u2013"
+    if value == 0:
+        return "0"
+    if value == round(value) and abs(value) < 1e15:
+        return str(round(value)).replace("-", "\u2212")
+    # The power of ten after rounding: 9.996 is 10.0, not 10.00.
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    places = max(0, digits - 1 - exponent)
+    return f"{value:.{places}f}".replace("-", "\u2212")
+
+
+def duration(seconds: float) -> str:
+    """Write a time as a person says it.
+
+    Parameters
+    ----------
+    seconds : float
+        Time [s], >= 0.
+
+    Returns
+    -------
+    str
+        Such as "31.4 s", "2 min 05 s", "1 h 03 min".
+
+    Examples
+    --------
+    >>> [duration(value).replace(GAP, " ") for value in (0.1334, 31.42, 125.0, 3780.0)]
+    ['0.133 s', '31.4 s', '2 min 05 s', '1 h 03 min']
+    """
+    if seconds < 99.95:
+        return f"{number(seconds)}{GAP}s"
+    if seconds < 3599.5:
+        minutes, rest = divmod(round(seconds), 60)
+        return f"{minutes}{GAP}min {rest:02d}{GAP}s"
+    hours, rest = divmod(round(seconds / 60), 60)
+    return f"{hours}{GAP}h {rest:02d}{GAP}min"
+
+
+def micrometres(length: float) -> str:
+    """Write a small length [m] in micrometres, with its unit.
+
+    Parameters
+    ----------
+    length : float
+        Length [m].
+
+    Returns
+    -------
+    str
+        Such as "1.9 µm".
+    """
+    return f"{number(length * 1e6, 2)}{GAP}µm"
+
+
+def inches_per_second(speed: float) -> str:
+    """Write a speed [m/s] in in/s, without its unit.
+
+    Parameters
+    ----------
+    speed : float
+        Speed [m/s].
+
+    Returns
+    -------
+    str
+        Such as "40" or "13.3".
+    """
+    return number(round(abs(speed) / INCH, 2))
+
+
+def arrow(direction: int) -> str:
+    """Mark a direction with its colour and an arrow.
+
+    Parameters
+    ----------
+    direction : int
+        +1 or -1.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
+    return f'<span class="arrow {name}">{sign} {name}</span>'
+
+
+def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
+    """Make a cell of a table with a bar before its number, so that rows can be compared at a glance.
+
+    Parameters
+    ----------
+    value : float
+        What it shows, >= 0; NaN for nothing.
+    longest : float
+        Value of the longest bar in the column, > 0.
+    over : bool
+        The value is beyond its limit.
+
+    Returns
+    -------
+    str
+        HTML, with its own attributes.
+    """
+    if isnan(value):
+        return '<td class="n">\u2013</td>'
+    bar = f'<span class="bar" style="width:{48 * value / longest:.0f}px"></span>'
+    return f'<td class="{"n over" if over else "n"}">{bar}{number(value, 2)}</td>'
+
+
+def offset_cell(offset: float, longest: float, *, over: bool = False) -> str:
+    """Make a cell of a table with a bar for a magnitude before the figure with its sign.
+
+    Parameters
+    ----------
+    offset : float
+        What it shows; NaN for nothing.
+    longest : float
+        Magnitude of the longest bar in the column, > 0.
+    over : bool
+        The value is beyond its limit.
+
+    Returns
+    -------
+    str
+        HTML, with its own attributes.
+    """
+    cell = bar_cell(abs(offset), longest, over=over)
+    return cell.replace("</span>", f"</span>{'+' if offset > 0 else '−' if offset < 0 else ''}")
+
+
+def table(heads: Sequence[tuple[str, bool]], rows: Iterable[Sequence[str]], *, tall: bool = False) -> str:
+    """Make a table that scrolls within itself on a narrow screen.
+
+    Parameters
+    ----------
+    heads : sequence of (str, bool)
+        Title of each column as text, and whether it holds numbers (aligned to the right).
+    rows : iterable of sequence of str
+        Cells as HTML; a cell that starts with "<td" brings its own attributes.
+    tall : bool
+        Limit the height and scroll inside.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    head = "".join(f'<th scope="col"{_aligned(numeric)}>{escape(title)}</th>' for title, numeric in heads)
+    numerics = [numeric for _, numeric in heads]
+    body = "\n".join(
+        "<tr>"
+        + "".join(
+            cell if cell.startswith("<td") else f"<td{_aligned(numeric)}>{cell}</td>"
+            for cell, numeric in zip(row, numerics, strict=True)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    # The tab stop lets a keyboard scroll it.
+    return (
+        f'<div class="scroll{" tall" if tall else ""}" tabindex="0">'
+        f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def _aligned(numeric: bool) -> str:  # noqa: FBT001 - one flag, one meaning
+    return ' class="n"' if numeric else ""

@@ -1,0 +1,137 @@
+"""Records registers while an axis advances, into memory or into a file of any length."""
+
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.kernel.registers import Leaf, Registers
+from detent.record.trace import Attribute, Trace
+
+ROWS = 16384
+"""Rows between two flushes."""
+
+Sink = Callable[[NDArray[np.void]], None]
+
+
+def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf]:
+    """Leaves of the named registers, each once, in the order asked.
+
+    Parameters
+    ----------
+    registers : type of Registers
+        Class of the recorded state.
+    names : iterable of str
+        Dotted paths, or patterns with ``*`` such as ``head.*``; ``all`` is every register but arrays.
+
+    Raises
+    ------
+    DetentError
+        A name is no register, or an array; the message names the nearest.
+    """
+    leaves = {leaf.path: leaf for leaf in registers.leaves()}
+    single = [leaf for leaf in leaves.values() if not leaf.length]
+    chosen: dict[str, Leaf] = {}
+    for name in names:
+        pattern = "*" if name == "all" else name
+        found = [leaf for leaf in single if fnmatchcase(leaf.path, pattern)]
+        if not found:
+            raise _no_signal(name, registers, leaves)
+        chosen.update((leaf.path, leaf) for leaf in found)
+    return list(chosen.values())
+
+
+def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -> DetentError:
+    if name in leaves:
+        return DetentError(
+            f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
+            "leave it out"
+        )
+    near = get_close_matches(name, [path for path, leaf in leaves.items() if not leaf.length], 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return DetentError(
+        f"signal {name!r}: no such register of {registers.__name__}; {hint}`detent registers` lists them all, "
+        "'all' records every one"
+    )
+
+
+class Recorder:
+    """Rows of chosen registers at every n-th tick.
+
+    Parameters
+    ----------
+    registers : type of Registers
+        Class of the recorded state; its leaf ``tick`` gives the time.
+    names : sequence of str
+        Registers to record, see `choose_leaves`.
+    every : int
+        Ticks between two rows.
+    period : float
+        Time of one tick [s].
+    sink : callable, optional
+        Takes each block of rows (structured array with ``t`` [s] first); without it blocks stay in memory for `trace`.
+    """
+
+    def __init__(
+        self, registers: type[Registers], names: Sequence[str], *, every: int, period: float, sink: Sink | None = None
+    ) -> None:
+        if every < 1:
+            raise DetentError(f"recording: came every {every} ticks; allowed: 1 or more; choose how often to record")
+        self.leaves = [leaf for leaf in choose_leaves(registers, names) if leaf.path != "tick"]
+        tick = next(leaf for leaf in registers.leaves() if leaf.path == "tick")
+        picked = [tick, *self.leaves]
+        self.every, self.period = every, period
+        self.picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
+        self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
+        self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
+        self._blocks: list[NDArray[np.void]] = []
+        self._sink = sink or self._blocks.append
+        self._next_row = 1
+
+    @property
+    def dtype(self) -> Any:
+        """Structured type of the rows handed to the sink."""
+        return np.dtype([("t", "<f8"), *((leaf.path, "<" + leaf.width.code) for leaf in self.leaves)])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit per column."""
+        return {"t": "s"} | {leaf.path: leaf.unit for leaf in self.leaves}
+
+    @property
+    def docs(self) -> dict[str, str]:
+        """Meaning per column."""
+        return {"t": "simulated time since power-on"} | {leaf.path: leaf.doc for leaf in self.leaves}
+
+    def room(self, tick: int) -> int:
+        """Ticks that may still pass from `tick` before `flush` must be called."""
+        return (self._next_row + ROWS - 1) * self.every - tick
+
+    def flush(self, tick: int) -> None:
+        """Hand the rows complete by `tick` to the sink."""
+        last = tick // self.every
+        if last < self._next_row:
+            return
+        index = np.arange(self._next_row, last + 1) % ROWS
+        raw: Any = self.rows[index].view(self._raw)[:, 0]
+        block: Any = np.empty(len(raw), self.dtype)
+        block["t"] = raw["tick"] * self.period
+        for leaf in self.leaves:
+            block[leaf.path] = raw[leaf.path]
+        self._sink(block)
+        self._next_row = last + 1
+
+    def trace(self, **attributes: str | float) -> Trace:
+        """What is in memory, as a trace."""
+        return make_trace(self, self._blocks, dict(attributes))
+
+
+def make_trace(recorder: Recorder, blocks: Sequence[NDArray[np.void]], attributes: dict[str, Attribute]) -> Trace:
+    """Blocks that a recorder handed to its sink, as one trace."""
+    whole: Any = np.concatenate(blocks) if blocks else np.empty(0, recorder.dtype)
+    columns = {str(name): np.ascontiguousarray(whole[name]) for name in recorder.dtype.names}
+    return Trace(columns=columns, units=recorder.units, docs=recorder.docs, attributes=attributes)

@@ -1,1 +1,0 @@
-"""One module per method: the whole axis wired as its block diagram."""

@@ -1,0 +1,104 @@
+"""The models are those of the equations of motion, and of their sampled solution."""
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from detent.identify.analyse.two_mass_response import (
+    LoadModel,
+    RigidModel,
+    TwoMassModel,
+    constants_of,
+    laplace,
+    modes_of,
+    respond_sampled,
+)
+
+M1, M2, K, D, B1, B2 = 0.4, 0.6, 5e4, 8.0, 1.5, 2.5  # per total mass
+OWN = np.array([np.log(M2 / M1), 0.5 * np.log(K / M2), D, B1, B2])
+GAIN, DELAY, HOLD = 0.7, 1.3e-3, 1e-3
+ALL = np.r_[OWN, np.log(GAIN), DELAY]
+FREQUENCY = np.array([1.0, 20.0, 45.0, 60.0, 80.0, 120.0, 300.0])
+
+# x1, v1, x2, v2
+A = np.array(
+    [
+        [0, 1, 0, 0],
+        [-K / M1, -(D + B1) / M1, K / M1, D / M1],
+        [0, 0, 0, 1],
+        [K / M2, D / M2, -K / M2, -(D + B2) / M2],
+    ]
+)
+B = np.array([0, GAIN / M1, 0, 0])
+
+
+def test_the_constants_come_back():
+    assert constants_of(OWN) == pytest.approx((M1, M2, K, D, B1, B2))
+
+
+def test_two_masses_answer_as_their_equations_of_motion():
+    found = respond_sampled(TwoMassModel(2), np.r_[OWN, np.log(GAIN), 0.0], FREQUENCY, 0.0)
+    for index, s in enumerate(laplace(FREQUENCY)):
+        x = np.linalg.solve(s * np.eye(4) - A, B)
+        assert found[:, index] == pytest.approx(x[[0, 2]], rel=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0, 1.3])
+def test_a_held_effort_answers_as_the_sampled_solution(delay):
+    """Exact discretisation, the effort changing part of the way through a sample."""
+    found = respond_sampled(TwoMassModel(2), np.r_[OWN, np.log(GAIN), delay * HOLD], FREQUENCY, HOLD)
+    big = np.zeros((5, 5))
+    big[:4, :4], big[:4, 4] = A, B
+    whole, part = int(delay), delay % 1.0
+    phi = linalg.expm(big * HOLD)[:4, :4]
+    late, early = (linalg.expm(big * HOLD * share) for share in (1 - part, part))
+    new, old = late[:4, 4], late[:4, :4] @ early[:4, 4]
+    for index, f in enumerate(FREQUENCY):
+        z = np.exp(2j * np.pi * f * HOLD)
+        x = np.linalg.solve(z * np.eye(4) - phi, new + old / z) * z**-whole
+        # Aliases beyond the third are left out.
+        assert found[:, index] == pytest.approx(x[[0, 2]], rel=1e-3)
+
+
+def test_the_modes_are_the_zeros_and_poles():
+    modes = modes_of(OWN)
+    zeros = np.roots([M2, D + B2, K])
+    poles = np.linalg.eigvals(A)
+    pole = poles[np.argmax(poles.imag)]
+    assert modes.omega_zero == pytest.approx(abs(zeros[0]))
+    assert modes.damping_zero == pytest.approx(-zeros[0].real / abs(zeros[0]))
+    assert modes.omega_pole == pytest.approx(abs(pole))
+    assert modes.damping_pole == pytest.approx(-pole.real / abs(pole))
+
+
+def test_no_resonance_is_left_by_much_damping():
+    assert modes_of(np.r_[OWN[:2], 1e4, 1.0, 1.0]) is None
+
+
+def test_the_load_alone_is_the_same_by_its_poles():
+    poles = np.linalg.eigvals(A)
+    slow = -poles[np.argsort(np.abs(poles))[1]].real
+    modes = modes_of(OWN)
+    own = np.array([slow, np.log(modes.omega_pole), modes.damping_pole, D / K])
+    whole = respond_sampled(TwoMassModel(2), np.r_[OWN, np.log(GAIN), 0.0], FREQUENCY, 0.0)[1]
+    gain = GAIN * K / (M1 * M2 * modes.omega_pole**2)
+    assert respond_sampled(LoadModel(), np.r_[own, np.log(gain), 0.0], FREQUENCY, 0.0)[0] == pytest.approx(whole)
+    assert gain == pytest.approx(GAIN, rel=2e-3)
+
+
+def test_one_mass_is_what_two_on_a_stiff_coupling_are():
+    stiff = np.r_[OWN[0], np.log(1e6), 0.0, OWN[3:]]
+    found = respond_sampled(TwoMassModel(2), np.r_[stiff, np.log(GAIN), DELAY], FREQUENCY, HOLD)
+    rigid = respond_sampled(RigidModel(2), np.r_[B1 + B2, np.log(GAIN), DELAY], FREQUENCY, HOLD)
+    assert found == pytest.approx(rigid, rel=1e-4)
+
+
+@pytest.mark.parametrize("model", [RigidModel(), TwoMassModel(), TwoMassModel(2), LoadModel()])
+def test_every_parameter_counts(model):
+    count = len(model.names)
+    start = {1: [3.0], 4: [2.0, 6.0, 0.05, 1e-4], 5: OWN}[count]
+    before = respond_sampled(model, np.r_[start, 0.0, 0.0], FREQUENCY, HOLD)
+    for index in range(count + 2):
+        changed = np.r_[start, 0.0, 0.0]
+        changed[index] += 0.01
+        assert np.abs(respond_sampled(model, changed, FREQUENCY, HOLD) / before - 1).max() > 1e-5

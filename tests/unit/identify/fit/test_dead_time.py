@@ -1,0 +1,96 @@
+"""Dead times of simulated axes come back, and a recording that does not hold one says so."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
+from tests.synthetic_responses import noisy_responses, record_cascade
+
+from detent.errors import DetentError
+from detent.identify.analyse.measure_response import measure_response
+from detent.identify.analyse.resonances import fit_resonances
+from detent.identify.fit.dead_time import dead_time_of, find_dead_time
+
+pytestmark = pytest.mark.compiled
+
+
+@cache
+def record(delay=3, coulomb=0.5, resolution=1e-6, top=20.0):
+    """A rigid axis under many sines that do not repeat: times, effort, position."""
+    rng = np.random.default_rng(1)
+    t = T_SAMPLE * np.arange(16_000)
+    effort = sum(np.cos(2 * np.pi * f * t + rng.uniform(0, 6.3)) for f in rng.uniform(0.3, top, 30))
+    p = make_params()
+    p.source.delay, p.motor_sensor.resolution = delay, resolution
+    set_friction(p.machine.load.friction, coulomb=coulomb, static=coulomb, viscous=4.0)
+    names = ["source.command", "motor_sensor.position"]
+    command = effort * 15 / np.abs(effort).max()
+    rows = Rig(p).record(len(t) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=command)
+    return rows["t"], rows["source.command"], rows["motor_sensor.position"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"delay": 0}, {"delay": 7, "resolution": 1e-5}, {"coulomb": 2.0}, {"top": 60.0}],
+    ids=lambda options: ",".join(options) or "plain",
+)
+def test_a_dead_time_comes_back(options):
+    found = find_dead_time(*record(**options))
+    delay = options.get("delay", 3)
+    assert found.reason == ""
+    assert found.whole == delay
+    assert found.samples == pytest.approx(delay, abs=0.04)
+    assert found.fraction == pytest.approx(found.samples - delay)
+    assert abs(found.estimate.value - delay * T_SAMPLE) < 3 * found.estimate.error
+    assert found.to_dict()["whole"] == delay
+
+
+def test_a_fraction_of_a_sample():
+    """Every fifth sample of a faster recording, taken between two efforts."""
+    t, effort, position = record(delay=3, top=20.0)
+    found = find_dead_time(t[::5], effort[::5], position[::5], hold=T_SAMPLE)
+    assert found.samples == pytest.approx(3 / 5, abs=0.05)
+    assert found.whole == 1
+
+
+def test_an_effort_that_was_measured_as_it_acts_is_not_held():
+    t, effort, position = record()
+    held, at_once = (find_dead_time(t, effort, position, hold=hold) for hold in (T_SAMPLE, 0.0))
+    assert at_once.estimate.value - held.estimate.value == pytest.approx(T_SAMPLE / 2)
+
+
+def test_a_motion_that_is_not_of_this_effort_is_doubted():
+    t, effort, position = record()
+    found = find_dead_time(t, np.roll(effort[::-1], 3000), position)
+    assert "% of the effort at best, less than 70%" in found.reason
+
+
+def test_an_effort_after_its_motion_is_doubted():
+    t, effort, position = record()
+    found = find_dead_time(t[:-6], effort[:-6], position[6:])
+    assert "no dead time from 0 to 40 samples" in found.reason
+
+
+def test_recordings_too_short_are_refused():
+    t, effort, position = record()
+    with pytest.raises(
+        DetentError, match="came 1000 times, 1000 efforts, 1000 positions; allowed: as many of each, 1280"
+    ):
+        find_dead_time(t[:1000], effort[:1000], position[:1000])
+    with pytest.raises(DetentError, match="15999 efforts"):
+        find_dead_time(t, effort[1:], position)
+
+
+def test_the_phase_of_a_response_gives_the_dead_time_beside_a_resonance():
+    t, effort, position, _ = record_cascade(3, delay=4, resolution=1e-6)
+    found = dead_time_of(fit_resonances(measure_response(t, effort, position), hold=T_SAMPLE), T_SAMPLE)
+    assert found.whole == 4
+    assert abs(found.fraction) < 0.02
+    assert abs(found.estimate.value - 4 * T_SAMPLE) < 3 * found.estimate.error
+
+
+def test_the_response_of_the_load_alone_gives_none():
+    responses, _, hold = noisy_responses(1)
+    with pytest.raises(DetentError, match="the frequency response of the load alone"):
+        dead_time_of(fit_resonances(load=responses[1], hold=hold), hold)

@@ -1,0 +1,309 @@
+"""The rules of the verdict, one by one: what is refused, in which words, and what to record instead."""
+
+import numpy as np
+import pytest
+from tests.identify_rig import Recorder, make_log
+
+from detent.identify.fit.constants import Constants
+from detent.identify.fit.free_run import Horizon
+from detent.identify.fit.kernel import make_kernel
+from detent.identify.fit.ladder import RUNGS, Climb
+from detent.identify.fit.regression import prepare
+from detent.identify.fit.run import make_run
+from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
+from detent.logs.log import Action, Finding, Kind, Severity
+
+RUN = Recorder(seconds=6.0).run()
+
+
+def prepared(run):
+    return prepare(run, make_kernel(10, run.step), "none" if run.reference is None else "reference")
+
+
+PARTS = [prepared(RUN)]
+EFFORT = float(np.sqrt(np.mean(RUN.effort**2)))
+TOP = float(np.quantile(np.abs(PARTS[0].motion.velocity), 0.95))
+
+
+def told(refusals):
+    return [(r.subject, r.constants) for r in refusals]
+
+
+# -- the log --------------------------------------------------------------------------------------------------
+
+
+def log_with(*findings, force=None):
+    t, _, position, made = Recorder(seconds=2.0).columns()
+    return make_log(t, {"position": position, "force": made if force is None else force}, findings=findings)
+
+
+def look(*findings, force=None):
+    log = log_with(*findings, force=force)
+    return look_at_log(log, make_run(log))
+
+
+def finding(kind, signal="force", rows=(), severity=Severity.ERROR, advice=""):
+    return Finding(kind, signal, tuple(rows), "points the other way", Action.LEFT, advice, severity)
+
+
+def test_a_clean_log_is_not_refused():
+    assert look() == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "subject", "advice"),
+    [
+        (Kind.WRONG_SIGN, "wrong sign", "turn the signal round in the mapping, as in force=-COLUMN"),
+        (Kind.WRONG_UNIT, "wrong unit", "state the unit of the column in the mapping"),
+        (Kind.LOST_SIGN, "lost sign", "record the signal with its sign"),
+    ],
+)
+def test_signals_that_contradict_each_other_are_refused(kind, subject, advice):
+    (found,) = look(finding(kind))
+    assert (found.subject, found.record, found.constants) == (subject, advice, ())
+    assert found.text == "made.csv: force points the other way"
+    assert str(found) == f"refused: all constants: {subject}: made.csv: force points the other way; do: {advice}"
+    (own,) = look(finding(kind, advice="do something else"))
+    assert own.record == "do something else"
+    assert look(finding(kind, severity=Severity.NOTE)) == []
+
+
+def test_what_the_import_mended_is_not_refused():
+    for kind in (Kind.SHIFTED, Kind.DROPPED_ROWS, Kind.WRAPPED_COUNTER, Kind.DUPLICATED_ROWS):
+        assert look(finding(kind, "position", [(1, 900)])) == []
+
+
+@pytest.mark.parametrize(("rows", "refused"), [(40, False), (60, True)])
+def test_a_stuck_signal_is_refused_beyond_five_per_cent(rows, refused):
+    found = look(finding(Kind.STUCK, "position", [(101, 100 + rows)]))
+    assert bool(found) is refused
+    if refused:
+        assert found[0].subject == "stuck signal"
+        assert "stands still in 6% of the rows" in found[0].text
+        assert found[0].record == "look at the sensor and its cable, and record again"
+    assert look(finding(Kind.STUCK, "temperature", [(1, 1000)])) == []
+
+
+def test_a_position_that_stays_behind_its_reference_is_refused():
+    log = log_with()
+    reference = Recorder(seconds=2.0).columns()[1]
+    stands = log.signals["position"].copy()
+    assert look_at_log(log, make_run(log)) == []
+    for first, subjects in ((800, []), (250, ["stuck signal"])):
+        stands[first:] = stands[first]
+        cut = make_log(log.t, log.signals | {"position": stands, "reference": reference})
+        found = look_at_log(cut, make_run(cut))
+        assert [r.subject for r in found] == subjects
+    assert "of its way while the position stands still" in found[0].text
+    assert found[0].record == "look at the encoder, its cable and the drive's enable, and record again"
+
+
+@pytest.mark.parametrize(("rows", "refused"), [(290, False), (310, True)])
+def test_saturation_is_refused_beyond_thirty_per_cent(rows, refused):
+    found = look(finding(Kind.SATURATED, "force", [(1, rows)]))
+    assert bool(found) is refused
+    if refused:
+        assert found[0].subject == "saturated"
+        assert found[0].text == "made.csv: force or position is at its limit in 31% of the rows"
+        assert found[0].record == "record slower or smaller moves that stay within the limit"
+
+
+def test_an_effort_between_two_limits_is_saturated_though_nobody_said_so():
+    force = np.clip(Recorder(seconds=2.0).columns()[3], -1.5, 1.5)
+    assert told(look(force=force)) == [("saturated", ())]
+    assert told(look(force=np.zeros(1000))) == [("saturated", ())]
+
+
+# -- the motion -----------------------------------------------------------------------------------------------
+
+
+def test_motion_both_ways_is_enough():
+    assert look_at_motion([RUN], PARTS) == []
+
+
+def test_less_than_a_second_of_motion_is_too_short():
+    run = RUN.part(0, 300)
+    (found,) = look_at_motion([run], [prepared(run)])
+    assert (found.subject, found.constants) == ("too short", ())
+    assert found.text.startswith("in 0.598 s the axis moves clear of standstill for 0.")
+    assert found.record == "record 10 s or more of moves to and fro"
+    # Several short runs are as good as a long one.
+    runs = [RUN.part(k, k + 600) for k in range(0, 2400, 600)]
+    assert look_at_motion(runs, [prepared(run) for run in runs]) == []
+
+
+@pytest.mark.parametrize(("sign", "way"), [(1, "larger"), (-1, "smaller")])
+def test_motion_one_way_is_refused(sign, way):
+    t = np.arange(2000) * 2e-3
+    log = make_log(t, {"position": sign * (0.1 * t + 0.02 * np.sin(3 * t)), "force": np.cos(t)})
+    run = make_run(log)
+    (found,) = look_at_motion([run], [prepared(run)])
+    assert (found.subject, found.constants) == ("no reversal", ())
+    assert f"to {way} positions in 100% of the time" in found.text
+    assert "friction and a constant force cannot be told apart" in found.text
+    assert found.record == "record moves in both directions, at two speeds or more"
+
+
+# -- the constants --------------------------------------------------------------------------------------------
+
+GOOD = {
+    "mass": (2.0, 0.01),
+    "coulomb.positive": (1.6, 0.01),
+    "coulomb.negative": (1.2, 0.01),
+    "viscous.positive": (6.0, 0.05),
+    "viscous.negative": (4.5, 0.05),
+    "delay": (0.004, 1e-4),
+}
+
+
+def look_at(**changed):
+    values = GOOD | {name.replace("_", "."): pair for name, pair in changed.items()}
+    errors = np.array([error for _, error in values.values()])
+    found = Constants(
+        tuple(values), np.array([v for v, _ in values.values()]), np.diag(errors**2), np.full(len(errors), 1e6), ""
+    )
+    return look_at_constants(RUN, found, PARTS)
+
+
+def test_constants_with_narrow_limits_are_trusted():
+    assert look_at() == []
+
+
+def test_a_delay_with_limits_of_more_than_ten_samples_is_refused_alone():
+    edge = 10 * RUN.step / 1.96
+    assert look_at(delay=(0.004, 0.97 * edge)) == []
+    (found,) = look_at(delay=(0.004, 1.03 * edge))
+    assert (found.subject, found.constants) == ("not told by the data", ("delay",))
+    assert found.text == "delay 4 +- 21 ms"
+    assert found.record == "record moves with short ramps, sampled faster"
+
+
+def test_a_negative_mass_refuses_everything():
+    found = look_at(mass=(-2.0, 0.01))
+    assert ("wrong sign", ()) in told(found)
+    first = found[0]
+    assert first.text == "the mass comes out as -2 kg: effort and motion point apart"
+    assert first.record == "turn the effort or the position round in the mapping"
+
+
+def test_a_mass_that_may_be_none_is_not_known_rather_than_of_the_wrong_sign():
+    """Steady speeds tell friction, but the mass not even by its sign: the friction is trusted all the same."""
+    assert told(look_at(mass=(-0.01, 0.03))) == [("little acceleration", ("mass",))]
+
+
+@pytest.mark.parametrize(("error", "refused"), [(0.19, False), (0.22, True)])
+def test_a_mass_with_wide_limits_is_refused_alone(error, refused):
+    found = look_at(mass=(2.0, error))
+    assert told(found) == ([("little acceleration", ("mass",))] if refused else [])
+    if refused:
+        assert found[0].text == "mass 2 +- 0.43 kg, as there is hardly any acceleration"
+        assert found[0].record == "record moves with short ramps"
+        assert str(found[0]).startswith("refused: mass: little acceleration")
+
+
+@pytest.mark.parametrize("name", ["coulomb_positive", "coulomb_negative", "static_positive", "static_negative"])
+def test_forces_with_wide_limits_beside_the_effort_are_refused(name):
+    edge = 0.15 * EFFORT / 1.96
+    assert look_at(**{name: (1.6, 0.97 * edge)}) == []
+    (found,) = look_at(**{name: (1.6, 1.03 * edge)})
+    dotted = name.replace("_", ".")
+    assert (found.subject, found.constants) == ("not told by the data", (dotted,))
+    assert found.text.startswith(f"{dotted} 1.6 +- ")
+    assert found.text.endswith(" N")
+    assert found.record == "record slow moves in both directions"
+
+
+@pytest.mark.parametrize("name", ["viscous_positive", "viscous_negative"])
+def test_viscous_friction_counts_at_the_top_speed(name):
+    edge = 0.15 * EFFORT / 1.96 / TOP
+    assert look_at(**{name: (6.0, 0.97 * edge)}) == []
+    (found,) = look_at(**{name: (6.0, 1.03 * edge)})
+    assert (found.subject, found.constants) == ("not told by the data", (name.replace("_", "."),))
+    assert found.record == "record steady moves at several speeds"
+
+
+def test_a_constant_of_which_nothing_is_known_has_no_figures():
+    (found,) = look_at(coulomb_positive=(1.6, 1e6))
+    assert found.text == "coulomb.positive not known at all"
+
+
+def test_without_instruments_there_is_no_delay_to_look_at():
+    names = [name for name in GOOD if name != "delay"]
+    values, errors = np.array([GOOD[n] for n in names]).T
+    found = Constants(tuple(names), values, np.diag(errors**2), np.full(len(errors), 1e6), "")
+    assert look_at_constants(RUN, found, PARTS) == []
+
+
+def test_an_error_that_nobody_knows_is_no_narrow_one():
+    assert told(look_at(mass=(2.0, np.nan))) == [("little acceleration", ("mass",))]
+    assert told(look_at(coulomb_positive=(1.6, np.nan))) == [("not told by the data", ("coulomb.positive",))]
+
+
+def test_friction_that_would_drive_the_axis_refuses_everything():
+    (found,) = look_at(coulomb_positive=(0.5, 0.01), coulomb_negative=(-0.9, 0.01))
+    assert (found.subject, found.constants) == ("friction below 0", ())
+    assert "-0.4 N, which would drive the axis" in found.text
+    assert found.record == "look at the sign of the effort and at the delay between the signals"
+    # A weight may make one of both negative, and errors may make the sum so.
+    assert look_at(coulomb_positive=(5.0, 0.01), coulomb_negative=(-3.0, 0.01)) == []
+    assert look_at(coulomb_positive=(0.1, 0.05), coulomb_negative=(-0.2, 0.05)) == []
+
+
+def test_friction_that_falls_with_speed_is_refused_in_its_direction():
+    (found,) = look_at(viscous_negative=(-5.0, 0.05))
+    assert (found.subject, found.constants) == ("friction below 0", ("viscous.negative",))
+    assert found.text == "viscous.negative is -5 N*s/m: friction falls with speed"
+    assert found.record == "record several speeds; look for a limit or a delay of the effort"
+    little = -0.04 * EFFORT / TOP
+    assert look_at(viscous_negative=(little, 0.001)) == []
+
+
+# -- the prediction -------------------------------------------------------------------------------------------
+
+
+def climb(error, *, taken=True):
+    return Climb(RUNGS[1], error, np.full(8, error**2), 1.0, taken, possible=True)
+
+
+def horizon(name, rms, naive):
+    return Horizon(0.5, name, 60, rms, 2 * rms, 1.0, naive)
+
+
+def test_a_model_that_predicts_and_simulates_well_is_trusted():
+    assert look_at_prediction([climb(0.3)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.1, 1.0)], []) == []
+    assert look_at_prediction([climb(0.3)], (), []) == []
+
+
+def test_a_model_that_does_not_predict_is_refused():
+    (found,) = look_at_prediction([climb(0.1), climb(0.4), climb(0.2, taken=False)], (), [])
+    assert (found.subject, found.constants) == ("model does not explain the log", ())
+    assert found.text == "the effort of stretches not seen is predicted with an error of 40%"
+    assert "its sign, unit and delay" in found.record
+    assert told(look_at_prediction([climb(np.nan)], (), [])) == [("model does not explain the log", ())]
+
+
+def test_a_model_that_simulates_no_better_than_none_is_refused():
+    tested = [horizon("0.1 s", 0.8, 1.0), horizon("0.5 s", 0.9, 1.0)]
+    (found,) = look_at_prediction([climb(0.1)], tested, [])
+    assert (found.subject, found.constants) == ("model does not explain the log", ())
+    assert found.text == "simulated over 0.5 s it errs by 0.9, going on with the velocity by 1"
+    assert found.record == "record with more acceleration, or look at units"
+    # One good horizon is enough, and others than the short ones do not count.
+    assert look_at_prediction([climb(0.1)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.9, 1.0)], []) == []
+    assert look_at_prediction([climb(0.1)], [horizon("2 s", 0.9, 1.0), horizon("free run", 2.0, 1.0)], []) == []
+    # Without a mass that is known there is nothing to simulate; without a delay there is.
+    unknown = [Refusal("little acceleration", "", "", ("mass",))]
+    assert look_at_prediction([climb(0.1)], tested, unknown) == []
+    assert told(look_at_prediction([climb(0.4)], tested, unknown)) == [("model does not explain the log", ())]
+    assert look_at_prediction([climb(0.1)], tested, [Refusal("x", "", "", ("delay",))]) == [found]
+
+
+def test_a_refusal_as_data():
+    refusal = Refusal("too short", "why", "what to do", ("mass", "delay"))
+    assert refusal.to_dict() == {
+        "subject": "too short",
+        "text": "why",
+        "record": "what to do",
+        "constants": ("mass", "delay"),
+    }
+    assert str(refusal) == "refused: mass, delay: too short: why; do: what to do"

@@ -1,0 +1,95 @@
+"""The tools of the physics checks: grain, windows, likeness, correlation over shifts, runs, parabolas."""
+
+import numpy as np
+import pytest
+
+from detent.logs.differences import (
+    correlation_curve,
+    equal_runs,
+    grain,
+    integral,
+    likeness,
+    paired_changes,
+    resolution,
+    runs_of,
+    window_rows,
+)
+from detent.logs.windows import fill_holes, parabolas, spread
+
+RNG = np.random.default_rng(1)
+T = np.arange(500) * 0.01
+X = np.sin(T)
+
+
+def test_resolution_and_grain():
+    assert resolution(np.round(X / 1e-3) * 1e-3) == pytest.approx(1e-3)
+    assert resolution(np.full(5, 3.0)) == 0.0
+    assert resolution(np.array([0.0, 1e-17, 1.0])) == 1.0
+    assert grain(np.round(X / 1e-2) * 1e-2) == pytest.approx(1e-2)
+    assert grain(X + RNG.normal(0, 0.01, 500)) == pytest.approx(0.01, rel=0.15)
+    assert grain(np.array([1.0, 2.0])) == 1.0
+
+
+def test_windows_grow_with_the_grain():
+    assert window_rows(X) == 4
+    assert window_rows(np.round(X / 0.05) * 0.05) == 25
+    assert window_rows(np.zeros(500)) == 4
+    rows = window_rows(np.round(X / 0.004) * 0.004)
+    assert 4 < rows < 25
+
+
+def test_changes_over_windows_agree_whatever_the_stamps():
+    t = np.cumsum(RNG.uniform(0.005, 0.02, 800))
+    by_velocity, by_position = paired_changes(np.sin(t), np.cos(t), t)
+    assert by_velocity == pytest.approx(by_position, abs=1e-4)
+    gap = np.r_[t[:400], t[400:] + 50]
+    by_velocity, by_position = paired_changes(np.r_[np.sin(t[:400]), np.sin(t[400:]) + 9], np.cos(t), gap)
+    assert by_velocity == pytest.approx(by_position, abs=1e-4)
+    assert len(by_position) == pytest.approx(800 / 2, abs=10)
+
+
+def test_integral():
+    assert integral(np.cos(T), T) == pytest.approx(np.sin(T), abs=1e-4)
+
+
+def test_likeness():
+    assert likeness(3 * X, X) == pytest.approx((1.0, 3.0))
+    assert likeness(-0.5 * X, X) == pytest.approx((-1.0, -0.5))
+    assert likeness(X + 5, X, is_centred=True) == pytest.approx((1.0, 1.0))
+    assert likeness(X, np.zeros(500)) == likeness(X[:1], X[:1]) == (0.0, 0.0)
+    noisy = likeness(X + RNG.normal(0, 0.2, 500), X + RNG.normal(0, 0.2, 500))
+    assert noisy.factor == pytest.approx(1.0, abs=0.05)
+    assert noisy.correlation < 0.97
+
+
+def test_correlation_over_shifts():
+    series = np.convolve(RNG.normal(size=600), np.hanning(30), "same")
+    curve = correlation_curve(np.roll(series, 11), series, 40)
+    assert (len(curve), int(np.argmax(curve))) == (81, 51)
+    assert curve.max() == pytest.approx(1.0)
+    assert (np.abs(curve) <= 1 + 1e-9).all()
+    ours, theirs = np.roll(series, 11)[40 + 5 : 560 + 5], series[40:560]
+    slow = np.corrcoef(ours, theirs)[0, 1]
+    assert curve[45] == pytest.approx(slow, abs=0.02)
+
+
+def test_runs():
+    mask = np.array([1, 1, 0, 1, 0, 0, 1], dtype=bool)
+    assert runs_of(mask).tolist() == [[0, 2], [3, 4], [6, 7]]
+    assert runs_of(~np.ones(3, dtype=bool)).tolist() == []
+    assert equal_runs(np.array([1.0, 1, 1, 2, 3, 3, 4, 4, 4]), 3).tolist() == [[0, 3], [6, 9]]
+    assert equal_runs(np.array([1.0, 1, 1, 2, 3, 3]), 2).tolist() == [[0, 3], [4, 6]]
+
+
+def test_spread_and_holes():
+    assert spread(np.array([0.0, 1, 5, 5, 5, 5]), 3).tolist() == [1, 5, 4, 0, 0, 0]
+    mask = np.array([1, 0, 0, 1, 0, 0, 0, 0, 1, 0], dtype=bool)
+    assert fill_holes(mask, 3).tolist() == [True] * 4 + [False] * 4 + [True, False]
+
+
+def test_parabolas_are_exact_for_parabolas():
+    value, slope, bend = parabolas(2 + 3 * T - 4 * T**2, 0.01, 7)
+    middle = T[3:-3]
+    assert value == pytest.approx(2 + 3 * middle - 4 * middle**2)
+    assert slope == pytest.approx(3 - 8 * middle)
+    assert bend == pytest.approx(np.full(len(middle), -8.0), rel=1e-6)

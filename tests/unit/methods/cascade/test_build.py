@@ -1,0 +1,261 @@
+"""Every key of the axis file does something: no option that is read and then forgotten.
+
+For each key a value is given that the axis must notice. "Notice" means more than another parameter: the axis makes a
+move there and back twice, without and with the value, and its registers must come out different.
+"""
+
+import math
+from functools import cache
+
+import pytest
+from tests.bad_files import example_text
+from tests.cascade_rig import Rig
+
+from detent.files.source import parse_source
+from detent.methods.cascade.build import (
+    LARGEST_ANGLE,
+    LONGEST_TICK,
+    build_cascade,
+    motion_limits,
+    sample_ticks,
+    start_position,
+)
+from detent.methods.cascade.cautions import find_cautions
+from detent.methods.cascade.derive import derive
+from detent.methods.cascade.system import MAX_RATE
+from detent.methods.load import axis_of
+from detent.methods.reference import reference_rows
+from detent.planning.profile import MotionLimits, plan_move
+from detent.plant.two_mass import fastest_rate
+
+pytestmark = pytest.mark.compiled
+
+VOLTAGE = ("drive.input=voltage", "drive.voltage_gain=15", "method.velocity_gain=5 V*s/m")
+FORCE = ("drive.input=force", "drive.effort_per_volt=100 N/V")
+BARE = "without [motor]"
+PID = ("method.structure=pid", "method.proportional=4 kV/m", "method.derivative=100 V*s/m")
+LOAD = ("method.feedback.position=load", "method.feedback.velocity=load", "load_encoder.resolution=2 um")
+PUSH = ("disturbance.push.force=80 N", "disturbance.push.at=50 ms", "disturbance.push.duration=0.2 s")
+# Key: the value, and what must hold for it to matter.
+CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "limits.speed": ("0.3 m/s", ()),
+    "limits.acceleration": ("3 m/s^2", ()),
+    "limits.jerk": ("100 m/s^3", ()),
+    "limits.effort": ("200 N", ()),
+    "motor.catalogue": ("maxon RE 40 148867", (BARE, *VOLTAGE)),
+    "motor.torque_constant": ("0.36 N*m/A", ()),
+    "motor.back_emf_constant": ("0.3 V*s/rad", VOLTAGE),
+    "motor.resistance": ("1.3 ohm", VOLTAGE),
+    "motor.inductance": ("2 mH", VOLTAGE),
+    "motor.rotor_inertia": ("650 g*cm^2", ()),
+    "drive.input": ("voltage", ()),
+    "drive.effort_per_volt": ("120 N/V", (BARE, *FORCE)),
+    "drive.current_per_volt": ("0.9 A/V", ()),
+    "drive.voltage_gain": ("12", VOLTAGE),
+    "drive.command_limit": ("1 V", ()),
+    "drive.command_step": ("20 mV", ()),
+    "drive.delay": ("2", ()),
+    "drive.max_current": ("1 A", ()),
+    "mechanics.travel_per_revolution": ("12 mm", ()),
+    "mechanics.motor_mass": ("9 kg", ()),
+    "mechanics.load_mass": ("31 kg", ()),
+    "mechanics.weight": ("10 N", ()),
+    "mechanics.transmission_loss": ("0.1", ()),
+    "mechanics.start_position": ("21 mm", ()),
+    "mechanics.friction.offset": ("3 N", ()),
+    "mechanics.friction.positive.coulomb": ("13 N", ()),
+    "mechanics.friction.positive.static": ("30 N", ()),
+    "mechanics.friction.positive.stribeck": ("1 mm/s", ()),
+    "mechanics.friction.positive.viscous": ("130 N*s/m", ()),
+    "mechanics.friction.negative.coulomb": ("13 N", ()),
+    "mechanics.friction.negative.static": ("30 N", ()),
+    "mechanics.friction.negative.stribeck": ("1 mm/s", ()),
+    "mechanics.friction.negative.viscous": ("130 N*s/m", ()),
+    "mechanics.load_friction.offset": ("3 N", ()),
+    "mechanics.load_friction.positive.coulomb": ("9 N", ()),
+    "mechanics.load_friction.positive.static": ("15 N", ()),
+    "mechanics.load_friction.positive.stribeck": ("5 mm/s", ("mechanics.load_friction.positive.static=20 N",)),
+    "mechanics.load_friction.positive.viscous": ("5 N*s/m", ()),
+    "mechanics.load_friction.negative.coulomb": ("9 N", ()),
+    "mechanics.load_friction.negative.static": ("15 N", ()),
+    "mechanics.load_friction.negative.stribeck": ("5 mm/s", ("mechanics.load_friction.negative.static=20 N",)),
+    "mechanics.load_friction.negative.viscous": ("5 N*s/m", ()),
+    "mechanics.coupling.stiffness": ("50 N/um", ()),
+    "mechanics.coupling.damping": ("1 kN*s/m", ()),
+    "mechanics.coupling.backlash": ("10 um", ()),
+    "encoder.resolution": ("2 um", ()),
+    "encoder.delay": ("1", ()),
+    "encoder.velocity_span": ("2", ()),
+    "encoder.velocity_filter": ("0.2 ms", ()),
+    "load_encoder.resolution": ("5 um", LOAD),
+    "load_encoder.delay": ("1", LOAD),
+    "load_encoder.velocity_span": ("2", LOAD),
+    "load_encoder.velocity_filter": ("0.5 ms", LOAD),
+    "method.structure": ("pid", PID[1:]),
+    "method.sample_period": ("0.5 ms", ()),
+    "method.position_gain": ("50", ()),
+    "method.velocity_gain": ("110 V*s/m", ()),
+    "method.velocity_integral": ("4 kV/m", ()),
+    "method.velocity_limit": ("0.3 m/s", ("limits.speed=0.3 m/s", "method.feed_forward.viscous=0")),
+    "method.proportional": ("5 kV/m", PID),
+    "method.integral": ("10 kV/(m*s)", PID),
+    "method.derivative": ("90 V*s/m", PID),
+    "method.derivative_filter": ("1 ms", PID),
+    "method.feedback.position": ("load", ("load_encoder.resolution=2 um",)),
+    "method.feedback.velocity": ("load", ("load_encoder.resolution=2 um",)),
+    "method.feed_forward.velocity": ("0.5", ()),
+    "method.feed_forward.acceleration": ("0.5", ()),
+    "method.feed_forward.viscous": ("0.5", ()),
+    "method.feed_forward.coulomb": ("0.5", ()),
+    "method.feed_forward.dead_band": ("10 mm/s", ()),
+    "method.feed_forward.weight": ("1", ("mechanics.weight=30 N",)),
+    "disturbance.push.force": ("90 N", PUSH),
+    "disturbance.push.at": ("60 ms", PUSH),
+    "disturbance.push.duration": ("0.1 s", PUSH),
+}
+# Keys of a rotary axis, and of the plan, of the host that runs it or of what is said about it.
+ROTARY = {"axis.motion", "mechanics.pendulum"}
+SAID = {"axis.name", "axis.method", "motor.max_current"}
+HOST = {
+    "limits.travel",
+    "limits.lowest",
+    "method.in_position",
+    "method.in_position_time",
+    "method.timeout",
+    "method.following_error",
+}
+
+
+def load(name, *overrides):
+    text = example_text(name)
+    if BARE in overrides:
+        text = text[: text.index("[motor]")] + text[text.index("[drive]") :]
+    return axis_of(parse_source("axis.toml", text), [text for text in overrides if text != BARE]).spec
+
+
+@cache
+def registers(name, overrides):
+    """What the axis has come to after a move there and back, and on the way."""
+    spec = load(name, *overrides)
+    p = build_cascade(spec)
+    start, way = start_position(spec), 0.05
+    rig, seen = Rig(p, start), []
+    for target in (start + way, start):
+        move = plan_move(target - way if target > start else start + way, target, motion_limits(spec), p.law.period)
+        rig.r.entry = 0
+        for _ in range(4):
+            rig.record(move.count // 4 * p.sample_ticks, ["law.command"], p.sample_ticks, profile=move)
+            seen.append(bytes(rig.r))
+        rig.run(800 * p.sample_ticks)
+    return tuple(seen)
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_a_key_changes_the_run(key):
+    value, given = CHANGES[key]
+    base = given
+    if key == "motor.catalogue":
+        base = (BARE, *VOLTAGE, "motor.catalogue=maxon RE 40 148877")
+        given = (BARE, *VOLTAGE)
+    assert registers("cascade", base) != registers("cascade", (*given, f"{key}={value}"))
+
+
+def test_every_key_is_tried():
+    keys = {row.key for row in reference_rows("cascade")}
+    assert set(CHANGES) | ROTARY | SAID | HOST == keys
+    assert len(CHANGES) + len(ROTARY | SAID | HOST) == len(keys)
+
+
+def test_a_pendulum_pulls_a_rotary_axis_down():
+    hanging = load("turntable", "mechanics.pendulum=0.5 N*m", "mechanics.start_position=90 deg")
+    rig = Rig(build_cascade(hanging), start_position(hanging))
+    rig.drive([0.0], 200 * rig.p.sample_ticks)
+    assert rig.x < math.radians(89)
+    still = load("turntable", "mechanics.pendulum=0.5 N*m")
+    rig = Rig(build_cascade(still), start_position(still))
+    assert rig.drive([0.0], 200 * rig.p.sample_ticks).x == 0.0
+
+
+def test_the_continuous_current_is_warned_about():
+    assert any("current" in caution.name for caution in find_cautions(load("cascade", "motor.max_current=0.3 A")))
+
+
+def test_resistance_of_a_current_drive_is_told():
+    one, other = (
+        {f.name: f.value for f in derive(load("cascade", *overrides))}["voltage of the motor"]
+        for overrides in ((), ("motor.resistance=2.4 ohm",))
+    )
+    assert other > one + 1
+
+
+def test_limits_of_a_move():
+    assert motion_limits(load("cascade")) == MotionLimits(0.5, 5.0, 200.0)
+    text = example_text("cascade").replace('jerk = "200 m/s^3"', "")
+    assert motion_limits(axis_of(parse_source("axis.toml", text), []).spec).jerk == math.inf
+
+
+def test_parameters_of_a_rotary_axis():
+    p = build_cascade(load("turntable"))
+    radius = 8 / 360
+    w = p.machine.winding
+    assert (w.used, w.resistance, w.inductance) == (1, 3.99, 0.556e-3)
+    assert w.force_constant == pytest.approx(0.0352 / radius)
+    assert w.max_current == pytest.approx(3 / w.force_constant)
+    assert (p.source.gain, p.source.limit, p.source.delay, p.law.max_command) == (2.4, 10.0, 1, 10.0)
+    assert p.machine.motor.mass == pytest.approx(0.02 + 45.3e-7 / radius**2)
+    assert p.machine.load.mass == pytest.approx(0.12)
+    assert (p.feedback.position_on_load, p.feedback.velocity_on_load) == (1, 0)
+    assert p.load_sensor.resolution == pytest.approx(math.radians(0.009))
+    assert p.law.feed_forward.velocity == 1.0
+
+
+def test_feed_forward_is_what_the_plant_needs():
+    shares = [f"method.feed_forward.{name}=1" for name in ("acceleration", "viscous", "coulomb", "weight")]
+    spec = load("cascade", *shares, "mechanics.weight=50 N", "mechanics.friction.offset=2 N")
+    f, per_volt = build_cascade(spec).law.feed_forward, spec.effort_per_command
+    assert f.acceleration * per_volt == pytest.approx(spec.mass)
+    assert f.viscous * per_volt == pytest.approx(115)
+    assert f.coulomb_positive * per_volt == pytest.approx(14 + 8 + 2)
+    assert f.coulomb_negative * per_volt == pytest.approx(16 + 8 - 2)
+    assert f.weight * per_volt == pytest.approx(50)
+    rotary = load(
+        "turntable", "method.feed_forward.viscous=0.5", "method.feed_forward.weight=0.5", "mechanics.pendulum=2 N*m"
+    )
+    f, per_volt = build_cascade(rotary).law.feed_forward, rotary.effort_per_command
+    assert f.pendulum * per_volt == pytest.approx(1.0)
+    assert f.viscous * per_volt == pytest.approx(0.5 * (0.02 + rotary.back_emf_drag))
+
+
+def test_the_command_ends_where_the_amplifier_does():
+    for overrides in ((), ("drive.max_current=1 A",), VOLTAGE, (BARE, *FORCE)):
+        p = build_cascade(load("cascade", *overrides))
+        assert p.law.max_command == p.source.limit
+
+
+def test_a_missing_encoder_of_the_load_reads_the_position_itself():
+    s = build_cascade(load("cascade")).load_sensor
+    assert (s.resolution, s.delay, s.span, s.smoothing) == (0.0, 0, 1, 1.0)
+
+
+@pytest.mark.parametrize("name", ["cascade", "turntable"])
+@pytest.mark.parametrize("stiffer", [1, 1000])
+def test_ticks_divide_the_sample_and_are_short_enough(name, stiffer):
+    spec = load(name)
+    key = spec.mechanics.coupling.stiffness * stiffer
+    unit = "N/m" if name == "cascade" else "N*m/rad"
+    p = build_cascade(load(name, f"mechanics.coupling.stiffness={key!r} {unit}"))
+    assert p.machine.period * p.sample_ticks == pytest.approx(spec.method.sample_period, rel=1e-12)
+    assert p.machine.period <= LONGEST_TICK * (1 + 1e-9)
+    assert fastest_rate(p.machine) * p.machine.period <= LARGEST_ANGLE * (1 + 1e-9) < MAX_RATE
+
+
+def test_ticks_of_a_sample():
+    assert sample_ticks(1e-3, 0.0) == 10
+    assert sample_ticks(1e-3, 5e4) == 100
+    assert sample_ticks(1e-6, 10.0) == 1
+
+
+def test_a_push_counts_in_ticks():
+    p = build_cascade(load("cascade", *PUSH))
+    tick = p.machine.period
+    assert (p.push.force, p.push.begin, p.push.end) == (80.0, round(0.05 / tick), round(0.25 / tick))

@@ -1,0 +1,277 @@
+"""Files of sequences: what they say, and every slip told with its place."""
+
+from importlib.resources import files
+
+import pytest
+
+from detent.errors import InputError
+from detent.methods.rotary_table.sequence_file import MOST_PROBLEMS, load_sequence, parse_sequence
+from detent.methods.rotary_table.sequence_job import LONGEST_TIME, MOST_STEPS, Go, Jog, Output, Repeat, Wait
+from detent.units import parse_quantity
+
+EXAMPLE = files("detent") / "examples" / "index_sequence.toml"
+
+JOB = """# an index
+[[input]]
+name = "feed"
+from = "1 s"
+to = "2500 ms"
+
+[[step]]
+go = 2
+label = "again"
+
+  [[ step ]]   # clamp
+set = "clamp"
+
+[[step]]
+wait = "20 ms"
+[[step]]
+clear = "clamp"
+[[step]]
+repeat = "again"
+times = 3
+[[step]]
+jog = "-"
+speed = "30 deg/s"
+while = "feed"
+[[input]]
+name = "feed"
+from = "9 s"
+to = "10 s"
+[[step]]
+jog = "+"
+for = "0.5 s"
+[[step]]
+wait_for = "feed"
+[[step]]
+wait_for = "feed"
+level = false
+"""
+
+
+def read(text):
+    return parse_sequence("job.toml", text)
+
+
+def refusal(text):
+    with pytest.raises(InputError) as caught:
+        read(text)
+    problems = caught.value.problems
+    assert all(problem.file == "job.toml" for problem in problems)
+    assert all(problem.came and problem.allowed and problem.remedy for problem in problems)
+    return problems
+
+
+def told(problems):
+    return [(problem.line, problem.column, problem.key, problem.came) for problem in problems]
+
+
+def test_each_step_is_read_with_its_line():
+    job = read(JOB)
+    assert job.name == "job.toml"
+    assert job.steps == (
+        Go(2, row=7, label="again"),
+        Output("clamp", on=True, row=11),
+        Wait(0.02, row=14),
+        Output("clamp", on=False, row=16),
+        Repeat("again", 3, row=18),
+        Jog(-1, parse_quantity("30 deg/s", "rad/s"), "feed", row=21),
+        Jog(1, duration=0.5, row=29),
+        Wait(signal="feed", row=32),
+        Wait(signal="feed", level=False, row=34),
+    )
+    assert job.inputs == {"feed": ((1.0, 2.5), (9.0, 10.0))}
+    assert job.count == 16
+
+
+@pytest.mark.parametrize("text", [JOB.replace("\n", "\r\n"), JOB.replace("[[ step ]]", '[["step"]]')])
+def test_as_programs_write_it(text):
+    assert read(text) == read(JOB)
+
+
+def test_the_lists_in_one_value():
+    job = read('step = [{go = 1}, {wait = "1 s"}]\ninput = [{name = "a", from = "0 s", to = "1 s"}]\n')
+    assert job.steps == (Go(1, row=1), Wait(1.0, row=1))
+    assert job.inputs == {"a": ((0.0, 1.0),)}
+    problems = refusal('step = [{go = 1}, {go = 200}]\ninput = [{name = "a", from = "0 s"}]\n')
+    assert told(problems) == [(1, 1, "step[2].go", "200"), (2, 1, "input[1]", "no to")]
+
+
+def test_stretches_of_a_signal_are_joined_in_order():
+    stretch = '[[input]]\nname = "a"\nfrom = "{} s"\nto = "{} s"\n'
+    text = "".join(stretch.format(*ends) for ends in ((5, 6), (1, 3), (2, 4)))
+    assert read(text + "[[step]]\ngo = 1\n").inputs == {"a": ((1.0, 4.0), (5.0, 6.0))}
+
+
+@pytest.mark.parametrize(
+    ("line", "came", "allowed", "remedy"),
+    [
+        ("go = 128", "128", "a position number from 0 to 127", "name an entry"),
+        ("go = -1", "-1", "a position number from 0 to 127", "name an entry"),
+        ("go = true", "true", "a whole number", "write a whole number without quotes, as in go = 3"),
+        ('go = "1"', '"1"', "a whole number", "write a whole number"),
+        ("wait = 2", "2", 'a time such as "2 s"', 'write it in quotes with its unit: wait = "2 s"'),
+        ('wait = "-1 s"', '"-1 s"', f"0 s, up to {LONGEST_TIME:g} s", "correct the time"),
+        ('wait = "2e5 s"', '"2e5 s"', "0 s, up to", "correct the time"),
+        ('wait = "1 deg"', 'the unit "deg", which measures something else', "a time", "use a unit"),
+        ('wait_for = "a b"', '"a b"', "a name: a letter or digit", 'write it in quotes, such as wait_for = "feed"'),
+        ("set = 1", "1", "a name: a letter or digit", 'write it in quotes, such as set = "feed"'),
+        ('clear = ""', '""', "a name: a letter or digit", "write it in quotes"),
+        ("goto = 3", 'the unknown key "goto"', "in [[step]]: go, jog", 'did you mean "go"?'),
+        ("colour = 3", 'the unknown key "colour"', "in [[step]]: go, jog", "remove it"),
+    ],
+)
+def test_a_value_that_will_not_do(line, came, allowed, remedy):
+    (problem,) = refusal(f"[[step]]\ngo = 1\n\n[[step]]\n  {line}\n")
+    assert told([problem]) == [(5, 3, f"step.{line.partition(' ')[0]}", came)]
+    assert problem.allowed.startswith(allowed)
+    assert problem.remedy.startswith(remedy)
+
+
+@pytest.mark.parametrize(
+    ("lines", "key", "came", "allowed"),
+    [
+        ('jog = "*"\nfor = "1 s"', "jog", '"*"', '"+" (to larger angles) or "-"'),
+        ('jog = 1\nfor = "1 s"', "jog", "1", '"+" (to larger angles) or "-"'),
+        ('jog = "+"\nfor = "0 s"', "for", '"0 s"', "more than 0 s, up to"),
+        ('jog = "+"\nfor = "1 s"\nspeed = "0 deg/s"', "speed", '"0 deg/s"', "more than 0 deg/s"),
+        ('jog = "+"\nfor = "1 s"\nspeed = "-3 deg/s"', "speed", '"-3 deg/s"', "more than 0 deg/s"),
+        ('jog = "+"\nfor = "1 s"\nspeed = 3', "speed", "3", 'an angular velocity such as "60 deg/s"'),
+        ('repeat = "a"\ntimes = 0', "times", "0", f"a whole number from 1 to {MOST_STEPS}"),
+        (f'repeat = "a"\ntimes = {MOST_STEPS + 1}', "times", f"{MOST_STEPS + 1}", "a whole number from 1"),
+        ('repeat = "a"\ntimes = 2.0', "times", "2.0", "a whole number"),
+        ("repeat = 2\ntimes = 2", "repeat", "2", "the label of an earlier step: a letter or digit"),
+        ('wait_for = "a"\nlevel = 0', "level", "0", "true (on) or false (off), without quotes"),
+        ("go = 1\nlabel = 7", "label", "7", "a name: a letter or digit"),
+        # keys that do not go together
+        ('go = 1\nspeed = "1 deg/s"', "speed", "speed beside go", "beside go: label (speed belongs to jog)"),
+        ('go = 1\nwait = "1 s"', "wait", "go and wait", "exactly one of go, jog, wait"),
+        ('wait = "1 s"\nlevel = true', "level", "level beside wait", "beside wait: label (level belongs to wait_for)"),
+        ('set = "x"\nfor = "1 s"', "for", "for beside set", "beside set: label (for belongs to jog)"),
+        ('repeat = "a"\ntimes = 2\nlabel = "b"', "label", "label beside repeat", "beside repeat: times (label belongs"),
+        ('jog = "+"', "jog", "jog without an end", "exactly one of while (a signal) and for (a time)"),
+        ('jog = "+"\nfor = "1 s"\nwhile = "a"', "jog", "jog with while and for", "exactly one of while"),
+        ('repeat = "a"', "repeat", "repeat without times", "a whole number of times"),
+        ('label = "x"', "", "a step that does nothing", "exactly one of go, jog, wait"),
+    ],
+)  # fmt: skip
+def test_a_step_that_will_not_do(lines, key, came, allowed):
+    begin = '[[input]]\nname = "a"\nfrom = "0 s"\nto = "9 s"\n[[step]]\ngo = 1\nlabel = "a"\n'
+    (problem,) = refusal(f"{begin}[[step]]\n{lines}\n")
+    rows = [number for number, line in enumerate(lines.splitlines(), 9) if key and line.startswith(f"{key} =")]
+    assert told([problem]) == [(rows[0] if rows else 8, 1, f"step.{key}" if key else "step", came)]
+    assert problem.allowed.startswith(allowed)
+
+
+@pytest.mark.parametrize(
+    ("lines", "place", "came", "allowed"),
+    [
+        ('name = "a"\nfrom = "2 s"\nto = "1 s"', (3, "input.to"), '"1 s"', "a time after from, 2 s"),
+        ('name = "a"\nfrom = "2 s"\nto = "2 s"', (3, "input.to"), '"2 s"', "a time after from, 2 s"),
+        ('name = "a"\nfrom = "-1 s"\nto = "2 s"', (2, "input.from"), '"-1 s"', "0 s, up to"),
+        ('name = "a"\nto = "2 s"', (0, "input"), "no from", "name, from and to"),
+        ('from = "1 s"\nto = "2 s"', (0, "input"), "no name", "name, from and to"),
+        ('name = "a"\nfrom = "1 s"\nto = "2 s"\non = true', (4, "input.on"), 'the unknown key "on"', "in [[input]]:"),
+    ],
+)
+def test_an_input_that_will_not_do(lines, place, came, allowed):
+    (problem,) = refusal(f"[[step]]\ngo = 1\n[[input]]\n{lines}\n")
+    assert told([problem]) == [(3 + place[0], 1, place[1], came)]
+    assert problem.allowed.startswith(allowed)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "key", "came", "remedy"),
+    [
+        ("[step]\ngo = 1", 1, "step", "one table [step]", "write [[step]], with two brackets"),
+        ("step = 3", 1, "step", "3", "write [[step]], with two brackets"),
+        ("go = 1\n[[step]]\ngo = 1", 1, "go", 'the unknown key "go"', "move it below a [[step]]"),
+        ('name = "a"\n[[step]]\ngo = 1', 1, "name", 'the unknown key "name"', "move it below a [[input]]"),
+        ("[[steps]]\ngo = 1", 1, "steps", 'the unknown table "steps"', "did you mean [[step]]?"),
+        ("[[move]]\nby = 1", 1, "move", 'the unknown table "move"', "remove it, or name a file of steps"),
+        ("[axis]\nname = 1", 1, "axis", 'the unknown table "axis"', "remove it, or name a file of steps"),
+    ],
+)
+def test_a_file_of_something_else(text, line, key, came, remedy):
+    (problem,) = refusal(text)
+    assert told([problem]) == [(line, 1, key, came)]
+    assert problem.remedy.startswith(remedy)
+
+
+@pytest.mark.parametrize(
+    ("lines", "place", "key", "came"),
+    [
+        ('[[step]]\nwait_for = "b"\n', (5, 1), "wait_for", 'the unknown input "b"'),
+        ('[[step]]\njog = "+"\n while = "b"\n', (6, 2), "while", 'the unknown input "b"'),
+        ('[[step]]\nset = "a"\n', (5, 1), "set", 'the input "a"'),
+        ('[[step]]\nrepeat = "x"\ntimes = 2\n', (5, 1), "repeat", 'the label "x", which no step before has'),
+        ('[[step]]\ngo = 1\nlabel = "x"\n[[step]]\ngo = 1\nlabel = "x"\n', (9, 1), "label", 'the label "x" again'),
+        (
+            '[[step]]\nwait = "3 s"\n[[step]]\nwait_for = "a"\n',
+            (7, 1),
+            "wait_for",
+            '"a", which is off for good from 2 s on; the step begins at 3 s or later',
+        ),
+        (
+            '[[step]]\nwait = "0 s"\nlabel = "x"\n[[step]]\nrepeat = "x"\ntimes = 100000\n[[step]]\ngo = 1\n',
+            (9, 1),
+            "times",
+            "100001 steps, repeats counted",
+        ),
+    ],
+)
+def test_steps_that_do_not_go_together_are_told_with_their_place(lines, place, key, came):
+    # the input stands behind the steps, so that places are counted through both lists
+    text = f'# a job\n\n\n{lines}[[input]]\nname = "a"\nfrom = "1 s"\nto = "2 s"\n'
+    (problem,) = refusal(text)
+    assert told([problem]) == [(*place, f"step.{key}", came)]
+
+
+def test_problems_come_all_at_once_those_of_syntax_too():
+    text = '[[input]]\nname = 1\nfrom = "0 s"\nto = "1 s"\n[[step]]\ngo = one\n[[step]]\ngo = 999\nspeed = 1\n'
+    assert told(refusal(text)) == [
+        (2, 1, "input.name", "1"),
+        (6, 6, "go", "`go = one`"),
+        (8, 1, "step.go", "999"),
+        (9, 1, "step.speed", "1"),
+        (9, 1, "step.speed", "speed beside go"),
+    ]
+
+
+def test_a_file_of_another_kind_is_not_reported_for_ever():
+    assert len(refusal("[[step]]\n" * 1000)) == MOST_PROBLEMS
+    assert len(refusal("[[input]]\n" * 1000)) == MOST_PROBLEMS
+
+
+def test_a_file_without_steps():
+    assert told(refusal('[[input]]\nname = "a"\nfrom = "0 s"\nto = "1 s"\n')) == [(0, 0, "", "no steps")]
+    assert told(refusal("# nothing\n")) == [(0, 0, "", "no steps")]
+
+
+def test_headers_inside_a_text_cost_the_place_only():
+    (problem,) = refusal("[[step]]\ngo = 1\nlabel = '''\n[[step]]\n'''\n")
+    assert (problem.line, problem.key) == (1, "step[1].label")
+
+
+def test_a_file_is_named_as_the_user_named_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.toml").write_text("﻿[[step]]\ngo = 1\n", encoding="utf-8")
+    assert load_sequence("job.toml").steps == (Go(1, row=1),)
+    (tmp_path / "job.csv").write_text("go\n1\n")
+    for name, came in (("absent.toml", "no such file"), ("job.csv", 'a name that ends in ".csv"')):
+        with pytest.raises(InputError) as caught:
+            load_sequence(name)
+        (problem,) = caught.value.problems
+        assert (problem.file, problem.came, problem.allowed) == (name, came, "a sequence of steps (.toml)")
+
+
+def test_the_example_uses_everything():
+    text = EXAMPLE.read_text(encoding="utf-8")
+    job = read(text)
+    assert text.startswith("# Sequence of a rotary table: ")
+    assert {type(step) for step in job.steps} == {Go, Jog, Wait, Output, Repeat}
+    assert {step.direction for step in job.steps if isinstance(step, Jog)} == {1, -1}
+    assert any(isinstance(step, Jog) and step.duration for step in job.steps)
+    assert any(isinstance(step, Wait) and step.signal for step in job.steps)
+    assert job.outputs == ("clamp",)

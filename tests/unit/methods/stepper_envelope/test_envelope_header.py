@@ -1,0 +1,387 @@
+"""The step rule in C and the one that runs here: the same bits in every register after every call."""
+
+import ctypes
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.bench.race import COMPILER, compile_c
+from tests.stepper_rig import COARSE_FINE, MAX_HZ, MOTOR, RAMP, N
+
+from detent.control.step_rule import (
+    ACCEL,
+    CRUISE,
+    DECEL,
+    FAULT,
+    IDLE,
+    INFEASIBLE,
+    OUT_OF_RANGE,
+    PAUSE,
+    REST,
+    STEP,
+    TURN,
+    StepRule,
+    deflect,
+    next_entry,
+    place_motor,
+    start_move,
+)
+from detent.drive.step_timer import StepTimer
+from detent.kernel.registers import Registers, block
+from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, motor_identifier, write_envelope_header
+from detent.methods.stepper_envelope.system import Stepper, StepperParams, load_rule, step_once, switch_on
+from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_ramp import StepRamp
+
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc) here to compile the header with")
+
+STRICT = ("-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wundef", "-Wcast-qual")
+CLOCK_HZ = 1_000_000
+
+CALLS = """
+unsigned long @_size(void);
+const int16_t *@_table(int up);
+int @_call(@_registers *m, const int16_t *up, const int16_t *down);
+void @_set(@_registers *m, int64_t position);
+void @_go(@_registers *m, int8_t heading, uint16_t turns);
+void @_lever(@_registers *m, int32_t word, int8_t heading);
+unsigned long @_size(void) { return (unsigned long)sizeof(@_registers); }
+const int16_t *@_table(int up) { return up ? @_up : @_down; }
+int @_call(@_registers *m, const int16_t *up, const int16_t *down) { return @_next(m, up, down); }
+void @_set(@_registers *m, int64_t position) { @_place(m, position); }
+void @_go(@_registers *m, int8_t heading, uint16_t turns) { @_start(m, heading, turns); }
+void @_lever(@_registers *m, int32_t word, int8_t heading) { @_deflect(m, word, heading); }
+"""
+"""What a shared library exports of a header's functions, all of which are static; @ stands for the motor."""
+
+
+class FirmwareRegisters(Registers):
+    """Registers of the header."""
+
+    rule: StepRule = block("control unit")
+    timer: StepTimer = block("step timer")
+
+
+def compile_headers(folder: Path, *motors: EnvelopeTables) -> ctypes.CDLL:
+    """One source file that includes the headers of all motors."""
+    source = folder / "firmware.c"
+    names = [motor_identifier(tables.motor) for tables in motors]
+    for name, tables in zip(names, motors, strict=True):
+        write_envelope_header(tables, folder / f"{name}.h")
+    lines = [f'#include "{name}.h"' for name in names] + [CALLS.replace("@", name) for name in names]
+    source.write_text("\n".join(lines), encoding="utf-8")
+    return compile_c(source, folder, *STRICT)
+
+
+class Twins:
+    """One motor twice, in Python and in C, given the same orders; every call compares all their registers."""
+
+    def __init__(self, tables: EnvelopeTables, library: ctypes.CDLL, at: int = 0) -> None:
+        self.tables, self.library, self.name = tables, library, motor_identifier(tables.motor)
+        self.p, self.r, self.c = StepperParams(pause=tables.pause), Stepper(), FirmwareRegisters()
+        load_rule(self.p, tables.up.ramp, tables.up.zones.limits, tables.clock_hz, reload=tables.reload)
+        switch_on(self.r, at, MOTOR.step_angle)
+        self._c("set", ctypes.c_int64(at))
+        assert self._function("size")() == ctypes.sizeof(FirmwareRegisters)
+        table = self._function("table")
+        table.restype = ctypes.POINTER(ctypes.c_int16)
+        self.up, self.down = (np.ctypeslib.as_array(table(up), (tables.steps + 1,)).copy() for up in (1, 0))
+        self.copy_tables(edited=False)
+        self.periods: list[int] = []
+        self.seen: set[tuple[str, int]] = set()
+
+    def _function(self, verb: str):
+        return getattr(self.library, f"{self.name}_{verb}")
+
+    def _c(self, verb: str, *arguments) -> int:
+        return self._function(verb)(ctypes.byref(self.c), *arguments)
+
+    def copy_tables(self, *, edited: bool = True) -> None:
+        """Bring an edit to the firmware's copies; without one they are what the header holds."""
+        if edited:
+            self.up[:], self.down[:] = self.tables.up.entries, self.tables.down.entries
+        assert self.up.tolist() == self.tables.up.entries.tolist()
+        assert self.down.tolist() == self.tables.down.entries.tolist()
+
+    def place(self, position: int) -> None:
+        place_motor(self.r.rule, position)
+        self._c("set", ctypes.c_int64(position))
+
+    def start(self, heading: int, turns: int = 0) -> None:
+        start_move(self.r.rule, heading, turns)
+        self._c("go", ctypes.c_int8(heading), ctypes.c_uint16(turns))
+
+    def deflect(self, word: int, heading: int) -> None:
+        deflect(self.p.rule, self.r.rule, word, len(self.tables.up.ramp) - 1, heading)
+        self._c("lever", ctypes.c_int32(word), ctypes.c_int8(heading))
+
+    def lever(self, hz: float, heading: int) -> None:
+        """Deflect by a frequency, whatever the words are; 0 releases."""
+        self.deflect(round(self.tables.clock_hz / hz if self.tables.reload and hz else hz), heading)
+
+    def write(self, register: str, value: int) -> None:
+        for rule in (self.r.rule, self.c.rule):
+            setattr(rule, register, value)
+
+    def call(self) -> int:
+        """One period is over."""
+        entry = next_entry(self.r.rule, self.tables.up.entries, self.tables.down.entries)
+        found = step_once(self.p, self.r, entry)
+        pointers = (ctypes.c_void_p(table.ctypes.data) for table in (self.up, self.down))
+        assert self._c("call", *pointers) == found
+        self.compare()
+        rule = self.r.rule
+        self.seen |= {("outcome", found), ("state", rule.state), ("cause", rule.cause)}
+        if found == STEP:
+            self.periods.append(self.r.timer.period)
+        return found
+
+    def compare(self) -> None:
+        for ours, theirs in ((self.r.rule, self.c.rule), (self.r.timer, self.c.timer)):
+            if bytes(ours) != bytes(theirs):  # the quick look first: bytes between registers may differ
+                assert ours.diff(theirs) == {}
+
+    def run(self, steps: int = 10**6) -> None:
+        """So many steps, or to rest."""
+        done = 0
+        while done < steps:
+            found = self.call()
+            if found == IDLE:
+                return
+            done += found == STEP
+
+    @property
+    def at_rest(self) -> tuple[int, int]:
+        """Where it stands, and the state there."""
+        assert self.c.rule.index == -1
+        return self.c.rule.position, self.c.rule.state
+
+
+def default_tables(zones=(), *, motor="Zoom A", reload=True, turn=N, stop=0, pause=1, clock_hz=CLOCK_HZ):
+    up, down = turn_envelopes(RAMP, ZoneMap(N, MAX_HZ, zones), 0, turn, stop)
+    return EnvelopeTables(
+        motor=motor, axis="microscope", up=up, down=down, clock_hz=clock_hz, reload=reload, travel_per_step=5e-6,
+        pause=pause,
+    )  # fmt: skip
+
+
+@pytest.fixture(
+    params=[(True, CLOCK_HZ, 1), (False, CLOCK_HZ, 0), (True, 72_000_000, 2), (False, 2**31 - 1, 1)],
+    ids=["reload", "frequency", "32-bit reload", "fastest clock"],
+)
+def motor(request, tmp_path):
+    """A motor with coarse and fine zones, turn at 6000 and stop at 1500."""
+    reload, clock_hz, pause = request.param
+    tables = default_tables(COARSE_FINE, reload=reload, turn=6000, stop=1500, pause=pause, clock_hz=clock_hz)
+    return Twins(tables, compile_headers(tmp_path, tables))
+
+
+def test_a_move_with_a_turn(motor):
+    motor.start(1, turns=1)
+    motor.run()
+    assert motor.at_rest == (1500, REST)
+    up, down = motor.tables.periods(motor.tables.up), motor.tables.periods(motor.tables.down)
+    assert motor.periods == [*up[:6000].tolist(), *down[1500:6000][::-1].tolist()]
+    assert {("state", s) for s in (REST, ACCEL, CRUISE, DECEL, TURN)} <= motor.seen
+    assert {("outcome", o) for o in (IDLE, STEP, PAUSE)} <= motor.seen
+
+
+def test_a_stop_moved_while_running(motor):
+    motor.start(1)
+    motor.run(3500)
+    rule = motor.r.rule
+    assert not motor.tables.up.move_stop(4800, rule.position, rule.index).overrun
+    motor.copy_tables()
+    motor.run(500)
+    edit = motor.tables.up.move_stop(4010, rule.position, rule.index)
+    assert edit.overrun
+    motor.copy_tables()
+    motor.run()
+    assert motor.at_rest == (edit.stop, REST)
+    motor.tables.down.move_stop(0)
+    motor.copy_tables()
+    motor.start(-1)
+    motor.run()
+    assert motor.at_rest == (0, REST)
+
+
+def test_the_operator(motor):
+    motor.place(1000)
+    for hz, heading, steps in (
+        (MAX_HZ, 1, 700), (1500.0, 1, 600), (1501.0, 1, 30), (60.0, 1, 300), (70_000.0, 1, 900), (MAX_HZ, -1, 600),
+        (0.0, -1, 40), (800.0, 1, 60), (800.0, -1, 60),
+    ):  # fmt: skip
+        motor.lever(hz, heading)
+        motor.run(steps)
+        motor.compare()
+    motor.write("manual", 0)
+    motor.run()
+    assert motor.at_rest[1] == REST
+    assert ("state", TURN) in motor.seen
+    motor.lever(MAX_HZ, 1)
+    motor.run()
+    assert motor.at_rest == (6000, REST)  # held into the end
+    motor.run()
+    assert ("state", FAULT) not in motor.seen
+
+
+def test_the_operator_interrupts_a_move_and_a_move_the_operator(motor):
+    motor.start(1)
+    motor.run(100)
+    motor.lever(500.0, -1)
+    motor.run(150)
+    motor.start(1)
+    motor.run(3000)
+    motor.start(-1, turns=1)  # reversal at speed
+    motor.run()
+    assert motor.at_rest == (6000, REST)
+
+
+def test_a_fault_and_what_follows(motor):
+    motor.start(1)
+    motor.run(1200)
+    motor.tables.up.entries[1250:1300] = 3
+    motor.copy_tables()
+    motor.run()
+    position, state = motor.at_rest
+    assert (state, motor.c.rule.cause) == (FAULT, INFEASIBLE)
+    motor.start(1)
+    motor.run()
+    assert motor.at_rest == (position, FAULT)
+    motor.write("reset", 1)
+    motor.run()
+    assert motor.at_rest == (position, REST)
+    for place in (-1, N + 1):
+        motor.place(place)
+        motor.start(-1)
+        motor.run()
+        assert motor.at_rest == (place, FAULT)
+        motor.write("reset", 1)
+        motor.run()
+    assert ("cause", OUT_OF_RANGE) in motor.seen
+    motor.place(N)
+    motor.write("event", 0)
+    motor.start(-1)
+    motor.run()
+    assert motor.at_rest == (1500, REST)
+
+
+def test_in_fault_the_motor_comes_down_whatever_it_is_told(motor):
+    motor.start(1)
+    motor.run(1940)
+    motor.tables.up.entries[1950] = 3  # one bad entry, shortly before a fine zone
+    motor.copy_tables()
+    motor.run(15)
+    assert (motor.r.rule.state, motor.r.rule.index > 0) == (FAULT, True)
+    motor.write("reset", 1)  # too early
+    motor.lever(MAX_HZ, -1)
+    motor.run()
+    assert motor.at_rest[1] == FAULT
+    assert motor.c.rule.direction == 1
+    assert motor.c.rule.position > COARSE_FINE[0].begin  # in fault its limit is not looked at
+    motor.write("reset", 1)
+    motor.run(50)
+    assert motor.c.rule.direction == -1
+
+
+def test_a_start_under_the_operators_hand_is_forgotten(motor):
+    motor.start(1)
+    motor.lever(0.0, 1)
+    motor.run()
+    motor.write("manual", 0)
+    motor.run()
+    assert (motor.at_rest, motor.periods) == ((0, REST), [])
+    motor.start(-1)  # nothing to do: the move has ended, which is an event
+    motor.run()
+    assert (motor.at_rest, motor.c.rule.event) == ((0, REST), 1)
+
+
+def test_several_motors_in_one_firmware_do_not_know_of_each_other(tmp_path):
+    tables = [default_tables(COARSE_FINE, motor="Zoom A"), default_tables(motor="Zoom B", reload=False, pause=0)]
+    library = compile_headers(tmp_path, *tables)
+    pair = [Twins(each, library) for each in tables]
+    for motor in pair:
+        motor.start(1, turns=1)
+    running = list(pair)
+    while running:
+        running = [motor for motor in running if motor.call() != IDLE]
+    alone = [Twins(each, library) for each in tables]
+    for motor in alone:
+        motor.start(1, turns=1)
+        motor.run()
+    assert [motor.periods for motor in pair] == [motor.periods for motor in alone]
+    assert pair[0].periods != pair[1].periods
+
+
+@st.composite
+def random_tables(draw: st.DrawFn) -> EnvelopeTables:
+    """Any ramp, extremes, zones of each direction, words, clock and pause."""
+    hz = sorted(draw(st.sets(st.floats(1.0, 65535.0), min_size=1, max_size=30)))
+    steps = draw(st.integers(1, 120))
+    limit = st.floats(1.0, 65535.0)
+    places, top = st.integers(0, steps), draw(limit)
+
+    def zones() -> list[Zone]:
+        edges = sorted(draw(st.sets(places, max_size=6)))
+        return [Zone(b, e, draw(limit)) for b, e in zip(edges[::2], edges[1::2], strict=False)]
+
+    upwards, downwards = zones(), zones()
+    both = ZoneMap(steps, top, downwards, ZoneMap(steps, top, upwards).limits)
+    up = StepEnvelope(StepRamp(np.array(hz)), ZoneMap(steps, top, upwards, both.limits), 1, draw(places), draw(places))
+    down = StepEnvelope(up.ramp, both, -1, draw(places), draw(places))
+    clock = st.integers(int(np.ceil(hz[-1])), 2**31 - 1) | st.sampled_from((10**6, 72 * 10**6, 2**31 - 1))
+    return EnvelopeTables(
+        motor="any", axis="any", up=up, down=down, clock_hz=draw(clock), reload=draw(st.booleans()),
+        travel_per_step=1e-6, pause=draw(st.sampled_from((0, 1, 7, 255))),
+    )  # fmt: skip
+
+
+def act(draw: st.DataObject, motor: Twins) -> None:
+    """One thing that a host may do between two calls."""
+    tables, rule = motor.tables, motor.r.rule
+    heading, places = st.sampled_from((1, -1)), st.integers(0, tables.steps)
+    verb = draw.draw(
+        st.sampled_from(("start", "deflect", "hz", "edit", "start", "poke", "write", "place")), label="verb"
+    )
+    if verb == "start":
+        motor.start(draw.draw(heading), draw.draw(st.sampled_from((0, 1, 2, 65535))))
+    elif verb == "deflect":
+        words = st.sampled_from(list(motor.p.rule.ramp[: len(tables.up.ramp)])) | st.integers(0, 2**31 - 1)
+        motor.deflect(draw.draw(words), draw.draw(heading))
+    elif verb == "hz":
+        motor.lever(draw.draw(st.sampled_from([0.0, *tables.up.ramp.hz.tolist()])), draw.draw(heading))
+    elif verb == "edit":
+        table = tables.up if draw.draw(st.booleans()) else tables.down
+        runs_here = rule.direction == table.direction and rule.index >= 0 and 0 <= rule.position <= tables.steps
+        table.move_stop(draw.draw(places), *((rule.position, rule.index) if runs_here else ()))
+        motor.copy_tables()
+    elif verb == "poke":  # a table as no builder makes it
+        table, last = (tables.up, tables.steps) if draw.draw(st.booleans()) else (tables.down, 0)
+        ahead = rule.position + rule.direction * draw.draw(st.integers(0, 3))  # where it matters soonest
+        near = draw.draw(st.booleans()) and 0 <= ahead <= tables.steps and ahead != last
+        place = ahead if near else draw.draw(places.filter(lambda one: one != last))
+        index = draw.draw(st.integers(0, len(tables.up.ramp) - 1))
+        zone = draw.draw(st.integers(0, len(tables.up.zones.limits) - 1))
+        table.entries[place] = draw.draw(st.sampled_from((SENTINEL, zone << INDEX_BITS | index)))
+        motor.copy_tables()
+    elif verb == "write":
+        motor.write(*draw.draw(st.sampled_from((("manual", 0), ("reset", 1), ("event", 0), ("turns", 3)))))
+    else:
+        motor.place(draw.draw(st.integers(-1, tables.steps + 1)))
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_whatever_the_host_does_the_bits_are_the_same(data):
+    tables = data.draw(random_tables())
+    with tempfile.TemporaryDirectory() as folder:
+        library = compile_headers(Path(folder), tables)
+    motor = Twins(tables, library, data.draw(st.integers(0, tables.steps), label="at"))
+    for _ in range(data.draw(st.integers(1, 25), label="orders")):
+        act(data, motor)
+        motor.compare()
+        for _ in range(data.draw(st.integers(1, 4) | st.integers(1, 40), label="calls")):
+            motor.call()

@@ -1,0 +1,85 @@
+"""Jobs of stepper stages: what a move, a turn, a changed stop and a manual run may be, and repeats written out."""
+
+import dataclasses
+import math
+
+import pytest
+
+from detent.errors import DetentError
+from detent.methods.moves.job import MOST_MOVES, expand_moves
+from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
+
+
+def test_a_move_names_motors_by_places_and_by_ways_and_the_others_stay():
+    move = StageMove(number=1, row=2, targets={"x": 0.01}, by={"z": -0.001})
+    assert move.motors == ("x", "z")
+    assert (move.dwell, move.label, move.turn, move.change) == (0.0, "", None, None)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        move.dwell = 1.0
+
+
+def test_moves_do_not_share_their_motors():
+    one, other = StageMove(1, 1, by={"x": 1.0}), StageMove(2, 2, targets={"x": 1.0})
+    assert one.targets == {}
+    assert other.by == {}
+    assert one.targets is not other.targets
+
+
+def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
+    assert StageMove(1, 1, {"x": 0.01}, turn=0.03).turn == 0.03
+    assert StageMove(1, 1, by={"x": 0.01}, change=Change(0.005, 0.02)).change == Change(at=0.005, to=0.02)
+
+
+@pytest.mark.parametrize(
+    ("values", "came", "allowed"),
+    [
+        ({}, "no motor", "a target or a way for at least one motor"),
+        ({"targets": {"x": 0.1, "y": 0.1}, "by": {"y": 0.1}}, "a target and a way for y", "one of the two"),
+        ({"targets": {"x": math.nan}}, "a way of x of nan m", "a finite number of metres"),
+        ({"by": {"x": 0.1, "y": -math.inf}}, "a way of y of -inf m", "a finite number of metres"),
+        ({"by": {"x": 0.1}, "dwell": -0.5}, "a dwell of -0.5 s", "0 s or more"),
+        ({"by": {"x": 0.1}, "dwell": math.nan}, "a dwell of nan s", "0 s or more"),
+        ({"by": {"x": 0.1}, "turn": math.inf}, "a turn of inf m", "a finite number of metres"),
+        ({"by": {"x": 0.1}, "change": Change(math.nan, 0)}, "a place of the change of nan m", "a finite number"),
+        ({"by": {"x": 0.1}, "change": Change(0, math.inf)}, "a changed stop of inf m", "a finite number"),
+        ({"by": {"x": 0.1, "y": 0.1}, "turn": 0.2}, "a turn or a change with 2 motors", "one motor"),
+        ({"targets": {"x": 0.1}, "by": {"y": 0.1}, "change": Change(0, 0)}, "a turn or a change with 2", "one motor"),
+        ({"by": {"x": 0.1}, "turn": 0.2, "change": Change(0, 0)}, "a turn and a change", "one of the two"),
+    ],
+)
+def test_no_move_is_what_no_stage_can_do(values, came, allowed):
+    with pytest.raises(DetentError, match="move 7: came ") as caught:
+        StageMove(number=7, row=1, **values)
+    assert f"came {came}" in str(caught.value)
+    assert f"; allowed: {allowed}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "came"),
+    [
+        ({"speed": 0.0}, "a speed of 0.0 m/s"),
+        ({"speed": math.nan}, "a speed of nan m/s"),
+        ({"speed": -math.inf}, "a speed of -inf m/s"),
+        ({"duration": 0.0}, "a duration of 0.0 s"),
+        ({"duration": math.inf}, "a duration of inf s"),
+        ({"dwell": -1.0}, "a dwell of -1.0 s"),
+    ],
+)
+def test_no_manual_run_is_what_no_operator_can_do(values, came):
+    jog = {"motor": "x", "speed": -0.005, "duration": 0.5}
+    assert StageJog(3, 1, **jog).motors == ("x",)
+    with pytest.raises(DetentError, match="move 3: came ") as caught:
+        StageJog(3, 1, **(jog | values))
+    assert f"came {came}; allowed: " in str(caught.value)
+
+
+def test_repeats_of_moves_and_manual_runs_are_written_out():
+    there, jog = StageMove(1, 2, {"x": 0.1}, label="there"), StageJog(1, 5, "x", 0.01, 0.5)
+    moves = expand_moves("job.toml", [(there, 1), (jog, 2)], repeat=2)
+    assert [move.number for move in moves] == [1, 2, 3, 4, 5, 6]
+    assert [move.row for move in moves] == [2, 5, 5, 2, 5, 5]
+    assert [type(move) for move in moves[:3]] == [StageMove, StageJog, StageJog]
+    assert dataclasses.replace(moves[3], number=1) == there
+    job = StageJob("job.toml", "moves", moves, ("x",))
+    assert (job.count, job.notes) == (6, ())
+    assert len(expand_moves("job.toml", [(jog, MOST_MOVES)])) == MOST_MOVES

@@ -1,0 +1,171 @@
+import dataclasses
+import doctest
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from detent.errors import DetentError
+from detent.methods.print_head.comparison_data import Comparison, StartCurve
+from detent.page import plots as figures
+from detent.page.parts import INCH
+from detent.page.plots import check_figure_path, plot_comparison, plot_signals, settling_time
+from detent.record.trace import Trace
+
+METHODS = ("power-on default", "nominal table", "identified")
+
+
+@pytest.fixture
+def trace() -> Trace:
+    t = np.arange(0, 2, 1e-3)
+    return Trace(
+        columns={
+            "t": t,
+            "carriage.velocity": np.sin(t),
+            "motor.current": np.cos(t),
+            "carriage.velocity_ref": np.sin(t),
+            "head.drive_cmd": (195 * np.sin(t)).astype(np.int16),
+            "head.transition": np.sin(t) > 0.5,
+        },
+        units={
+            "t": "s", "carriage.velocity": "m/s", "carriage.velocity_ref": "m/s", "motor.current": "A",
+            "head.drive_cmd": "count",
+        },
+        attributes={"axis": "demo axis", "job": "LETTER.TXT", "seed": 1},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def comparison() -> Comparison:
+    t = np.linspace(0, 1, 1001)
+    return Comparison(
+        methods=METHODS,
+        speeds=[40 * INCH, 10 * INCH],
+        errors=np.array(
+            [[[-0.254, -0.199], [-0.457, -0.238]], [[-0.134, -0.125], [-0.274, -0.238]], [[0.004, -0.003]] * 2]
+        ),
+        starts=[
+            StartCurve(name=name, t=t, velocity=40 * INCH * np.minimum(t / end, stop))
+            for name, end, stop in zip(METHODS, (0.5, 0.4, 0.07), (0.9, 1.0, 1.0), strict=True)
+        ],
+        target=40 * INCH,
+        machine="slope +10 %",
+    )  # fmt: skip
+
+
+def texts(path: Path) -> list[str]:
+    return [
+        re.sub(r"<[^>]+>", "", text).strip()
+        for text in re.findall(r"<text.*?</text>", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    ]
+
+
+def test_the_examples_in_the_docstrings_hold() -> None:
+    assert doctest.testmod(figures).failed == 0
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".SVG", b"<?xml")])
+def test_the_suffix_chooses_the_format(tmp_path: Path, trace: Trace, suffix: str, magic: bytes) -> None:
+    path = tmp_path / f"run{suffix}"
+    plot_signals(trace, ["motor.current"], path)
+    assert path.read_bytes().startswith(magic)
+
+
+def test_signals_share_a_plot_area_by_unit_and_carry_it(tmp_path: Path, trace: Trace) -> None:
+    plot_signals(trace, ["*"], tmp_path / "run.svg")
+    svg = (tmp_path / "run.svg").read_text(encoding="utf-8")
+    assert len(set(re.findall(r'id="(axes_\d+)"', svg))) == 4
+    words = texts(tmp_path / "run.svg")
+    for text in ("[m/s]", "carriage.velocity", "carriage.velocity_ref", "[A]", "[count]", "time [s]", "on", "off"):
+        assert text in words
+    assert "demo axis · LETTER.TXT" in words
+
+
+def test_a_dollar_sign_is_one(tmp_path: Path, trace: Trace) -> None:
+    named = dataclasses.replace(trace, attributes={"axis": "from $1", "job": "to $2"})
+    plot_signals(named, ["motor.current"], tmp_path / "run.svg")
+    assert "from $1 · to $2" in texts(tmp_path / "run.svg")
+
+
+def test_a_short_stretch_is_in_milliseconds(tmp_path: Path, trace: Trace) -> None:
+    plot_signals(trace, ["motor.current"], tmp_path / "run.svg", (0.5, 0.7))
+    words = texts(tmp_path / "run.svg")
+    assert "time [ms]" in words
+    assert "600" in words
+
+
+def test_the_same_figure_gives_the_same_file(tmp_path: Path, trace: Trace) -> None:
+    for suffix in (".svg", ".pdf", ".png"):
+        for name in ("a", "b"):
+            plot_signals(trace, ["motor.*", "head.*"], tmp_path / (name + suffix))
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_drawing_leaves_other_peoples_settings_alone(tmp_path: Path, trace: Trace) -> None:
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    plot_signals(trace, ["motor.current"], tmp_path / "run.png")
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize(
+    ("signals", "name", "t_range", "says"),
+    [
+        (["motor.curent"], "run.png", None, "did you mean 'motor.current'"),
+        ([], "run.png", None, "no signal was asked for; name one of: carriage.velocity"),
+        (["motor.current"], "run.png", (5.0, 6.0), "no rows from 5 s to 6 s"),
+        (["motor.current"], "run.jpg", None, r"cannot be saved as '\.jpg'; use one of \.png, \.svg, \.pdf"),
+        (["motor.current"], "nowhere/run.png", None, "cannot be written"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said(
+    tmp_path: Path, trace: Trace, signals: list[str], name: str, t_range: tuple[float, float] | None, says: str
+) -> None:
+    with pytest.raises(DetentError, match=says):
+        plot_signals(trace, signals, tmp_path / name, t_range)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_trace_cannot_be_drawn(tmp_path: Path) -> None:
+    with pytest.raises(DetentError, match="holds no rows"):
+        plot_signals(Trace(columns={"t": np.empty(0), "x": np.empty(0)}), ["x"], tmp_path / "run.png")
+
+
+def test_the_comparison_writes_every_error_and_how_soon(tmp_path: Path, comparison: Comparison) -> None:
+    plot_comparison(comparison, tmp_path / "c.svg")
+    words = texts(tmp_path / "c.svg")
+    for text in ("-25.4", "-19.9", "-45.7", "-13.4", "-27.4", "+0.4", "-0.3", "40 in/s", "10 in/s", *METHODS):
+        assert text in words
+    assert "machine: slope +10 %" in words
+    assert "power-on default: not reached" in words
+    assert "nominal table: after 0.40 s" in words
+    assert "identified: after 0.07 s" in words
+
+
+def test_the_comparison_can_do_without_starts(tmp_path: Path, comparison: Comparison) -> None:
+    plot_comparison(dataclasses.replace(comparison, starts=()), tmp_path / "c.svg")
+    assert not any("time" in text for text in texts(tmp_path / "c.svg"))
+
+
+def test_errors_of_another_shape_are_refused(tmp_path: Path, comparison: Comparison) -> None:
+    with pytest.raises(DetentError, match=r"errors have shape \(3, 2\), allowed: \(3, 2, 2\)"):
+        plot_comparison(dataclasses.replace(comparison, errors=np.zeros((3, 2))), tmp_path / "c.png")
+
+
+def test_settling_counts_from_the_last_time_outside() -> None:
+    t = np.array([0.0, 1.0, 2.0, 3.0])
+    assert settling_time(t, np.array([1.0, 1.0, 1.0, 1.0]), 1.0, 0.01) == 0.0
+    assert settling_time(t, np.array([0.0, 1.0, 0.0, 1.0]), 1.0, 0.01) == 3.0
+    assert settling_time(t, np.array([0.0, 1.0, 1.0, 0.0]), 1.0, 0.01) is None
+    assert settling_time(t, np.array([0.0, np.nan, 1.0, 1.0]), 1.0, 0.01) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("a.txt", r"cannot be saved as '\.txt'"), ("no/a.png", "no folder .*no.; make it")]
+)
+def test_a_target_can_be_refused_before_any_work(tmp_path: Path, name: str, says: str) -> None:
+    assert check_figure_path(tmp_path / "a.PNG") == tmp_path / "a.PNG"
+    with pytest.raises(DetentError, match=says):
+        check_figure_path(tmp_path / name)
