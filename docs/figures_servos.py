@@ -58,7 +58,7 @@ def plus_pulse() -> None:
     axis = phase_axis()
     plus = axis.timing(4e-3, 2e-3, signals=["converters.tracking.plus"]).waveforms.signals[-1]
     third = int(plus.times[np.flatnonzero(plus.values)[2]])
-    tick = round(axis.method.tick * 1e12)
+    tick = round(axis.simulated.tick * 1e12)
     shown = axis.timing((third // tick - 4) * tick * 1e-12, 9 * tick * 1e-12, signals=PULSE_SIGNALS).waveforms
     plot_timing(shown, FOLDER / "plus-pulse.svg", marks=((third, "+ pulse"),))
 
@@ -379,7 +379,6 @@ def damping() -> None:
 def feedback_table() -> None:
     """The comparison as a table, for the page."""
     import generate
-
     from detent.methods.shown import comparison_table
 
     _, heads, rows = comparison_table(slide().spec, feedback())

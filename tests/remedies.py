@@ -1,7 +1,7 @@
 """Remedies that name a value: what they name is accepted, and nothing nearer to what was refused would be."""
 
 import re
-from dataclasses import replace
+from copy import copy
 from functools import wraps
 
 import pytest
@@ -84,7 +84,8 @@ def broken_rules(method, entries, good_text, load_text, monkeypatch):
 
         return run
 
-    watched = replace(METHODS[method], rules=tuple(noting(rule) for rule in METHODS[method].rules))
+    watched = copy(METHODS[method])
+    watched.rules = tuple(noting(rule) for rule in watched.rules)
     monkeypatch.setitem(METHODS, method, watched)
     for bad in entries:
         is_refused(load_text, bad.make(good_text), bad.overrides)

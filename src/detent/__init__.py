@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from detent.axis import Axis, Envelope, Run, Timing, load, load_trace
+    from detent.axis import Axis, Run, Timing, load, load_trace
     from detent.identify.page.identified import identify_axis
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Axis",
-    "Envelope",
     "Run",
     "Timing",
     "__version__",
@@ -31,7 +30,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """The API loads when it is first used, so that `import detent` and `detent --help` stay quick."""
-    if name in ("Axis", "Envelope", "Run", "Timing", "load", "load_trace"):
+    if name in ("Axis", "Run", "Timing", "load", "load_trace"):
         from detent import axis
 
         return getattr(axis, name)

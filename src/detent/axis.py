@@ -1,31 +1,25 @@
 """The Python API: an axis, loaded from its file, and the runs it makes. The words are those of the command line."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from detent.axisfile.tables import AxisSpec
 from detent.errors import DetentError
-from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.check import CheckReport, check_spec
 from detent.methods.load import AxisFile, read_axis
-from detent.methods.print_head.run import Progress
-from detent.methods.registry import AnySpec
-from detent.methods.simulated import AnyJob, AnyResult, Simulated, simulated
-from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.method import Comparison, Job, Method, Result, Shown, Simulated
+from detent.methods.registry import METHODS, bringing
 from detent.record.capture import Stretch, capture
+from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves, make_trace
 from detent.record.trace import Trace
 from detent.record.trace_files import load_trace, save_trace
 from detent.record.trace_store import TraceWriter
 from detent.record.vcd_file import save_vcd
 from detent.record.waveforms import Waveforms
-
-if TYPE_CHECKING:
-    # Loaded where a comparison is made, or a recording replayed: most commands do neither.
-    from detent.methods.cascade.replay_job import ReplayJob
-    from detent.methods.compared import AnyComparison
-    from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
 
 KEPT_ROWS = 100_000
 """Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
@@ -44,7 +38,7 @@ class Axis:
     file: AxisFile
 
     @property
-    def spec(self) -> AnySpec:
+    def spec(self) -> AxisSpec:
         """The specification, in SI units."""
         return self.file.spec
 
@@ -54,9 +48,14 @@ class Axis:
         return self.spec.axis.name
 
     @property
-    def method(self) -> Simulated:
-        """What its control method brings to the simulation: registers, base tick, usual signals."""
-        return simulated(self.spec)
+    def method(self) -> Method[Any]:
+        """Its control method."""
+        return METHODS[self.spec.axis.method]
+
+    @cached_property
+    def simulated(self) -> Simulated:
+        """What the simulation takes of it: registers, base tick, usual signals."""
+        return self.method.simulated(self.spec)
 
     def check(self) -> CheckReport:
         """Effective values, derived figures and warnings."""
@@ -70,28 +69,26 @@ class Axis:
         DetentError
             A name is unknown; the message names the nearest.
         """
-        choose_leaves(self.method.registers, names)
+        choose_leaves(self.simulated.registers, names)
 
-    def load_job(self, path: str | Path) -> AnyJob:
+    def load_job(self, path: str | Path) -> Job:
         """Read a job of the kind the axis takes.
 
         Parameters
         ----------
         path : path
-            Print head: plain text or a Diablo 630 stream. Servos, cascade axes: a list of moves as CSV or TOML; phase
-            servo: also a line of text. Rotary table: a sequence as TOML. Steppers: moves of several motors, or tiles,
-            as CSV or TOML.
+            What its method takes; ``detent run --help`` lists it.
 
         Raises
         ------
         InputError
             Everything that is wrong with it.
         """
-        return self.method.load(Path(path))
+        return self.simulated.load(Path(path))
 
-    def _job(self, job: str | Path | AnyJob) -> AnyJob:
+    def _job(self, job: str | Path | Job) -> Job:
         """The job itself, read if it is a file; refused if the method takes none of its kind."""
-        wanted = self.method.job
+        wanted = self.simulated.job
         loaded = self.load_job(job) if isinstance(job, str | Path) else job
         if not isinstance(loaded, wanted):
             names = " or ".join(kind.__name__ for kind in (wanted if isinstance(wanted, tuple) else (wanted,)))
@@ -101,9 +98,7 @@ class Axis:
             )
         return loaded
 
-    def load_recording(
-        self, path: str | Path, mapping: str | Path | None = None, columns: Sequence[str] = ()
-    ) -> "ReplayJob":
+    def load_recording(self, path: str | Path, mapping: str | Path | None = None, columns: Sequence[str] = ()) -> Any:
         """Read a recording of a machine, to be replayed on this axis by `run`.
 
         Parameters
@@ -125,26 +120,26 @@ class Axis:
         InputError
             The log or the mapping cannot be read, or says something wrong.
         DetentError
-            The axis is no cascade axis, or the log does not fit it.
+            The axis is of a method that replays nothing, or the log does not fit it.
         """
         from detent.logs.read_log import read_log
-        from detent.methods.cascade.replay_job import make_replay_job
 
-        spec = self.spec
-        if not isinstance(spec, CascadeSpec):
+        replay = self._brought("recording", "whose loops follow any reference")
+        return replay(self.spec, read_log(path, mapping, columns))
+
+    def _brought(self, word: str, why: str) -> Callable[..., Any]:
+        """What not every method brings; refused where this one does not."""
+        able = bringing(word)
+        if self.method.name not in able:
             raise DetentError(
-                f"{self.name}: came an axis of the method {spec.axis.method}; allowed: cascade, whose loops follow any "
-                "reference; name an axis file of it"
+                f"{self.name}: came an axis of the method {self.method.name}; allowed: {' or '.join(able)}, {why}; "
+                "name an axis file of it"
             )
-        log = read_log(path, mapping, columns)
-        signals = {role: (values, log.units[role]) for role, values in log.signals.items()}
-        notes = [str(finding) for finding in log.findings]
-        notes += [f"guessed: {'; '.join(log.guesses)}"] if log.guesses else []
-        return make_replay_job(spec, log.name, log.t, signals, notes)
+        return getattr(self.method, word)
 
     def run(
         self,
-        job: str | Path | AnyJob,
+        job: str | Path | Job,
         *,
         signals: Sequence[str] | None = None,
         every: int | None = None,
@@ -178,7 +173,7 @@ class Axis:
         DetentError
             The job is of another kind, a signal is unknown, or the trace cannot be written.
         """
-        method = self.method
+        method = self.simulated
         loaded = self._job(job)
         every = method.every if every is None else every
         if every == 0:
@@ -199,7 +194,7 @@ class Axis:
                 result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, memory.trace(recorder, about))
 
-    def compare(self, progress: Progress | None = None) -> "tuple[AnyComparison, ...]":
+    def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:
         """Hold the method against the ways it was made to better, on this axis.
 
         Returns
@@ -209,11 +204,9 @@ class Axis:
             one `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and
             a `JerkComparison`. Cascade: one `ProfileComparison`.
         """
-        from detent.methods.compared import compare_methods
+        return self.method.compare(self.spec, progress)
 
-        return compare_methods(self.spec, progress)
-
-    def envelopes(self) -> "dict[str, Envelope]":
+    def envelopes(self) -> Mapping[str, Any]:
         """Tables of permissible frequencies of each motor, between its extremes at power-on.
 
         Returns
@@ -225,20 +218,14 @@ class Axis:
         DetentError
             The axis has no steppers.
         """
-        spec = self.spec
-        if not isinstance(spec, StepperEnvelopeSpec):
-            raise DetentError(
-                f"{self.name}: came an axis of the method {spec.axis.method}; allowed: stepper_envelope, whose motors "
-                "have a table of permissible frequencies; name an axis file of it"
-            )
-        return {name: Envelope(_envelope_tables(spec, name)) for name in spec.stepper}
+        return self._brought("envelopes", "whose motors have a table of permissible frequencies")(self.spec)
 
     def timing(
         self,
         at: float,
         duration: float,
         *,
-        job: str | Path | AnyJob | None = None,
+        job: str | Path | Job | None = None,
         signals: Sequence[str] | None = None,
         progress: Progress | None = None,
     ) -> "Timing":
@@ -262,33 +249,14 @@ class Axis:
         DetentError
             A signal is unknown, the stretch is too long, or the run ends before it.
         """
-        method = self.method
+        method = self.simulated
         loaded = method.sample_job() if job is None else self._job(job)
         stretch = Stretch(at, duration, tuple(method.timing if signals is None else signals), self.name)
 
-        def run(recorder: Any) -> AnyResult:
+        def run(recorder: Any) -> Result:
             return method.run(loaded, recorder=recorder, progress=progress)
 
         return Timing(capture(method.registers, method.clocking, method.tick, run, stretch))
-
-
-def _envelope_tables(spec: StepperEnvelopeSpec, name: str) -> "EnvelopeTables":
-    """Tables of one motor as its file describes it."""
-    from detent.methods.stepper_envelope.build import make_tables
-    from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
-
-    table, tables = spec.stepper[name], make_tables(spec.stepper[name])
-    return EnvelopeTables(
-        motor=name,
-        axis=spec.axis.name,
-        up=tables.up,
-        down=tables.down,
-        clock_hz=round(spec.controller.timer),
-        reload=spec.controller.words == "reload",
-        travel_per_step=table.step,
-        first_position=table.mechanics.lower_end,
-        pause=table.drive.reversal_pause,
-    )
 
 
 @dataclass(frozen=True)
@@ -314,49 +282,6 @@ class Timing:
         """Write a VCD file, which GTKWave and Surfer open."""
         save_vcd(self.waveforms, path)
         return Path(path)
-
-
-@dataclass(frozen=True)
-class Envelope:
-    """Tables of one stepper.
-
-    Attributes
-    ----------
-    tables : EnvelopeTables
-        Both directions, and what firmware must know to use them.
-    """
-
-    tables: "EnvelopeTables"
-
-    def save(self, path: str | Path) -> Path:
-        """Write the tables; the suffix chooses CSV (.csv), a C99 header with the step rule (.h), or a figure.
-
-        Raises
-        ------
-        DetentError
-            The suffix is another, or the file cannot be written.
-        """
-        from detent.methods.stepper_envelope.envelope_figure import plot_envelope
-        from detent.methods.stepper_envelope.envelope_files import write_envelope_csv, write_envelope_header
-
-        path = Path(path)
-        writers = {".csv": write_envelope_csv, ".h": write_envelope_header}
-        writers.get(path.suffix.lower(), plot_envelope)(self.tables, path)
-        return path
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data: size and memory of the tables."""
-        t = self.tables
-        return {
-            "motor": t.motor,
-            "steps": t.steps,
-            "step": t.travel_per_step,
-            "ramp": len(t.up.ramp),
-            "start_hz": float(t.up.ramp.hz[0]),
-            "top_hz": float(t.up.ramp.hz[-1]),
-            "run_up": t.up.ramp.duration,
-            "bytes": t.up.entries.nbytes + t.down.entries.nbytes + len(t.up.ramp) * t.word_bytes,
-        }
 
 
 class _Memory:
@@ -399,10 +324,10 @@ class Run:
     """
 
     axis: Axis
-    result: AnyResult
+    result: Result
     trace: Trace | None
     settings: dict[str, str] = field(default_factory=dict[str, str])
-    comparisons: "tuple[AnyComparison, ...]" = ()
+    comparisons: tuple[Comparison, ...] = ()
 
     @property
     def done(self) -> bool:
@@ -414,11 +339,14 @@ class Run:
         """Why it did not, and what to do."""
         return self.result.failure
 
+    @property
+    def verdict(self) -> str:
+        """Whether the job was done, in a sentence."""
+        return self.axis.method.verdict(self.axis.name, self.result)
+
     def summary(self) -> list[tuple[str, str]]:
         """The figures a person wants first: name and text."""
-        from detent.methods.shown import summary_rows
-
-        return summary_rows(self.axis.spec, self.result)
+        return self.axis.method.summary(self.axis.spec, self.result)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
@@ -426,11 +354,11 @@ class Run:
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
-        from detent.methods.shown import report_of
         from detent.page.page import write_page
 
-        settings = {"axis file": self.axis.file.file, "seed": str(self.axis.method.seed)} | self.settings
-        write_page(path, report_of(self.axis.spec, self.result, self.trace, self.comparisons, settings))
+        settings = {"axis file": self.axis.file.file, "seed": str(self.axis.simulated.seed)} | self.settings
+        shown = Shown(trace=self.trace, comparisons=self.comparisons, settings=settings)
+        write_page(path, self.axis.method.page(self.axis.spec, self.result, shown))
         return Path(path)
 
     def save(self, path: str | Path) -> Path:
@@ -473,4 +401,4 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
     return Axis(read_axis(path, overrides))
 
 
-__all__ = ["Axis", "Envelope", "Run", "Timing", "load", "load_trace"]
+__all__ = ["Axis", "Run", "Timing", "load", "load_trace"]

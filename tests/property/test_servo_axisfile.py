@@ -7,7 +7,7 @@ refused by a rule, and what no rule refuses must be an axis that can be looked o
 import json
 import math
 import re
-from dataclasses import replace
+from copy import copy
 
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
@@ -219,7 +219,9 @@ def test_what_no_rule_refuses_can_be_looked_over_and_built(name):
 @pytest.mark.parametrize("name", BUILD)
 def test_the_value_that_a_remedy_names_satisfies_its_rule(name, monkeypatch):
     method = METHODS[METHOD[name]]
-    monkeypatch.setitem(METHODS, METHOD[name], replace(method, rules=()))
+    without = copy(method)
+    without.rules = ()
+    monkeypatch.setitem(METHODS, METHOD[name], without)
 
     @given(overrides_of(name))
     @settings(max_examples=200, deadline=None)

@@ -30,7 +30,7 @@ def run() -> detent.Run:
 def test_the_words_of_the_package_are_those_it_promises() -> None:
     for name in detent.__all__:
         assert getattr(detent, name) is not None
-    with pytest.raises(AttributeError, match="no attribute 'Gripper'; it has Axis, Envelope, "):
+    with pytest.raises(AttributeError, match="no attribute 'Gripper'; it has Axis, Run, "):
         _ = detent.Gripper
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn, cast
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from detent import __version__
 from detent.cli.terminal import discard_output
@@ -37,6 +37,17 @@ class Commands(TyperGroup):
         raise typer.Exit(status)
 
 
+class ListsMethods(TyperCommand):
+    """A verb whose help ends in what each installed method takes as a job, and how fast it ticks."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Add the methods, which load only here."""
+        from detent.methods.registry import METHODS
+
+        self.epilog = "Jobs and base ticks: " + " ".join(f"{m.name}: {m.jobs}; {m.pace}." for m in METHODS.values())
+        super().format_help(ctx, formatter)
+
+
 app = typer.Typer(
     name="detent",
     cls=Commands,
@@ -60,11 +71,7 @@ Signals = Annotated[
 ]
 
 
-JOB_HELP = (
-    "What the axis does. Print head: plain text or a Diablo 630 stream. Servos and cascade axes: a list of moves "
-    "(.csv, .toml); phase servo: text (.txt) too. Rotary table: a sequence (.toml). Steppers: moves or tiles "
-    "(.csv, .toml)."
-)
+JOB_HELP = "What the axis does: a file of the kind that its method takes, see below."
 Job = Annotated[
     Path | None,
     typer.Option(

@@ -21,7 +21,6 @@ def compare(
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
-    from detent.methods.shown import comparison_table, plot_comparison_of
     from detent.page.plots import check_figure_path
 
     check_figure_path(figure)
@@ -34,8 +33,8 @@ def compare(
         for number, found in enumerate(comparisons, 1):
             files.append(figure if number == 1 else figure.with_stem(f"{figure.stem}-{number}"))
             progress(0.9, "drawing")
-            plot_comparison_of(axis.spec, found, files[-1])
-    tables = [comparison_table(axis.spec, found) for found in comparisons]
+            axis.method.plot(axis.spec, found, files[-1])
+    tables = [axis.method.table(axis.spec, found) for found in comparisons]
     if as_json:
         data = [{"title": title} | found.to_dict() for (title, _, _), found in zip(tables, comparisons, strict=True)]
         print_json({"comparisons": data, "files": [str(path) for path in files]})

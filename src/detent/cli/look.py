@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from detent.cli.app import File, Job, Json, Set, Signals, app
+from detent.cli.app import File, Job, Json, ListsMethods, Set, Signals, app
 from detent.cli.terminal import print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
 
 
-@app.command()
+@app.command(cls=ListsMethods)
 def timing(
     file: File,
     at: Annotated[str, typer.Option("--at", metavar="TIME", help="Where to look, since power-on, such as '21.5 ms'.")],
@@ -37,8 +37,8 @@ def timing(
     check_figure_path(figure)
     axis = load(file, overrides or [])
     begin = _time("--at", at)
-    length = _time("--for", duration) if duration is not None else 80 * axis.method.tick
-    names = split_names(signals) or list(axis.method.timing)
+    length = _time("--for", duration) if duration is not None else 80 * axis.simulated.tick
+    names = split_names(signals) or list(axis.simulated.timing)
     axis.check_signals(names)
     loaded = axis.load_job(job) if job is not None else None
     say_if_cold()

@@ -7,28 +7,20 @@ from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, Set, app
+from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, ListsMethods, Set, app
 from detent.cli.terminal import make_console, print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
-
-DONE_WORDS = {
-    "print_head": "Printed {job} on {axis}.",
-    "rotary_table": "{job}: every step was done on {axis}.",
-    "stepper_envelope": "{job}: every move arrived on {axis}, no step was lost.",
-    "cascade": "{job}: every move was in position on {axis}.",
-    "replay": "{job}: replayed on {axis}.",
-}
-"""What is said of a job that was done, by method; of servos, that every move arrived."""
 
 Replay = Annotated[
     Path | None,
     typer.Option(
         "--replay",
         metavar="LOG",
-        help="Cascade axis, in place of a job: a recording of the machine (.csv, .h5, .parquet, .mat, .npz, .jsonl). "
-        "Its reference is followed, or its effort drives the axis; recording and simulation are compared.",
+        help="In place of a job: a recording of the machine (.csv, .h5, .parquet, .mat, .npz, .jsonl), of axes whose "
+        "loops follow any reference. Its reference is followed, or its effort drives the axis; recording and "
+        "simulation are compared.",
     ),
 ]
 Mapping = Annotated[
@@ -69,9 +61,7 @@ Every = Annotated[
         "--every",
         min=0,
         max=10_000_000,
-        help="Record every n-th base tick (print head 40 us, phase servo 250 ns, filtered servo 10 us, rotary table "
-        "100 us, steppers 2 us, cascade as its file has it); 0 records nothing. Default: 10, 256, 10, 20, 100, one "
-        "sample.",
+        help="Record every n-th base tick; 0 records nothing. Tick and default of each method: below.",
     ),
 ]
 TraceKinds = Annotated[
@@ -80,12 +70,12 @@ TraceKinds = Annotated[
 Comparison = Annotated[
     bool,
     typer.Option(
-        "--compare/--no-compare", help="All but print heads: show the comparison with other methods in the report."
+        "--compare/--no-compare", help="Show the comparison with other methods in the report, where its page has one."
     ),
 ]
 
 
-@app.command()
+@app.command(cls=ListsMethods)
 def run(
     file: File,
     job: Annotated[Path | None, typer.Option("--job", help=JOB_HELP)] = None,
@@ -109,7 +99,7 @@ def run(
     source = _source(job, replay, mapping, columns or [])
     loaded = axis.load_job(source) if replay is None else axis.load_recording(source, mapping, columns or [])
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
-    wanted = [*axis.method.signals, *split_names(signals)]
+    wanted = [*axis.simulated.signals, *split_names(signals)]
     axis.check_signals(wanted)
     _make_folder(folder)
     say_if_cold()
@@ -117,7 +107,7 @@ def run(
         store = folder / "trace.h5" if kinds else None
         done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
-        if comparison and replay is None and axis.spec.axis.method != "print_head":
+        if comparison and replay is None and axis.method.reports_comparisons:
             done.comparisons = axis.compare(progress)
         progress(1.0, "writing the report")
         written = [done.report(folder / "report.html"), *_convert_trace(folder, kinds)]
@@ -181,23 +171,15 @@ def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
 
 def _print_run(done: Any, written: list[Path]) -> None:
     console = make_console()
-    result, method = done.result, done.axis.spec.axis.method
-    prints = method == "print_head"
-    if done.done:
-        kind = "replay" if getattr(result.job, "kind", "") == "replay" else method
-        words = DONE_WORDS.get(kind, "{job}: every move arrived on {axis}.")
-        console.print(words.format(job=result.job.name, axis=done.axis.name), style="bold green", soft_wrap=True)
-    else:
-        words = "Not printed" if prints else "Not done"
-        console.print(f"{words}: {result.failure}", style="bold red", soft_wrap=True)
+    result = done.result
+    console.print(done.verdict, style="bold green" if done.done else "bold red", soft_wrap=True)
     for name, text in done.summary():
         console.print(f"  {name:<20} {text}", soft_wrap=True)
     for text in result.warnings:
         console.print(f"  warning: {text}", style="yellow", soft_wrap=True)
     notes = getattr(result.job, "notes", ())
     for note in notes[:5]:
-        text = note if isinstance(note, str) else f"byte {note.offset}, {note.code}: {note.text}"
-        console.print(f"  note: {text}", soft_wrap=True)
+        console.print(f"  note: {note}", soft_wrap=True)
     if len(notes) > 5:
         console.print(f"  {len(notes) - 5} more notes; --json shows them all")
     for path in written:

@@ -8,9 +8,10 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
-import tree_sitter_toml
-from tree_sitter import Language, Node, Parser
+if TYPE_CHECKING:
+    from tree_sitter import Node, Parser
 
 Path = tuple[str, ...]
 
@@ -67,12 +68,15 @@ def find_place(places: dict[Path, Place], path: Path) -> Place:
 
 
 @cache
-def _parser() -> Parser:
+def _parser() -> "Parser":
     """Make the parser once."""
+    import tree_sitter_toml
+    from tree_sitter import Language, Parser
+
     return Parser(Language(tree_sitter_toml.language()))
 
 
-def _walk(node: Node, prefix: Path) -> Iterator[tuple[Path, Node, Node]]:
+def _walk(node: "Node", prefix: Path) -> "Iterator[tuple[Path, Node, Node]]":
     """Walk all keys below a node: (path, node of the key, node of the value or of the header)."""
     for child in node.named_children:
         key = next((part for part in child.named_children if part.type in _KEYS), None)
@@ -86,7 +90,7 @@ def _walk(node: Node, prefix: Path) -> Iterator[tuple[Path, Node, Node]]:
             yield from _walk(child, prefix)
 
 
-def _walk_pair(pair: Node, key: Node, prefix: Path) -> Iterator[tuple[Path, Node, Node]]:
+def _walk_pair(pair: "Node", key: "Node", prefix: Path) -> "Iterator[tuple[Path, Node, Node]]":
     """Walk one ``key = value`` and what an inline table holds."""
     path = (*prefix, *_key_parts(key))
     value = next((part for part in pair.named_children if part.type not in _KEYS), None)
@@ -97,7 +101,7 @@ def _walk_pair(pair: Node, key: Node, prefix: Path) -> Iterator[tuple[Path, Node
         yield from _walk(value, path)
 
 
-def _key_parts(key: Node) -> Path:
+def _key_parts(key: "Node") -> Path:
     """Split a key into its parts, quotes removed."""
     if key.type == "dotted_key":
         return tuple(part for child in key.named_children for part in _key_parts(child))
@@ -110,7 +114,7 @@ def _key_parts(key: Node) -> Path:
     return (text,)
 
 
-def _place(source: bytes, key: Node, value: Node) -> Place:
+def _place(source: bytes, key: "Node", value: "Node") -> Place:
     """Line and column of a key, in characters, with the value's first line."""
     row = key.start_point[0]
     line_start = source.rfind(b"\n", 0, key.start_byte) + 1

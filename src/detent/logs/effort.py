@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from detent.logs.differences import grain, window_rows
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Values
+from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 from detent.logs.windows import parabolas
-from detent.methods.cascade.replay_job import EFFORTS
 
 EXPLAINED = 0.3
 """Share of the variance of an effort that the motion must explain before its sign is judged."""

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from detent.axisfile.catalogue import Catalogue
+from detent.axisfile.tables import AxisSpec
 from detent.errors import FileProblem, InputError
 from detent.files.fields import (
     AnyName,
@@ -27,7 +28,8 @@ from detent.files.locate import Path
 from detent.files.overrides import apply_overrides, as_table, put_value
 from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path, nearest_key
 from detent.files.source import Source, read_source
-from detent.methods.registry import METHODS, AnySpec, Method
+from detent.methods.method import Method
+from detent.methods.registry import METHODS
 from detent.units import QuantityError, parse_quantity
 
 METHOD_KEY: Path = ("axis", "method")
@@ -51,7 +53,7 @@ class AxisFile:
     """
 
     file: str
-    spec: AnySpec
+    spec: AxisSpec
     origins: dict[str, str]
     texts: dict[str, str]
 
@@ -67,7 +69,7 @@ class _Layers:
     doubtful: set[Path] = field(default_factory=set[Path])
 
 
-def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> AnySpec:
+def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> AxisSpec:
     """Load an axis file.
 
     Parameters
@@ -115,21 +117,29 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
 
 
 def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
-    """Method the file names, for its motion; without a name, the first, so that the rest is checked all the same."""
+    """Method the file names, for its motion; without a name the likeliest, so that the rest is checked too."""
     name, stated = _stated(source, overrides, METHOD_KEY)
     if not isinstance(name, str):
-        return next(iter(METHODS.values()))
+        likeliest = copy.copy(max(METHODS.values(), key=lambda method: _known_keys(source, method)))
+        likeliest.rules = ()  # what does not go together depends on the method, which is only guessed
+        return likeliest
     if name in METHODS:
         method = METHODS[name]
         turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
-        return replace(method, spec=method.rotary) if turns else method
+        return method.turned() if turns else method
     near = difflib.get_close_matches(name.lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
-    remedy = f'did you mean "{near[0]}"?' if near else f'write method = "{next(iter(METHODS))}"'
+    remedy = f'did you mean "{near[0]}"?' if near else "write one of these"
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
     reporter = Reporter(source.file, source.places, overridden, Table)
     # Nothing else can be said: another method would have other keys.
     problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
+
+
+def _known_keys(source: Source, method: Method[Any]) -> int:
+    """How many keys of a file the method knows."""
+    known = {path for path, _ in leaf_fields(method.spec)}
+    return sum(path in known for path in source.places)
 
 
 def _stated(source: Source, overrides: Sequence[str], path: Path) -> tuple[object, bool]:
@@ -194,7 +204,7 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
             layers.catalogue[(*around, key)] = name
 
 
-def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AnySpec:
+def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AxisSpec:
     """Validate all layers together; what is wrong joins ``layers.problems``."""
     tables = layers.tables
     # Rules between keys need a whole specification: keys with problems are replaced by ones that are allowed, and the

@@ -38,7 +38,7 @@ class ReferenceRow:
     example: str
 
 
-def reference_rows(method: str = "print_head") -> tuple[ReferenceRow, ...]:
+def reference_rows(method: str) -> tuple[ReferenceRow, ...]:
     """All keys a method's axis file knows, in the order of the schema.
 
     Parameters
@@ -48,7 +48,7 @@ def reference_rows(method: str = "print_head") -> tuple[ReferenceRow, ...]:
 
     Examples
     --------
-    >>> row = reference_rows()[3]
+    >>> row = reference_rows("print_head")[3]
     >>> row.key, row.unit, row.required
     ('limits.travel', 'm', True)
     """

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.kernel.registers import Leaf, Registers
-from detent.methods.filtered_servo.system import CLOCKS
-from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.record.recorder import choose_leaves
 from detent.record.waveforms import Phase, Waveform, Waveforms, clock_waveform, waveforms_from_rows
 from detent.units import format_quantity
@@ -192,46 +190,3 @@ def _with_first_half(
     doubled[leaf.path][0::2], doubled[leaf.path][1::2] = first_half(rows), rows[leaf.path]
     doubled["tick"] = np.arange(len(doubled)) + 2 * (int(rows["tick"][0]) - 1) + 1
     return waveforms_from_rows(doubled, [leaf], period=period / 2)[leaf.path]
-
-
-def phase_servo_clocking(spec: PhaseServoSpec) -> Clocking:
-    """First clock and sawtooth as a tick begins, pulses while the second clock is active, samplers as it ends."""
-    mask, half = spec.detector.counts - 1, 1 << (spec.drive.pwm_bits - 1)
-
-    def reference(rows: Any) -> NDArray[Any]:
-        """Reference counter after the first clock: without the pulse of the second."""
-        plus, minus = (rows[f"converters.tracking.{sign}"].astype(np.int64) for sign in ("plus", "minus"))
-        return (rows["converters.tracking.reference"] - plus + minus) & mask
-
-    def sawtooth(rows: Any) -> NDArray[Any]:
-        """Sawtooth in the first of the two oscillator periods."""
-        return (rows["pwm.sawtooth"].astype(np.int64) - 1 + half) % (2 * half) - half
-
-    def request(rows: Any) -> NDArray[Any]:
-        """Request in the first of the two oscillator periods."""
-        return np.sign(rows["law.word"].astype(np.int64) - sawtooth(rows))
-
-    pulse = Phase(pulse=(0.5, 0.75))
-    tracking = "converters.tracking"
-    return Clocking(
-        phases={
-            tracking: Phase(0.75),
-            f"{tracking}.gate": pulse,
-            f"{tracking}.plus": pulse,
-            f"{tracking}.minus": pulse,
-            "speed": Phase(0.75),
-            "sequencer": Phase(0.75),
-            "law": Phase(0.75),
-        },
-        clocks={
-            "clocks.CK1": ((0.0, 0.25), "first reference clock"),
-            "clocks.CK2": ((0.5, 0.75), "second reference clock"),
-        },
-        between={f"{tracking}.reference": reference, "pwm.sawtooth": sawtooth, "pwm.request": request},
-        needs=(f"{tracking}.plus", f"{tracking}.minus", "pwm.sawtooth", "law.word"),
-    )
-
-
-def filtered_servo_clocking() -> Clocking:
-    """Ten clocks of the decoder in a tick."""
-    return Clocking(rows_per_tick=CLOCKS, clocks={"clock.C": ((0.0, 0.5), "decoder clock, 1 MHz")})

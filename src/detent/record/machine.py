@@ -7,18 +7,6 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from detent.kernel.registers import Registers
-from detent.methods.filtered_servo import system as filtered_servo
-from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.phase_servo import system as phase_servo
-from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.methods.print_head import system as print_head
-from detent.methods.print_head.build import build_print_head
-from detent.methods.print_head.schema import PrintHeadSpec
-from detent.methods.rotary_table import system as rotary_table
-from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
-from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.record.capture import Capture
 from detent.record.recorder import Recorder
 
@@ -27,6 +15,9 @@ LONGEST_STRETCH = 1 << 20
 
 AnyRecorder = Recorder | Capture
 """What records a run: every n-th tick of all of it, or each clock of a stretch."""
+
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0..1, and what is being done."""
 
 P = TypeVar("P", bound=Registers)
 S = TypeVar("S", bound=Registers)
@@ -110,40 +101,3 @@ class Machine(Generic[P, S]):
         """Hand the last rows to the recorder's sink."""
         if self.recorder is not None:
             self.recorder.flush(self._clock.tick)
-
-
-def print_head_machine(
-    spec: PrintHeadSpec, recorder: AnyRecorder | None = None
-) -> Machine[print_head.PrintHeadParams, print_head.PrintHead]:
-    """Print head at power-on."""
-    p, r = build_print_head(spec), print_head.PrintHead()
-    print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
-    return Machine(p, r, Loop(print_head.TICK, print_head.advance), recorder)
-
-
-def phase_servo_machine(
-    spec: PhaseServoSpec, recorder: AnyRecorder | None = None
-) -> Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo]:
-    """Phase servo at power-on."""
-    p, r = build_phase_servo(spec), phase_servo.PhaseServo()
-    phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
-    return Machine(p, r, Loop(spec.tick, phase_servo.advance), recorder)
-
-
-def filtered_servo_machine(
-    spec: FilteredServoSpec, recorder: AnyRecorder | None = None
-) -> Machine[filtered_servo.FilteredServoParams, filtered_servo.FilteredServo]:
-    """Filtered servo at power-on."""
-    p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
-    filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
-    loop = Loop(filtered_servo.TICK, filtered_servo.advance, filtered_servo.advance_by_clocks)
-    return Machine(p, r, loop, recorder)
-
-
-def rotary_table_machine(
-    spec: RotaryTableSpec, recorder: AnyRecorder | None = None
-) -> Machine[rotary_table.RotaryTableParams, rotary_table.RotaryTable]:
-    """Rotary table at power-on."""
-    p, r = build_rotary_table(spec), rotary_table.RotaryTable()
-    rotary_table.switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
-    return Machine(p, r, Loop(rotary_table.TICK, rotary_table.advance), recorder)

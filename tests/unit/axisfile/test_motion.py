@@ -11,7 +11,7 @@ from detent.axisfile.motion import ROTARY_UNITS, rotary_model, unit_in
 from detent.errors import InputError
 from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of
 from detent.files.quantities import Force, Length, Time
-from detent.methods.registry import CASCADE
+from detent.methods.registry import METHODS
 from detent.units import KINDS, parse_quantity
 
 
@@ -105,7 +105,7 @@ def test_a_table_without_lengths_stays_itself():
 
 
 def test_only_units_and_examples_differ():
-    linear, rotary = dict(leaf_fields(CASCADE.spec)), dict(leaf_fields(CASCADE.rotary))
+    linear, rotary = dict(leaf_fields(METHODS["cascade"].spec)), dict(leaf_fields(METHODS["cascade"].rotary))
     assert list(linear) == list(rotary)
     changed = 0
     for path, field in linear.items():

@@ -287,7 +287,7 @@ KEYS_AND_TABLES = [
         "axis.method",
         '"lathe"',
         '"stepper_envelope"',
-        'write method = "print_head"',
+        "write one of these",
     ),
     edit(
         "method with a hyphen",
@@ -420,7 +420,7 @@ OVERRIDES = [
     given("choice", "method.span=fast", "method.span", "fast", '"emf" or "steady"', 'write "steady"'),
     given("switch", "method.trim=maybe", "method.trim", "maybe", "true or false", "trim = true"),
     given("fraction", "encoder.cycles_per_revolution=1.5", "encoder.cycles_per_revolution", "1.5", "whole", "whole"),
-    given("method", "axis.method=lathe", "axis.method", "lathe", '"print_head"', "write method"),
+    given("method", "axis.method=lathe", "axis.method", "lathe", '"print_head"', "write one"),
     given("part of a method", "axis.method=stepper", "axis.method", "stepper", '"print_head"', '"stepper_envelope"?'),
     given("catalogue", "motor.catalogue=maxon RE 4", "motor.catalogue", "maxon RE 4", "Faulhaber", "did you mean"),
     given("supply below effort", "drive.supply=34 V", "drive.supply", "34 V", 'limits.effort ("38 V") up to', "lower"),

@@ -10,9 +10,9 @@ from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.errors import InputError
 from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, table_of
 from detent.files.problems import default_text, field_at, format_value
-from detent.kernel.registers import Registers
 from detent.methods.check import check_spec
-from detent.methods.registry import METHODS, Method
+from detent.methods.method import Method
+from detent.methods.registry import METHODS
 
 
 class FaultTable(Table, frozen=True):
@@ -36,19 +36,12 @@ TEXT = '[axis]\nname = "x"\nmethod = "faulty"\n[fault]\nticks = [20000, 20096]\n
 
 @pytest.fixture(autouse=True)
 def faulty(monkeypatch):
-    method = Method(
-        name="faulty",
-        title="faulty: fails when told",
-        spec=FaultSpec,
-        fill=lambda spec: spec,
-        rules=(),
-        derive=lambda _: (),
-        cautions=lambda _: iter(()),
-        catalogue=None,
-        registers=lambda: Registers,
-        parameters=lambda: Registers,
-    )
-    monkeypatch.setitem(METHODS, "faulty", method)
+    class Faulty(Method[FaultSpec]):
+        name = "faulty"
+        title = "faulty: fails when told"
+        spec = FaultSpec
+
+    monkeypatch.setitem(METHODS, "faulty", Faulty())
 
 
 def field(key):

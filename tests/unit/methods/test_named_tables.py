@@ -31,10 +31,10 @@ from detent.files.fields import (
 from detent.files.findings import Contradiction
 from detent.files.problems import bad_names, default_text, field_at, format_value, known_keys
 from detent.files.quantities import Frequency, Inertia, Length, Torque
-from detent.kernel.registers import Registers
 from detent.methods.check import check_spec
+from detent.methods.method import Method
 from detent.methods.reference import reference_rows
-from detent.methods.registry import METHODS, Method
+from detent.methods.registry import METHODS
 
 NAME = Naming("NAME", "[a-z][a-z0-9_-]{0,9}", "up to 10 small letters, digits and signs, a letter first", "north")
 NUMBER = Naming("NUMBER", "[0-9]", "a digit", "1")
@@ -82,19 +82,14 @@ def stops_inside(spec):
 
 @pytest.fixture(autouse=True)
 def yard(monkeypatch):
-    method = Method(
-        name="yard",
-        title="yard: rails side by side",
-        spec=YardSpec,
-        fill=lambda spec: spec,
-        rules=(stops_inside,),
-        derive=lambda _: (),
-        cautions=lambda _: iter(()),
-        catalogue=STEPPER_MOTORS,
-        registers=lambda: Registers,
-        parameters=lambda: Registers,
-    )
-    monkeypatch.setitem(METHODS, "yard", method)
+    class Yard(Method[YardSpec]):
+        name = "yard"
+        title = "yard: rails side by side"
+        spec = YardSpec
+        rules = (stops_inside,)
+        catalogue = STEPPER_MOTORS
+
+    monkeypatch.setitem(METHODS, "yard", Yard())
 
 
 MOTOR = "Trinamic QSH2818-32-07-006"

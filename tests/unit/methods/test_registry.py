@@ -15,8 +15,9 @@ from detent.files.problems import dotted, field_at
 from detent.files.quantities import Length
 from detent.kernel.registers import Registers
 from detent.methods.check import check_spec
+from detent.methods.method import Method
 from detent.methods.reference import reference_rows
-from detent.methods.registry import METHODS, Method
+from detent.methods.registry import METHODS
 
 
 class SledAxisTable(AxisTable, frozen=True):
@@ -35,29 +36,43 @@ class SledSpec(AxisSpec, frozen=True):
 
 PARKED_OUTSIDE = Contradiction(("park", "travel"), "up to travel", "lower park")
 
-SLED = Method(
-    name="sled",
-    title="sled: goes downhill",
-    spec=SledSpec,
-    fill=lambda spec: spec if spec.park else spec.model_copy(update={"park": spec.travel / 2}),
-    rules=(
-        lambda spec: iter(
-            [Contradiction(("park", "travel"), "up to travel", "lower park")] * (spec.park > spec.travel)
-        ),
-    ),
-    derive=lambda spec: (quantity_figure("way back", spec.travel, "m", "travel"),),
-    cautions=lambda spec: iter([Caution("travel", "long", "short", "it takes long", "walk")] * (spec.travel > 9)),
-    catalogue=None,
-    registers=lambda: Registers,
-    parameters=lambda: Registers,
-)
+
+def park_inside(spec):
+    if spec.park > spec.travel:
+        yield PARKED_OUTSIDE
+
+
+class Sled(Method[SledSpec]):
+    name = "sled"
+    title = "sled: goes downhill"
+    jobs = "a slope"
+    pace = "1 s, every one"
+    spec = SledSpec
+    rules = (park_inside,)
+
+    def fill(self, spec):
+        return spec if spec.park else spec.model_copy(update={"park": spec.travel / 2})
+
+    def derive(self, spec):
+        return (quantity_figure("way back", spec.travel, "m", "travel"),)
+
+    def cautions(self, spec):
+        if spec.travel > 9:
+            yield Caution("travel", "long", "short", "it takes long", "walk")
+
+    def registers(self):
+        return Registers
+
+    def parameters(self):
+        return Registers
+
 
 SLED_TEXT = 'travel = "2 m"\n[axis]\nname = "hill"\nmethod = "sled"\n'
 
 
 @pytest.fixture(autouse=True)
 def sled(monkeypatch):
-    monkeypatch.setitem(METHODS, "sled", SLED)
+    monkeypatch.setitem(METHODS, "sled", Sled())
 
 
 def problem_of(load_text, key, text, *overrides):

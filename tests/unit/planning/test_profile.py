@@ -2,11 +2,12 @@ import math
 
 import numpy as np
 import pytest
+from tests.planned_jobs import plan_job
 
 from detent.errors import DetentError
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning import profile as profile_module
-from detent.planning.profile import MotionLimits, plan_job, plan_move, profile_of_recording
+from detent.planning.profile import MotionLimits, plan_move, profile_of_recording
 
 T = 1e-3
 LIMITS = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)

@@ -6,7 +6,7 @@ import pytest
 import detent
 from detent.errors import DetentError
 from detent.methods.load import load_spec
-from detent.methods.simulated import simulated
+from detent.methods.registry import METHODS
 from detent.record.capture import Stretch, capture
 from detent.record.vcd_file import load_vcd, save_vcd
 
@@ -21,7 +21,7 @@ STRETCHES = {
 
 def captured(name, at=None, duration=None, signals=None, overrides=()):
     spec = load_spec(detent.example(name), overrides)
-    method = simulated(spec)
+    method = METHODS[spec.axis.method].simulated(spec)
     begin, length = STRETCHES[name]
     stretch = Stretch(
         begin if at is None else at,
@@ -47,7 +47,7 @@ def test_a_capture_spans_its_stretch_and_shows_what_was_asked(name):
     assert found.begin == round(begin * 1e12)
     assert found.end == round((begin + length) * 1e12)
     names = [signal.name for signal in found.signals]
-    method = simulated(load_spec(detent.example(name)))
+    method = detent.load(detent.example(name)).simulated
     assert [*(method.clocking.clocks or {}), *method.timing] == names
 
 
@@ -119,7 +119,7 @@ WATCHED = ("train.position", "train.velocity", "train.current")
 )
 def test_watching_changes_nothing(name, delay):
     """A trace of every tick of the job passes through the same values; a decoder clock sees its tick begin."""
-    method = simulated(load_spec(detent.example(name)))
+    method = detent.load(detent.example(name)).simulated
     found = captured(name, signals=WATCHED)
     trace = detent.load(detent.example(name)).run(method.sample_job(), signals=WATCHED, every=1).trace
     end = round(sum(STRETCHES[name]) / method.tick)

@@ -4,10 +4,10 @@ from tests.print_head_rig import EXAMPLE
 from detent.control.head_computer import HOME_LEFT, POWER_ON
 from detent.control.latch import read_latch, write_latch
 from detent.methods.load import load_spec
+from detent.methods.print_head.run import print_head_machine
 from detent.methods.print_head.system import TICK, PrintHead
 from detent.record import machine as machine_module
 from detent.record import recorder as recorder_module
-from detent.record.machine import print_head_machine
 from detent.record.recorder import Recorder
 
 

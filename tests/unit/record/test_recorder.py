@@ -7,9 +7,9 @@ from tests.print_head_rig import EXAMPLE
 from detent.errors import DetentError
 from detent.kernel.registers import Registers, block, f8, i4_array, i8, register, u1
 from detent.methods.load import load_spec
+from detent.methods.print_head.run import print_head_machine
 from detent.methods.print_head.system import TICK, PrintHead
 from detent.record import recorder as recorder_module
-from detent.record.machine import print_head_machine
 from detent.record.recorder import Recorder, choose_leaves
 
 

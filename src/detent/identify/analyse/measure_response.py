@@ -13,8 +13,8 @@ from detent.identify.analyse.average_windows import FEWEST_ROWS, average_windows
 from detent.identify.analyse.excitation_period import cut_periods
 from detent.identify.analyse.frequency_response import FrequencyResponse
 from detent.logs.log import Log, Values
+from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
-from detent.methods.cascade.replay_job import EFFORTS
 
 
 def measure_response(

@@ -158,7 +158,7 @@ def identify(
     logs : sequence of Log
         Runs of one axis, as `read_log` gives them.
     effort : str, optional
-        Which signal drives the axis; by default the first of `replay_job.EFFORTS` that the logs hold.
+        Which signal drives the axis; by default the first of `roles.EFFORTS` that the logs hold.
     method : str
         "regression" of the equation of motion; or "output error", which goes on from there by simulation.
     report : callable, optional

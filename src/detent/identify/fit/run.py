@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.logs.log import Kind, Log
-from detent.methods.cascade.replay_job import EFFORTS
+from detent.logs.roles import EFFORTS
 
 Numbers = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import numpy as np
 from detent.errors import DetentError
 from detent.identify.fit.coloured import coloured_covariance
 from detent.logs.differences import grain
-from detent.logs.effort import EFFORTS
 from detent.logs.log import Log, Values
+from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 
 BLOCKS = 10

@@ -17,7 +17,7 @@ from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
 
 if TYPE_CHECKING:
-    from detent.methods.print_head.run import Progress
+    from detent.record.machine import Progress
 
 _STAGES = {
     "ladder": (0.1, 0.4, "fitting models to parts of the log"),

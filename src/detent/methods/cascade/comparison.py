@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.host import CascadeHost, Rows
-from detent.methods.cascade.run import Progress
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
 from detent.planning.profile import MotionLimits, plan_move
+from detent.record.machine import Progress
 from detent.sensing.gauge import set_gauge
 
 WATCHED_TIME = 0.5

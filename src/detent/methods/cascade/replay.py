@@ -21,9 +21,8 @@ from detent.errors import DetentError
 from detent.methods.cascade.host import CHUNK, CascadeHost, Rows
 from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.cascade.replay_job import ReplayJob
-from detent.methods.cascade.run import Progress
 from detent.methods.cascade.schema import CascadeSpec
-from detent.record.machine import AnyRecorder
+from detent.record.machine import AnyRecorder, Progress
 from detent.units import format_quantity
 
 EFFORTS: dict[str, tuple[str, ...]] = {

@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.logs.roles import EFFORTS
 from detent.methods.cascade.schema import CascadeSpec
-
-EFFORTS = ("force", "torque", "current", "voltage", "command")
-"""Signals of a log that can drive an axis, the nearest to its mechanics first."""
 
 Numbers = NDArray[np.float64]
 

@@ -1,7 +1,6 @@
 """A list of moves on a simulated cascade axis, from power-on: what its drive sees, and an observer beside the load."""
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,12 +11,9 @@ from detent.methods.cascade.host import CascadeHost, Peaks
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import MOST_PROBLEMS, Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_move
-from detent.record.machine import AnyRecorder
+from detent.record.machine import AnyRecorder, Progress
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
-
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
 
 COAST = 0.1
 """Time that a run goes on after the drive has gone off [s]."""

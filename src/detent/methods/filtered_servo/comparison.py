@@ -17,10 +17,10 @@ from detent.analysis.arguments import require_positive
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.derive import Machine as Figures
+from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
-from detent.methods.moves.run import Progress
-from detent.record.machine import Machine, filtered_servo_machine
+from detent.record.machine import Machine, Progress
 from detent.record.recorder import Recorder, make_trace
 from detent.record.trace import Trace
 

@@ -277,3 +277,8 @@ class _Carriage:
         remedy = "remove it; save a document of a word processor as plain text first"
         came = f"the character {code}, which prints nothing alone"
         self.problems.append(FileProblem(self.file, self.row, self.place, "", came, _WHAT_TEXT_HOLDS, remedy))
+
+
+def one_move(name: str, by: float, dwell: float) -> MoveJob:
+    """A job of one move by a way [m] or [rad] and a dwell [s], for looking at signals."""
+    return MoveJob(name, "moves", (Move(number=1, row=0, by=by, dwell=dwell),))

@@ -18,8 +18,8 @@ from detent.methods.moves.page_data import (
     PhaseMove,
     ServoReportData,
 )
-from detent.methods.moves.run import MoveRecord, MoveRun, ServoSpec
-from detent.methods.moves.summary import SOONEST, arrived, count_unit, interference_text, move_figures
+from detent.methods.moves.run import MoveRecord, MoveRun
+from detent.methods.moves.summary import SOONEST, ServoSpec, arrived, count_unit, interference_text, move_figures
 from detent.methods.phase_servo.hold_comparison import HoldComparison
 from detent.methods.phase_servo.noise_comparison import NoiseComparison
 from detent.methods.phase_servo.schema import PhaseServoSpec

@@ -1,33 +1,15 @@
 """A list of moves on a simulated servo axis, from power-on: what an observer beside the carriage sees."""
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from detent.errors import AxisError
-from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.host import Destination, FilteredHost, Host, PhaseHost, check_job
+from detent.methods.moves.host import Destination, Host, check_job
 from detent.methods.moves.job import MoveJob
-from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.record.machine import AnyRecorder
+from detent.record.machine import Progress
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
-
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
-
-ServoSpec = PhaseServoSpec | FilteredServoSpec
-
-PHASE_SIGNALS = (
-    "train.position", "train.velocity", "train.current", "sequencer.mode", "sequencer.state", "sequencer.distance",
-    "sequencer.ready", "sequencer.stop", "law.setpoint", "law.integral", "law.word", "speed.word",
-    "converters.absolute.word", "gauge.target",
-)  # fmt: skip
-FILTERED_SIGNALS = (
-    "train.position", "train.velocity", "train.current", "generator.command", "deviation.deviation", "deviation.error",
-    "deviation.word", "speed.word", "filter.output", "clock.period", "gauge.target",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,24 +122,15 @@ class MoveRun:
         return found
 
 
-def make_host(spec: ServoSpec, recorder: AnyRecorder | None = None) -> Host:
-    """Host of the axis, at power-on."""
-    return PhaseHost(spec, recorder) if isinstance(spec, PhaseServoSpec) else FilteredHost(spec, recorder)
-
-
-def run_moves(
-    spec: ServoSpec, job: MoveJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
-) -> MoveRun:
-    """Make a list of moves on the axis of `spec`, from power-on.
+def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> MoveRun:
+    """Make a list of moves on an axis, from power-on.
 
     Parameters
     ----------
-    spec : PhaseServoSpec or FilteredServoSpec
-        The axis.
+    host : Host
+        The host of the axis, at power-on.
     job : MoveJob
         The moves.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
     progress : callable, optional
         Told the share done.
 
@@ -171,7 +144,6 @@ def run_moves(
     InputError
         A move cannot be commanded to this axis.
     """
-    host = make_host(spec, recorder)
     result = MoveRun(job, tolerance=host.tolerance, grid=host.grid)
     destinations = check_job(host, job)
     try:
@@ -239,16 +211,9 @@ def _verdict(host: Host, to: Destination, error: float, *, arrived: bool) -> str
 
 def _away(host: Host, error: float) -> str:
     """How far from the target, in the unit of the axis too."""
+    counts, more = host.in_counts(error).partition(",")[::2]
     side = "short of it to the left" if error > 0 else "to the right of it"
-    counts = abs(error) / (host.spec.step if isinstance(host, PhaseHost) else host.grid)
-    name = "steps" if isinstance(host, PhaseHost) else "pulses"
-    text = f"{format_quantity(abs(error), 'm')} ({counts:.1f} {name}) {side}"
-    pitches = error / host.grid
-    if isinstance(host, PhaseHost) and abs(pitches) > 0.5 and abs(pitches - round(pitches)) < 0.1:
-        text += (
-            f", on the positioning point {abs(round(pitches))} {'pitch' if abs(round(pitches)) == 1 else 'pitches'} off"
-        )
-    return text
+    return f"{format_quantity(abs(error), 'm')} ({counts}) {side}{',' + more if more else ''}"
 
 
 def _finish(host: Host, result: MoveRun) -> None:

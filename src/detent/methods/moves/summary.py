@@ -4,11 +4,14 @@ import math
 import statistics
 from collections.abc import Callable
 
+from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.moves.page_data import CountUnit, MoveFigures, Worst
-from detent.methods.moves.run import MoveRecord, MoveRun, ServoSpec
+from detent.methods.moves.run import MoveRecord, MoveRun
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.print_head.run import Direction, PrintRun
 from detent.page.words import GAP, count, duration, number
+
+ServoSpec = PhaseServoSpec | FilteredServoSpec
 
 SOONEST = 1e-6
 """An axis that says so by less than this before it is within the tolerance says so in time [s]."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.axisfile.tables import PushTable
-from detent.methods.moves.run import Progress
 from detent.methods.phase_servo.derive import Machine as Figures
 from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench, change_method
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
+from detent.record.machine import Progress
 from detent.record.recorder import Recorder
 
 PITCHES = 6

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from detent.axisfile.tables import BurstTable, InterferenceTable
 from detent.errors import DetentError
-from detent.methods.moves.run import Progress
 from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench, change_method
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
+from detent.record.machine import Progress
 from detent.sensing.interference import ENTRIES
 
 PULSES = (0, 1, 2, 5, 8, 12, 16, 20, 30)

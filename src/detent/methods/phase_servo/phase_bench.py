@@ -7,9 +7,10 @@ runs differ in what is compared and in nothing else.
 import math
 
 from detent.control.phase_sequencer import POSITION_MODE
+from detent.methods.phase_servo.host import phase_servo_machine
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready
-from detent.record.machine import Machine, phase_servo_machine
+from detent.record.machine import Machine
 from detent.record.recorder import Recorder
 
 START = 0.25e-3

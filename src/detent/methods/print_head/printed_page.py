@@ -122,6 +122,10 @@ class JobNote:
     code: str
     text: str
 
+    def __str__(self) -> str:
+        """As a person reads it."""
+        return f"byte {self.offset}, {self.code}: {self.text}"
+
 
 @dataclass(frozen=True, slots=True)
 class AcceptedCode:

@@ -5,7 +5,7 @@ next line while the present one prints.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -16,18 +16,26 @@ from detent.control.column_timer import COLUMNS
 from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
+from detent.methods.print_head import system as print_head
+from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.derive import Machine as TrueMachine
 from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
-from detent.record.machine import AnyRecorder, print_head_machine
+from detent.record.machine import AnyRecorder, Loop, Machine, Progress
 
 NOT_FIRED = -(1 << 31)
 EMITTERS_PER_COLUMN = 2.5
 
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
+
+def print_head_machine(
+    spec: PrintHeadSpec, recorder: AnyRecorder | None = None
+) -> Machine[print_head.PrintHeadParams, print_head.PrintHead]:
+    """Print head at power-on."""
+    p, r = build_print_head(spec), print_head.PrintHead()
+    print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
+    return Machine(p, r, Loop(print_head.TICK, print_head.advance), recorder)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.methods.rotary_table.build import start_turns, ticks
 from detent.methods.rotary_table.host import TableHost
-from detent.methods.rotary_table.run import Progress
 from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, RotaryTableSpec
 from detent.methods.rotary_table.system import TICK, RotaryTable
 from detent.methods.rotary_table.table_observer import FULL_TURN
+from detent.record.machine import Progress
 from detent.record.recorder import Recorder, make_trace
 from detent.units import format_quantity
 

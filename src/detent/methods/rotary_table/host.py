@@ -10,10 +10,12 @@ from typing import Any
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import at_least, at_most
+from detent.methods.rotary_table import system as rotary_table
+from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_faults import StepFault, find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
-from detent.record.machine import AnyRecorder, rotary_table_machine
+from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
 
 MOST_PROBLEMS = 20
@@ -23,6 +25,15 @@ MARGIN = 0.5
 
 SETTLING = 10.0
 """Time that the position loop is given to settle, in units of 1 / Kp."""
+
+
+def rotary_table_machine(
+    spec: RotaryTableSpec, recorder: AnyRecorder | None = None
+) -> Machine[rotary_table.RotaryTableParams, rotary_table.RotaryTable]:
+    """Rotary table at power-on."""
+    p, r = build_rotary_table(spec), rotary_table.RotaryTable()
+    rotary_table.switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
+    return Machine(p, r, Loop(rotary_table.TICK, rotary_table.advance), recorder)
 
 
 class TableHost:

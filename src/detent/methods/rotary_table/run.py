@@ -1,7 +1,6 @@
 """A sequence on a simulated rotary table, from power-on: what an observer beside the table sees."""
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,12 +10,9 @@ from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob, Wait
 from detent.methods.rotary_table.table_observer import FULL_TURN, TableObserver
-from detent.record.machine import LONGEST_STRETCH, AnyRecorder
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Progress
 from detent.sensing.angle_gauge import set_angle_gauge
 from detent.units import format_quantity
-
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
 
 SEQUENCE_SIGNALS = (
     "machine.motor.velocity", "table", "detector.absolute.theta", "positioner.state", "positioner.z",

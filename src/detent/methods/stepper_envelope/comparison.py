@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from detent.control.step_comparison import BRAKING_DISTANCE, CONSTANT_FREQUENCY, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import start_move
 from detent.errors import DetentError
-from detent.methods.print_head.run import Progress
 from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
 from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.system import Stepper, StepperParams, advance
 from detent.planning.step_ramp import natural_frequency, total_inertia
-from detent.record.machine import LONGEST_STRETCH
+from detent.record.machine import LONGEST_STRETCH, Progress
 from detent.record.recorder import choose_leaves
 
 Numbers = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """What of a stepper's envelope leaves for other tools and for firmware: the table as CSV, table and rule as a C header.
 
 The header's registers, numbers and words are those of the control unit and the step timer that run here: they are taken
-from the same declarations, so firmware and simulation cannot drift apart. Its text is template/step_rule.h.in.
+from the same declarations, so firmware and simulation cannot drift apart. Its text is step_rule.h.in.
 """
 
 import csv
@@ -26,6 +26,7 @@ from detent.control.step_rule import StepRule
 from detent.drive.step_timer import StepTimer
 from detent.errors import DetentError
 from detent.kernel.registers import Field, Registers
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.system import StepperParams, load_rule
 from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
 from detent.record.trace_store import part_of, writing
@@ -357,3 +358,63 @@ def _numbers(values: NDArray[Any]) -> str:
     per_line = PER_LINE if max(map(len, texts)) <= 5 else PER_LINE // 2
     rows = (texts[first : first + per_line] for first in range(0, len(texts), per_line))
     return ",\n".join("    " + ", ".join(row) for row in rows)
+
+
+def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:
+    """Tables of one motor as its file describes it."""
+    from detent.methods.stepper_envelope.build import make_tables
+
+    table, tables = spec.stepper[name], make_tables(spec.stepper[name])
+    return EnvelopeTables(
+        motor=name,
+        axis=spec.axis.name,
+        up=tables.up,
+        down=tables.down,
+        clock_hz=round(spec.controller.timer),
+        reload=spec.controller.words == "reload",
+        travel_per_step=table.step,
+        first_position=table.mechanics.lower_end,
+        pause=table.drive.reversal_pause,
+    )
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Tables of one stepper.
+
+    Attributes
+    ----------
+    tables : EnvelopeTables
+        Both directions, and what firmware must know to use them.
+    """
+
+    tables: EnvelopeTables
+
+    def save(self, path: str | Path) -> Path:
+        """Write the tables; the suffix chooses CSV (.csv), a C99 header with the step rule (.h), or a figure.
+
+        Raises
+        ------
+        DetentError
+            The suffix is another, or the file cannot be written.
+        """
+        from detent.methods.stepper_envelope.envelope_figure import plot_envelope
+
+        path = Path(path)
+        writers = {".csv": write_envelope_csv, ".h": write_envelope_header}
+        writers.get(path.suffix.lower(), plot_envelope)(self.tables, path)
+        return path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data: size and memory of the tables."""
+        t = self.tables
+        return {
+            "motor": t.motor,
+            "steps": t.steps,
+            "step": t.travel_per_step,
+            "ramp": len(t.up.ramp),
+            "start_hz": float(t.up.ramp.hz[0]),
+            "top_hz": float(t.up.ramp.hz[-1]),
+            "run_up": t.up.ramp.duration,
+            "bytes": t.up.entries.nbytes + t.down.entries.nbytes + len(t.up.ramp) * t.word_bytes,
+        }

@@ -1,6 +1,5 @@
 """A job on a simulated stepper stage, from power-on: what its host commands, and what an observer of rotors sees."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,10 +10,7 @@ from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.planning.step_ramp import torque_margin
-from detent.record.machine import AnyRecorder
-
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
+from detent.record.machine import AnyRecorder, Progress
 
 MOTOR_SIGNALS = (
     "rule.position", "rule.index", "rule.state", "rule.direction", "timer.period", "rotor.angle", "rotor.velocity",

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.planned_jobs import plan_job
 
 from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.moves.job import Move, MoveJob
-from detent.planning.profile import MotionLimits, plan_job, plan_move
+from detent.planning.profile import MotionLimits, plan_move
 
 
 def test_a_reference_that_stands_has_no_derivatives():

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.places import DATA
+from tests.planned_jobs import plan_job
 
 import detent
 from detent.errors import DetentError
@@ -16,7 +17,7 @@ from detent.methods.cascade.replay import at_stamps, per_command, run_cascade_re
 from detent.methods.cascade.replay_job import ReplayJob, make_replay_job
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
-from detent.planning.profile import MotionLimits, plan_job
+from detent.planning.profile import MotionLimits
 
 pytestmark = pytest.mark.compiled
 

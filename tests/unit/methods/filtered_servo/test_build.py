@@ -12,9 +12,9 @@ from tests.filtered_servo_rig import EXAMPLE
 
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
-from detent.record.machine import filtered_servo_machine
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE
 
 pytestmark = pytest.mark.compiled

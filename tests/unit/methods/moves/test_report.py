@@ -8,6 +8,8 @@ from tests.unit.methods.moves.samples import noise_comparison, record, run_of
 
 import detent
 from detent.methods.filtered_servo import system as filtered_servo
+from detent.methods.filtered_servo.host import FilteredHost
+from detent.methods.filtered_servo.method import SIGNALS as FILTERED_SIGNALS
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob, text_job
@@ -15,7 +17,10 @@ from detent.methods.moves.move_file import load_moves
 from detent.methods.moves.page import make_servo_page
 from detent.methods.moves.page_data import FilteredMove, PhaseMove, ServoReportData
 from detent.methods.moves.report import NEEDED_FILTERED, NEEDED_PATH, NEEDED_PHASE, servo_report
-from detent.methods.moves.run import FILTERED_SIGNALS, PHASE_SIGNALS, MoveRun, ServoSpec, run_moves
+from detent.methods.moves.run import MoveRun, run_moves
+from detent.methods.moves.summary import ServoSpec
+from detent.methods.phase_servo.host import PhaseHost
+from detent.methods.phase_servo.method import SIGNALS as PHASE_SIGNALS
 from detent.methods.phase_servo.system import PhaseServo
 from detent.page.page import render_page
 from detent.page.parts import INCH
@@ -31,13 +36,13 @@ PITCH = INCH / 60
 def phase(job: MoveJob, *overrides: str) -> Played:
     spec = load_spec(detent.example("phase_servo.toml"), overrides)
     recorder = Recorder(PhaseServo, PHASE_SIGNALS, every=256, period=spec.tick)
-    return spec, run_moves(spec, job, recorder=recorder), recorder.trace()
+    return spec, run_moves(PhaseHost(spec, recorder), job), recorder.trace()
 
 
 def filtered(job: MoveJob, *overrides: str) -> Played:
     spec = load_spec(detent.example("filtered_servo.toml"), overrides)
     recorder = Recorder(FilteredServo, FILTERED_SIGNALS, every=10, period=filtered_servo.TICK)
-    return spec, run_moves(spec, job, recorder=recorder), recorder.trace()
+    return spec, run_moves(FilteredHost(spec, recorder), job), recorder.trace()
 
 
 def steps(*ways: float, **common: float) -> MoveJob:

@@ -6,11 +6,15 @@ import pytest
 
 import detent
 from detent.errors import InputError
+from detent.methods.filtered_servo import method as filtered_method
+from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob, text_job
 from detent.methods.moves.move_file import load_moves
-from detent.methods.moves.run import FILTERED_SIGNALS, PHASE_SIGNALS, make_host, run_moves
+from detent.methods.moves.run import run_moves
+from detent.methods.phase_servo import method as phase_method
+from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.phase_servo.system import PhaseServo
 from detent.record.recorder import choose_leaves
 
@@ -21,11 +25,11 @@ PITCH = INCH / 60
 
 
 def phase(*overrides):
-    return load_spec(detent.example("phase_servo.toml"), overrides)
+    return PhaseHost(load_spec(detent.example("phase_servo.toml"), overrides))
 
 
 def filtered(*overrides):
-    return load_spec(detent.example("filtered_servo.toml"), overrides)
+    return FilteredHost(load_spec(detent.example("filtered_servo.toml"), overrides))
 
 
 def job(*moves):
@@ -68,7 +72,7 @@ def test_a_move_of_no_way_is_ready_at_once_and_keeps_its_place(moves):
 
 
 def test_the_slide_makes_all_moves_and_stands_within_its_window(slide):
-    spec = filtered()
+    spec = filtered().spec
     assert slide.done, slide.failure
     assert slide.worst_error < 2.5 * spec.pulse
     assert all(math.isnan(move.switched) for move in slide.moves)
@@ -100,9 +104,9 @@ def test_twenty_pulses_move_nothing():
 
 
 def test_an_overspeed_of_the_slide_is_a_fault_with_its_cause():
-    spec = filtered("limits.speed=0.2 m/s", "method.counter_bits=12")
+    spec = filtered("limits.speed=0.2 m/s", "method.counter_bits=12").spec
     spec = spec.model_copy(update={"method": spec.method.model_copy(update={"counter_bits": 8})})
-    found = run_moves(spec, job({"target": 0.4}))
+    found = run_moves(FilteredHost(spec), job({"target": 0.4}))
     assert not found.done
     assert "the speed counter was about to wrap" in found.failure
     assert math.isnan(found.moves[-1].ready)
@@ -166,12 +170,12 @@ def test_all_bad_moves_are_told_at_once_up_to_a_limit():
 
 
 def test_the_usual_signals_exist():
-    assert len(choose_leaves(PhaseServo, PHASE_SIGNALS)) == len(PHASE_SIGNALS)
-    assert len(choose_leaves(FilteredServo, FILTERED_SIGNALS)) == len(FILTERED_SIGNALS)
+    assert len(choose_leaves(PhaseServo, phase_method.SIGNALS)) == len(phase_method.SIGNALS)
+    assert len(choose_leaves(FilteredServo, filtered_method.SIGNALS)) == len(filtered_method.SIGNALS)
 
 
 def test_a_retune_takes_effect_with_the_move_and_the_next_one_goes_back():
-    host = make_host(filtered())
+    host = filtered()
     host.start()
     for period in (2e-3, None):
         move = Move(number=1, row=1, by=1e-3, sample_period=period)

@@ -10,6 +10,7 @@ from detent.methods.moves.job import Move, MoveJob
 from detent.methods.moves.page_data import CountUnit, Worst
 from detent.methods.moves.run import MoveRecord, run_moves
 from detent.methods.moves.summary import FAULT_WORDS, count_unit, move_figures, move_summary_rows, summary_rows
+from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.print_head.print_job import parse_text
 from detent.methods.print_head.run import PrintRun, print_job
 
@@ -134,7 +135,9 @@ def test_interference_is_counted_in_words() -> None:
 
 
 def test_every_kind_of_interference_has_its_words() -> None:
-    run = run_moves(load_spec(detent.example("phase_servo.toml")), MoveJob("one", "moves", (Move(1, 1, by=0.0),)))
+    run = run_moves(
+        PhaseHost(load_spec(detent.example("phase_servo.toml"))), MoveJob("one", "moves", (Move(1, 1, by=0.0),))
+    )
     assert set(run.faults) == set(FAULT_WORDS)
 
 

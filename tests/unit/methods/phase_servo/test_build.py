@@ -16,8 +16,8 @@ from detent.errors import InputError
 from detent.kernel.turn_table import TURN
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.host import phase_servo_machine
 from detent.methods.reference import reference_rows
-from detent.record.machine import phase_servo_machine
 
 pytestmark = pytest.mark.compiled
 

@@ -14,8 +14,8 @@ from tests.places import ROOT
 from detent.control.phase_sequencer import ACQUIRE, HOLD, POSITION_MODE, SETTLE_BUSY, SETTLE_READY, SPEED, SPEED_MODE
 from detent.kernel.step import step
 from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.host import phase_servo_machine
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, advance, be_ready, switch_on, tick
-from detent.record.machine import phase_servo_machine
 
 N = 64
 SAMPLE_TICKS, INTEGRATE_TICKS = 2048, 4096

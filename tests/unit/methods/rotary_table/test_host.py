@@ -8,10 +8,16 @@ import detent
 from detent.control.table_positioner import HOLD, JOG, MOVE, POWER_ON
 from detent.errors import InputError
 from detent.methods.load import load_spec
-from detent.methods.rotary_table.host import TableHost, check_sequence, describe_numbers, dial_of, dial_speed
+from detent.methods.rotary_table.host import (
+    TableHost,
+    check_sequence,
+    describe_numbers,
+    dial_of,
+    dial_speed,
+    rotary_table_machine,
+)
 from detent.methods.rotary_table.sequence_job import Go, Jog, Repeat, SequenceJob, Wait
 from detent.methods.rotary_table.system import TICK
-from detent.record.machine import rotary_table_machine
 
 pytestmark = pytest.mark.compiled
 

@@ -7,10 +7,9 @@ from tests.rotary_table_rig import RATIO, Rig
 
 import detent
 from detent.methods.load import load_spec
-from detent.methods.rotary_table.host import TableHost
+from detent.methods.rotary_table.host import TableHost, rotary_table_machine
 from detent.methods.rotary_table.table_observer import TableObserver, endless_phase
 from detent.plant.gearing import fill_eccentricity, output_phase
-from detent.record.machine import rotary_table_machine
 
 pytestmark = pytest.mark.compiled
 

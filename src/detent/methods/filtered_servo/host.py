@@ -1,0 +1,109 @@
+"""The host of a filtered servo: command pulses, in position, fault."""
+
+import math
+from typing import Any
+
+from detent.control.deviation_counter import FAULT
+from detent.control.pulse_generator import PER_PULSE
+from detent.errors import SERVO_FAULT_TEXT, FileProblem
+from detent.methods.filtered_servo import system as filtered_servo
+from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.moves.host import Destination, Problem
+from detent.methods.moves.job import Move
+from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.units import format_quantity
+
+
+def filtered_servo_machine(
+    spec: FilteredServoSpec, recorder: AnyRecorder | None = None
+) -> Machine[filtered_servo.FilteredServoParams, filtered_servo.FilteredServo]:
+    """Filtered servo at power-on."""
+    p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
+    filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
+    loop = Loop(filtered_servo.TICK, filtered_servo.advance, filtered_servo.advance_by_clocks)
+    return Machine(p, r, loop, recorder)
+
+
+class FilteredHost:
+    """Host of a filtered servo: command pulses, in position, fault."""
+
+    def __init__(self, spec: FilteredServoSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec = spec
+        self.machine = filtered_servo_machine(spec, recorder)
+        self.grid = spec.pulse
+        self.tolerance = (spec.method.in_position + 1) * spec.pulse
+        self.state: Any = self.machine.state
+        self.home = spec.mechanics.start_position
+
+    def start(self) -> None:
+        """Leave the reset."""
+        self.machine.pass_ticks(1)
+
+    def place(self, move: Move, position: float) -> Destination:
+        """Where a move to `position` [m] ends."""
+        pulses = round((position - self.home) / self.spec.pulse)
+        return Destination(move, self.home + pulses * self.spec.pulse, pulses)
+
+    def command(self, to: Destination) -> None:
+        """Ask for the pulses; a sample period of the move takes effect with the next window."""
+        g, move = self.state.generator, to.move
+        g.rate = round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE)
+        g.goal = to.counts
+        self.state.clock.demanded = round((move.sample_period or self.spec.method.sample_period) * 1e6)
+        self.state.away, self.state.busy, self.state.event = 1, 1, 0
+
+    def time_limit(self, to: Destination) -> float:
+        """Time after which a move that is not in position has failed [s]."""
+        speed = to.move.speed or self.spec.limits.speed
+        way, a = abs(to.position - self.state.train.position), self.spec.method.command_acceleration
+        return way / speed + (2 * speed / a if a > 0 else 0.0) + self.spec.method.timeout
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until in position; False on a fault, or when it is not within `seconds`."""
+        self.machine.pass_time(seconds)
+        arrived = bool(self.state.event) and self.state.deviation.state != FAULT
+        self.state.event = 0
+        return arrived
+
+    def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
+        """Speed and sample period of a move against the limits of the counters."""
+        del to, asked
+        spec, found = self.spec, list[FileProblem]()
+        top = spec.limits.speed
+        if move.speed is not None and not 0 < move.speed <= top * (1 + 1e-9):
+            allowed = f"up to limits.speed, {format_quantity(top, 'm/s')}"
+            came = format_quantity(move.speed, "m/s")
+            found.append(problem("speed", came, allowed, "lower it, or raise limits.speed"))
+        period = move.sample_period
+        if period is None:
+            return found
+        most = (1 << (spec.method.counter_bits - 1)) - 2
+        longest = most * spec.pulse / (move.speed or top)
+        if not 1e-4 <= period <= min(longest, 0.1):
+            allowed = f"from 0.1 ms to {format_quantity(min(longest, 0.1), 's')}: the speed counter holds {most} pulses"
+            came = format_quantity(period, "s")
+            found.append(problem("sample_period", came, allowed, "shorten it, lower the speed, or widen the counter"))
+        return found
+
+    def in_counts(self, error: float) -> str:
+        """How far off that is, in pulses."""
+        return f"{abs(error) / self.grid:.1f} pulses"
+
+    @property
+    def failure(self) -> str:
+        """Why the axis has given up; empty while it runs."""
+        d = self.state.deviation
+        return SERVO_FAULT_TEXT[d.cause] if d.state == FAULT else ""
+
+    @property
+    def switched(self) -> float:
+        """A filtered servo has one mode."""
+        return math.nan
+
+    def stands(self, dwell: float) -> None:
+        """Let the axis stand; that it comes into position again after a disturbance is no news."""
+        left = round(dwell / self.machine.tick)
+        while left > 0:
+            left -= self.machine.pass_ticks(left)
+            self.state.event = 0

@@ -1,0 +1,111 @@
+"""The host of a phase servo: set strobe with direction and distance, ready, stop."""
+
+import math
+from typing import Any
+
+from detent.errors import AxisError, FileProblem
+from detent.methods.moves.host import Destination, Problem
+from detent.methods.moves.job import Move
+from detent.methods.phase_servo import system as phase_servo
+from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.units import format_quantity
+
+ACQUISITION = 0.5
+"""Longest time that a phase servo may take to lock and settle after power-on [s]."""
+
+GRID_TOLERANCE = 0.05
+"""How far a target may be from a positioning point, in pitches: what a decimal figure of a length misses."""
+
+
+def phase_servo_machine(
+    spec: PhaseServoSpec, recorder: AnyRecorder | None = None
+) -> Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo]:
+    """Phase servo at power-on."""
+    p, r = build_phase_servo(spec), phase_servo.PhaseServo()
+    phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
+    return Machine(p, r, Loop(spec.tick, phase_servo.advance), recorder)
+
+
+class PhaseHost:
+    """Host of a phase servo: set strobe with direction and distance, ready, stop."""
+
+    def __init__(self, spec: PhaseServoSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec = spec
+        self.machine = phase_servo_machine(spec, recorder)
+        self.grid, self.tolerance = spec.pitch, 2 * spec.step
+        self.state: Any = self.machine.state
+        self.home = round(spec.mechanics.start_position / spec.pitch) * spec.pitch
+        self._counts = 0
+
+    def start(self) -> None:
+        """Wait until the axis has locked, settled on the nearest positioning point and is ready."""
+        self.machine.pass_time(ACQUISITION)
+        s = self.state.sequencer
+        if not s.event:
+            raise AxisError(
+                f"the axis did not become ready within {format_quantity(ACQUISITION, 's')} of power-on: the tracker is "
+                "never silent; look for noise on the detector (detector.jitter, disturbance.lines)"
+            )
+        s.event = 0
+
+    def place(self, move: Move, position: float) -> Destination:
+        """Where a move to `position` [m] ends."""
+        pitches = round((position - self.home) / self.spec.pitch)
+        return Destination(move, self.home + pitches * self.spec.pitch, pitches * self.spec.detector.counts)
+
+    def command(self, to: Destination) -> None:
+        """Set strobe."""
+        s, distance = self.state.sequencer, to.counts - self._counts
+        s.command, s.backward, s.strobe = abs(distance), distance < 0, 1
+        self._counts = to.counts
+
+    def time_limit(self, to: Destination) -> float:
+        """Time after which a move that is not ready has failed [s]: twice what its way can take, and half a second."""
+        way = abs(to.position - self.state.train.position)
+        return 0.5 + 2 * (way / self.spec.limits.speed + 2 * math.sqrt(way / self.spec.method.table_acceleration))
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until ready; False when it is not within `seconds`."""
+        self.machine.pass_time(seconds)
+        arrived = bool(self.state.sequencer.event)
+        self.state.sequencer.event = 0
+        return arrived
+
+    def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
+        """Targets off the positioning points, and words that this axis does not take."""
+        found: list[FileProblem] = []
+        if abs(asked - to.position) > GRID_TOLERANCE * self.grid:
+            low = to.position - self.grid if to.position > asked else to.position
+            near = f"{format_quantity(low, 'm', 7)} or {format_quantity(low + self.grid, 'm', 7)}"
+            grid = f"a multiple of the detector's pitch, {format_quantity(self.grid, 'm', 6)}"
+            key = "target" if move.by is None else "by"
+            found.append(problem(key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"))
+        for word, value in (("speed", move.speed), ("sample_period", move.sample_period)):
+            if value is not None:
+                allowed = f"no {word}: this axis takes its speed from the velocity table"
+                found.append(problem(word, str(value), allowed, "leave it out, or change the axis file"))
+        return found
+
+    def in_counts(self, error: float) -> str:
+        """How far off that is, in steps, and whether it is on another positioning point."""
+        pitches, wrong = error / self.grid, abs(round(error / self.grid))
+        text = f"{abs(error) / self.spec.step:.1f} steps"
+        on_another = abs(pitches) > 0.5 and abs(pitches - round(pitches)) < 0.1
+        name = "pitch" if wrong == 1 else "pitches"
+        return f"{text}, on the positioning point {wrong} {name} off" if on_another else text
+
+    @property
+    def failure(self) -> str:
+        """Why the axis has given up; a phase servo never does."""
+        return ""
+
+    @property
+    def switched(self) -> float:
+        """When position mode was entered [s]."""
+        return self.state.sequencer.switched * self.machine.tick
+
+    def stands(self, dwell: float) -> None:
+        """Let the axis stand."""
+        self.machine.pass_time(dwell)

@@ -1,0 +1,138 @@
+"""The phase servo as a method: what its package brings."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from detent.axisfile.catalogue import DC_MOTORS
+from detent.files.findings import Caution, Derived
+from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.moves.job import MoveJob, one_move
+from detent.methods.phase_servo.cautions import find_cautions
+from detent.methods.phase_servo.derive import derive
+from detent.methods.phase_servo.rules import RULES
+from detent.methods.phase_servo.schema import PhaseServoSpec, fill_derived
+
+if TYPE_CHECKING:
+    from detent.kernel.registers import Registers
+    from detent.page.page import Page
+    from detent.record.machine import AnyRecorder, Progress
+
+SIGNALS = (
+    "train.position", "train.velocity", "train.current", "sequencer.mode", "sequencer.state", "sequencer.distance",
+    "sequencer.ready", "sequencer.stop", "law.setpoint", "law.integral", "law.word", "speed.word",
+    "converters.absolute.word", "gauge.target",
+)  # fmt: skip
+TIMING = (
+    "converters.carrier.count", "detector.ps", "converters.tracking.reference", "converters.tracking.ps_first",
+    "converters.tracking.ps_second", "converters.tracking.msb_first", "converters.tracking.msb_second",
+    "converters.tracking.gate", "converters.tracking.plus", "converters.tracking.minus", "converters.absolute.gated",
+    "converters.absolute.word", "speed.count", "sequencer.distance", "sequencer.mode", "law.word", "pwm.request",
+    "train.current",
+)  # fmt: skip
+
+
+class PhaseServo(Method[PhaseServoSpec]):
+    """Resolver phase: pulses for speed, an absolute word for the stop."""
+
+    name = "phase_servo"
+    title = "phase servo: resolver phase to pulses for speed, absolute at the stop"
+    jobs = "a list of moves (.csv, .toml) or a line of text (.txt)"
+    pace = "250 ns, every 256th"
+    spec = PhaseServoSpec
+    rules = RULES
+    catalogue = DC_MOTORS
+
+    def fill(self, spec: PhaseServoSpec) -> PhaseServoSpec:
+        """The defaults that depend on another table."""
+        return fill_derived(spec)
+
+    def derive(self, spec: PhaseServoSpec) -> tuple[Derived, ...]:
+        """Derived figures."""
+        return derive(spec)
+
+    def cautions(self, spec: PhaseServoSpec) -> Iterable[Caution]:
+        """What looks wrong."""
+        return find_cautions(spec)
+
+    def registers(self) -> "type[Registers]":
+        """State of the axis."""
+        from detent.methods.phase_servo.system import PhaseServo as State
+
+        return State
+
+    def parameters(self) -> "type[Registers]":
+        """Constants of the axis."""
+        from detent.methods.phase_servo.system import PhaseServoParams
+
+        return PhaseServoParams
+
+    def simulated(self, spec: PhaseServoSpec) -> Simulated:
+        """A phase servo that makes moves."""
+        from detent.methods.moves.move_file import load_moves
+        from detent.methods.moves.run import MoveRun, run_moves
+        from detent.methods.phase_servo import system
+        from detent.methods.phase_servo.clocking import phase_servo_clocking
+        from detent.methods.phase_servo.host import PhaseHost
+
+        p = spec.printing
+
+        def run(job: MoveJob, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None) -> MoveRun:
+            return run_moves(PhaseHost(spec, recorder), job, progress=progress)
+
+        def load(path: Path) -> MoveJob:
+            margin = round(p.left_margin / spec.pitch) * spec.pitch
+            return load_moves(path, pitch=p.character_pitch, left_margin=margin, hammer_time=p.hammer_time)
+
+        return Simulated(
+            registers=system.PhaseServo,
+            tick=spec.tick,
+            every=256,
+            seed=spec.detector.seed,
+            signals=SIGNALS,
+            timing=TIMING,
+            clocking=phase_servo_clocking(spec),
+            load=load,
+            job=MoveJob,
+            run=run,
+            sample_job=lambda: one_move("one move of 6 pitches", 6 * spec.pitch, 0.05),
+        )
+
+    def compare(self, spec: PhaseServoSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+        """Beside a servo that stops by counted pulses: noise, rest, load."""
+        from detent.methods.phase_servo.hold_comparison import compare_hold
+        from detent.methods.phase_servo.noise_comparison import compare_noise
+
+        return compare_noise(spec, progress=progress), compare_hold(spec)
+
+    def summary(self, spec: PhaseServoSpec, result: Any) -> list[tuple[str, str]]:
+        """Moves, times, worst errors."""
+        from detent.methods.moves.summary import move_summary_rows
+
+        return move_summary_rows(spec, result)
+
+    def page(self, spec: PhaseServoSpec, result: Any, shown: Shown) -> "Page":
+        """The report."""
+        from detent.methods.moves.page import make_servo_page
+        from detent.methods.moves.report import servo_report
+
+        noise, hold = (*shown.comparisons, None, None)[:2]
+        return make_servo_page(servo_report(spec, result, shown.trace, noise=noise, hold=hold, settings=shown.settings))
+
+    def table(self, spec: PhaseServoSpec, comparison: Any) -> Table:
+        """Where moves end under noise, or how the servos stand still."""
+        from detent.methods.phase_servo.tables import comparison_table
+
+        del spec
+        return comparison_table(comparison)
+
+    def plot(self, spec: PhaseServoSpec, comparison: Any, path: Path) -> None:
+        """The servos side by side."""
+        from detent.methods.phase_servo.noise_comparison import NoiseComparison
+        from detent.page import plot_looks
+
+        del spec
+        if isinstance(comparison, NoiseComparison):
+            plot_looks.plot_noise(comparison, path)
+        else:
+            plot_looks.plot_hold(comparison, path)
