@@ -58,14 +58,15 @@ def lost(motor: Any) -> int:
 
     start_move(motor.r.rule, 1)
     motor.advance_to(FOREVER, 0, until_event=True)
-    motor.advance_to(motor.r.instant + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
+    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
     return motor.lost
 
 
 def watch(motor: Any, names: Sequence[str], seconds: float, every: int) -> tuple[Any, Any]:
     """Start upwards and record registers: time [s], and the registers by name."""
     from detent.control.step_rule import start_move
-    from detent.methods.stepper_envelope.system import Stepper, advance_on_rig
+    from detent.kernel.loop import advance
+    from detent.methods.stepper_envelope.system import Stepper, tables
     from detent.record.recorder import choose_leaves
 
     leaves = choose_leaves(Stepper, names)
@@ -73,10 +74,9 @@ def watch(motor: Any, names: Sequence[str], seconds: float, every: int) -> tuple
     count = round(seconds / motor.p.rotor.dt / every)
     rows = np.zeros((count + 1, len(picks)), np.uint8)
     start_move(motor.r.rule, 1)
-    left = count * every
+    left, feed = count * every, tables(motor.tables.up.entries, motor.tables.down.entries)
     while left > 0:
-        tables = motor.tables.up.entries, motor.tables.down.entries
-        left -= advance_on_rig(motor.p, motor.r, *tables, left, rows, picks, every)
+        left -= advance(motor.p, motor.r, left, rows, picks, every, *feed)
         motor.r.rule.event = 0  # at rest time passes on
     found = rows.view(np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in leaves]))[1:, 0]
     return np.arange(1, count + 1) * every * motor.p.rotor.dt, found
@@ -402,8 +402,8 @@ def jerk() -> None:
 def methods_table() -> None:
     """The comparison with the other methods as a table, for the page."""
     import generate
-
     from detent.methods.shown import comparison_table
+
     from detent.methods.stepper_envelope.comparison import compare_steps
 
     spec = zoom().spec

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from detent.kernel.loop import advance
 from detent.methods.cascade.system import (
+    STANDING,
     Cascade,
     CascadeParams,
-    advance,
-    advance_along,
-    advance_driven,
+    along,
+    driven,
     fill_clocks,
     switch_on,
 )
@@ -79,19 +80,19 @@ class Rig:
 
     def run(self, ticks: int) -> "Rig":
         """Let ticks pass."""
-        assert advance(self.p, self.r, ticks, *NO_TRACE) == ticks
+        assert advance(self.p, self.r, ticks, *NO_TRACE, *STANDING) == ticks
         return self
 
     def drive(self, command: Sequence[float] | np.ndarray, ticks: int) -> "Rig":
         """Let ticks pass under commands from the host, one per sample."""
         values = np.asarray(command, np.float64)
-        assert advance_driven(self.p, self.r, values, ticks, *NO_TRACE) == ticks
+        assert advance(self.p, self.r, ticks, *NO_TRACE, *driven(values)) == ticks
         return self
 
-    def record(self, ticks: int, names: Sequence[str], every: int = 1, **along: Any) -> dict[str, np.ndarray]:
+    def record(self, ticks: int, names: Sequence[str], every: int = 1, **feed: Any) -> dict[str, np.ndarray]:
         """Run and record registers every so many ticks (values at the end of a tick), with `t` [s] since power-on.
 
-        `along` is a `profile` to follow or a `command` per sample; without, the reference stands.
+        `feed` is a `profile` to follow or a `command` per sample; without, the reference stands.
         """
         leaves = {leaf.path: leaf for leaf in Cascade.leaves()}
         chosen = [leaves[name] for name in names]
@@ -99,13 +100,13 @@ class Rig:
         dtype: Any = np.dtype([(c.path, "<" + c.width.code) for c in chosen])
         first = self.r.tick
         rows = np.zeros((ticks // every + 2, dtype.itemsize), np.uint8)
-        if "profile" in along:
-            ref: Profile = along["profile"]
-            advance_along(self.p, self.r, ref.position, ref.velocity, ref.acceleration, ticks, rows, picks, every)
-        elif "command" in along:
-            advance_driven(self.p, self.r, np.asarray(along["command"], np.float64), ticks, rows, picks, every)
-        else:
-            advance(self.p, self.r, ticks, rows, picks, every)
+        laid = STANDING
+        if "profile" in feed:
+            ref: Profile = feed["profile"]
+            laid = along(ref.position, ref.velocity, ref.acceleration)
+        elif "command" in feed:
+            laid = driven(np.asarray(feed["command"], np.float64))
+        advance(self.p, self.r, ticks, rows, picks, every, *laid)
         index = np.arange(first // every + 1, self.r.tick // every + 1)
         table = rows[index % len(rows)].view(dtype)[:, 0]
         t = index * every * self.p.machine.period

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from detent.control.pulse_generator import PER_PULSE
+from detent.kernel.loop import advance
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams, advance, switch_on
+from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams, switch_on
 from detent.methods.load import load_spec
 
 EXAMPLE = Path(str(files("detent") / "examples" / "filtered_servo.toml"))

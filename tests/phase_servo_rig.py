@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from detent.kernel.loop import advance
 from detent.kernel.turn_table import TURN
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.build import build_phase_servo
@@ -17,7 +18,6 @@ from detent.methods.phase_servo.system import (
     Converters,
     PhaseServo,
     PhaseServoParams,
-    advance,
     be_ready,
     convert,
     run_converters,

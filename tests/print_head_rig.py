@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from detent.control.head_computer import FAULT, HIGH_STEADY, IDLE, POWER_ON
+from detent.kernel.loop import advance
 from detent.methods.load import load_spec
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec
-from detent.methods.print_head.system import PERIOD_US, PrintHead, PrintHeadParams, advance, switch_on
+from detent.methods.print_head.system import PERIOD_US, PrintHead, PrintHeadParams, switch_on
 
 EXAMPLE = Path(str(files("detent") / "examples" / "print_head.toml"))
 COUNT = 38.0 / 300

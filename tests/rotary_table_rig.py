@@ -10,7 +10,8 @@ import numpy as np
 from detent.control.endless_angle import TURN_COUNTER
 from detent.control.position_table import SHORTEST
 from detent.control.table_positioner import POWER_ON, Positioner, PositionerParams, interrupt
-from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, advance, switch_on
+from detent.kernel.loop import advance
+from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.plant.rotary_motor import fill_motor
 from detent.sensing.angle_composition import CompositionParams
 

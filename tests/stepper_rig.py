@@ -10,15 +10,16 @@ import numpy as np
 
 from detent.control.step_comparison import CONSTANT_FREQUENCY
 from detent.control.step_rule import FAULT, REST, deflect, start_move
+from detent.kernel.loop import advance
 from detent.kernel.registers import Leaf
 from detent.methods.stepper_envelope.system import (
     NOWHERE,
     Stepper,
     StepperParams,
-    advance,
-    advance_on_rig,
+    alone,
     load_rule,
     switch_on,
+    tables,
 )
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
@@ -139,8 +140,8 @@ class Rig:
         return lost_steps(self.p.rotor, self.r.rotor)
 
     @property
-    def tables(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.up.entries, self.down.entries
+    def tables(self) -> tuple[Any, Any]:
+        return tables(self.up.entries, self.down.entries)
 
     @property
     def resting(self) -> bool:
@@ -213,7 +214,7 @@ class Rig:
         if self._every:
             self._turn_and_log(instants)
         else:
-            advance_on_rig(self.p, self.r, *self.tables, instants, *NO_TRACE)
+            advance(self.p, self.r, instants, *NO_TRACE, *self.tables)
         self.r.rule.event = 0
 
     def log_steps(self, fastest_hz: float) -> "Rig":
@@ -227,10 +228,10 @@ class Rig:
         picks, dtype = pick((*COURSE, "timer.pulses"))
         rows = np.zeros((4096, dtype.itemsize), np.uint8)
         while instants > 0 and not self.r.rule.event:
-            first = self.r.instant // self._every + 1
+            first = self.r.tick // self._every + 1
             most = min(instants, (len(rows) - 1) * self._every)
-            instants -= advance_on_rig(self.p, self.r, *self.tables, most, rows, picks, self._every)
-            written = np.arange(first, self.r.instant // self._every + 1)
+            instants -= advance(self.p, self.r, most, rows, picks, self._every, *self.tables)
+            written = np.arange(first, self.r.tick // self._every + 1)
             self._rows.append(rows[written % len(rows)].view(dtype)[:, 0])
 
     def logged(self) -> Course:
@@ -251,9 +252,9 @@ class Rig:
         """Run without the rotor until the motor rests or an event comes; one row per step."""
         picks, dtype = pick(COURSE)
         rows = np.zeros((min(most, 3 * self.zones.steps + 10), dtype.itemsize), np.uint8)
-        begin, first = self.r.timer.expires, self.r.timer.pulses
+        begin, first = self.r.timer.expires, self.r.tick
         self.r.rule.event = 0
-        done = advance(self.p, self.r, *self.tables, min(most, len(rows)), rows, picks, 1)
+        done = advance(alone(self.p), self.r, min(most, len(rows)), rows, picks, 1, *self.tables)
         self.r.rule.event = 0
         found = rows[np.arange(first + 1, first + done + 1) % len(rows)].view(dtype)[:, 0]
         return course_of(found, self.clock_hz, (self.r.timer.expires - begin) / self.clock_hz)

@@ -35,7 +35,7 @@ from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
 from detent.drive.step_timer import reload_values
-from detent.methods.stepper_envelope.system import advance_on_rig
+from detent.kernel.loop import advance
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory, turn_envelopes
 from detent.planning.step_ramp import start_frequency, total_inertia, travel_per_step
 
@@ -683,7 +683,7 @@ def test_28_two_motors_on_the_rig_run_as_if_alone():
     no_trace = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
     for _ in range(0, 3_000_000, 50):
         for rig in rigs:
-            advance_on_rig(rig.p, rig.r, *rig.tables, 50, *no_trace)
+            advance(rig.p, rig.r, 50, *no_trace, *rig.tables)
     for single, rig in zip(alone, rigs, strict=True):
         assert rig.lost == single.lost == 0
         assert rig.r.rotor.peak_lag == single.r.rotor.peak_lag

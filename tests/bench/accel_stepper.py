@@ -11,10 +11,10 @@ import math
 
 from detent.drive.step_timer import StepTimer, StepTimerParams, load_period, pulse
 from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import Bytes, Offsets, until_row, write_row
 from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
 from detent.kernel.step import hot_step, step
-from detent.methods.stepper_envelope.system import NOWHERE, Bytes, Offsets
+from detent.methods.stepper_envelope.system import NOWHERE
 
 
 class AccelStepperParams(Registers):

@@ -197,5 +197,6 @@ int64_t advance(const StepperParams *restrict p, Stepper *restrict r, const int1
     }
     r->rule = rule;
     r->timer = timer;
+    r->tick += done;
     return done;
 }

@@ -4,7 +4,8 @@ import numpy as np
 from tests.bench.race import Race, timed
 from tests.cascade_rig import NO_TRACE, SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
-from detent.methods.cascade.system import advance_along
+from detent.kernel.loop import advance
+from detent.methods.cascade.system import along
 from detent.planning.profile import MotionLimits, plan_move
 
 LOG = 25.0
@@ -24,7 +25,7 @@ class Shuttle:
         there = plan_move(0.0, 0.1, MotionLimits(0.5, 5.0, 100.0), T_SAMPLE)
         samples = round(LOG / T_SAMPLE)
         times = -(-samples // (2 * there.count))
-        self.arrays = tuple(
+        reference = tuple(
             np.tile(np.concatenate([way, back]), times)[:samples]
             for way, back in (
                 (there.position, there.position[::-1]),
@@ -32,6 +33,7 @@ class Shuttle:
                 (there.acceleration, there.acceleration[::-1]),
             )
         )
+        self.feed = along(*reference)
         self.rig = Rig(p)
         self.begin = self.rig.r.snapshot()
         self.ticks = samples * SAMPLE_TICKS
@@ -40,7 +42,7 @@ class Shuttle:
         """The log; returns the ticks."""
         rig = self.rig
         rig.r.restore(self.begin)
-        advance_along(rig.p, rig.r, *self.arrays, self.ticks, *NO_TRACE)
+        advance(rig.p, rig.r, self.ticks, *NO_TRACE, *self.feed)
         assert abs(rig.r.law.position_error) < 0.05
         return self.ticks
 

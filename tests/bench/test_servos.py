@@ -10,12 +10,12 @@ from detent.control.pulse_generator import PER_PULSE
 from detent.drive.sawtooth_pwm import SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.loop import advance
 from detent.kernel.step import step
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.system import RUN, TICK, FilteredServo, switch_on
-from detent.methods.filtered_servo.system import advance as advance_filtered
 from detent.methods.load import load_spec
-from detent.methods.phase_servo.system import advance, run_converters
+from detent.methods.phase_servo.system import run_converters
 from detent.plant.drive_train import move_averaged
 from detent.sensing.gauge import read_gauge
 from detent.sensing.phase_detector import compare
@@ -68,7 +68,7 @@ class Slide:
 
     def advance(self, ticks):
         """Run so many ticks."""
-        assert advance_filtered(self.p, self.r, ticks, *NO_TRACE) == ticks
+        assert advance(self.p, self.r, ticks, *NO_TRACE) == ticks
 
     def run(self):
         """The next second; returns the ticks."""

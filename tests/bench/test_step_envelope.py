@@ -22,7 +22,8 @@ from tests.stepper_rig import COARSE_FINE, MAX_HZ, NO_TRACE, RAMP, RELOAD_CLOCK_
 
 from detent.control.step_comparison import PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, OUT_OF_RANGE, REST
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, advance
+from detent.kernel.loop import advance
+from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone
 from detent.planning.step_envelope import SENTINEL, StepEnvelope, ZoneMap
 from detent.planning.step_ramp import make_ramp
 
@@ -67,7 +68,7 @@ def test_moving_a_stop(benchmark, steps):
 
 def compiled(rig, steps=LONGEST):
     """The composed steps; returns the steps made."""
-    return advance(rig.p, rig.r, *rig.tables, steps, *NO_TRACE)
+    return advance(alone(rig.p), rig.r, steps, *NO_TRACE, *rig.tables)
 
 
 def rule_in_c(folder, *flags):
@@ -77,7 +78,7 @@ def rule_in_c(folder, *flags):
     function.argtypes, function.restype = [ctypes.c_void_p] * 4 + [ctypes.c_int64] * 2, ctypes.c_int64
 
     def run(rig, steps=LONGEST):
-        up, down = rig.tables
+        up, down = rig.up.entries, rig.down.entries
         state = ctypes.addressof(rig.p), ctypes.addressof(rig.r)
         return function(*state, up.ctypes.data, down.ctypes.data, len(up), steps)
 

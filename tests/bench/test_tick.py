@@ -8,7 +8,7 @@ from tests.bench.race import COMPILER, OPTIMISED, Race, first_line, needs_c, tim
 from tests.print_head_rig import NO_TRACE
 
 from detent.control.head_computer import IDLE
-from detent.methods.print_head.system import advance, advance_plain
+from detent.kernel.loop import advance
 
 C_BAR = 1.3
 """The composed steps may take this much longer than C."""
@@ -59,13 +59,6 @@ def test_averaged_tick_against_c(benchmark, in_c):
     if race.hold(benchmark, "compiled steps"):
         benchmark.extra_info["C compiler"] = first_line(str(COMPILER), "--version")
         assert race.ratio("compiled steps", list(in_c)) <= C_BAR, race.nanoseconds()
-
-
-def test_local_copy_pays(benchmark):
-    stretch = Stretch()
-    race = Race({"advance": printing(stretch, compiled), "advance_plain": printing(stretch, advance_plain)})
-    if race.hold(benchmark, "advance"):
-        assert race.ratio("advance", ["advance_plain"]) < 1.0, race.nanoseconds()
 
 
 def test_switch_level_tick(benchmark):

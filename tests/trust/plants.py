@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from detent.methods.cascade.system import Cascade, CascadeParams, advance_along, fill_clocks, switch_on
+from detent.kernel.loop import advance
+from detent.methods.cascade.system import Cascade, CascadeParams, along, fill_clocks, switch_on
 from detent.planning.profile import MotionLimits, Profile, plan_move, profile_of_recording
 
 SUBSTEPS = 4
@@ -148,7 +149,7 @@ def record(p: CascadeParams, ref: Profile, start: float) -> dict[str, np.ndarray
     picks = np.concatenate([np.arange(o, o + 8) for o in offsets]).astype(np.int64)
     rows = np.zeros((ref.count + 1, 16), np.uint8)
     every = p.sample_ticks
-    advance_along(p, r, ref.position, ref.velocity, ref.acceleration, ref.count * every, rows, picks, every)
+    advance(p, r, ref.count * every, rows, picks, every, *along(ref.position, ref.velocity, ref.acceleration))
     table = rows.view(np.float64)[1 : ref.count + 1]
     return {"position": table[:, 0].copy(), "force": table[:, 1].copy()}
 

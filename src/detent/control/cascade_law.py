@@ -17,8 +17,7 @@ Astrom, Hagglund: Advanced PID Control (2006), sections 3.3 (derivative filter),
 Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feed-forward).
 """
 
-import math
-
+from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, block, f8, register, u1
 from detent.kernel.step import step
 
@@ -95,7 +94,7 @@ def coulomb_part(p: FeedForwardParams, velocity: float) -> float:
 @step
 def feed_forward(p: FeedForwardParams, ref: CascadeReference) -> float:
     """Command that the plant needs to follow the reference [V]."""
-    weight = p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * math.sin(ref.position)
+    weight = p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * sin(ref.position)
     moving = p.viscous * ref.velocity + coulomb_part(p, ref.velocity)
     return p.acceleration * ref.acceleration + moving + weight
 

@@ -10,6 +10,7 @@ the field again whole tooth pitches, that is four steps, later.
 import math
 from collections.abc import Callable
 
+from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, f8, f8_array, i8, register
 from detent.kernel.step import hot_step, step
 
@@ -70,7 +71,7 @@ def hold_field(r: StepperRotor) -> None:
 def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
     """One time step; friction takes speed away but never turns it round."""
     lag = r.commanded * p.step_angle - r.angle
-    torque = p.torque * math.sin(p.teeth * lag) + p.damping * (r.field_velocity - r.velocity)
+    torque = p.torque * sin(p.teeth * lag) + p.damping * (r.field_velocity - r.velocity)
     velocity = r.velocity + p.dt * r.strength * torque / p.inertia
     loss = p.dt * p.friction / p.inertia
     if velocity > loss:

@@ -12,8 +12,7 @@ Armstrong-Helouvry, Dupont, Canudas de Wit: A survey of models, analysis tools a
 of machines with friction. Automatica 30 (1994), section 2.
 """
 
-import math
-
+from detent.kernel.elementary import exp
 from detent.kernel.registers import Registers, block, f8, register
 from detent.kernel.step import hot_step
 
@@ -47,7 +46,7 @@ def resistance(p: DirectionFriction, speed: float) -> float:
     if p.stribeck > 0.0 and p.static > p.coulomb:
         ratio = speed / p.stribeck
         if ratio * ratio < NOTHING_LEFT:
-            force += (p.static - p.coulomb) * math.exp(-ratio * ratio)
+            force += (p.static - p.coulomb) * exp(-ratio * ratio)
     return force
 
 

@@ -20,6 +20,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, block, f8, i1, register
 from detent.kernel.step import hot_step
 from detent.plant.dc_winding import WindingParams, current_rate, motor_force
@@ -73,7 +74,7 @@ class TwoMass(Registers):
 @hot_step
 def load_weight(p: TwoMassParams, position: float) -> float:
     """Weight against the positive direction at a position of the load [N]."""
-    return p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * math.sin(position)
+    return p.weight if p.pendulum == 0.0 else p.weight + p.pendulum * sin(position)
 
 
 @hot_step

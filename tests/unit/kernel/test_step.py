@@ -60,7 +60,7 @@ def test_compilation_options_are_those_of_the_house():
 
 SCRIPT = """
 import numpy as np
-from detent.kernel.recording import write_row
+from detent.kernel.loop import write_row
 from detent.kernel.registers import Registers, i8, register
 
 class Own(Registers):

@@ -15,7 +15,8 @@ from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import plant_registers, start_velocities
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.run import Run
-from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, advance_along, fill_clocks, switch_on
+from detent.kernel.loop import advance
+from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, switch_on
 from detent.planning.profile import profile_of_recording
 from detent.plant.two_mass import fastest_rate
 from detent.sensing.position_sensor import MEMORY
@@ -127,13 +128,13 @@ def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Numbers, Numb
     p, r = _params(constants, loops, run), Cascade()
     _start(p, r, loops, run)
     reference = run.reference if run.reference is not None else run.position
-    along = profile_of_recording(run.t, reference, run.step)
+    asked = profile_of_recording(run.t, reference, run.step)
     leaves = {leaf.path: leaf.offset for leaf in Cascade.leaves()}
     picks = np.concatenate([np.arange(leaves[n], leaves[n] + 8) for n in ("machine.motor.position", "law.command")])
     samples = len(run.position)
     rows = np.zeros((samples + 1, 16), np.uint8)
     every = p.sample_ticks
-    signals = (along.position, along.velocity, along.acceleration)
-    advance_along(p, r, *signals, samples * every, rows, picks.astype(np.int64), every)
+    feed = along(asked.position, asked.velocity, asked.acceleration)
+    advance(p, r, samples * every, rows, picks.astype(np.int64), every, *feed)
     table = rows.view(np.float64)
     return np.concatenate([run.position[:1], table[1:samples, 0]]), table[1 : samples + 1, 1].copy()

@@ -27,6 +27,10 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.float64]
 
 
+RANK = 1e-10
+"""Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding
+leaves of them decides nothing."""
+
 SHARE = 0.3
 """Cosines per independent residual, at most: beyond these the long-run variance would be read where it has fallen."""
 
@@ -51,8 +55,8 @@ def independent_rows(residual: Numbers) -> float:
 
 def neighbour_correlation(residual: Numbers) -> float:
     """Correlation of neighbours, within 0 and 0.99, corrected for its bias of ``1 / n``."""
-    power = float(residual @ residual)
-    correlation = float(residual[1:] @ residual[:-1]) / power + 1.0 / len(residual) if power > 0.0 else 0.0
+    power = float(np.sum(residual**2))
+    correlation = float(np.sum(residual[1:] * residual[:-1])) / power + 1.0 / len(residual) if power > 0.0 else 0.0
     return min(max(correlation, 0.0), 0.99)
 
 
@@ -126,7 +130,7 @@ def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Number
     scores = chosen / length * residual[:, None]
     few = independent / max(independent - k, 2.0)
     fallen = fallen_density(neighbour_correlation(residual), n, min(degrees, n))
-    inverse = np.asarray(np.linalg.pinv((chosen / length).T @ (columns / size)), np.float64)
+    inverse = np.asarray(np.linalg.pinv((chosen / length).T @ (columns / size), rcond=RANK), np.float64)
     found = [
         inverse @ (n * few * variance) @ inverse.T
         for variance in (long_run_variance(scores, min(degrees, n)) / fallen, _lagged_variance(scores, n / independent))
@@ -155,7 +159,7 @@ def carried_degrees(columns: Numbers, residual: Numbers, instruments: Numbers, c
     """
     size, length = _sizes(columns), _sizes(instruments)
     tools = instruments / length
-    weight = (tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size)), np.float64).T) ** 2
+    weight = (tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size), rcond=RANK), np.float64).T) ** 2
     total, squares = weight.sum(axis=0), (weight**2).sum(axis=0)
     r = neighbour_correlation(residual) ** 2
     carried = np.where(squares > 0.0, total**2 / np.where(squares > 0.0, squares, 1.0), 1.0) * (1.0 - r) / (1.0 + r)

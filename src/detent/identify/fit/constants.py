@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.estimate import Estimate, estimate
+from detent.identify.fit.estimate import Estimate, estimate, significant
 from detent.identify.fit.regression import Fit, Instruments
 from detent.identify.fit.run import Run
 
@@ -36,6 +36,9 @@ _SUMS: dict[str, dict[str, float]] = {
 }
 """Constants as sums of those of the terms; a force that does not turn round is part of both Coulomb constants."""
 
+
+CANCELLED = 1e-9
+"""What is left of a sum, in parts of what was added up, at which nothing is left of it."""
 
 METHODS: dict[Instruments, str] = {
     "reference": "instrumental variables",
@@ -135,7 +138,10 @@ def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers, Numbers]:
             if term in fit.names:
                 weights[row, fit.names.index(term)] = sign
     degrees = np.where(weights != 0.0, fit.degrees, np.inf).min(axis=1)
-    return tuple(wanted), weights @ fit.values, weights @ fit.covariance @ weights.T, degrees
+    values, parts = weights @ fit.values, np.abs(weights) @ np.abs(fit.values)
+    # Two that cancel leave rounding, of either sign.
+    values = [significant(v) if abs(v) > CANCELLED * p else 0.0 for v, p in zip(values, parts, strict=True)]
+    return tuple(wanted), np.array(values), weights @ fit.covariance @ weights.T, degrees
 
 
 def _has(fit: Fit, name: str, sums: dict[str, float]) -> bool:

@@ -40,8 +40,8 @@ class Motion:
     ----------
     position, velocity, acceleration : float64 array
         Means over the window around each row [m, m/s, m/s^2] or in rad.
-    right : float64 array
-        Share of each window in motion to larger positions.
+    right, left : float64 array
+        Shares of each window in motion to larger and to smaller positions; standstill is half of both.
     quick, places, effort : float64 array, shape (n,)
         Velocity, by a short window, position and effort at every sample.
     rows : int array
@@ -54,6 +54,7 @@ class Motion:
     velocity: Numbers
     acceleration: Numbers
     right: Numbers
+    left: Numbers
     quick: Numbers
     places: Numbers
     effort: Numbers
@@ -79,11 +80,13 @@ def make_motion(position: Numbers, effort: Numbers, kernel: Kernel, rows: Rows) 
         Samples around which it lies.
     """
     quick = fine_kernel(kernel).velocities(position)
+    still = 0.5 * (quick == 0.0)
     return Motion(
         kernel.mean(position, rows),
         kernel.velocity(position, rows),
         kernel.acceleration(position, rows),
-        kernel.mean((quick > 0.0) + 0.5 * (quick == 0.0), rows),
+        kernel.mean((quick > 0.0) + still, rows),
+        kernel.mean((quick < 0.0) + still, rows),
         quick,
         position,
         effort,
@@ -106,9 +109,9 @@ def _bristle(m: Motion, stribeck: float, sense: int) -> Numbers:
 TERMS: Mapping[str, Term] = {
     "mass": lambda m, _: m.acceleration,
     "offset": lambda m, _: np.ones_like(m.velocity),
-    "coulomb": lambda m, _: 2.0 * m.right - 1.0,
+    "coulomb": lambda m, _: m.right - m.left,
     "coulomb.positive": lambda m, _: m.right,
-    "coulomb.negative": lambda m, _: m.right - 1.0,
+    "coulomb.negative": lambda m, _: -m.left,
     "viscous": lambda m, _: m.velocity,
     "viscous.positive": lambda m, _: np.maximum(m.velocity, 0.0),
     "viscous.negative": lambda m, _: np.minimum(m.velocity, 0.0),
@@ -160,7 +163,7 @@ def model_columns(m: Motion, names: Sequence[str], bend: float) -> Numbers:
 
 def standstill_velocity(run: Run, kernel: Kernel) -> float:
     """Velocity below which a window cannot tell motion from noise [m/s]."""
-    noise = run.noise * math.sqrt(float(kernel.first @ kernel.first))
+    noise = run.noise * math.sqrt(float(np.sum(kernel.first**2)))
     count = run.resolution / (2.0 * kernel.half * run.step)
     return max(NOISES * noise, 0.5 * count)
 

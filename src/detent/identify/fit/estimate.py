@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 LEVEL = 0.95
 """Share of intervals that hold the true value."""
 
+DIGITS = 9
+"""Digits of a constant; what comes after them differs from processor to processor, and a simulation that sticks and
+slips would make more of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
@@ -71,6 +75,11 @@ def estimate(  # noqa: PLR0913 - the fields of an estimate
     """
     reach = quantile(degrees) * error
     return Estimate(name, value, unit, error, value - reach, value + reach, method)
+
+
+def significant(value: float, digits: int = DIGITS) -> float:
+    """The value to so many digits."""
+    return float(f"{value:.{digits}g}")
 
 
 def quantile(degrees: float) -> float:

@@ -16,7 +16,8 @@ from detent.identify.fit.constants import Constants, hanging_position
 from detent.identify.fit.equations import fine_kernel
 from detent.identify.fit.kernel import make_kernel
 from detent.identify.fit.run import Run
-from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, advance_driven, fill_clocks, switch_on
+from detent.kernel.loop import advance
+from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, driven, fill_clocks, switch_on
 from detent.plant.two_mass import fastest_rate
 
 Numbers = NDArray[np.float64]
@@ -105,7 +106,7 @@ class Plant:
         at = np.arange(ticks) + begin * self.ticks - self._late
         command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
         rows = np.zeros((samples, 8), np.uint8)
-        advance_driven(self._params, r, command, ticks, rows, _PICKS, self.ticks)
+        advance(self._params, r, ticks, rows, _PICKS, self.ticks, *driven(command))
         moved = rows.view(np.float64)[:, 0] + self._hanging
         moved[0] = position
         return moved

@@ -14,7 +14,7 @@ from detent.identify.fit.equations import LOSS
 from detent.identify.fit.estimate import Estimate, quantiles
 from detent.identify.fit.free_run import Horizon, simulate_horizons
 from detent.identify.fit.kernel import make_kernel
-from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung
+from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.regression import Fit, Instruments, Prepared, prepare
 from detent.identify.fit.residuals import Residuals, residuals_of
@@ -330,22 +330,22 @@ def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report | No
     """Climb the ladder, then fit the chosen model and those as good."""
     climbs = climb(parts, _rungs_for(parts, runs), _teller(report, "ladder"))
     chosen = next(c for c in reversed(climbs) if c.taken)
-    fits = {c.rung.name: fit_rung(parts, c.rung) for c in climbs if _is_rival(c, chosen)}
-    if chosen.rung.is_bent and not _is_told(fits[chosen.rung.name]):
+    fits = {c.rung.name: c.fit for c in climbs if _is_rival(c, chosen)}
+    if chosen.rung.is_bent and not _is_told(parts, fits[chosen.rung.name]):
         climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
         chosen = next(c for c in reversed(climbs) if c.taken)
-        fits.setdefault(chosen.rung.name, fit_rung(parts, chosen.rung))
+        fits.setdefault(chosen.rung.name, chosen.fit)
     fit = fits.pop(chosen.rung.name)
     return _Found(climbs, fit, tuple(fits.values()))
 
 
-def _is_told(fit: Fit) -> bool:
-    """True where the log tells the bend of a model, and that friction rises towards standstill.
+def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
+    """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill.
 
     A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
     """
     reach = quantiles(fit.degrees) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    if not reach[-1] < WIDEST_BEND * fit.bend:
+    if is_at_bound(parts, fit) or not reach[-1] < WIDEST_BEND * fit.bend:
         return False
     excess = [k for k, name in enumerate(fit.names) if name.startswith("excess")]
     return all(fit.values[k] > reach[k] for k in excess)

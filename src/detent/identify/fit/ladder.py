@@ -11,6 +11,7 @@ Stone: Cross-validatory choice and assessment of statistical predictions. J. Roy
 Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81 (1994), whole stretches.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -24,6 +25,7 @@ from detent.identify.fit.regression import (
     Fit,
     Prepared,
     bend_correction,
+    combine,
     fit_equations,
     make_columns,
     make_effort,
@@ -38,14 +40,23 @@ STRETCHES = 8
 CLEAR = 0.0
 """Mean gain of a rung in standard errors over the stretches, from which it is taken."""
 
-SPEEDS = 8
-"""Stribeck velocities tried."""
+ALIKE = 1e-8
+"""Gain in parts of the mean square, up to which two rungs predict the same and only rounding tells them apart."""
 
-LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+SLOWEST = 0.002
+"""Least Stribeck velocity tried, in parts of the top speed."""
+
+FINER = 1.6
+"""Ratio of neighbouring Stribeck velocities tried, at most."""
+
+AT_BOUND = 0.01
+"""A bend that is this near to the least or the largest that was tried, in parts of it, is a bound and no value."""
+
+LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
 """Shares lost in a transmission that are tried."""
 
-ROUNDS = 12
-"""Corrections of a Stribeck velocity or a loss, at most."""
+ROUNDS, WIDER = 8, 1.3
+"""Brackets of a Stribeck velocity or a loss looked at, and the ratio of their ends."""
 
 Report = Callable[[float], None]
 
@@ -106,6 +117,8 @@ class Climb:
         True where it was climbed.
     possible : bool
         False where its friction falls towards standstill.
+    fit : Fit
+        To all of the log.
     """
 
     rung: Rung
@@ -114,6 +127,7 @@ class Climb:
     gain: float
     taken: bool
     possible: bool
+    fit: Fit
 
 
 def extended(rung: Rung, extra: Sequence[str]) -> Rung:
@@ -125,43 +139,66 @@ def stribeck_speeds(parts: Sequence[Prepared]) -> Numbers:
     """Stribeck velocities that the log could show, from the slow end of its motion to half its top speed."""
     speed = np.abs(np.concatenate([p.motion.velocity for p in parts]))
     top, low = float(np.quantile(speed, 0.98)), float(np.quantile(speed, 0.02))
-    return np.geomspace(min(max(low, 0.02 * top), 0.2 * top), 0.4 * top, SPEEDS)
+    least, most = min(max(low, SLOWEST * top), 0.2 * top), 0.4 * top
+    return np.geomspace(least, most, 1 + math.ceil(math.log(most / least) / math.log(FINER)))
 
 
-def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> float:
-    """Stribeck velocity, or share lost: that with the smallest residual, from there on what the instruments say.
+def bends_tried(parts: Sequence[Prepared], names: Sequence[str]) -> Numbers:
+    """Stribeck velocities, or shares lost, among which the best is looked for."""
+    return LOSSES if LOSS in names else stribeck_speeds(parts)
+
+
+def is_at_bound(parts: Sequence[Prepared], fit: Fit) -> bool:
+    """True where the bend of a fit is the least or the largest that was tried: the log says no more than a bound."""
+    tried = bends_tried(parts, fit.model)
+    return not (1.0 + AT_BOUND) * tried[0] < fit.bend < (1.0 - AT_BOUND) * tried[-1]
+
+
+def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, float]:
+    """Stribeck velocity, or share lost: what the instruments say, and that with the smallest residual, near it.
 
     The smallest residual alone answers to the noise in the columns: intervals around it held the truth in 86 % of the
     simulated logs with low-speed friction, those around what the instruments say in 93 to 96 %.
     """
-    tried = LOSSES if LOSS in names else stribeck_speeds(parts)
+    tried = bends_tried(parts, names)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
     effort = make_effort(parts, fit_equations(parts, plain).delay)
 
     def miss(bend: float) -> float:
         """Sum of the squared residuals."""
         columns, ideal = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
-        residual = effort - columns @ solve(ideal, columns, effort)
-        return float(residual @ residual)
+        residual = effort - combine(columns, solve(ideal, columns, effort))
+        return float(np.sum(residual**2))
 
     best = int(np.argmin([miss(float(bend)) for bend in tried]))
     around = tried[[max(best - 1, 0), min(best + 1, len(tried) - 1)]]
     optimize: Any = import_module("scipy.optimize")  # it states no types
     limits = {"xatol": 1e-4 * float(around[1])}
     found = float(optimize.minimize_scalar(miss, bounds=tuple(around), method="bounded", options=limits).x)
-    return _refined_bend(parts, names, found, tried)
+    return _refined_bend(parts, names, found, tried), found
 
 
 def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float, tried: Numbers) -> float:
-    """The bend at which the instruments ask for no other; the start where there is none within the range tried."""
-    bend = start
+    """The bend at which the instruments ask for no other; the start where there is none within the range tried.
+
+    What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
+    """
+
+    def asked(bend: float) -> float:
+        """What the instruments want the bend changed by."""
+        return bend_correction(parts, fit_equations(parts, names, bend))
+
+    near = start
+    wanted = asked(near)
     for _ in range(ROUNDS):
-        correction = bend_correction(parts, fit_equations(parts, names, bend))
-        if abs(correction) < 1e-3 * bend:
-            return bend
-        bend += float(np.clip(correction, -0.3 * bend, 0.3 * bend))
-        if not tried[0] < bend < tried[-1]:
-            break
+        far = near * (WIDER if wanted > 0.0 else 1.0 / WIDER)
+        if not tried[0] < far < tried[-1]:
+            return start
+        other = asked(far)
+        if (other > 0.0) != (wanted > 0.0):
+            optimize: Any = import_module("scipy.optimize")  # it states no types
+            return float(optimize.brentq(asked, near, far, xtol=1e-4 * start))
+        near, wanted = far, other
     return start
 
 
@@ -189,13 +226,19 @@ def climb(
     climbs: list[Climb] = []
     best: Climb | None = None
     for k, rung in enumerate(rungs):
-        squares, power, possible = _held_out(parts, rung)
+        fit = fit_rung(parts, rung)
+        squares = _held_out(parts, fit)
+        # Friction that falls towards standstill is no Stribeck friction, whatever it fits.
+        possible = sum(fit.value(name) for name in rung.terms if name.startswith("excess")) >= 0.0
         gain = np.nan
         if best is not None:
             better = best.stretches - squares
-            gain = float(better.mean() / max(better.std(ddof=1) / np.sqrt(len(better)), 1e-300))
+            scatter = max(float(better.std(ddof=1)) / np.sqrt(len(better)), 1e-300)
+            is_clear = abs(float(better.mean())) > ALIKE * float(best.stretches.mean())
+            gain = float(better.mean() / scatter) if is_clear else 0.0
         taken = best is None or (possible and gain > CLEAR)
-        climbs.append(Climb(rung, float(np.sqrt(squares.mean() / power)), squares, gain, taken, possible))
+        error = float(np.sqrt(squares.mean() / np.mean(fit.effort**2)))
+        climbs.append(Climb(rung, error, squares, gain, taken, possible, fit))
         best = climbs[-1] if taken else best
         if report is not None:
             report((k + 1) / len(rungs))
@@ -208,8 +251,17 @@ def chosen_rung(climbs: Sequence[Climb]) -> Rung:
 
 
 def fit_rung(parts: Sequence[Prepared], rung: Rung) -> Fit:
-    """Fit the model of a rung, its Stribeck velocity or loss included."""
-    return fit_equations(parts, rung.terms, best_bend(parts, rung.terms) if rung.is_bent else 1.0)
+    """Fit the model of a rung, its Stribeck velocity or loss included.
+
+    Where two ways to that number differ by more than noise, the model is to blame; no residual shows it, so that the
+    difference counts as an error.
+    """
+    if not rung.is_bent:
+        return fit_equations(parts, rung.terms)
+    bend, other = best_bend(parts, rung.terms)
+    fit = fit_equations(parts, rung.terms, bend)
+    fit.covariance[-1, -1] += (bend - other) ** 2
+    return fit
 
 
 Mask = NDArray[np.bool_]
@@ -245,16 +297,11 @@ def hold_out(parts: Sequence[Prepared], count: int = STRETCHES) -> list[tuple[Ma
     return masks
 
 
-def _held_out(parts: Sequence[Prepared], rung: Rung) -> tuple[Numbers, float, bool]:
-    """Mean squares of the prediction of each stretch, the mean square of the effort, and whether friction rises.
-
-    Friction that falls towards standstill is no Stribeck friction, whatever it fits.
-    """
-    whole = fit_rung(parts, rung)
-    columns, ideal = (make_columns(parts, rung.terms, whole.bend, ideal=ideal) for ideal in (False, True))
+def _held_out(parts: Sequence[Prepared], fit: Fit) -> Numbers:
+    """Mean squares of the prediction of each stretch."""
+    columns, ideal = (make_columns(parts, fit.model, fit.bend, ideal=ideal) for ideal in (False, True))
     squares: list[float] = []
     for inside, apart in hold_out(parts):
-        theta = solve(ideal[apart], columns[apart], whole.effort[apart])
-        squares.append(float(np.mean((whole.effort[inside] - columns[inside] @ theta) ** 2)))
-    excess = sum(whole.value(name) for name in rung.terms if name.startswith("excess"))
-    return np.array(squares), float(np.mean(whole.effort**2)), excess >= 0.0
+        theta = solve(ideal[apart], columns[apart], fit.effort[apart])
+        squares.append(float(np.mean((fit.effort[inside] - combine(columns[inside], theta)) ** 2)))
+    return np.array(squares)

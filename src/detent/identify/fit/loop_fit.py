@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.identify.fit.estimate import significant
 from detent.identify.fit.run import Run
 
 Numbers = NDArray[np.float64]
@@ -37,6 +38,9 @@ WORST = 0.1
 
 SLIGHT = 0.01
 """Share of the effort below which a feed-forward is none."""
+
+REACH = 0.01
+"""To each side, in natural logarithms: between these errors the gain with the least of them is worked out."""
 
 GAINS = (0.5, 2000.0)
 """Position gains looked at [1/s]."""
@@ -148,7 +152,8 @@ class _Trial:
         parts = self.parts(feeds)
         gain = self._search(parts[:cut], effort[:cut])
         columns = parts @ self.mix(gain, parts.shape[1])
-        theta, rest = _solve(columns[:cut], effort[:cut]), effort[cut:]
+        theta = np.array([significant(value) for value in _solve(columns[:cut], effort[:cut]).tolist()])
+        rest = effort[cut:]
         first = 2 if self.integrates else 1
         least = SLIGHT * _rms(effort)
         if not (theta[:first] > 0.0).all() or (self.integrates and _rms(columns[:, 1] * theta[1]) < least):
@@ -179,7 +184,13 @@ class _Trial:
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        return float(np.exp(optimize.minimize_scalar(miss, bounds=around, method="bounded").x))
+        found = float(optimize.minimize_scalar(miss, bounds=around, method="bounded").x)
+        # Near its least the error is flat, and rounding decides where the search ends: its slope tells the place.
+        for _ in range(2):
+            less, least, more = miss(found - REACH), miss(found), miss(found + REACH)
+            bend = less - 2.0 * least + more
+            found += float(np.clip(0.5 * (less - more) / bend, -1.0, 1.0)) * REACH if bend > 0.0 else 0.0
+        return significant(math.exp(found), 6)
 
 
 def _solve(columns: Numbers, effort: Numbers) -> Numbers:

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.coloured import carried_degrees, coloured_covariance
+from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance
 from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
 from detent.identify.fit.kernel import Kernel, make_kernel
 from detent.identify.fit.run import Run
@@ -40,6 +40,9 @@ ENDS = 0.1
 ROUNDS = 8
 """Rounds in which the delay of the effort is found, at most."""
 
+
+SHARED = 1e-3
+"""Part of a constant in a sum that nothing tells, from which on it is not told."""
 
 UNKNOWN = 1e6
 """Standard error of a constant that nothing in the log excites, in largest efforts: nothing is known about it."""
@@ -213,11 +216,11 @@ def fit_equations(
         late += moved
         y = make_effort(parts, late)
         x, z = _with_delay(parts, _known(names, theta), late, columns, ideal)
-    residual = y - columns @ theta
+    residual = y - combine(columns, theta)
     x, _, z = _with_bend(parts, names, theta, bend, x, residual, z)
     covariance, cosines = coloured_covariance(x, residual, z)
-    absent = np.flatnonzero(~x.any(axis=0))
-    covariance[absent, absent] = (UNKNOWN * float(np.abs(y).max())) ** 2
+    unknown = _unknown(x, z)
+    covariance[unknown, unknown] = (UNKNOWN * float(np.abs(y).max())) ** 2
     singular = np.linalg.svd(columns / column_sizes(columns), compute_uv=False)
     bends = ("loss" if LOSS in names else "stribeck",) if is_bent(names) else ()
     return Fit(
@@ -280,7 +283,7 @@ def _bend_slope(
     parts: Sequence[Prepared], names: Sequence[str], theta: Numbers, bend: float, *, ideal: bool
 ) -> Numbers:
     """Change of the effort with the bend, shape (m,)."""
-    more, less = (make_columns(parts, names, bend * f, ideal=ideal) @ theta for f in (1.05, 0.95))
+    more, less = (combine(make_columns(parts, names, bend * f, ideal=ideal), theta) for f in (1.05, 0.95))
     return (more - less) / (0.1 * bend)
 
 
@@ -325,5 +328,24 @@ def solve(instruments: Numbers, columns: Numbers, effort: Numbers) -> Numbers:
     """
     size, length = column_sizes(columns), column_sizes(instruments)
     tools = instruments / length
-    found, *_ = np.linalg.lstsq(tools.T @ (columns / size), tools.T @ effort, rcond=1e-12)
+    matrix, moments = products(tools, columns / size), products(tools, effort[:, None])[:, 0]
+    found, *_ = np.linalg.lstsq(matrix, moments, rcond=RANK)
     return found / size
+
+
+def products(a: Numbers, b: Numbers) -> Numbers:
+    """``A' B``, each sum in one order on every processor, which BLAS does not promise."""
+    right = np.ascontiguousarray(b.T)
+    return np.array([(right * column).sum(axis=1) for column in np.ascontiguousarray(a.T)])
+
+
+def combine(columns: Numbers, constants: Numbers) -> Numbers:
+    """``X theta``, likewise."""
+    return np.asarray((columns * constants).sum(axis=1), np.float64)
+
+
+def _unknown(columns: Numbers, instruments: Numbers) -> NDArray[np.intp]:
+    """Constants that the columns cannot tell: absent, or one with others."""
+    matrix = products(instruments / column_sizes(instruments), columns / column_sizes(columns))
+    _, singular, ways = np.linalg.svd(matrix)
+    return np.flatnonzero((np.abs(ways[singular <= RANK * singular[0]]) > SHARED).any(axis=0))

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.kernel.loop import advance
 from detent.kernel.registers import Leaf, Registers
 from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.system import Cascade, CascadeParams, advance_along, advance_driven, switch_on
+from detent.methods.cascade.system import Cascade, CascadeParams, Feed, along, driven, switch_on
 from detent.planning.profile import Profile
 from detent.record.machine import AnyRecorder, Loop, Machine
 
@@ -125,8 +126,7 @@ class CascadeHost:
         self.machine: Machine[CascadeParams, Cascade] = Machine(
             self.params, self.state, Loop(self.tick, self._advance), recorder
         )
-        self._command: Numbers | None = None
-        self._reference: tuple[Numbers, Numbers, Numbers] = (np.array([start]), np.zeros(1), np.zeros(1))
+        self._feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
 
     @property
     def period(self) -> float:
@@ -154,12 +154,12 @@ class CascadeHost:
 
     def follow(self, profile: Profile) -> None:
         """Follow a reference from the next sample on; behind its end it stands."""
-        self._command, self._reference = None, (profile.position, profile.velocity, profile.acceleration)
+        self._feed = along(profile.position, profile.velocity, profile.acceleration)
         self.state.entry = 0
 
     def drive(self, command: Numbers) -> None:
         """Open the loops: the amplifier gets these commands, one per sample, and nothing behind their end."""
-        self._command = command
+        self._feed = driven(command)
         self.state.entry = 0
 
     def switch_off(self) -> None:
@@ -167,9 +167,7 @@ class CascadeHost:
         self.drive(np.zeros(1))
 
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
-        if self._command is not None:
-            return advance_driven(p, r, self._command, ticks, *recording)
-        return advance_along(p, r, *self._reference, ticks, *recording)
+        return advance(p, r, ticks, *recording, *self._feed)
 
     def rehearse(self, samples: int) -> Rows:
         """What the next samples would bring; the axis stays where it is.

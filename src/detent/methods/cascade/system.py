@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference, control
 from detent.drive.effort_source import MEMORY as SOURCE_MEMORY
 from detent.drive.effort_source import EffortSource, EffortSourceParams, take_command
-from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.push import Push, push_force
@@ -28,8 +27,6 @@ from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.position_sensor import MEMORY as SENSOR_MEMORY
 from detent.sensing.position_sensor import PositionSensor, PositionSensorParams, read_position, stand_sensor
 
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
 Numbers = NDArray[np.float64]
 
 MAX_RATE = 1.0
@@ -86,151 +83,76 @@ def decide(p: CascadeParams, r: Cascade) -> None:
     control(p.law, r.law, r.reference, position, velocity)
 
 
-@step
-def serve(p: CascadeParams, r: Cascade) -> None:
-    """Sample, decide, actuate."""
-    sample(p, r)
-    decide(p, r)
-    take_command(p.source, r.source, r.law.command)
-    r.wake += p.sample_ticks
-
-
-@step
-def move(p: CascadeParams, r: Cascade, ticks: int) -> None:
-    """The mechanics through ticks without a sample."""
-    plant, machine, gauge = local_copy(p.machine), local_copy(r.machine), local_copy(r.gauge)
-    machine.effort = r.source.output
-    now = r.tick
-    for _ in range(ticks):
-        machine.external = push_force(p.push, now)
-        move_masses(plant, machine)
-        now += 1
-        read_gauge(gauge, now, machine.load.position, machine.load.velocity)
-    r.tick = now
-    copy_back(r.machine, machine)
-    copy_back(r.gauge, gauge)
-
-
-@step
-def stretch_of(r: Cascade, ticks: int, every: int) -> int:
-    """Of `ticks` to run, those up to the next sample or row."""
-    return min(until_row(r.tick, ticks, every), r.wake - r.tick)
-
-
-@step
-def advance(p: CascadeParams, r: Cascade, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
-    """Run `ticks` ticks with the reference that stands in the registers.
-
-    Parameters
-    ----------
-    p, r : CascadeParams, Cascade
-        Parameters and state.
-    ticks : int
-        Ticks to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-
-    Returns
-    -------
-    int
-        Ticks run.
-    """
-    done = 0
-    while done < ticks:
-        if r.tick == r.wake:
-            serve(p, r)
-        stretch = stretch_of(r, ticks - done, every)
-        move(p, r, stretch)
-        done += stretch
-        write_row(r, r.tick, trace, picks, every)
-    return done
-
-
 @hot_step
-def take_reference(r: Cascade, position: Numbers, velocity: Numbers, acceleration: Numbers) -> None:
+def take_reference(r: Cascade, position: HostArray, velocity: HostArray, acceleration: HostArray) -> None:
     """Take the next entry; behind the last one the reference stands where that is."""
-    last = position.shape[0] - 1
-    if r.entry <= last:
+    entries = len(position)
+    if r.entry < entries:
         r.reference.position = position[r.entry]
         r.reference.velocity = velocity[r.entry]
         r.reference.acceleration = acceleration[r.entry]
         r.entry += 1
-    else:
+    elif entries > 0:
         r.reference.velocity = r.reference.acceleration = 0.0
 
 
 @step
-def advance_along(
-    p: CascadeParams,
-    r: Cascade,
-    position: Numbers,
-    velocity: Numbers,
-    acceleration: Numbers,
-    ticks: int,
-    trace: Bytes,
-    picks: Offsets,
-    every: int,
-) -> int:
-    """Run `ticks` ticks along a reference, one entry per sample from `entry` on.
-
-    Parameters
-    ----------
-    p, r, ticks, trace, picks, every
-        As for `advance`.
-    position, velocity, acceleration : float64 array, shape (samples,), samples >= 1
-        Reference [m], [m/s], [m/s^2]. Behind its end the axis is held at the last position.
-
-    Returns
-    -------
-    int
-        Ticks run.
-    """
-    done = 0
-    while done < ticks:
-        if r.tick == r.wake:
-            take_reference(r, position, velocity, acceleration)
-            serve(p, r)
-        stretch = stretch_of(r, ticks - done, every)
-        move(p, r, stretch)
-        done += stretch
-        write_row(r, r.tick, trace, picks, every)
-    return done
+def serve(
+    p: CascadeParams, r: Cascade, position: HostArray, velocity: HostArray, acceleration: HostArray, command: HostArray
+) -> None:
+    """Sample, decide, actuate; where there are commands, the loops are open, and 0 comes behind the last one."""
+    sample(p, r)
+    entries = len(command)
+    if entries > 0:
+        output = command[r.entry] if r.entry < entries else 0.0
+        r.entry += 1
+    else:
+        take_reference(r, position, velocity, acceleration)
+        decide(p, r)
+        output = r.law.command
+    take_command(p.source, r.source, output)
+    r.wake += p.sample_ticks
 
 
-@step
-def advance_driven(
-    p: CascadeParams, r: Cascade, command: Numbers, ticks: int, trace: Bytes, picks: Offsets, every: int
-) -> int:
-    """Run `ticks` ticks without the loops: the amplifier gets one entry of `command` per sample, from `entry` on.
+@hot_step
+def move(p: CascadeParams, r: Cascade) -> None:
+    """The mechanics through a tick."""
+    machine = r.machine
+    machine.effort = r.source.output
+    machine.external = push_force(p.push, r.tick)
+    move_masses(p.machine, machine)
+    r.tick += 1
+    read_gauge(r.gauge, r.tick, machine.load.position, machine.load.velocity)
 
-    Parameters
-    ----------
-    p, r, ticks, trace, picks, every
-        As for `advance`.
-    command : float64 array, shape (samples,)
-        Command [V]; 0 behind its end.
 
-    Returns
-    -------
-    int
-        Ticks run.
-    """
-    done = 0
-    while done < ticks:
-        if r.tick == r.wake:
-            sample(p, r)
-            take_command(p.source, r.source, command[r.entry] if r.entry < command.shape[0] else 0.0)
-            r.entry += 1
-            r.wake += p.sample_ticks
-        stretch = stretch_of(r, ticks - done, every)
-        move(p, r, stretch)
-        done += stretch
-        write_row(r, r.tick, trace, picks, every)
-    return done
+@ticks(CascadeParams)
+@hot_step
+def tick(
+    p: CascadeParams, r: Cascade, position: HostArray, velocity: HostArray, acceleration: HostArray, command: HostArray
+) -> bool:
+    """One substep of the mechanics; see `along` and `driven` for what the host has laid ready."""
+    if r.tick == r.wake:
+        serve(p, r, position, velocity, acceleration, command)
+    move(p, r)
+    return True
+
+
+Feed = tuple[HostArray, HostArray, HostArray, HostArray]
+
+_NONE = lay_ready(np.zeros(0))
+
+STANDING: Feed = (_NONE, _NONE, _NONE, _NONE)
+"""Feed of an axis whose reference stands in its registers."""
+
+
+def along(position: Numbers, velocity: Numbers, acceleration: Numbers) -> Feed:
+    """Feed of an axis that follows a reference [m], [m/s], [m/s^2], one entry per sample from `entry` on."""
+    return lay_ready(position), lay_ready(velocity), lay_ready(acceleration), _NONE
+
+
+def driven(command: Numbers) -> Feed:
+    """Feed of an axis without its loops: what the amplifier gets [V], one entry per sample from `entry` on."""
+    return _NONE, _NONE, _NONE, lay_ready(command)
 
 
 def smoothing(time_constant: float, period: float) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT, FileProblem
+from detent.kernel.loop import advance
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.schema import FilteredServoSpec
@@ -21,7 +22,7 @@ def filtered_servo_machine(
     """Filtered servo at power-on."""
     p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
     filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
-    loop = Loop(filtered_servo.TICK, filtered_servo.advance, filtered_servo.advance_by_clocks)
+    loop = Loop(filtered_servo.TICK, advance, filtered_servo.advance_by_clocks)
     return Machine(p, r, loop, recorder)
 
 

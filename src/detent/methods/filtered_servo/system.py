@@ -10,9 +10,6 @@ One tick is 10 us, ten clocks of the decoder. Its order is: sample what the enco
 actuate, move. Decoder clocks in which nothing happens, or nothing whose moment matters, are skipped.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from detent.control.deviation_counter import (
     FAULT,
     RESET,
@@ -31,8 +28,7 @@ from detent.control.pulse_generator import (
     ramp_rate,
 )
 from detent.control.sample_clock import SampleClock, count_clock
-from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import Bytes, Offsets, ticks, write_row
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged, move_with_current
@@ -50,9 +46,6 @@ from detent.sensing.interference import (
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, is_settled, preset_decoder
 from detent.sensing.speed_filter import SpeedFilter, SpeedFilterParams, filter_speed
-
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
 
 TICK_US = 10
 TICK = TICK_US * 1e-6
@@ -289,15 +282,6 @@ def move(p: FilteredServoParams, r: FilteredServo, train: DriveTrain) -> None:
 
 
 @hot_step
-def tick(p: FilteredServoParams, r: FilteredServo, train: DriveTrain) -> None:
-    """Ten microseconds; `train` is the drive train of `r` or a local copy of it."""
-    if r.deviation.reset:
-        leave_reset(r)
-    sample(p, r, train.position)
-    drive(p, r, train)
-
-
-@hot_step
 def drive(p: FilteredServoParams, r: FilteredServo, train: DriveTrain) -> None:
     """The second half of a tick: tell the host, actuate, move."""
     if r.tick >= r.wake:
@@ -308,50 +292,27 @@ def drive(p: FilteredServoParams, r: FilteredServo, train: DriveTrain) -> None:
     r.tick += 1
 
 
-@step
-def advance(p: FilteredServoParams, r: FilteredServo, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
-    """Run up to `ticks` ticks; stops early when the axis has come into position or failed and the host must look.
-
-    Parameters
-    ----------
-    p, r : FilteredServoParams, FilteredServo
-        Parameters and state.
-    ticks : int
-        Most ticks to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-
-    Returns
-    -------
-    int
-        Ticks run.
-    """
-    done = 0
-    while done < ticks and r.event == 0:
-        stretch = until_row(r.tick, ticks - done, every)
-        train = local_copy(r.train)
-        n = 0
-        while n < stretch and r.event == 0:
-            tick(p, r, train)
-            n += 1
-        copy_back(r.train, train)
-        done += n
-        write_row(r, r.tick, trace, picks, every)
-    return done
+@ticks(FilteredServoParams, local="train")
+@hot_step
+def tick(p: FilteredServoParams, r: FilteredServo, train: DriveTrain) -> bool:
+    """Ten microseconds, on `train` of `r`; none while the host must look: in position, or failed."""
+    if r.event:
+        return False
+    if r.deviation.reset:
+        leave_reset(r)
+    sample(p, r, train.position)
+    drive(p, r, train)
+    return True
 
 
 @step
-def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, ticks: int, trace: Bytes, picks: Offsets) -> int:
-    """`advance` with every decoder clock run and recorded, for timing diagrams: the same bits, clock by clock.
+def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, most: int, trace: Bytes, picks: Offsets) -> int:
+    """The one loop with every decoder clock run and recorded, for timing diagrams: the same bits, clock by clock.
 
     Row ``10 tick + clock`` modulo rows of `trace` holds the registers after that clock.
     """
     n = 0
-    while n < ticks and r.event == 0:
+    while n < most and r.event == 0:
         if r.deviation.reset:
             leave_reset(r)
         prepare(p, r)

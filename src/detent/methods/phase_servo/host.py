@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from detent.errors import AxisError, FileProblem
+from detent.kernel.loop import advance
 from detent.methods.moves.host import Destination, Problem
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
@@ -25,7 +26,7 @@ def phase_servo_machine(
     """Phase servo at power-on."""
     p, r = build_phase_servo(spec), phase_servo.PhaseServo()
     phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
-    return Machine(p, r, Loop(spec.tick, phase_servo.advance), recorder)
+    return Machine(p, r, Loop(spec.tick, advance), recorder)
 
 
 class PhaseHost:

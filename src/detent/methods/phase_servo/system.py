@@ -10,9 +10,6 @@ samples. Its order is: sample (comparator, converters, pulses), decide, actuate,
 combinational; they are worked out in the ticks in which something they depend on has changed.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from detent.control.clock_chain import ClockChain, ClockParams, integrate_strobe, next_period, sample_strobe
 from detent.control.phase_law import Law, LawParams, drive_word, integrate
 from detent.control.phase_sequencer import (
@@ -33,7 +30,7 @@ from detent.control.phase_sequencer import (
 from detent.drive.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, SplitBridgeParams, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
@@ -58,9 +55,6 @@ from detent.sensing.tracking_converter import (
     emit_pulse,
     shift_samples,
 )
-
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
 
 
 class ConverterParams(Registers):
@@ -184,8 +178,9 @@ def tick_integrator(p: PhaseServoParams, r: PhaseServo) -> None:
 
 
 @hot_step
-def sample(p: PhaseServoParams, r: PhaseServo, c: Converters, x: float) -> None:
+def sample(p: PhaseServoParams, r: PhaseServo, x: float) -> None:
     """Clocks, comparator, converters; what their pulses and strobes change is noted."""
+    c = r.converters
     next_period(r.clocks)
     count_carrier(p.converters.carrier, c.carrier)
     compare(p.detector, r.detector, c.carrier.count, x)
@@ -222,53 +217,19 @@ def move(p: PhaseServoParams, r: PhaseServo, train: DriveTrain) -> None:
     read_gauge(r.gauge, r.tick, train.position, train.velocity)
 
 
+@ticks(PhaseServoParams, local="train")
 @hot_step
-def tick(p: PhaseServoParams, r: PhaseServo, c: Converters, train: DriveTrain) -> None:
-    """One period of the reference clocks; `c` and `train` are the blocks of `r` or local copies of them."""
-    sample(p, r, c, train.position)
+def tick(p: PhaseServoParams, r: PhaseServo, train: DriveTrain) -> bool:
+    """One period of the reference clocks, on `train` of `r`; none while the host must look: ready."""
+    if r.sequencer.event:
+        return False
+    sample(p, r, train.position)
     if r.changed or r.tick >= r.wake:
-        decide(p, r, absolute_error(p.converters.absolute, c.absolute))
+        decide(p, r, absolute_error(p.converters.absolute, r.converters.absolute))
     actuate(p, r, train.current)
     move(p, r, train)
     r.tick += 1
-
-
-@step
-def advance(p: PhaseServoParams, r: PhaseServo, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
-    """Run up to `ticks` periods; stops early when the axis has become ready and the host has not yet looked.
-
-    Parameters
-    ----------
-    p, r : PhaseServoParams, PhaseServo
-        Parameters and state.
-    ticks : int
-        Most periods to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-
-    Returns
-    -------
-    int
-        Periods run.
-    """
-    done = 0
-    while done < ticks and r.sequencer.event == 0:
-        stretch = until_row(r.tick, ticks - done, every)
-        converters = local_copy(r.converters)
-        train = local_copy(r.train)
-        n = 0
-        while n < stretch and r.sequencer.event == 0:
-            tick(p, r, converters, train)
-            n += 1
-        copy_back(r.converters, converters)
-        copy_back(r.train, train)
-        done += n
-        write_row(r, r.tick, trace, picks, every)
-    return done
+    return True
 
 
 def switch_on(p: PhaseServoParams, r: PhaseServo, position: float, seed: int) -> None:
@@ -298,8 +259,8 @@ def be_ready(p: PhaseServoParams, r: PhaseServo) -> None:
 
 
 @step
-def run_converters(p: ConverterParams, r: Converters, d: DetectorParams, start: int, rate: int, ticks: int) -> int:
-    """Converters alone, the phase of the secondary at `start` and growing by `rate` per tick [2^-32 turn].
+def run_converters(p: ConverterParams, r: Converters, d: DetectorParams, start: int, rate: int, periods: int) -> int:
+    """Converters alone, the phase of the secondary at `start` and growing by `rate` per period [2^-32 turn].
 
     Returns
     -------
@@ -309,7 +270,7 @@ def run_converters(p: ConverterParams, r: Converters, d: DetectorParams, start: 
     local = local_copy(r)
     net = 0
     phase = start
-    for _ in range(ticks):
+    for _ in range(periods):
         count_carrier(p.carrier, local.carrier)
         ps = (phase + (local.carrier.count << d.carrier_shift)) >> 31 & 1
         convert(p, local, ps)

@@ -15,10 +15,11 @@ from detent.control.head_computer import HIGH_STEADY, IDLE
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
 from detent.files.quantities import INCH
+from detent.kernel.loop import advance
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.derive import Machine as Figures
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
-from detent.methods.print_head.system import TICK, PrintHead, advance, switch_on
+from detent.methods.print_head.system import TICK, PrintHead, switch_on
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 

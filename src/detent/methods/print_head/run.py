@@ -16,6 +16,7 @@ from detent.control.column_timer import COLUMNS
 from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
+from detent.kernel.loop import advance
 from detent.methods.print_head import system as print_head
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.derive import Machine as TrueMachine
@@ -35,7 +36,7 @@ def print_head_machine(
     """Print head at power-on."""
     p, r = build_print_head(spec), print_head.PrintHead()
     print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
-    return Machine(p, r, Loop(print_head.TICK, print_head.advance), recorder)
+    return Machine(p, r, Loop(print_head.TICK, advance), recorder)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,16 +8,12 @@ One tick is one PWM period of 40 us, begun by the 25 kHz trigger. Its order is: 
 last period, decide, actuate, move.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from detent.control.column_timer import LineBuffer, fire, schedule
 from detent.control.head_computer import HeadComputer, HeadParams
 from detent.control.head_sequence import decide, next_wake, on_emitter, on_reverse_edge, power_on
 from detent.drive.h_bridge import Bridge, BridgeLines, steer
 from detent.drive.pwm_timer import PwmTimer, trigger
-from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
@@ -25,9 +21,6 @@ from detent.plant.push import Push, push_force
 from detent.plant.switched_motor import Scratch, SwitchedParams, move_switched
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right, stand_at
 from detent.sensing.quadrature import Quadrature, count_edge
-
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
 
 PERIOD_US = 40
 TICK = PERIOD_US * 1e-6
@@ -156,64 +149,19 @@ def move(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> None:
         )
 
 
+@ticks(PrintHeadParams, local="train")
 @hot_step
-def tick(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> None:
-    """One PWM period; `train` is the drive train of `r` or a local copy of it."""
+def tick(p: PrintHeadParams, r: PrintHead, train: DriveTrain) -> bool:
+    """One PWM period, on `train` of `r`; none while a status byte waits for the supervisor."""
+    if r.head.status.latch.flag:
+        return False
     r.head.now_us = r.tick * PERIOD_US
     sample(p, r, train.position, train.velocity)
     decide(p.head, r.head, r.buffer)
     actuate(p, r)
     move(p, r, train)
     r.tick += 1
-
-
-@step
-def advance_plain(p: PrintHeadParams, r: PrintHead, ticks: int) -> int:
-    """`advance` without trace and without a local copy; the benchmark holds it beside `advance`."""
-    for n in range(ticks):
-        if r.head.status.latch.flag:
-            return n
-        tick(p, r, r.train)
-    return ticks
-
-
-@step
-def advance(p: PrintHeadParams, r: PrintHead, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
-    """Run up to `ticks` periods; stops early when a status byte waits for the supervisor.
-
-    The drive train, which only its own move writes, is worked on in a local copy, so that it stays in machine
-    registers; it is written back before anything else looks at it.
-
-    Parameters
-    ----------
-    p, r : PrintHeadParams, PrintHead
-        Parameters and state.
-    ticks : int
-        Most periods to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-
-    Returns
-    -------
-    int
-        Periods run.
-    """
-    done = 0
-    while done < ticks and r.head.status.latch.flag == 0:
-        stretch = until_row(r.tick, ticks - done, every)
-        train = local_copy(r.train)
-        n = 0
-        while n < stretch and r.head.status.latch.flag == 0:
-            tick(p, r, train)
-            n += 1
-        copy_back(r.train, train)
-        done += n
-        write_row(r, r.tick, trace, picks, every)
-    return done
+    return True
 
 
 def switch_on(p: PrintHeadParams, r: PrintHead, position: float, seed: int) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import at_least, at_most
+from detent.kernel.loop import advance
 from detent.methods.rotary_table import system as rotary_table
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
@@ -33,7 +34,7 @@ def rotary_table_machine(
     """Rotary table at power-on."""
     p, r = build_rotary_table(spec), rotary_table.RotaryTable()
     rotary_table.switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
-    return Machine(p, r, Loop(rotary_table.TICK, rotary_table.advance), recorder)
+    return Machine(p, r, Loop(rotary_table.TICK, advance), recorder)
 
 
 class TableHost:

@@ -11,13 +11,9 @@ move. In a tick with both, the interrupt comes in the middle of the task, where 
 clocks the logic rests, and a tick is the exact motion of the plant.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from detent.control.table_positioner import Positioner, PositionerParams, begin_pass, end_pass, interrupt
 from detent.drive.velocity_amplifier import VelocityAmplifier, VelocityAmplifierParams, drive_torque
-from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register, u4
 from detent.kernel.step import hot_step, step
 from detent.plant.gearing import PHASE_PER_RADIAN, Gear, GearParams, follow, output_phase
@@ -25,9 +21,6 @@ from detent.plant.rotary_motor import LoadTorque, RotaryMotor, RotaryMotorParams
 from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
 from detent.sensing.angle_gauge import AngleGauge, read_angle_gauge
 from detent.sensing.resolver_counter import Resolver, ResolverParams, count_phase
-
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
 
 TICK_US = 100
 TICK = TICK_US * 1e-6
@@ -156,49 +149,17 @@ def move(p: RotaryTableParams, r: RotaryTable, machine: Machine) -> None:
     follow(p.machine.reduction, machine.reduction, travel)
 
 
+@ticks(RotaryTableParams, local="machine")
 @hot_step
-def tick(p: RotaryTableParams, r: RotaryTable, machine: Machine) -> None:
-    """One substep of the drive; `machine` is the machine of `r` or a local copy of it."""
+def tick(p: RotaryTableParams, r: RotaryTable, machine: Machine) -> bool:
+    """One substep of the drive, on `machine` of `r`; none while the host must look: at rest."""
+    if r.positioner.event:
+        return False
     if r.tick == r.clocks.wake:
         serve(p, r, machine)
     move(p, r, machine)
     r.tick += 1
-
-
-@step
-def advance(p: RotaryTableParams, r: RotaryTable, ticks: int, trace: Bytes, picks: Offsets, every: int) -> int:
-    """Run up to `ticks` ticks; stops early when the axis has come to rest and the host has not yet looked.
-
-    Parameters
-    ----------
-    p, r : RotaryTableParams, RotaryTable
-        Parameters and state.
-    ticks : int
-        Most ticks to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-
-    Returns
-    -------
-    int
-        Ticks run.
-    """
-    done = 0
-    while done < ticks and r.positioner.event == 0:
-        stretch = until_row(r.tick, ticks - done, every)
-        machine = local_copy(r.machine)
-        n = 0
-        while n < stretch and r.positioner.event == 0:
-            tick(p, r, machine)
-            n += 1
-        copy_back(r.machine, machine)
-        done += n
-        write_row(r, r.tick, trace, picks, every)
-    return done
+    return True
 
 
 def switch_on(p: RotaryTableParams, r: RotaryTable, turns: float, task_at: int, seed: int) -> None:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from detent.control.step_comparison import BRAKING_DISTANCE, CONSTANT_FREQUENCY, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import start_move
 from detent.errors import DetentError
+from detent.kernel.loop import advance
 from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
 from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, advance
+from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone, tables
 from detent.planning.step_ramp import natural_frequency, total_inertia
 from detent.record.machine import LONGEST_STRETCH, Progress
 from detent.record.recorder import choose_leaves
@@ -181,7 +182,7 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: i
         _take_over(motor, code, way, motor.table.max_hz if method == "largest frequency" else None)
     start_move(motor.r.rule, 1)
     motor.advance_to(1 << 60, 0, until_event=True)
-    motor.advance_to(motor.r.instant + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
+    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
     return Course(motor.rested, motor.lost, float(motor.r.rotor.peak_lag))
 
 
@@ -248,8 +249,8 @@ def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:
     (period,) = choose_leaves(Stepper, ["timer.period"])
     picks = np.arange(period.offset, period.offset + period.width.size)
     rows = np.zeros((motor.table.steps + 1, len(picks)), np.uint8)
-    entries = motor.tables.up.entries, motor.tables.down.entries
-    made = advance(motor.p, motor.r, *entries, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1)
+    feed = tables(motor.tables.up.entries, motor.tables.down.entries)
+    made = advance(alone(motor.p), motor.r, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1, *feed)
     seconds = np.asarray(rows[1 : made + 1].view("<i8")[:, 0] / motor.p.timer.clock_hz, float)
     t: Numbers = np.concatenate([[0.0], np.cumsum(seconds)])
     position = np.linspace(0.0, made * motor.table.step, made + 1)

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from detent.control.step_rule import FAULT, REST
+from detent.kernel.loop import advance
 from detent.kernel.registers import Registers, block, i8, register
 from detent.methods.stepper_envelope.build import MotorTables, build_stepper, instant, make_tables
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.system import Stepper, advance_on_rig, switch_on
+from detent.methods.stepper_envelope.system import Stepper, switch_on, tables
 from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder
 
@@ -56,6 +57,7 @@ class StageMotor:
         # ctypes gives every register its type at run time only.
         self.r: Any = Stepper()
         switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.rotor.step_angle)
+        self._feed = tables(self.tables.up.entries, self.tables.down.entries)
         self.rows, self.picks = _NO_ROWS
         self.rested = 0.0
         """When its last step was over [s], at the last event."""
@@ -84,11 +86,11 @@ class StageMotor:
     def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
         """Advance up to an instant, or until the control unit has an event for the host; True if it has one."""
         r = self.r
-        while r.instant < at and not (until_event and r.rule.event):
+        while r.tick < at and not (until_event and r.rule.event):
             if not until_event:
                 r.rule.event = 0
-            n = min(at - r.instant, LONGEST_STRETCH)
-            advance_on_rig(self.p, r, self.tables.up.entries, self.tables.down.entries, n, self.rows, self.picks, every)
+            n = min(at - r.tick, LONGEST_STRETCH)
+            advance(self.p, r, n, self.rows, self.picks, every, *self._feed)
         if r.rule.event:
             self.rested = r.timer.expires / self.p.timer.clock_hz
         return bool(r.rule.event)
@@ -158,7 +160,7 @@ class Stage:
             for name in sorted(waiting):
                 if self.motors[name].advance_to(stop, every, until_event=True):
                     waiting.discard(name)
-                    reached = max(reached, int(self.motors[name].r.instant))
+                    reached = max(reached, int(self.motors[name].r.tick))
             self._bring_to(stop if waiting else max(reached, self.instant))
         return waiting
 

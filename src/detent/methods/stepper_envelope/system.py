@@ -4,9 +4,9 @@
                                                         ^              |
                                                         +-- period over+
 
-The base tick is one step: `advance` runs the control unit and the timer alone, as firmware does. `advance_on_rig` adds
-the rotor in fixed time steps, to see whether it follows. The order is: decide, actuate, move, record; an open-loop
-motor has nothing to sample. Several motors are several of these records, each with its own tables; nothing is shared.
+A tick is a time step of the rotor, the judge of whether the motor follows; without the rotor, as in firmware, it is a
+step (`alone`). The order is: decide, actuate, move, record; an open-loop motor has nothing to sample. What the host has
+laid ready are both tables. Several motors are several of these records, each with its own tables; nothing is shared.
 """
 
 from collections.abc import Sequence
@@ -29,17 +29,15 @@ from detent.control.step_rule import (
     place_motor,
 )
 from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
-from detent.kernel.compiled import copy_back, local_copy
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
 from detent.plant.stepper_rotor import RotorParams, StepperRotor, hold_field, step_field, turn_rotor
 
-Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
-Entries = NDArray[np.int16]
+Entries = HostArray
+"""Table of int16, see `control.step_rule.next_entry`."""
 
 NOWHERE = -(1 << 62)
 """Position that no motor reaches."""
@@ -57,13 +55,17 @@ class StepperParams(Registers):
     rotor: RotorParams = block("motor and load")
 
 
+class AloneParams(StepperParams):
+    """The same for a motor without its rotor: control unit and timer, as in firmware, where a tick is a step."""
+
+
 class Stepper(Registers):
     """State of one motor with its control unit."""
 
+    tick: i8 = register("time steps of the rotor since power-on; steps where it runs without the rotor", unit="tick")
     rule: StepRule = block("control unit")
     comparison: Comparison = block("a method to compare with")
     timer: StepTimer = block("step timer and phases")
-    instant: i8 = register("time steps of the rotor since power-on", unit="count")
     stop_at: i8 = register("position at which the loop returns to the host", unit="count")
     peak_hz: f8 = register("largest step frequency since the host cleared it", unit="Hz")
     outside: i8 = register("time step in which the rotor was last outside its tolerance", unit="count")
@@ -92,58 +94,31 @@ def step_once(p: StepperParams, r: Stepper, entry: int) -> int:
     return outcome
 
 
-@step
-def advance(
-    p: StepperParams, r: Stepper, up: Entries, down: Entries, steps: int, trace: Bytes, picks: Offsets, every: int
-) -> int:
-    """Run up to `steps` steps without the rotor; stops when the motor rests, or has raised an event.
+@hot_step
+def next_period(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> int:
+    """The running period is over: what the control unit, or the method it is compared with, makes of it."""
+    return step_once(p, r, AT_REST if p.comparison.method else next_entry(r.rule, up, down))
 
-    Parameters
-    ----------
-    p, r : StepperParams, Stepper
-        Parameters and state.
-    up, down : int16 array, shape (N + 1,)
-        Tables, see `control.step_rule.next_entry`.
-    steps : int
-        Most steps to make.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers after a step; row number ``pulses // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Steps between two records; 0 records nothing.
 
-    Returns
-    -------
-    int
-        Steps made.
-    """
-    done = 0
-    running = True
-    while running and done < steps:
-        stretch = until_row(r.timer.pulses, steps - done, every)
-        motor = local_copy(r)
-        n = 0
-        running = motor.rule.event == 0
-        while running and n < stretch:
-            entry = AT_REST if p.comparison.method else next_entry(motor.rule, up, down)
-            outcome = step_once(p, motor, entry)
-            if outcome == STEP:
-                n += 1
-            running = outcome != IDLE and motor.rule.event == 0
-        copy_back(r, motor)
-        if n > 0:
-            write_row(r, r.timer.pulses, trace, picks, every)
-        done += n
-    return done
+@ticks(AloneParams)
+@hot_step
+def tick_alone(p: AloneParams, r: Stepper, up: Entries, down: Entries) -> bool:
+    """One step, as firmware makes it; none while the motor rests, or has raised an event."""
+    outcome = PAUSE
+    while outcome == PAUSE and r.rule.event == 0:
+        outcome = next_period(p, r, up, down)
+    if outcome != STEP:
+        return False
+    r.tick += 1
+    return True
 
 
 @step
-def actuate(p: StepperParams, r: Stepper, entry: int, now: int) -> bool:
+def actuate(p: StepperParams, r: Stepper, up: Entries, down: Entries, now: int) -> bool:
     """The running period is over: the next one, and what its pulse does to the field. False at rest."""
     if r.timer.period == 0:
         r.timer.expires = now  # at rest time passes until a start, which takes effect at once
-    outcome = step_once(p, r, entry)
+    outcome = next_period(p, r, up, down)
     if outcome == STEP:
         hz = frequency(p.timer, r.timer)
         r.peak_hz = max(r.peak_hz, hz)
@@ -153,42 +128,31 @@ def actuate(p: StepperParams, r: Stepper, entry: int, now: int) -> bool:
     return outcome != IDLE
 
 
-@step
-def advance_on_rig(
-    p: StepperParams, r: Stepper, up: Entries, down: Entries, instants: int, trace: Bytes, picks: Offsets, every: int
-) -> int:
-    """Run up to `instants` time steps of the rotor; stops early when the motor has raised an event.
+@ticks(StepperParams)
+@hot_step
+def tick(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> bool:
+    """One time step of the rotor; none while the motor has an event for its host."""
+    if r.rule.event:
+        return False
+    now = r.tick * p.instant_ticks
+    running = True
+    while running and r.timer.expires <= now:
+        running = actuate(p, r, up, down, now)
+    turn_rotor(p.rotor, r.rotor)
+    r.tick += 1
+    if abs(r.rotor.lag) > p.tolerance:
+        r.outside = r.tick
+    return True
 
-    Parameters
-    ----------
-    p, r, up, down, picks
-        As for `advance`.
-    instants : int
-        Most time steps to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record; row number ``instant // every`` modulo rows.
-    every : int
-        Time steps between two records; 0 records nothing.
 
-    Returns
-    -------
-    int
-        Time steps run.
-    """
-    done = 0
-    while done < instants and r.rule.event == 0:
-        now = r.instant * p.instant_ticks
-        running = True
-        while running and r.timer.expires <= now:
-            entry = AT_REST if p.comparison.method else next_entry(r.rule, up, down)
-            running = actuate(p, r, entry, now)
-        turn_rotor(p.rotor, r.rotor)
-        r.instant += 1
-        if abs(r.rotor.lag) > p.tolerance:
-            r.outside = r.instant
-        done += 1
-        write_row(r, r.instant, trace, picks, every)
-    return done
+def alone(p: StepperParams) -> AloneParams:
+    """The same parameters, in the same memory, for running without the rotor."""
+    return AloneParams.from_buffer(p)
+
+
+def tables(up: NDArray[np.int16], down: NDArray[np.int16]) -> tuple[Entries, Entries]:
+    """Feed of a motor: both tables, in the memory in which the host edits them."""
+    return lay_ready(up), lay_ready(down)
 
 
 def load_rule(p: StepperParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool) -> None:

@@ -262,7 +262,7 @@ def test_friction_that_falls_with_speed_is_refused_in_its_direction():
 
 
 def climb(error, *, taken=True):
-    return Climb(RUNGS[1], error, np.full(8, error**2), 1.0, taken, possible=True)
+    return Climb(RUNGS[1], error, np.full(8, error**2), 1.0, taken, possible=True, fit=None)
 
 
 def horizon(name, rms, naive):

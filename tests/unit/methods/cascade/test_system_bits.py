@@ -11,7 +11,8 @@ import pytest
 from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, T_SAMPLE, TICK, Rig, make_params, set_friction
 from tests.places import ROOT
 
-from detent.methods.cascade.system import Cascade, CascadeParams, advance, advance_along, fill_clocks
+from detent.kernel.loop import advance
+from detent.methods.cascade.system import STANDING, Cascade, CascadeParams, along, fill_clocks
 from detent.planning.profile import MotionLimits, plan_move
 
 MOVE = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)
@@ -56,9 +57,9 @@ def run_hash(variant: str) -> str:
     move = plan_move(0.0, 0.004, MOVE, T_SAMPLE)
     rows = np.zeros((7, len(rig.r.snapshot())), np.uint8)
     picks = np.arange(rows.shape[1], dtype=np.int64)
-    arrays = (move.position, move.velocity, move.acceleration)
+    feed = along(move.position, move.velocity, move.acceleration)
     for ticks in (999, 1, 1500):
-        advance_along(rig.p, rig.r, *arrays, ticks, rows, picks, 130)
+        advance(rig.p, rig.r, ticks, rows, picks, 130, *feed)
         digest.update(rig.r.snapshot())
     digest.update(rows.tobytes())
     rig.r.reference.position -= 0.001
@@ -94,11 +95,11 @@ def test_plain_python_gives_the_same_bytes_as_compiled_code():
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_time_may_be_cut_anywhere(variant):
     move = plan_move(0.0, 0.01, MOVE, T_SAMPLE)
-    arrays = (move.position, move.velocity, move.acceleration)
+    feed = along(move.position, move.velocity, move.acceleration)
     whole, pieces = Rig(noisy_params(variant)), Rig(noisy_params(variant))
-    assert advance_along(whole.p, whole.r, *arrays, 6000, *NO_TRACE) == 6000
+    assert advance(whole.p, whole.r, 6000, *NO_TRACE, *feed) == 6000
     for ticks in (1, 2, 997, 3, 4000, 997):
-        assert advance_along(pieces.p, pieces.r, *arrays, ticks, *NO_TRACE) == ticks
+        assert advance(pieces.p, pieces.r, ticks, *NO_TRACE, *feed) == ticks
     assert whole.r.snapshot() == pieces.r.snapshot()
 
 
@@ -109,11 +110,11 @@ def test_rows_are_the_registers_after_every_so_many_ticks():
     rig = Rig(noisy_params("backlash"))
     rig.r.reference.position = 0.001
     r, stepped = rig.r, rig.r.copy()
-    assert advance(rig.p, r, 3, rows, picks, 7) == 3
-    assert advance(rig.p, r, 37, rows, picks, 7) == 37
+    assert advance(rig.p, r, 3, rows, picks, 7, *STANDING) == 3
+    assert advance(rig.p, r, 37, rows, picks, 7, *STANDING) == 37
     expected = {}
     for _ in range(40):
-        assert advance(rig.p, stepped, 1, *NO_TRACE) == 1
+        assert advance(rig.p, stepped, 1, *NO_TRACE, *STANDING) == 1
         if stepped.tick % 7 == 0:
             expected[stepped.tick // 7 % 5] = stepped.snapshot()
     assert r.snapshot() == stepped.snapshot()

@@ -5,7 +5,8 @@ import pytest
 from tests.filtered_servo_rig import NO_TRACE, PLANT_B, PULSE, START, Rig, plant_a
 
 from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, RESET, RUN, SPEED_RANGE
-from detent.methods.filtered_servo.system import CLOCKS, NEVER, TICK, FilteredServo, advance, switch_on
+from detent.kernel.loop import advance
+from detent.methods.filtered_servo.system import CLOCKS, NEVER, TICK, FilteredServo, switch_on
 
 RAMP = "method.command_acceleration=1 m/s^2"
 

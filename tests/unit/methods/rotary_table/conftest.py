@@ -6,9 +6,10 @@ from importlib.resources import files
 import pytest
 from tests.rotary_table_rig import NO_TRACE
 
+from detent.kernel.loop import advance
 from detent.methods.load import load_spec
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
-from detent.methods.rotary_table.system import RotaryTable, advance, switch_on
+from detent.methods.rotary_table.system import RotaryTable, switch_on
 
 EXAMPLE = files("detent").joinpath("examples/rotary_table.toml")
 

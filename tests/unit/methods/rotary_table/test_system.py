@@ -14,7 +14,8 @@ from tests.rotary_table_rig import COUNT, NO_TRACE, RATIO, Rig, T
 
 from detent.control.position_table import NEGATIVE, POSITIVE
 from detent.control.table_positioner import HOLD, MOVE, POWER_ON
-from detent.methods.rotary_table.system import RotaryTable, advance, switch_on
+from detent.kernel.loop import advance
+from detent.methods.rotary_table.system import RotaryTable, switch_on
 from detent.plant.gearing import fill_eccentricity
 from detent.sensing.resolver_counter import fill_resolver
 

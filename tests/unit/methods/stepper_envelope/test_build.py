@@ -16,6 +16,7 @@ from tests.stepper_rig import COARSE_FINE, FINE_HZ, LOAD, MAX_HZ, MOTOR, RAMP, r
 
 from detent.control.step_rule import start_move
 from detent.files.source import parse_source
+from detent.kernel.loop import advance
 from detent.methods.load import axis_of
 from detent.methods.reference import reference_rows
 from detent.methods.stepper_envelope.build import (
@@ -28,7 +29,8 @@ from detent.methods.stepper_envelope.build import (
     stepper_motor,
     zone_maps,
 )
-from detent.methods.stepper_envelope.system import Stepper, advance_on_rig, switch_on
+from detent.methods.stepper_envelope.system import Stepper, switch_on
+from detent.methods.stepper_envelope.system import tables as feed
 from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, WindingPullOut
 from detent.planning.step_envelope import Zone
 
@@ -119,7 +121,7 @@ def registers_after(*overrides):
     start_move(r.rule, 1, 1)
     states = []
     for _ in range(400):
-        advance_on_rig(p, r, tables.up.entries, tables.down.entries, 2500, *NO_TRACE)
+        advance(p, r, 2500, *NO_TRACE, *feed(tables.up.entries, tables.down.entries))
         states.append(bytes(r))
         if r.rule.event:
             break

@@ -40,7 +40,7 @@ def test_a_wait_ends_with_the_last_motor(spec):
     assert stage.wait_for(stage.motors, 5.0) == set()
     a, b = stage.motors.values()
     assert (a.position, b.position) == (60, 35)
-    assert a.r.instant == b.r.instant == stage.instant
+    assert a.r.tick == b.r.tick == stage.instant
     assert b.rested < a.rested == pytest.approx(stage.time, abs=2 * stage.tick)
     assert (a.lost, b.lost) == (0, 0)
     assert a.resting
@@ -52,7 +52,7 @@ def test_a_wait_gives_up(spec):
     short_moves(stage)
     assert stage.wait_for(["group_a"], 0.01) == {"group_a"}
     assert stage.time == pytest.approx(0.01)
-    assert {motor.r.instant for motor in stage.motors.values()} == {stage.instant}
+    assert {motor.r.tick for motor in stage.motors.values()} == {stage.instant}
 
 
 def test_a_motor_runs_as_if_it_were_alone(spec):

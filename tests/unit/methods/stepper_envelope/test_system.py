@@ -3,7 +3,8 @@ import pytest
 from tests.stepper_rig import CLOCK_HZ, NO_TRACE, RAMP, Rig
 
 from detent.control.step_rule import IDLE, PAUSE, STEP, next_entry
-from detent.methods.stepper_envelope.system import NOWHERE, StepperParams, advance, advance_on_rig, load_rule, step_once
+from detent.kernel.loop import advance
+from detent.methods.stepper_envelope.system import NOWHERE, StepperParams, alone, load_rule, step_once
 from detent.planning.step_envelope import Zone
 from detent.planning.step_ramp import StepRamp
 
@@ -22,7 +23,7 @@ def test_a_step_moves_position_pattern_and_time_together():
 
 def test_a_course_ends_with_the_last_period():
     rig = Rig(3).start()
-    assert advance(rig.p, rig.r, *rig.tables, 100, *NO_TRACE) == 3
+    assert advance(alone(rig.p), rig.r, 100, *NO_TRACE, *rig.tables) == 3
     assert rig.r.timer.expires == pytest.approx(CLOCK_HZ * (2 / 400 + 1 / 490), rel=1e-6)
     assert rig.r.timer.period == 0
     assert decide(rig) == IDLE
@@ -40,21 +41,21 @@ def test_a_reversal_waits_whole_periods_of_the_start_frequency(pause):
 
 
 def test_on_the_rig_the_motor_takes_the_same_steps_at_the_same_times():
-    alone = Rig(40).start()
-    seconds = alone.course().seconds
+    steps = Rig(40).start()
+    seconds = steps.course().seconds
     rig = Rig(40).start().run_to_rest()
     assert rig.seconds == pytest.approx(seconds, abs=1e-12)
-    assert rig.r.rule.snapshot()[:-8] == alone.r.rule.snapshot()[:-8]
+    assert rig.r.rule.snapshot()[:-8] == steps.r.rule.snapshot()[:-8]
     assert rig.r.rotor.commanded == rig.position == 40
-    assert rig.r.instant * 2e-6 == pytest.approx(seconds, abs=4e-6)
+    assert rig.r.tick * 2e-6 == pytest.approx(seconds, abs=4e-6)
 
 
 def test_time_at_rest_passes_and_a_start_takes_effect_at_once():
     rig = Rig(4)
-    assert advance_on_rig(rig.p, rig.r, *rig.tables, 1000, *NO_TRACE) == 1000
+    assert advance(rig.p, rig.r, 1000, *NO_TRACE, *rig.tables) == 1000
     assert rig.r.timer.pulses == 0
     rig.start()
-    assert advance_on_rig(rig.p, rig.r, *rig.tables, 1, *NO_TRACE) == 1
+    assert advance(rig.p, rig.r, 1, *NO_TRACE, *rig.tables) == 1
     assert rig.r.timer.pulses == 1
     assert rig.r.timer.expires == 1000 * 2000 + CLOCK_HZ // 400
 
@@ -72,11 +73,11 @@ def test_records_are_taken_at_multiples_of_their_interval():
     leaf = next(leaf for leaf in type(rig.r).leaves() if leaf.path == "rule.position")
     picks = np.arange(leaf.offset, leaf.offset + 8)
     rows = np.zeros((10, 8), np.uint8)
-    advance(rig.p, rig.r, *rig.tables, 100, rows, picks, 4)
+    advance(alone(rig.p), rig.r, 100, rows, picks, 4, *rig.tables)
     assert rows.view(np.int64)[:, 0].tolist() == [0, 4, 8, 12, 16, 20, 24, 28, 0, 0]
     rig = Rig(30).start()
     rows = np.zeros((8, 8), np.uint8)
-    advance_on_rig(rig.p, rig.r, *rig.tables, 4000, rows, picks, 500)
+    advance(rig.p, rig.r, 4000, rows, picks, 500, *rig.tables)
     assert rows.view(np.int64)[:, 0].tolist() == [5, 1, 1, 2, 2, 3, 3, 4]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from detent.kernel.recording import until_row, write_row
+from detent.kernel.loop import until_row, write_row
 from detent.kernel.registers import Registers, i8, register, u1
 
 

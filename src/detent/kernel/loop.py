@@ -1,0 +1,134 @@
+"""The one loop: every axis is advanced by it, and every row of a trace is written in it.
+
+A system states its tick by `ticks`, under the class of its parameters, where `advance` finds it: numba when it compiles
+the loop for these parameters, plain Python at each call. A tick handed over as an argument, or kept in a closure, would
+never be found in the compiled cache.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba.extending
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.registers import Registers
+from detent.kernel.step import hot_step, step
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
+F = TypeVar("F", bound=Callable[..., bool])
+
+extending: Any = numba.extending  # it publishes no types
+
+HostArray = Any
+"""A ctypes array; compiled code reads ``array[k]`` and ``len(array)``."""
+
+_TICKS: dict[type[Registers], tuple[Callable[..., bool], str]] = {}
+
+
+def ticks(params: type[Registers], local: str = "") -> Callable[[F], F]:
+    """State the tick of a system: ``tick(params, state, *feed)``.
+
+    It counts the state's field ``tick`` up and gives True; False where nothing happens before the host has looked.
+    Where a benchmark shows a gain, `local` names the block of the plant: a stretch of ticks works on a copy of it in a
+    stack slot, so that it stays in machine registers. The tick is then ``tick(params, state, block, *feed)``, and does
+    not touch the one in the state.
+    """
+
+    def register(function: F) -> F:
+        """Keep it for this class of parameters."""
+        _TICKS[params] = function, local
+        return function
+
+    return register
+
+
+def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
+    """Up to `most` ticks of the system whose parameters these are, without a row; returns how many."""
+    tick, local = _TICKS[type(p)]
+    blocks = (getattr(r, local),) if local else ()
+    n = 0
+    while n < most and tick(p, r, *blocks, *feed):
+        n += 1
+    return n
+
+
+@extending.overload(run_stretch, jit_options={"forceinline": True})
+def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over the types of all
+    tick, local = _TICKS[p.registers]
+
+    def plain(p: Any, r: Any, most: Any, *feed: Any) -> int:
+        n = 0
+        while n < most and tick(p, r, *feed):
+            n += 1
+        return n
+
+    def on_a_copy(p: Any, r: Any, most: Any, *feed: Any) -> int:
+        block = local_copy(getattr(r, local))
+        n = 0
+        while n < most and tick(p, r, block, *feed):
+            n += 1
+        copy_back(getattr(r, local), block)
+        return n
+
+    return on_a_copy if local else plain
+
+
+def lay_ready(values: NDArray[Any]) -> HostArray:
+    """An array of the host, float64 or int16, as steps read along it; the memory is shared where it can be."""
+    return np.ctypeslib.as_ctypes(np.require(values, requirements=["C", "W"]))
+
+
+@hot_step
+def until_row(count: int, most: int, every: int) -> int:
+    """Of at most so many ticks from `count` on, those up to the next row; all of them where `every` is 0."""
+    return min(most, every - count % every) if every > 0 else most
+
+
+@hot_step
+def write_row(r: Any, count: int, trace: Bytes, picks: Offsets, every: int) -> None:
+    """Write the row of this count, number ``count // every`` modulo rows, if it has one."""
+    if every > 0 and count % every == 0:
+        row = (count // every) % trace.shape[0]
+        for k in range(picks.shape[0]):
+            trace[row, k] = byte_at(r, picks[k])
+
+
+@step
+def advance(  # noqa: PLR0913 - an axis, how long, and where its rows go
+    p: Any, r: Any, most: int, trace: Bytes, picks: Offsets, every: int, *feed: Any
+) -> int:
+    """Run up to `most` ticks; stops early where the axis waits for its host.
+
+    Parameters
+    ----------
+    p, r : Registers
+        Parameters and state of an axis.
+    most : int
+        Most ticks to run.
+    trace : uint8 array, shape (rows, bytes)
+        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
+    picks : int64 array, shape (bytes,)
+        Byte offsets in the state that make a row.
+    every : int
+        Ticks between two records; 0 records nothing.
+    *feed
+        Arrays that the host has laid ready for the axis, as its tick takes them; see `lay_ready`.
+
+    Returns
+    -------
+    int
+        Ticks run.
+    """
+    done = 0
+    while done < most:
+        stretch = until_row(r.tick, most - done, every)
+        n = run_stretch(p, r, stretch, *feed)
+        done += n
+        if n > 0:
+            write_row(r, r.tick, trace, picks, every)
+        if n < stretch:
+            break
+    return done
