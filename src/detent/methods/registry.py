@@ -15,14 +15,14 @@ from detent.methods.cascade.derive import derive as derive_cascade
 from detent.methods.cascade.rules import RULES as CASCADE_RULES
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.schema import fill_derived as fill_cascade
-from detent.methods.filtered_servo.cautions import find_cautions as find_filtered_servo_cautions
+from detent.methods.filtered_servo.checks import RULES as FILTERED_SERVO_RULES
+from detent.methods.filtered_servo.checks import find_cautions as find_filtered_servo_cautions
 from detent.methods.filtered_servo.derive import derive as derive_filtered_servo
-from detent.methods.filtered_servo.rules import RULES as FILTERED_SERVO_RULES
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.schema import fill_derived as fill_filtered_servo
-from detent.methods.phase_servo.cautions import find_cautions as find_phase_servo_cautions
+from detent.methods.phase_servo.checks import RULES as PHASE_SERVO_RULES
+from detent.methods.phase_servo.checks import find_cautions as find_phase_servo_cautions
 from detent.methods.phase_servo.derive import derive as derive_phase_servo
-from detent.methods.phase_servo.rules import RULES as PHASE_SERVO_RULES
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.schema import fill_derived as fill_phase_servo
 from detent.methods.print_head.cautions import find_cautions as find_print_head_cautions

@@ -7,7 +7,7 @@ one of them is wrong already: a consequence of an error is not another error.
 import math
 from collections.abc import Callable, Iterator
 
-from detent.axisfile.common_rules import Plant, static_friction, time_constants
+from detent.axisfile.common_checks import Plant, sides, static_friction, time_constants
 from detent.files.findings import Contradiction
 from detent.files.quantities import INCH
 from detent.methods.print_head.derive import Machine
@@ -91,7 +91,7 @@ def _positions_inside_travel(spec: PrintHeadSpec) -> Iterator[Contradiction]:
 
 
 def _static_friction(spec: PrintHeadSpec) -> Iterator[Contradiction]:
-    yield from static_friction(spec.mechanics.friction)
+    yield from static_friction(sides(spec.mechanics.friction))
 
 
 def _slope_limits(spec: PrintHeadSpec) -> Iterator[Contradiction]:
