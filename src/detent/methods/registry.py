@@ -25,9 +25,9 @@ from detent.methods.phase_servo.checks import find_cautions as find_phase_servo_
 from detent.methods.phase_servo.derive import derive as derive_phase_servo
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.schema import fill_derived as fill_phase_servo
-from detent.methods.print_head.cautions import find_cautions as find_print_head_cautions
+from detent.methods.print_head.checks import RULES as PRINT_HEAD_RULES
+from detent.methods.print_head.checks import find_cautions as find_print_head_cautions
 from detent.methods.print_head.derive import derive as derive_print_head
-from detent.methods.print_head.rules import RULES as PRINT_HEAD_RULES
 from detent.methods.print_head.schema import PrintHeadSpec
 from detent.methods.print_head.schema import fill_derived as fill_print_head
 from detent.methods.rotary_table.cautions import find_cautions as find_rotary_table_cautions

@@ -1,9 +1,11 @@
 """Warnings about a print-head axis that can be built."""
 
+from functools import partial
+
 import pytest
 from tests.remedies import check_caution
 
-from detent.methods.print_head.cautions import find_cautions
+from detent.methods.print_head.checks import find_cautions
 
 
 def cautions(load_text, text, *overrides):
@@ -37,7 +39,9 @@ def test_the_default_plant_has_nothing_to_warn_about(load_text, good_text):
 def test_warnings_say_value_limit_consequence_and_remedy(load_text, good_text, golden, overrides, name):
     found = cautions(load_text, good_text, *overrides)
     golden(f"{name}, {' '.join(overrides)}", found[name])
-    check_caution(lambda *more: cautions(load_text, good_text, *more), overrides, name, found[name])
+    # The IR counts named are in the middle of what will do.
+    at_bound = name != "acceleration from the IR counts"
+    check_caution(partial(cautions, load_text, good_text), overrides, name, found[name], at_bound=at_bound)
 
 
 def test_the_switch_level_bridge_shows_current_gaps_so_nothing_is_warned(load_text, good_text):
