@@ -10,9 +10,9 @@ from detent.axisfile.motion import rotary_model
 from detent.axisfile.tables import AxisSpec
 from detent.files.findings import Caution, Contradiction, Derived
 from detent.kernel.registers import Registers
-from detent.methods.cascade.cautions import find_cautions as find_cascade_cautions
+from detent.methods.cascade.checks import RULES as CASCADE_RULES
+from detent.methods.cascade.checks import find_cautions as find_cascade_cautions
 from detent.methods.cascade.derive import derive as derive_cascade
-from detent.methods.cascade.rules import RULES as CASCADE_RULES
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.schema import fill_derived as fill_cascade
 from detent.methods.filtered_servo.checks import RULES as FILTERED_SERVO_RULES

@@ -8,8 +8,8 @@ from tests.bad_files import edit, given, params
 from tests.remedies import broken_rules, check_rule, named_value
 
 from detent.errors import InputError
-from detent.methods.cascade import rules
-from detent.methods.cascade.rules import RULES
+from detent.methods.cascade import checks
+from detent.methods.cascade.checks import RULES
 
 LEAD = 'travel_per_revolution = "10 mm"     # lead of the screw\n'
 MOTOR = (
@@ -180,4 +180,4 @@ def test_the_memory_is_that_of_the_blocks():
 def test_the_fastest_plant_takes_ticks_that_can_be_counted():
     from detent.methods.cascade.build import sample_ticks
 
-    assert sample_ticks(0.1, rules.FASTEST) < 2**31
+    assert sample_ticks(0.1, checks.FASTEST) < 2**31
