@@ -30,9 +30,9 @@ from detent.methods.print_head.checks import find_cautions as find_print_head_ca
 from detent.methods.print_head.derive import derive as derive_print_head
 from detent.methods.print_head.schema import PrintHeadSpec
 from detent.methods.print_head.schema import fill_derived as fill_print_head
-from detent.methods.rotary_table.cautions import find_cautions as find_rotary_table_cautions
+from detent.methods.rotary_table.checks import RULES as ROTARY_TABLE_RULES
+from detent.methods.rotary_table.checks import find_cautions as find_rotary_table_cautions
 from detent.methods.rotary_table.derive import derive as derive_rotary_table
-from detent.methods.rotary_table.rules import RULES as ROTARY_TABLE_RULES
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.schema import fill_derived as fill_rotary_table
 from detent.methods.stepper_envelope.cautions import find_cautions as find_stepper_envelope_cautions

@@ -10,8 +10,8 @@ from tests.bad_files import added, check_bad_file, edit, given, params
 from tests.remedies import broken_rules, check_rule, named_value
 
 from detent.errors import InputError
-from detent.methods.rotary_table import rules
-from detent.methods.rotary_table.rules import RULES
+from detent.methods.rotary_table import checks
+from detent.methods.rotary_table.checks import RULES
 
 LONG_STROBE = ("mechanics.gear_ratio=2", "method.task_period=100 ms", "detector.fine.counts=65536")
 COARSEST = (
@@ -251,5 +251,5 @@ def test_the_constants_are_those_of_the_blocks():
     from detent.control import table_positioner
     from detent.methods.rotary_table import system as rotary_table
 
-    assert pytest.approx(rotary_table.TICK) == rules.TICK
-    assert table_positioner.LONGEST_WAY == rules.LONGEST_WAY
+    assert pytest.approx(rotary_table.TICK) == checks.TICK
+    assert table_positioner.LONGEST_WAY == checks.LONGEST_WAY
