@@ -35,9 +35,9 @@ from detent.methods.rotary_table.checks import find_cautions as find_rotary_tabl
 from detent.methods.rotary_table.derive import derive as derive_rotary_table
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.schema import fill_derived as fill_rotary_table
-from detent.methods.stepper_envelope.cautions import find_cautions as find_stepper_envelope_cautions
+from detent.methods.stepper_envelope.checks import RULES as STEPPER_ENVELOPE_RULES
+from detent.methods.stepper_envelope.checks import find_cautions as find_stepper_envelope_cautions
 from detent.methods.stepper_envelope.derive import derive as derive_stepper_envelope
-from detent.methods.stepper_envelope.rules import RULES as STEPPER_ENVELOPE_RULES
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.schema import fill_derived as fill_stepper_envelope
 
