@@ -321,7 +321,7 @@ def still_follows(inertia: float, friction: float) -> bool:
 
 def margin() -> None:
     """How much more inertia and friction the ramp of the example bears."""
-    from detent.methods.stepper_envelope.cautions import MOST_FRICTION, MOST_USED, START_RESERVE
+    from detent.methods.stepper_envelope.checks import MOST_FRICTION, MOST_USED, START_RESERVE
 
     m = figures_of(*OPEN)
     factors = np.array([0.5, 1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10.5, 11])

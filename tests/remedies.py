@@ -1,25 +1,24 @@
-"""Remedies that name a value: what they name is accepted, and nothing nearer to what was refused would be."""
+"""Remedies that name a value: with it the finding is gone, a little short of it the finding is back."""
 
 import re
 from copy import copy
 from functools import wraps
 
-import pytest
-
 from detent.errors import InputError
 from detent.methods.registry import METHODS
 from detent.units import format_quantity
-from tests.bad_files import Bad, check_bad_file
+from tests.bad_files import check_bad_file
 
 VALUE = r'"[^"]*"|\[[^\]]*\]|[\w.+-]*\w'
 NAMED = re.compile(rf"set ([a-z0-9_.]+) = ({VALUE})(?: and ([a-z0-9_.]+) = ({VALUE}))?")
 NUMBER = re.compile(r'"([\d.e+-]+) (.+)"')
 
 
-def alternatives(remedy):
-    """What a remedy names, as overrides; each of them alone would do."""
-    found = [match.groups() for match in NAMED.finditer(remedy)]
-    return [[f"{key}={value}" for key, value in zip(entry[::2], entry[1::2], strict=True) if key] for entry in found]
+def named_value(remedy):
+    """What a remedy names, as overrides; nothing where it is a sentence."""
+    found = NAMED.search(remedy)
+    entry = found.groups() if found else ()
+    return [f"{key}={value}" for key, value in zip(entry[::2], entry[1::2], strict=True) if key]
 
 
 def neighbours(override):
@@ -44,31 +43,15 @@ def is_refused(load_text, text, overrides):
     return False
 
 
-def check_remedies(load_text, text, overrides, problem):
-    """Each value that a problem's remedy names is accepted; of its two neighbours one is not. Returns how many."""
-    named = alternatives(problem.remedy)
-    for alternative in named:
-        load_text(text, *overrides, *alternative)
-        near = [n for override in alternative for n in neighbours(override)]
-        refused = [is_refused(load_text, text, [*overrides, n]) for n in near]
-        assert any(refused) or not near, f"{alternative}: a nearer value would do as well"
-    return len(named)
-
-
-def check_rule(bad, good_text, load_text):
-    """Load the bad file: the problem expected, and a remedy that holds what it promises."""
-    check_bad_file(bad, good_text, load_text)
-    text = bad.make(good_text)
-    with pytest.raises(InputError) as caught:
-        load_text(text, *bad.overrides)
-    count = check_remedies(load_text, text, bad.overrides, caught.value.problems[0])
-    # A table of rules says how many values it expects a message to name.
-    assert count == bad.remedy.count("set ")
-
-
-def given(name, *overrides, key, came, allowed, remedy, others=0):
-    """A bad axis made by overrides of the good file; the problem stands at the last that the rule looks at."""
-    return Bad(name, "--set", key, came, allowed, remedy, overrides=overrides, others=others)
+def check_rule(bad, good_text, load_text, golden):
+    """Load the bad file: the problem expected, gone with the value named, there again a little beside it."""
+    text, problem = bad.make(good_text), check_bad_file(bad, good_text, load_text, golden)
+    named = named_value(problem.remedy)
+    assert problem.remedy
+    if named:
+        load_text(text, *bad.overrides, *named)
+        near = [override for one in named for override in neighbours(one)]
+        assert not near or any(is_refused(load_text, text, [*bad.overrides, one]) for one in near)
 
 
 def broken_rules(method, entries, good_text, load_text, monkeypatch):
@@ -90,3 +73,20 @@ def broken_rules(method, entries, good_text, load_text, monkeypatch):
     for bad in entries:
         is_refused(load_text, bad.make(good_text), bad.overrides)
     return broken
+
+
+def check_caution(look, overrides, name, finding, *, at_bound=True):
+    """A caution is gone with the value it names, and there again a little beside it; `look` gives cautions by name."""
+    named = named_value(finding.remedy)
+    assert finding.remedy
+    if named:
+        assert name not in look(*overrides, *named)
+        near = [override for one in named for override in neighbours(one)]
+        assert not near or not at_bound or any(_found(look, name, [*overrides, one]) for one in near)
+
+
+def _found(look, name, overrides):
+    try:
+        return name in look(*overrides)
+    except InputError:
+        return True

@@ -67,6 +67,11 @@ class Contradiction:
         return tuple(tuple(key.split(".")) for key in self.keys)
 
 
+def wrong(keys: str, allowed: str, remedy: str) -> Contradiction:
+    """Contradiction between keys, written with spaces between them; the one to blame first is the first."""
+    return Contradiction(tuple(keys.split()), allowed, remedy)
+
+
 @dataclass(frozen=True, slots=True)
 class Caution:
     """One thing that looks wrong.

@@ -1,6 +1,7 @@
 """The value nearest to a refused one that would do, as a message names it: ready to be copied into the file."""
 
-from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+import math
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
@@ -11,6 +12,9 @@ from detent.units import IN_DEGREES, format_quantity, in_degrees, parse_quantity
 
 BARELY = 1e-9
 """Relative distance that a value keeps from a bound it must not touch."""
+
+UNITS = "check the units of what it depends on"
+"""Remedy where a key has no value that would do."""
 
 
 def at_most(value: float, unit: str, digits: int = 4) -> str:
@@ -97,3 +101,41 @@ def _accepts(field: FieldInfo, value: float) -> bool:
 def either(*remedies: str) -> str:
     """Join remedies of which each would do; empty ones are left out."""
     return " or ".join(remedy for remedy in remedies if remedy)
+
+
+class Remedies:
+    """Values that would do, for the keys of a model: what they name is within the key's own bounds.
+
+    Each takes the bound and what is said where the key has no such value.
+    """
+
+    def __init__(self, model: type[Table]) -> None:
+        self._model = model
+
+    def most(self, key: str, bound: float, otherwise: str = UNITS, digits: int = 4) -> str:
+        """Set a key to the largest short value that is not above a bound."""
+        return self._set(key, bound, otherwise, digits, ROUND_FLOOR)
+
+    def least(self, key: str, bound: float, otherwise: str = UNITS, digits: int = 4) -> str:
+        """Set a key to the smallest short value that is not below a bound."""
+        return self._set(key, bound, otherwise, digits, ROUND_CEILING)
+
+    def exactly(self, key: str, value: float, otherwise: str = UNITS) -> str:
+        """Set a key to a value, to twelve digits."""
+        return self._set(key, value, otherwise, 12, ROUND_HALF_EVEN)
+
+    def _set(self, key: str, value: float, otherwise: str, digits: int, rounding: str) -> str:
+        if not math.isfinite(value):
+            return otherwise
+        field = field_at(self._model, tuple(key.split(".")))
+        unit = unit_of(field)
+        if unit:
+            written = _written(value, unit, digits, rounding)
+            value = parse_quantity(written.strip('"'), unit)
+        else:
+            whole = field.annotation is int
+            value = (
+                float(Decimal(repr(value)).to_integral_value(rounding)) if whole else _rounded(value, digits, rounding)
+            )
+            written = f"{value:.0f}" if whole else f"{value!r}"
+        return put(key, written) if _accepts(field, value) else otherwise

@@ -10,12 +10,21 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, quantity_figure
-from detent.methods.cascade.rules import dead_time
 from detent.methods.cascade.schema import CascadeSpec, FrictionTable
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
     from detent.methods.cascade.loop import LinearLoop
+
+
+def dead_time(spec: CascadeSpec) -> float:
+    """Time from a motion until the drive acts on its velocity [s].
+
+    Hold of a sample, delays of encoder and amplifier, half the span of the velocity and its filter.
+    """
+    table = spec.velocity_encoder
+    samples = 0.5 + spec.drive.delay + table.delay + 0.5 * table.velocity_span
+    return samples * spec.method.sample_period + table.velocity_filter
 
 
 class Machine:

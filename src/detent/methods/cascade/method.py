@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.axisfile.motion import rotary_model
 from detent.files.findings import Caution, Derived
-from detent.methods.cascade.cautions import find_cautions
+from detent.methods.cascade.checks import RULES, find_cautions
 from detent.methods.cascade.derive import derive
-from detent.methods.cascade.rules import RULES
 from detent.methods.cascade.schema import CascadeSpec, fill_derived
 from detent.methods.method import Comparison, Method, Shown, Simulated, Table
 from detent.methods.moves.job import MoveJob, one_move

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
-from detent.methods.filtered_servo.cautions import find_cautions
+from detent.methods.filtered_servo.checks import RULES, find_cautions
 from detent.methods.filtered_servo.derive import derive
-from detent.methods.filtered_servo.rules import RULES
 from detent.methods.filtered_servo.schema import FilteredServoSpec, fill_derived
 from detent.methods.method import Comparison, Method, Shown, Simulated, Table
 from detent.methods.moves.job import MoveJob, one_move

@@ -8,9 +8,8 @@ from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
 from detent.methods.method import Comparison, Method, Shown, Simulated, Table
 from detent.methods.moves.job import MoveJob, one_move
-from detent.methods.phase_servo.cautions import find_cautions
+from detent.methods.phase_servo.checks import RULES, find_cautions
 from detent.methods.phase_servo.derive import derive
-from detent.methods.phase_servo.rules import RULES
 from detent.methods.phase_servo.schema import PhaseServoSpec, fill_derived
 
 if TYPE_CHECKING:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
 from detent.methods.method import Comparison, Method, Shown, Simulated, Table
-from detent.methods.print_head.cautions import find_cautions
+from detent.methods.print_head.checks import RULES, find_cautions
 from detent.methods.print_head.derive import derive
-from detent.methods.print_head.rules import RULES
 from detent.methods.print_head.schema import PrintHeadSpec, fill_derived
 
 if TYPE_CHECKING:

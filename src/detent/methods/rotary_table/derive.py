@@ -14,6 +14,9 @@ from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity
 
+TICK = 1e-4
+"""Base tick [s] (`methods.rotary_table.system`)."""
+
 FULL_TURN = 2 * math.pi
 
 POINTS = 256

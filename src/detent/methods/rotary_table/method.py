@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from detent.files.findings import Caution, Derived
 from detent.methods.method import Comparison, Method, Shown, Simulated, Table
-from detent.methods.rotary_table.cautions import find_cautions
+from detent.methods.rotary_table.checks import RULES, find_cautions
 from detent.methods.rotary_table.derive import derive
-from detent.methods.rotary_table.rules import RULES
 from detent.methods.rotary_table.schema import RotaryTableSpec, fill_derived
 
 if TYPE_CHECKING:

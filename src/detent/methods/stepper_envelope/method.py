@@ -34,7 +34,7 @@ class StepperEnvelope(Method[StepperEnvelopeSpec]):
     @cached_property
     def rules(self) -> Sequence[Callable[[StepperEnvelopeSpec], Iterable[Contradiction]]]:  # pyright: ignore[reportIncompatibleVariableOverride] - they make tables, with NumPy
         """What must hold between keys."""
-        from detent.methods.stepper_envelope.rules import RULES
+        from detent.methods.stepper_envelope.checks import RULES
 
         return RULES
 
@@ -50,7 +50,7 @@ class StepperEnvelope(Method[StepperEnvelopeSpec]):
 
     def cautions(self, spec: StepperEnvelopeSpec) -> Iterable[Caution]:
         """What looks wrong."""
-        from detent.methods.stepper_envelope.cautions import find_cautions
+        from detent.methods.stepper_envelope.checks import find_cautions
 
         return find_cautions(spec)
 

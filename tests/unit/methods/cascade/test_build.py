@@ -20,7 +20,7 @@ from detent.methods.cascade.build import (
     sample_ticks,
     start_position,
 )
-from detent.methods.cascade.cautions import find_cautions
+from detent.methods.cascade.checks import find_cautions
 from detent.methods.cascade.derive import derive
 from detent.methods.cascade.system import MAX_RATE
 from detent.methods.load import axis_of

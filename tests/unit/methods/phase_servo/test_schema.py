@@ -130,45 +130,27 @@ def test_loading_what_was_dumped_gives_the_same_specification(load_text, good_te
 
 GAINS = "three whole numbers from 1 to 1000"
 VALUES = [
-    added("two gains", "[method]\nspeed_gains = [1, 1]", "54:1", "method.speed_gains", "2 numbers", GAINS, "so many"),
-    added("no gain", "[method]\nposition_gains = [4, 0, 1]", "54:1", "method.position_gains", "0 as", GAINS, "range"),
-    added("gain", "[method]\nposition_gains = [4, 1001, 1]", "54:1", "method.position_gains", "1001", GAINS, "range"),
-    added("a gain", "[method]\nspeed_gains = 16", "54:1", "method.speed_gains", "16", GAINS, "in brackets"),
-    added("order", '[clock]\norder = "strict"', "54:1", "clock.order", '"strict"', '"robust" or "literal"', "write"),
-    added("final", '[method]\nfinal = "counted"', "54:1", "method.final", '"counted"', '"absolute"', "write"),
-    added("clock", '[clock]\noscillator = "8 rad/s"', "54:1", "clock.oscillator", "rad/s", "a frequency", "kHz"),
-    added("clock without unit", "[clock]\noscillator = 8e6", "54:1", "clock.oscillator", "8e6", "a frequency", "unit"),
-    added("slow", '[clock]\noscillator = "50 kHz"', "54:1", "clock.oscillator", "50 kHz", "from 100 kHz", "range"),
-    edit("few steps", "# counts = 64 ", "counts = 8 # ", "36:1", "detector.counts", "8", "16, 32, 64", "range"),
-    edit(
-        "crooked windings",
-        "# counts = 64 ",
-        'quadrature_error = "31 deg" # ',
-        "36:1",
-        "detector.quadrature_error",
-        '"31 deg"',
-        "from -30 deg to 30 deg",
-        "range",
-    ),
-    edit(
-        "encoder",
-        "[detector]",
-        "[encoder]\ncycles_per_revolution = 3\n[detector]",
-        "34:1",
-        "encoder",
-        "unknown table [encoder]",
-        "detector, clock",
-        "remove it",
-    ),
-    edit("no winding", 'inductance = "0.8 mH"', "", "10:1", "motor.inductance", "nothing", "from 1 nH", "add induct"),
-    edit("no side", 'effort = "6 A"', "", "5:1", "limits.effort", "nothing", "a current", 'effort = "6 A"'),
-    edit("effort in volts", '"6 A"', '"6 V"', "8:1", "limits.effort", '"6 V"', "a current", "same dimension"),
+    added("two gains", "[method]\nspeed_gains = [1, 1]", "54:1", "method.speed_gains"),
+    added("no gain", "[method]\nposition_gains = [4, 0, 1]", "54:1", "method.position_gains"),
+    added("gain", "[method]\nposition_gains = [4, 1001, 1]", "54:1", "method.position_gains"),
+    added("a gain", "[method]\nspeed_gains = 16", "54:1", "method.speed_gains"),
+    added("order", '[clock]\norder = "strict"', "54:1", "clock.order"),
+    added("final", '[method]\nfinal = "counted"', "54:1", "method.final"),
+    added("clock", '[clock]\noscillator = "8 rad/s"', "54:1", "clock.oscillator"),
+    added("clock without unit", "[clock]\noscillator = 8e6", "54:1", "clock.oscillator"),
+    added("slow", '[clock]\noscillator = "50 kHz"', "54:1", "clock.oscillator"),
+    edit("few steps", "# counts = 64 ", "counts = 8 # ", "36:1", "detector.counts"),
+    edit("crooked windings", "# counts = 64 ", 'quadrature_error = "31 deg" # ', "36:1", "detector.quadrature_error"),
+    edit("encoder", "[detector]", "[encoder]\ncycles_per_revolution = 3\n[detector]", "34:1", "encoder"),
+    edit("no winding", 'inductance = "0.8 mH"', "", "10:1", "motor.inductance"),
+    edit("no side", 'effort = "6 A"', "", "5:1", "limits.effort"),
+    edit("effort in volts", '"6 A"', '"6 V"', "8:1", "limits.effort"),
 ]
 
 
 @pytest.mark.parametrize("bad", params(value=VALUES))
-def test_bad_value(bad, good_text, load_text):
-    check_bad_file(bad, good_text, load_text)
+def test_bad_value(bad, good_text, load_text, golden):
+    check_bad_file(bad, good_text, load_text, golden)
 
 
 @pytest.mark.parametrize("angle", ["30 deg", "-30 deg"])

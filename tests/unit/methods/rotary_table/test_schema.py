@@ -115,27 +115,24 @@ def test_the_tables_cannot_be_changed(load_text, good_text):
 
 
 VALUES = [
-    edit("no speed", 'speed = "60 deg/s"', "", "5:1", "limits.speed", "nothing", "an angular", 'speed = "60 deg/s"'),
-    edit("hertz", '"60 deg/s"', '"1 Hz"', "6:1", "limits.speed", "1 Hz", "954.9 rpm", "write rad/s, rpm or turn/s"),
-    edit("force", '"3 N*m"', '"3 N"', "8:1", "limits.effort", '"3 N"', "a torque", "same dimension"),
-    edit("no ratio", RATIO, "", "19:1", "mechanics.gear_ratio", "nothing", "from 2 to 1000000", "gear_ratio = 90"),
-    edit("one", RATIO, "gear_ratio = 1 ", "20:1", "mechanics.gear_ratio", "1", "from 2 to 1000000", "in this range"),
-    edit("bare angle", '"10 deg"', "10", "22:1", "mechanics.start_angle", "10", "an angle", "text with a unit"),
-    edit("gain", "= 30 ", "= 0 ", "25:1", "method.position_gain", "0", "from 0.01 up to 1000", "in this range"),
-    edit("gain text", "= 30 ", '= "30 1/s" ', "25:1", "method.position_gain", "30 1/s", "a number", "without quotes"),
-    edit("number", "[position.1]", "[position.128]", "31:1", "position.128", "128", "from 0 to 127", "[position.1]"),
-    edit("name", "[position.1]", "[position.home]", "31:1", "position.home", "home", "from 0 to 127", "[position.1]"),
-    edit("no angle", 'angle = "90 deg"', "", "31:1", "position.1.angle", "nothing", "an angle", 'angle = "90 deg"'),
-    edit("way", '"positive"', '"left"', "37:1", "position.2.direction", '"left"', '"shortest" or "positive"', "write"),
-    edit("key", "[method]", "[method]\nrange = 1", "25:1", "method.range", "range", "guarded", "remove it"),
-    added("resolver", "[encoder]\nlines = 1", "45:1", "encoder", "[encoder]", "detector, method", "remove"),
-    added(
-        "no load", '[disturbance.load]\nat = "1 s"\nduration = "1 s"', "45:1", "disturbance.load.torque", "nothing",
-        "a torque", 'torque = "20 N*m"',
-    ),
+    edit("no speed", 'speed = "60 deg/s"', "", "5:1", "limits.speed"),
+    edit("hertz", '"60 deg/s"', '"1 Hz"', "6:1", "limits.speed"),
+    edit("force", '"3 N*m"', '"3 N"', "8:1", "limits.effort"),
+    edit("no ratio", RATIO, "", "19:1", "mechanics.gear_ratio"),
+    edit("one", RATIO, "gear_ratio = 1 ", "20:1", "mechanics.gear_ratio"),
+    edit("bare angle", '"10 deg"', "10", "22:1", "mechanics.start_angle"),
+    edit("gain", "= 30 ", "= 0 ", "25:1", "method.position_gain"),
+    edit("gain text", "= 30 ", '= "30 1/s" ', "25:1", "method.position_gain"),
+    edit("number", "[position.1]", "[position.128]", "31:1", "position.128"),
+    edit("name", "[position.1]", "[position.home]", "31:1", "position.home"),
+    edit("no angle", 'angle = "90 deg"', "", "31:1", "position.1.angle"),
+    edit("way", '"positive"', '"left"', "37:1", "position.2.direction"),
+    edit("key", "[method]", "[method]\nrange = 1", "25:1", "method.range"),
+    added("resolver", "[encoder]\nlines = 1", "45:1", "encoder"),
+    added("no load", '[disturbance.load]\nat = "1 s"\nduration = "1 s"', "45:1", "disturbance.load.torque"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("bad", params(value=VALUES))
-def test_bad_value(bad, good_text, load_text):
-    check_bad_file(bad, good_text, load_text)
+def test_bad_value(bad, good_text, load_text, golden):
+    check_bad_file(bad, good_text, load_text, golden)

@@ -1,0 +1,135 @@
+"""Checks that several methods share: contradictions between keys, and cautions about drive and motor."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from detent.axisfile.tables import BurstTable, FrictionTables
+from detent.files.findings import Caution, Contradiction, wrong
+from detent.files.nearest import BARELY, UNITS, Remedies, at_least, at_most, put
+from detent.units import format_quantity as text
+
+BURST = "disturbance.lines.burst"
+
+
+class Rubbing(Protocol):
+    """A table of friction in one direction."""
+
+    @property
+    def static(self) -> float:
+        """Friction at rest."""
+        ...
+
+    @property
+    def coulomb(self) -> float:
+        """Friction of any motion."""
+        ...
+
+
+def static_friction(tables: Mapping[str, Rubbing], unit: str = "N") -> Iterator[Contradiction]:
+    """Static friction is at least the Coulomb friction, in each table."""
+    for key, table in tables.items():
+        if table.static < table.coulomb:
+            least = f"at least the Coulomb friction, {text(table.coulomb, unit)}; left out it is 1.15 x coulomb"
+            yield wrong(f"{key}.static {key}.coulomb", least, put(f"{key}.static", at_least(table.coulomb, unit)))
+
+
+def sides(friction: FrictionTables) -> dict[str, Rubbing]:
+    """Friction to the right and to the left by the keys of its tables."""
+    return {"mechanics.friction.right": friction.right, "mechanics.friction.left": friction.left}
+
+
+def inside_travel(positions: Mapping[str, float], travel: float) -> Iterator[Contradiction]:
+    """Places of the axis, by their keys, lie on its way of `travel` [m]."""
+    for key, position in positions.items():
+        if position > travel:
+            yield wrong(
+                f"{key} limits.travel", f"up to limits.travel, {text(travel, 'm')}", put(key, at_most(travel, "m"))
+            )
+
+
+def end_of_move(remedy: Remedies, timeout: float, settled: float, tick: float) -> Iterator[Contradiction]:
+    """A move can be in position for long enough before its time is over."""
+    if timeout < settled + tick:
+        yield wrong(
+            "method.timeout method.in_position_time",
+            f"longer than method.in_position_time, {text(settled, 's')}: no move could end",
+            remedy.least("method.timeout", (settled + tick) * (1 + BARELY)),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """Constants that decide how fast a machine's state changes: ohm, H (above 0), V/(A*s), kg.
+
+    `coupling` is the exchange between winding and mass: force constant x back-EMF constant / mass.
+    """
+
+    resistance: float
+    inductance: float
+    coupling: float
+    mass: float
+
+
+def time_constants(plant: Plant, friction: FrictionTables, fastest: float) -> Iterator[Contradiction]:
+    """The rates of the machine add up to `fastest` [1/s] or less, for the exact solution of its equations."""
+    resistance, coupling, mass = plant.resistance, plant.coupling, plant.mass
+    side, table = max({"right": friction.right, "left": friction.left}.items(), key=lambda entry: entry[1].viscous)
+    viscous, rate = f"mechanics.friction.{side}.viscous", table.viscous / mass
+    electrical = resistance / plant.inductance + math.sqrt(coupling / plant.inductance)
+    allowed = f"such that the rates of the machine add up to 1/{text(1 / fastest, 's')} or less, here"
+    if electrical + rate <= fastest:
+        return
+    if rate >= fastest:
+        left = (fastest - electrical) * mass * (1 - BARELY)
+        remedy = put(viscous, at_most(left, "N*s/m")) if left > 0 else UNITS
+        yield wrong(f"{viscous} motor.inductance", f"{allowed} viscous over mass", remedy)
+    else:
+        # R/L + sqrt(coupling/L) = fastest - rate is a square in 1/sqrt(L).
+        root = (math.sqrt(coupling + 4 * resistance * (fastest - rate)) - math.sqrt(coupling)) / (2 * resistance)
+        remedy = put("motor.inductance", at_least(1 / root**2 * (1 + BARELY), "H"))
+        yield wrong(f"motor.inductance motor.resistance {viscous}", f"{allowed} R / L", remedy)
+
+
+def burst(table: BurstTable | None, tick: float) -> Iterator[Contradiction]:
+    """A burst is given by its first moment or by its ticks; `tick` is the base tick [s]."""
+    if table is None:
+        return
+    if table.ticks:
+        yield from _listed(table)
+    elif table.at is None:
+        keys = f"{BURST}.at {BURST}.ticks"
+        yield wrong(keys, "the first moment, or ticks in its place", 'add at = "5 ms", or ticks')
+    if table.at is not None and table.count > 1 and table.spacing < tick:
+        yield wrong(
+            f"{BURST}.spacing {BURST}.count",
+            f"at least one base tick, {text(tick, 's')}: a line carries one pulse at a time",
+            put(f"{BURST}.spacing", at_least(tick, "s")),
+        )
+
+
+def _listed(table: BurstTable) -> Iterator[Contradiction]:
+    """Ticks of a burst rise and stand alone."""
+    for name, default in (("at", None), ("count", 1), ("spacing", BurstTable.model_fields["spacing"].default)):
+        if getattr(table, name) != default:
+            allowed = f"left out where ticks are listed, {len(table.ticks)} of them here"
+            yield wrong(f"{BURST}.{name} {BURST}.ticks", allowed, f"remove {name}, or remove ticks")
+            return
+    rising = sorted(set(table.ticks))
+    if rising != table.ticks:
+        yield wrong(f"{BURST}.ticks", "whole numbers that rise, each once", put(f"{BURST}.ticks", rising))
+
+
+def idle_effort(remedy: Remedies, effort: float, most: float, unit: str, giver: str) -> Iterator[Caution]:
+    """limits.effort is not above what the drive gives."""
+    if effort > most * (1 + 1e-6):
+        limit, consequence = f"up to what {giver}, {text(most, unit)}", "the limit never acts: the drive is weaker"
+        yield Caution("limits.effort", text(effort, unit), limit, consequence, remedy.most("limits.effort", most))
+
+
+def overheating(name: str, current: float, most: float | None, remedy: str) -> Iterator[Caution]:
+    """A current [A] that lasts is not above motor.max_current."""
+    if most is not None and current > most * (1 + BARELY):
+        limit = f"up to motor.max_current, {text(most, 'A')}"
+        yield Caution(name, text(current, "A"), limit, "the motor overheats if this lasts", remedy)

@@ -1,0 +1,450 @@
+"""What is checked in a cascade axis: contradictions between its keys, and cautions about what will surprise.
+
+An unstable loop is a caution: it can be simulated, and shows what it does.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+
+from detent.axisfile import common_checks as common
+from detent.axisfile.motion import rotary_model
+from detent.files.findings import Caution, Contradiction, wrong
+from detent.files.nearest import BARELY, Remedies, at_most, put
+from detent.methods.cascade.derive import Machine, dead_time
+from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, EncoderTable
+from detent.units import format_quantity as text
+
+FASTEST = 1e7
+"""Fastest rate of the plant [1/s]: the tick is then 50 ns, and a simulated second takes some seconds."""
+
+LEAST_MASS = 1e-12
+"""Smallest mass [kg] or moment of inertia [kg m^2]: a thousandth of the lightest rotor of a file."""
+
+MOST_COUNTS = 2**53
+"""Counts of an encoder: beyond them a float no longer knows each."""
+
+QUICK = 0.1
+"""Bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit."""
+
+LEAST_GAIN_MARGIN = 1.5
+
+LEAST_PHASE_MARGIN = math.radians(30)
+"""Phase margin below which a loop rings."""
+
+SLOWER = 2.0
+"""By how much the velocity loop should be faster than the position loop around it."""
+
+NEAR_RESONANCE = 0.5
+"""Share of the anti-resonance from which on a velocity loop on the motor no longer moves the load with it."""
+
+LARGEST_JUMP = 0.1
+"""Share of the largest command by which one count may move the drive."""
+
+MOST_COMMAND = 0.95
+"""Share of what the drive can do that a move at its limits may take."""
+
+
+def remedy_of(spec: CascadeSpec) -> Remedies:
+    """Values that would do, in the units of the axis's motion."""
+    return Remedies(rotary_model(CascadeSpec) if spec.axis.motion == "rotary" else CascadeSpec)
+
+
+# --------------------------------------------------------------------------------------------------- contradictions
+
+
+def _motor(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """Drive, motor and transmission go together."""
+    drive, motor = spec.drive.input, spec.motor
+    if drive == "force" and motor is not None:
+        allowed = '"current" or "voltage" where there is a [motor]: a drive that imposes a force needs none'
+        yield wrong("drive.input motor.rotor_inertia motor.catalogue", allowed, put("drive.input", '"current"'))
+    if drive != "force" and motor is None:
+        yield wrong("drive.input", '"force" where there is no [motor]', put("drive.input", '"force"'))
+    if motor is not None and spec.mechanics.travel_per_revolution is None:
+        yield wrong(
+            "mechanics.travel_per_revolution drive.input",
+            "a length where there is a [motor]",
+            'add travel_per_revolution = "10 mm" in [mechanics] (lead of the screw, or circumference of the pulley)',
+        )
+
+
+def _masses(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """There is something to move, on both sides of a coupling; only what turns can hang."""
+    mechanics, coupled = spec.mechanics, spec.mechanics.coupling is not None
+    masses = {"mechanics.load_mass": (spec.mass, "all that moves")}
+    if coupled:
+        masses = {
+            "mechanics.motor_mass": (spec.motor_mass, "what moves on the motor's side of the coupling"),
+            "mechanics.load_mass": (mechanics.load_mass, "what moves on the load's side of the coupling"),
+        }
+    for key, (mass, what) in masses.items():
+        if mass < LEAST_MASS:
+            yield wrong(
+                f"{key} mechanics.coupling.stiffness",
+                f"such that {what} comes to at least {LEAST_MASS:g} {spec.unit('kg')}",
+                f"state {key}" + (", or leave [mechanics.coupling] out" if coupled else ""),
+            )
+    if mechanics.pendulum > 0 and spec.axis.motion == "linear":
+        yield wrong(
+            "mechanics.pendulum axis.motion",
+            "0 N*m where axis.motion is linear: a load hangs from an axis that turns; a weight is mechanics.weight",
+            put("mechanics.pendulum", '"0 N*m"'),
+        )
+
+
+def _gains(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """The gains of the structure are stated."""
+    method = spec.method
+    for name in ("velocity_gain", "position_gain") if method.structure == "cascade" else ("proportional",):
+        if getattr(method, name) == 0:
+            yield wrong(
+                f"method.{name} method.structure",
+                f'above 0 where method.structure is "{method.structure}"',
+                f"state {name} in [method]{_to_begin_with(spec, name)}",
+            )
+
+
+def _to_begin_with(spec: CascadeSpec, name: str) -> str:
+    """A gain that will do for nearly every axis: a velocity loop that keeps far from its dead time, and 20 Hz."""
+    if not _is_solid(spec):
+        return ""
+    bandwidth = min(QUICK / dead_time(spec), 2 * math.pi * 20)
+    if name == "position_gain":
+        return f", such as {bandwidth / 4:.2g} to begin with"
+    unit, power = ("V*s/m", 1) if name == "velocity_gain" else ("V/m", 2)
+    gain = bandwidth**power * spec.mass / spec.effort_per_command / 2 ** (2 * (power - 1))
+    return f", such as {at_most(gain, spec.unit(unit), 2)} to begin with"
+
+
+def _is_solid(spec: CascadeSpec) -> bool:
+    """Whether everything that a rate is computed from is there."""
+    return not (any(_masses(spec)) or any(_motor(spec)))
+
+
+def _encoders(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """The loops have their encoders, with a memory and counts that can be told apart."""
+    feedback, unit = spec.method.feedback, spec.unit("m")
+    for loop in ("position", "velocity"):
+        if getattr(feedback, loop) == "load" and spec.load_encoder is None:
+            key = f"method.feedback.{loop}"
+            yield wrong(key, '"motor" where there is no [load_encoder]', put(key, '"motor"'))
+    tables: dict[str, EncoderTable | None] = {"encoder": spec.encoder, "load_encoder": spec.load_encoder}
+    finest = 2 * max(abs(spec.limits.lowest), abs(spec.highest)) / MOST_COUNTS
+    for name, table in tables.items():
+        if table is not None and table.delay + table.velocity_span > MOST_SAMPLES:
+            allowed = f"up to {MOST_SAMPLES} samples together with {name}.delay"
+            fewer = put(f"{name}.velocity_span", MOST_SAMPLES - table.delay)
+            yield wrong(f"{name}.velocity_span {name}.delay", allowed, fewer)
+    for name, table in tables.items():
+        if table is not None and 0 < table.resolution < finest:
+            yield wrong(
+                f"{name}.resolution limits.travel",
+                f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be told apart",
+                remedy_of(spec).least(f"{name}.resolution", finest),
+            )
+
+
+def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """Friction is plausible, and the axis starts on its way."""
+    start, low, high, unit = spec.mechanics.start_position, spec.limits.lowest, spec.highest, spec.unit("m")
+    yield from common.static_friction(directions(spec), spec.unit("N"))
+    if not low <= start <= high:
+        yield wrong(
+            "mechanics.start_position limits.travel limits.lowest",
+            f"from {text(low, unit)} to {text(high, unit)}, the way of the axis",
+            put("mechanics.start_position", f'"{low if start < low else high!r} {unit}"'),
+        )
+
+
+def directions(spec: CascadeSpec) -> dict[str, DirectionTable]:
+    """Friction of both masses in both directions, by their tables."""
+    masses = {"friction": spec.mechanics.friction, "load_friction": spec.mechanics.load_friction}
+    return {
+        f"mechanics.{name}.{sense}": table
+        for name, friction in masses.items()
+        for sense, table in (("positive", friction.positive), ("negative", friction.negative))
+    }
+
+
+def _rate(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """The plant is slow enough to be simulated."""
+    from detent.methods.cascade.loop import fastest_rate
+
+    if not _is_solid(spec):
+        return
+    rate = fastest_rate(spec)
+    if rate > FASTEST:
+        key = _culprit(spec)
+        rises = key.endswith(("stribeck", "resistance", "inductance"))
+        yield wrong(
+            f"{key} mechanics.load_mass mechanics.motor_mass",
+            f"such that the fastest rate of motor, coupling and load is 1/{text(1 / FASTEST, 's')} or less, "
+            f"here 1/{text(1 / rate, 's', 3)}",
+            f"{'raise' if rises else 'lower'} {key}, or check its unit and those of the masses",
+        )
+
+
+def _culprit(spec: CascadeSpec) -> str:
+    """Key that makes the plant too fast."""
+    coupling, motor = spec.mechanics.coupling, spec.motor
+    at_motor, at_load = (spec.mass,) * 2 if coupling is None else (spec.motor_mass, spec.mechanics.load_mass)
+    light = min(at_motor, at_load)
+    rates = {"mechanics.pendulum": math.sqrt(spec.mechanics.pendulum / light)}
+    for key, table in directions(spec).items():
+        mass = at_load if "load" in key else at_motor
+        fall = (table.static - table.coulomb) / table.stribeck if table.stribeck > 0 else 0.0
+        rates |= {f"{key}.viscous": table.viscous / mass, f"{key}.stribeck": fall / mass}
+    if coupling is not None:
+        rates["mechanics.coupling.stiffness"] = math.sqrt(coupling.stiffness / light)
+        rates["mechanics.coupling.damping"] = coupling.damping / light
+    if motor is not None and spec.drive.input == "voltage":
+        drag = spec.force_constant * spec.emf_constant / at_motor
+        rates["motor.resistance"] = drag / motor.resistance
+        if motor.inductance > 0:
+            rates["motor.inductance"] = motor.resistance / motor.inductance + math.sqrt(drag / motor.inductance)
+    return max(rates, key=lambda name: rates[name])
+
+
+def _drive(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """The drive does not throw the axis away, and its converter has a step."""
+    if not _is_solid(spec):
+        return
+    light = spec.mass if spec.mechanics.coupling is None else min(spec.motor_mass, spec.mechanics.load_mass)
+    moved = 0.5 * spec.limits.effort / light * spec.method.sample_period**2
+    if moved > spec.limits.travel:
+        yield wrong(
+            "limits.effort mechanics.load_mass mechanics.motor_mass method.sample_period",
+            "such that it moves the lightest mass by up to limits.travel in a sample, here "
+            f"{text(moved, spec.unit('m'))}: no loop stands that",
+            remedy_of(spec).most("limits.effort", spec.limits.effort * spec.limits.travel / moved),
+        )
+    if spec.drive.command_step > spec.largest_command:
+        yield wrong(
+            "drive.command_step drive.command_limit limits.effort drive.max_current",
+            f"up to the largest command, {text(spec.largest_command, 'V')}",
+            remedy_of(spec).most("drive.command_step", spec.largest_command),
+        )
+
+
+def _supervision(spec: CascadeSpec) -> Iterator[Contradiction]:
+    """Limits of the loops let a move pass and end."""
+    method, speed, remedy = spec.method, spec.limits.speed, remedy_of(spec)
+    if method.structure == "cascade" and method.velocity_limit < speed:
+        yield wrong(
+            "method.velocity_limit limits.speed",
+            f"at least limits.speed, {text(speed, spec.unit('m/s'))}; left out it is 1.25 x limits.speed",
+            remedy.least("method.velocity_limit", speed),
+        )
+    if method.following_error <= method.in_position:
+        yield wrong(
+            "method.following_error method.in_position limits.travel encoder.resolution",
+            f"above method.in_position, {text(method.in_position, spec.unit('m'))}",
+            remedy.least("method.following_error", method.in_position * (1 + 1e-3)),
+        )
+    yield from common.end_of_move(remedy, method.timeout, method.in_position_time, method.sample_period)
+
+
+RULES: tuple[Callable[[CascadeSpec], Iterator[Contradiction]], ...] = (
+    _motor,
+    _masses,
+    _gains,
+    _encoders,
+    _places,
+    _rate,
+    _drive,
+    _supervision,
+)
+"""Contradictions are told in this order."""
+
+
+# --------------------------------------------------------------------------------------------------------- cautions
+
+
+def find_cautions(spec: CascadeSpec) -> Iterator[Caution]:
+    """Look a cascade axis over."""
+    machine = Machine(spec)
+    for look in (_loops, _bandwidth, _position, _resolution, _force, _current, _following, _rest):
+        yield from look(machine)
+
+
+def _loops(m: Machine) -> Iterator[Caution]:
+    """The loops settle, and do not ring."""
+    loop, margin = m.loop, m.loop.gain_margin
+    if margin < LEAST_GAIN_MARGIN:
+        yield Caution(
+            "stability of the loops",
+            f"gain margin {margin:.3g}, spectral radius {loop.spectral_radius:.4f}",
+            f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1 the loops are unstable",
+            "the axis swings, and the swing grows until the command is limited"
+            if margin < 1
+            else "a little more gain or less mass, and the axis swings",
+            _lowered(m, margin / LEAST_GAIN_MARGIN * (1 - 1e-3))
+            if margin > 0
+            else "lower all gains, those of integrals and of the position first, or shorten the dead time",
+        )
+        return
+    for name, inner, gain in (
+        ("velocity loop", loop.velocity_loop, "method.velocity_gain or method.velocity_integral"),
+        ("position loop", loop.position_loop, "the outer gain or the integral"),
+    ):
+        if inner.crossover > 0 and inner.phase < LEAST_PHASE_MARGIN:
+            yield Caution(
+                f"phase margin of the {name}",
+                text(inner.phase, "rad", 3),
+                f"at least {text(LEAST_PHASE_MARGIN, 'rad')}",
+                "it rings after every change",
+                f"lower {gain}, or shorten the dead time of {text(dead_time(m.spec), 's', 3)}",
+            )
+
+
+def _lowered(m: Machine, share: float) -> str:
+    """Remedy: the gain of the whole loop lowered to a share of what it is."""
+    method, unit = m.spec.method, m.spec.unit
+    if method.structure == "pid":
+        return f"lower proportional, integral and derivative in [method] to {100 * share:.3g} % of what they are"
+    gain = put("method.velocity_gain", at_most(share * method.velocity_gain, unit("V*s/m")))
+    if method.velocity_integral == 0:
+        return gain
+    return f"{gain} and method.velocity_integral = {at_most(share * method.velocity_integral, unit('V/m'))}"
+
+
+def _bandwidth(m: Machine) -> Iterator[Caution]:
+    """Each loop keeps below what it acts on."""
+    loop, method = m.loop, m.spec.method
+    inner, outer = loop.velocity_loop.crossover, loop.position_loop.crossover
+    near = NEAR_RESONANCE * m.anti_resonance / (2 * math.pi)
+    if 0 < inner < SLOWER * outer:
+        yield Caution(
+            "bandwidth of the position loop",
+            text(outer, "Hz"),
+            f"up to half that of the velocity loop, {text(inner / SLOWER, 'Hz')}",
+            "the velocity loop is too slow for it, and a move overshoots",
+            f"lower method.position_gain, {method.position_gain:.4g}, or raise method.velocity_gain",
+        )
+    if inner > near > 0 and method.feedback.velocity == "motor":
+        yield Caution(
+            "bandwidth of the velocity loop",
+            text(inner, "Hz"),
+            f"up to half the anti-resonance, {text(near, 'Hz')}",
+            "it holds the motor while the load swings on its coupling, hardly damped",
+            _lowered(m, 0.99 / loop.velocity_level(near)),
+        )
+
+
+def _position(m: Machine) -> Iterator[Caution]:
+    """Position is measured where and as finely as it is held."""
+    spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
+    count = spec.position_encoder.resolution
+    if coupling is not None and coupling.backlash > 0 and method.feedback.position == "load" and m.integrates:
+        yield Caution(
+            "backlash in the position loop",
+            text(coupling.backlash, unit),
+            "none, where the position is that of the load and there is an integral",
+            "at rest the motor hunts from flank to flank",
+            put("method.feedback.position", '"motor"'),
+        )
+    if method.in_position < count:
+        yield Caution(
+            "method.in_position",
+            text(method.in_position, unit),
+            f"at least a count of the encoder, {text(count, unit)}",
+            "one count off, and the axis is not in position",
+            remedy_of(spec).least("method.in_position", count),
+        )
+
+
+def _resolution(m: Machine) -> Iterator[Caution]:
+    """A count of velocity does not shake the drive."""
+    spec, table, most = m.spec, m.spec.velocity_encoder, LARGEST_JUMP * m.spec.largest_command
+    name = "encoder" if spec.method.feedback.velocity == "motor" else "load_encoder"
+    if m.jump > most:
+        span = math.ceil(table.velocity_span * m.jump / most * (1 - BARELY))
+        yield Caution(
+            "command of one count of velocity",
+            text(m.jump, "V"),
+            f"up to a tenth of the largest command, {text(most, 'V')}",
+            "the drive is noisy even at rest",
+            put(f"{name}.velocity_span", span)
+            if span + table.delay <= MOST_SAMPLES
+            else f"state {name}.velocity_filter, or use a finer encoder",
+        )
+
+
+def _force(m: Machine) -> Iterator[Caution]:
+    """The drive has the force that the limits ask for."""
+    spec, speed, acceleration, unit = m.spec, m.speed, m.spec.limits.acceleration, m.spec.unit("N")
+    loose, strongest = m.breaking(spec.mechanics.weight) + spec.mechanics.pendulum, m.available(0.0)
+    hold, needed, available = m.needed(speed), m.needed(speed, acceleration), m.available(speed)
+    if loose >= strongest:
+        yield Caution(
+            "friction and weight",
+            text(loose, unit),
+            f"below the largest force, {text(strongest, unit)}",
+            "there are places where the axis never breaks loose",
+            "raise limits.effort, drive.command_limit or the amplifier's limit",
+        )
+    elif hold >= available * MOST_COMMAND:
+        yield Caution(
+            "force at limits.speed",
+            text(hold, unit),
+            f"below what the drive has at that speed, {text(available, unit)}",
+            "the following error grows without end",
+            "lower limits.speed, or raise drive.command_limit or limits.effort",
+        )
+    elif needed > available * MOST_COMMAND:
+        yield Caution(
+            "force of an acceleration",
+            text(needed, unit),
+            f"up to 95 % of what the drive has at limits.speed, {text(available * MOST_COMMAND, unit)}",
+            "the command is limited and the axis falls behind as it speeds up",
+            remedy_of(spec).most("limits.acceleration", (available * MOST_COMMAND - hold) / spec.mass),
+        )
+
+
+def _current(m: Machine) -> Iterator[Caution]:
+    """The limits act before the drive's own, and the motor stands the current."""
+    spec, motor, unit = m.spec, m.spec.motor, m.spec.unit("N")
+    has_limit = spec.drive.max_current is not None and spec.drive.input != "force"
+    by_current = (spec.drive.max_current or 0.0) * spec.force_constant if has_limit else math.inf
+    by_drive = min(spec.drive.command_limit * m.per_command, by_current)
+    giver = "the drive gives at standstill"
+    yield from common.idle_effort(remedy_of(spec), spec.limits.effort, by_drive, unit, giver)
+    if motor is not None:
+        held = m.needed(m.speed) / spec.force_constant
+        stronger = "use a stronger motor, or lower friction and weight"
+        yield from common.overheating("current at limits.speed", held, motor.max_current, stronger)
+
+
+def _following(m: Machine) -> Iterator[Caution]:
+    """At limits.speed the axis keeps within the limits of its loops."""
+    method, unit, speed = m.spec.method, m.spec.unit("m"), m.spec.unit("m/s")
+    error, demand, remedy = m.following_error, m.velocity_demand, remedy_of(m.spec)
+    if error >= method.following_error:
+        yield Caution(
+            "following error at limits.speed",
+            text(error, unit),
+            f"below method.following_error, {text(method.following_error, unit)}",
+            "the drive goes off on a move at full speed",
+            remedy.least("method.following_error", 1.5 * error, "raise the feed-forward of velocity"),
+        )
+    if demand > method.velocity_limit:
+        yield Caution(
+            "velocity demand at limits.speed",
+            text(demand, speed),
+            f"up to method.velocity_limit, {text(method.velocity_limit, speed)}",
+            "without an integral friction slows the axis below its reference, and the demand cannot make up for it",
+            remedy.least("method.velocity_limit", demand, "state method.velocity_integral"),
+        )
+
+
+def _rest(m: Machine) -> Iterator[Caution]:
+    """Without an integral friction does not hold the axis outside its window."""
+    method, unit, error = m.spec.method, m.spec.unit("m"), m.resting_error
+    if error > method.in_position:
+        yield Caution(
+            "error at rest",
+            text(error, unit),
+            f"up to method.in_position, {text(method.in_position, unit)}",
+            "friction or weight may hold the axis outside, and a move then fails",
+            "state method.integral" if method.structure == "pid" else "state method.velocity_integral",
+        )

@@ -1,0 +1,429 @@
+"""What is checked in a rotary-table axis: contradictions between its keys, and cautions about what will surprise.
+
+Sections and tests in brackets are those of the rotary-table specification.
+
+Two things are allowed that one might expect here. The task's period need not be a whole multiple of the strobe's: they
+are clocks of their own, nothing in the equations needs it, and a ratio between is how the race of trap 3 comes now and
+then. A conversion need not end within the interrupt's delay: the comparators run freely, one result in each period of
+the excitation, and a strobe takes the last; what it does need is a new one.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+
+from detent.axisfile import common_checks as common
+from detent.files.findings import Caution, Contradiction, wrong
+from detent.files.nearest import BARELY, Remedies, put
+from detent.methods.rotary_table.derive import FULL_TURN, TICK, Machine, counted, weakest_output
+from detent.methods.rotary_table.form_checks import find_forms
+from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
+from detent.units import format_quantity as text
+
+LONGEST_WAY = 1 << 31
+"""Ways are shorter: IR has 32 bits before its point [count] (`control.table_positioner`)."""
+
+FASTEST_WORD = (1 << 31) - 1
+"""Largest speed in the interpolator's format: its square is taken in 64 bits (`control.angle_interpolator`)."""
+
+HIGHEST_OFFSET = 0.95
+"""Share of a resolver's weakest output that the comparator's offset may reach: beyond it hardly crosses at all."""
+
+LEAST_DAMPING = 0.4
+"""Damping ratio from which a step is answered with an overshoot of a quarter at most."""
+
+DIAL_RANGE = 600
+"""Largest over smallest speed of a dial: 0.1 to 60 deg/s (7)."""
+
+SMALL_ERROR = 0.01
+"""Error of a speed by rounding that is not worth a word."""
+
+remedy = Remedies(RotaryTableSpec)
+
+
+def _ticks(seconds: float) -> int:
+    return round(seconds / TICK)
+
+
+# --------------------------------------------------------------------------------------------------- contradictions
+
+
+def _gear(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """Gear and coarse resolver turn together, and a turn has less than 2^30 counts."""
+    gear, reduction, ratio = spec.mechanics.gear_ratio, spec.detector.coarse.reduction, spec.ratio
+    if gear != ratio:
+        allowed = "a whole number: after a turn of the table the fine resolver must stand where it began (3.1)"
+        yield wrong("mechanics.gear_ratio", allowed, remedy.exactly("mechanics.gear_ratio", ratio))
+    if reduction not in {ratio, gear}:
+        yield wrong(
+            "detector.coarse.reduction mechanics.gear_ratio",
+            f"equal to mechanics.gear_ratio, {gear:g}: the coarse resolver turns with the table",
+            remedy.exactly("detector.coarse.reduction", ratio, "leave it out: it is then mechanics.gear_ratio"),
+        )
+    if 2 * spec.period >= LONGEST_WAY:
+        yield wrong(
+            "detector.fine.counts mechanics.gear_ratio",
+            f"such that T = G x fine counts, here {spec.period}, is below 2^30: a jog begins with 2 T to go, and the "
+            "remaining angle has 32 bits before its point",
+            remedy.most("detector.fine.counts", (LONGEST_WAY // 2 - 1) // ratio),
+        )
+
+
+def _detector(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """The coarse word tells motor turns apart, conversions end in time, comparators see zero crossings."""
+    detector, strobe = spec.detector, spec.method.strobe_period
+    if Machine(spec).allowed_coarse_error <= 0:
+        # 1/(2 G) > 1/C + 1/(G F), times G
+        least = math.floor(spec.ratio / (0.5 - 1 / detector.fine.counts) * (1 + BARELY)) + 1
+        yield wrong(
+            "detector.coarse.counts mechanics.gear_ratio detector.fine.counts",
+            f"at least {least}: a count of the coarse word is then less than half a motor turn (3.1)",
+            remedy.least("detector.coarse.counts", least, "choose a smaller mechanics.gear_ratio"),
+        )
+    name, counts = max((("fine", detector.fine.counts), ("coarse", detector.coarse.counts)), key=lambda entry: entry[1])
+    if counts / detector.clock > strobe * (1 + BARELY):
+        yield wrong(
+            f"detector.clock detector.{name}.counts method.strobe_period",
+            f"at least {text(counts / strobe, 'Hz')}: a conversion of {counts} clocks, here "
+            f"{text(counts / detector.clock, 's')}, ends in each strobe period, {text(strobe, 's')}",
+            remedy.least("detector.clock", counts / strobe),
+        )
+    tables: dict[str, FineTable] = {"fine": detector.fine, "coarse": detector.coarse}
+    for name, table in tables.items():
+        most, around = HIGHEST_OFFSET * weakest_output(table), f"detector.{name}"
+        if abs(table.offset_error) > most:
+            key = f"{around}.offset_error"
+            yield wrong(
+                f"{key} {around}.gain_error {around}.quadrature_error",
+                f"up to {text(most, '%')} in magnitude: where the windings give least, the comparator would see no "
+                "zero crossing",
+                remedy.least(key, -most) if table.offset_error < 0 else remedy.most(key, most),
+            )
+
+
+def _clocks(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """Periods are whole ticks, in their order."""
+    method = spec.method
+    for name, fewest in {"strobe_period": 2, "interrupt_delay": 1, "task_period": 2, "task_phase": 0}.items():
+        ticks = float(getattr(method, name)) / TICK
+        if abs(ticks - round(ticks)) > 1e-6:
+            nearest = remedy.exactly(f"method.{name}", max(fewest, round(ticks)) * TICK)
+            yield wrong(f"method.{name}", "a whole number of 0.1 ms, the base tick", nearest)
+    strobe, delay, period = (
+        _ticks(method.strobe_period),
+        _ticks(method.interrupt_delay),
+        text(method.strobe_period, "s"),
+    )
+    if delay >= strobe:
+        yield wrong(
+            "method.interrupt_delay method.strobe_period",
+            f"below method.strobe_period, {period}: each interrupt comes before the next strobe",
+            remedy.exactly("method.interrupt_delay", (strobe - 1) * TICK),
+        )
+    if _ticks(method.task_period) < strobe:
+        yield wrong(
+            "method.task_period method.strobe_period",
+            f"at least method.strobe_period, {period}: two passes of the task would judge the same angle, and roll "
+            "over twice",
+            remedy.exactly("method.task_period", strobe * TICK),
+        )
+    way = spec.drive.full_speed / spec.ratio * method.strobe_period
+    if way >= math.pi:
+        yield wrong(
+            "method.strobe_period drive.full_speed motor.max_speed mechanics.gear_ratio",
+            f"such that the table turns less than 180 deg in it, here {text(way, 'rad')} at the largest word: a "
+            "change of more than T/2 is taken for a crossing of the boundary (3.3)",
+            remedy.most("drive.full_speed", math.pi / method.strobe_period * spec.ratio * (1 - BARELY)),
+        )
+
+
+def _speeds(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """Speeds are neither above the drive's nor below the interpolator's."""
+    top, most, least = spec.limits.speed, spec.largest_speed, 1 / spec.per_interrupt(1.0)
+    word, bits = spec.per_interrupt(top), spec.method.fraction_bits
+    if top > most * (1 + BARELY):
+        which = "motor.max_speed" if spec.motor.max_speed <= spec.drive.full_speed else "drive.full_speed"
+        yield wrong(
+            "limits.speed motor.max_speed drive.full_speed mechanics.gear_ratio",
+            f"up to {which} over the gear ratio, {text(most, 'rad/s')}",
+            remedy.most("limits.speed", most),
+        )
+    # A speed that was left out is that of the limit.
+    speeds = {f"position.{number}.speed": entry.speed for number, entry in spec.position.items() if entry.speed != top}
+    for key, speed in ({"limits.speed": top} | speeds).items():
+        if speed < least * (1 - BARELY):
+            yield wrong(
+                f"{key} method.fraction_bits method.strobe_period detector.fine.counts",
+                f"at least {text(least, 'rad/s')}: the interpolator moves on by {_parts(bits)} in an interrupt",
+                remedy.least(key, least, "lengthen method.strobe_period"),
+            )
+    if word > FASTEST_WORD:
+        yield wrong(
+            "method.fraction_bits limits.speed method.strobe_period detector.fine.counts",
+            f"such that limits.speed, here {word:.4g} parts of a count per interrupt, is a word of 32 bits",
+            remedy.most("limits.speed", top * FASTEST_WORD / word),
+        )
+
+
+def _parts(bits: int) -> str:
+    return f"whole 2^-{bits} counts" if bits else "whole counts"
+
+
+def _acceleration(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """The acceleration is one for the interpolator, and brakes within a turn."""
+    m, speed, acceleration, bits = Machine(spec), spec.limits.speed, spec.limits.acceleration, spec.method.fraction_bits
+    least = acceleration / spec.acceleration_word
+    if acceleration < least * (1 - BARELY):
+        yield wrong(
+            "limits.acceleration method.fraction_bits method.strobe_period detector.fine.counts",
+            f"at least {text(least, 'rad/s^2')}: the interpolator's speed grows by {_parts(bits)} per interrupt from "
+            "one interrupt to the next",
+            remedy.least("limits.acceleration", least, "lengthen method.strobe_period"),
+        )
+    way, reserve = speed**2 / (2 * acceleration), m.jog_reserve_at(speed)
+    if way >= FULL_TURN - reserve:
+        harder = speed**2 / (2 * (FULL_TURN - reserve)) * (1 + BARELY) if reserve < FULL_TURN else math.inf
+        yield wrong(
+            "limits.acceleration limits.speed method.task_period method.position_gain method.judge",
+            f"such that braking, here over {text(way, 'rad')}, takes less than a turn less the {text(reserve, 'rad')} "
+            "by which a rollover comes late: a jog would brake before it",
+            remedy.least("limits.acceleration", harder, "lower limits.speed, or raise method.position_gain"),
+        )
+
+
+def _positions(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """Positions can be gone to, at speeds within the limit."""
+    top, furthest, window = spec.limits.speed, LONGEST_WAY - spec.period, (spec.period - 1) // 2
+    for number, entry in spec.position.items():
+        if entry.speed > top * (1 + BARELY):
+            key = f"position.{number}.speed"
+            yield wrong(f"{key} limits.speed", f"up to limits.speed, {text(top, 'rad/s')}", remedy.most(key, top))
+    others = [number for number, entry in spec.position.items() if entry.direction != "as commanded"]
+    if spec.method.form != "turn counter" and others:
+        yield wrong(
+            " ".join(["method.form", *(f"position.{number}.direction" for number in others)]),
+            f'"turn counter" where a position has a direction or a shortest way: position {", ".join(others)}; without '
+            'the counter a positioning ends at the boundary, and an angle is gone to "as commanded" (3.6)',
+            put("method.form", '"turn counter"'),
+        )
+    for number, entry in spec.position.items():
+        beyond = entry.direction == "as commanded" and abs(entry.angle) / spec.count >= furthest >= spec.period
+        if beyond:
+            key, most = f"position.{number}.angle", (furthest - 1) * spec.count * (1 - BARELY)
+            yield wrong(
+                f"{key} detector.fine.counts mechanics.gear_ratio",
+                f"less than {text(furthest * spec.count, 'rad')} from 0: from any angle of the turn the way has fewer "
+                "than 2^31 counts, which the remaining angle holds",
+                remedy.least(key, -most) if entry.angle < 0 else remedy.most(key, most),
+            )
+    if spec.method.in_position > window:
+        yield wrong(
+            "method.in_position mechanics.gear_ratio detector.fine.counts",
+            f"below half a turn, up to {window} counts",
+            remedy.most("method.in_position", window),
+        )
+
+
+def _machine(spec: RotaryTableSpec) -> Iterator[Contradiction]:
+    """The motor breaks loose, and a load lasts."""
+    static, load = spec.mechanics.static, spec.disturbance.load
+    yield from common.static_friction({"mechanics": spec.mechanics}, "N*m")
+    if spec.limits.effort <= static:
+        yield wrong(
+            "limits.effort mechanics.static mechanics.coulomb",
+            f"above mechanics.static, {text(static, 'N*m')}: the motor never breaks loose",
+            remedy.least("limits.effort", static * (1 + BARELY), "lower mechanics.static"),
+        )
+    if load is not None and load.duration < TICK * (1 - BARELY):
+        key = "disturbance.load.duration"
+        yield wrong(key, f"at least a base tick, {text(TICK, 's')}", remedy.least(key, TICK))
+
+
+RULES: tuple[Callable[[RotaryTableSpec], Iterator[Contradiction]], ...] = (
+    _gear,
+    _detector,
+    _clocks,
+    _speeds,
+    _acceleration,
+    _positions,
+    _machine,
+)
+"""Contradictions are told in this order."""
+
+
+# --------------------------------------------------------------------------------------------------------- cautions
+
+
+def find_cautions(spec: RotaryTableSpec) -> Iterator[Caution]:
+    """Look a rotary-table axis over."""
+    machine = Machine(spec)
+    for look in (find_forms, _loop, _drive, _torque, _rest, _slow, _composition):
+        yield from look(machine)
+
+
+def _loop(m: Machine) -> Iterator[Caution]:
+    """The loop is damped, and its word is never clipped."""
+    spec, damping, most = m.spec, m.loop.damping, m.spec.largest_word
+    if not spec.method.position_control:
+        return
+    if damping < LEAST_DAMPING:
+        yield Caution(
+            "damping of the loop",
+            f"{damping:.3g}",
+            f"at least {LEAST_DAMPING:g}",
+            "the table overshoots and swings at each stop"
+            if m.is_stable
+            else f"the loop is unstable, spectral radius {m.loop.spectral_radius:.4f}: the table swings more and more",
+            remedy.most("method.position_gain", m.loop.largest_gain(LEAST_DAMPING), "make drive.time_constant shorter"),
+        )
+    if m.is_stable and m.peak_word(m.speed) > most * (1 + BARELY):
+        needed = m.word_at(m.speed)
+        yield Caution(
+            "speed word at limits.speed",
+            f"{needed:.4g} counts, {m.peak_word(m.speed):.4g} after an acceleration",
+            f"up to {most}, the largest word",
+            "the drive does not keep up, and the following error grows for as long as a jog lasts"
+            if needed > most
+            else "the word is clipped after each acceleration, and the table lags by more than the figures say",
+            "lower limits.speed, or raise drive.full_speed",
+        )
+
+
+def _drive(m: Machine) -> Iterator[Caution]:
+    """The drive keeps to the motor's speed, and the interpolator's words are not rounded to nothing."""
+    spec, full, most, bits = m.spec, m.spec.drive.full_speed, m.spec.motor.max_speed, m.spec.method.fraction_bits
+    if full > most * (1 + BARELY):
+        yield Caution(
+            "drive.full_speed",
+            text(full, "rad/s"),
+            f"up to motor.max_speed, {text(most, 'rad/s')}",
+            "in a fault the largest word drives the motor faster than it stands",
+            remedy.most("drive.full_speed", most),
+        )
+    words = {f"a dial of limits.speed / {DIAL_RANGE}": spec.per_interrupt(m.speed / DIAL_RANGE)}
+    words |= {"limits.acceleration": spec.acceleration_word}
+    words |= {f"position.{number}.speed": spec.per_interrupt(entry.speed) for number, entry in spec.position.items()}
+    name, word = min(words.items(), key=lambda entry: entry[1])
+    error = 0.5 / word
+    if error > SMALL_ERROR:
+        more = bits + math.ceil(math.log2(error / SMALL_ERROR))
+        yield Caution(
+            "method.fraction_bits",
+            f"{bits}: {name} is {word:.3g} parts of a count per interrupt",
+            f"enough for {0.5 / SMALL_ERROR:g} of them",
+            "it is rounded to nothing, and the table stays where it is (test 20)"
+            if word < 0.5
+            else f"it is rounded to whole ones and wrong by up to {text(error, '%')} (test 20)",
+            remedy.least("method.fraction_bits", more, "use a longer method.strobe_period"),
+        )
+
+
+def _torque(m: Machine) -> Iterator[Caution]:
+    """The amplifier has the torque that is asked of it, and its limit acts."""
+    spec, effort, load = m.spec, m.spec.limits.effort, m.spec.disturbance.load
+    needed, steady, moves = m.accelerating_torque, m.resisting_torque, spec.method.position_control and m.is_stable
+    if moves and needed > effort * (1 + BARELY):
+        lower = spec.limits.acceleration * (effort - steady) / (needed - steady)
+        yield Caution(
+            "torque of an acceleration",
+            text(needed, "N*m"),
+            f"up to limits.effort, {text(effort, 'N*m')}",
+            "the amplifier is at its limit, the table lags and passes its target at the end",
+            remedy.most("limits.acceleration", lower, "raise limits.effort"),
+        )
+    giver = "the amplifier asks for, reversed from full speed"
+    yield from common.idle_effort(remedy, effort, 2 * m.stiffness * spec.drive.full_speed, "N*m", giver)
+    torque = abs(load.torque) / spec.ratio if load else 0.0
+    together = torque + max(needed if moves else 0.0, spec.mechanics.coulomb)
+    if load and together > effort * (1 + BARELY):
+        yield Caution(
+            "disturbance.load.torque",
+            f"{text(torque, 'N*m')} at the motor, {text(together, 'N*m')} with an acceleration",
+            f"up to limits.effort, {text(effort, 'N*m')}",
+            "the table is driven off its place while the load acts"
+            if torque > effort + spec.mechanics.coulomb
+            else "a table that is moving against the load falls behind",
+            remedy.least("limits.effort", together, "use a larger mechanics.gear_ratio"),
+        )
+
+
+def _rest(m: Machine) -> Iterator[Caution]:
+    """At rest the table is in position, and stays so."""
+    spec, window, error, noise = m.spec, m.spec.method.in_position, m.resting_error, m.noise
+    if m.breaking_word > spec.largest_word:
+        yield Caution(
+            "static friction",
+            text(spec.mechanics.static, "N*m"),
+            f"below the torque of the largest word, {text(m.stiffness * spec.drive.full_speed, 'N*m')}",
+            "the table never breaks loose",
+            "shorten drive.time_constant or lower mechanics.static",
+        )
+    elif spec.method.position_control and error > window:
+        yield Caution(
+            "deviation at rest",
+            f"up to {counted(error)}, {text(error * spec.count, 'rad')}",
+            f"up to method.in_position, {window}",
+            f"{'friction' if spec.mechanics.static > 0 else 'a word that is rounded to 0'} holds the table off its "
+            "place, and a positioning does not end",
+            remedy.least("method.in_position", error, "raise method.position_gain"),
+        )
+    elif spec.method.position_control and error + noise > window:
+        yield Caution(
+            "noise in position",
+            f"up to {counted(noise)}, with {error} at rest",
+            f"together up to method.in_position, {window}",
+            "readings leave the window again and again, and a positioning takes long to end or does not",
+            remedy.least("method.in_position", error + noise, "lower detector.fine.noise"),
+        )
+
+
+def _slow(m: Machine) -> Iterator[Caution]:
+    """A slow jog does not stick, and a short way back is not a turn."""
+    spec, method, mechanics = m.spec, m.spec.method, m.spec.mechanics
+    step = m.deviation(mechanics.static - mechanics.coulomb) / spec.count
+    window = max(1, method.in_position)
+    if method.position_control and m.breaking_word <= spec.largest_word and step > window:
+        lower = window * spec.count * m.gain * spec.ratio * m.stiffness
+        yield Caution(
+            "stick-slip",
+            f"{step:.4g} counts of deviation more to break loose than to move on",
+            f"up to {window}",
+            "at a slow jog the table stands, breaks loose and stands again",
+            remedy.most("mechanics.static", mechanics.coulomb + lower),
+        )
+    numbers = [number for number, entry in spec.position.items() if entry.direction in {"positive", "negative"}]
+    counts = method.in_position + m.noise
+    if numbers and method.form == "turn counter" and round(method.short_way / spec.count) < counts:
+        yield Caution(
+            "method.short_way",
+            text(method.short_way, "rad"),
+            f"at least {counted(counts)}, {text(counts * spec.count, 'rad')}, what is in position, where a position "
+            f"has a direction: {', '.join(numbers)}",
+            "a table that stands beyond its target by a count goes round a whole turn when it is sent there again",
+            remedy.least("method.short_way", counts * spec.count, "lower method.in_position"),
+        )
+
+
+def _composition(m: Machine) -> Iterator[Caution]:
+    """The two words of the detector make one angle."""
+    spec, errors, allowed = m.spec, m.coarse_errors, m.allowed_coarse_error
+    turn, total = text(FULL_TURN / spec.ratio, "rad"), sum(errors.values())
+    if spec.detector.composition == "truncated":
+        yield Caution(
+            "detector.composition",
+            '"truncated"',
+            '"rounded"',
+            f"near each zero of the fine word the angle is wrong by a motor turn, {turn} (3.1, test 2)",
+            put("detector.composition", '"rounded"'),
+        )
+    if total > allowed:
+        parts, largest = (
+            ", ".join(f"{name} {text(error, 'rad')}" for name, error in errors.items()),
+            max(errors.values()),
+        )
+        yield Caution(
+            "coarse error",
+            f"up to {text(total, 'rad')}: {parts}",
+            f"up to {text(allowed, 'rad')}, half a motor turn less a count",
+            f"at some angles the table reads a motor turn too much or too little, {turn}, and jumps (3.1, trap 7)",
+            f"improve the largest of them, {text(largest, 'rad')}, or choose a smaller mechanics.gear_ratio",
+        )
