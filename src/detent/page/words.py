@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from math import isnan
 
+from markupsafe import Markup
+
 from detent.page.parts import INCH
 
 GAP = "\u202f"
@@ -150,21 +152,10 @@ def inches_per_second(speed: float) -> str:
     return number(round(abs(speed) / INCH, 2))
 
 
-def arrow(direction: int) -> str:
-    """Mark a direction with its colour and an arrow.
-
-    Parameters
-    ----------
-    direction : int
-        +1 or -1.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+def arrow(direction: int) -> Markup:
+    """An arrow to the right for +1, to the left for -1, in the colour of the direction."""
     name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
-    return f'<span class="arrow {name}">{sign} {name}</span>'
+    return Markup('<span class="arrow {}">{} {}</span>').format(name, sign, name)
 
 
 def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
