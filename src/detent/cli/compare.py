@@ -14,33 +14,43 @@ def compare(
     file: File,
     overrides: Set = None,
     figure: Annotated[
-        Path, typer.Option("--figure", help="PNG, SVG or PDF; a second comparison gets a 2 in its name.")
-    ] = Path("comparison.png"),
+        Path,
+        typer.Option(
+            "--figure",
+            help="A page (.html) of all comparisons, or a picture: PNG, SVG or PDF; the picture of a second comparison "
+            "gets a 2 in its name.",
+        ),
+    ] = Path("comparison.html"),
     *,
     as_json: Json = False,
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
-    from detent.methods.shown import comparison_table, plot_comparison_of
-    from detent.page.plots import check_figure_path
+    from detent.methods.shown import comparison_of, plot_comparison_of
+    from detent.page.frame import comparison_page
+    from detent.page.plots import SUFFIXES, check_figure_path
+    from detent.page.render import write_page
 
-    check_figure_path(figure)
+    check_figure_path(figure, (".html", *SUFFIXES))
     axis = load(file, overrides or [])
     say_if_cold()
-    files: list[Path] = []
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "running the axis in several ways")
-        comparisons = axis.compare(progress)
-        for number, found in enumerate(comparisons, 1):
-            files.append(figure if number == 1 else figure.with_stem(f"{figure.stem}-{number}"))
-            progress(0.9, "drawing")
-            plot_comparison_of(axis.spec, found, files[-1])
-    tables = [comparison_table(axis.spec, found) for found in comparisons]
+        found = axis.compare(progress)
+        told = [comparison_of(axis.spec, one) for one in found]
+        progress(0.9, "drawing")
+        if figure.suffix.lower() == ".html":
+            files = [figure]
+            write_page(figure, comparison_page(axis.name, told, {"axis file": axis.file.file}))
+        else:
+            files = [figure if k == 1 else figure.with_stem(f"{figure.stem}-{k}") for k in range(1, len(found) + 1)]
+            for one, path in zip(found, files, strict=True):
+                plot_comparison_of(axis.spec, one, path)
     if as_json:
-        data = [{"title": title} | found.to_dict() for (title, _, _), found in zip(tables, comparisons, strict=True)]
+        data = [{"title": one.table.title} | came.to_dict() for one, came in zip(told, found, strict=True)]
         print_json({"comparisons": data, "files": [str(path) for path in files]})
         return
-    for title, heads, rows in tables:
-        print_table(title, heads, rows, right=True)
+    for one in told:
+        print_table(*one.table, right=True)
     for path in files:
-        print(f"figure: {path}")
+        print(f"{'page' if path.suffix.lower() == '.html' else 'figure'}: {path}")

@@ -1,6 +1,7 @@
 """What each control method shows: the report of a run, its summary, the comparison with its alternatives."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,7 +27,10 @@ from detent.methods.simulated import AnyResult
 from detent.methods.stepper_envelope.comparison import JerkComparison, StepComparison
 from detent.methods.stepper_envelope.run import StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.page.figure import Figure
+from detent.page.frame import Comparison as PageComparison
 from detent.page.page import Page
+from detent.page.table import TextTable
 from detent.record.trace import Trace
 from detent.units import format_quantity
 
@@ -147,8 +151,28 @@ def _first(found: Sequence[object], kind: type[C]) -> C | None:
     return next((one for one in found if isinstance(one, kind)), None)
 
 
-def plot_comparison_of(spec: AnySpec, comparison: AnyComparison, path: Path) -> None:
+@dataclass(frozen=True, slots=True)
+class _TableOnly:
+    """A comparison that does not draw its figures itself yet."""
+
+    table: TextTable
+
+    def figures(self) -> tuple[Figure, ...]:
+        return ()
+
+
+def comparison_of(spec: AnySpec, comparison: Any) -> PageComparison:
+    """A comparison as page and terminal show it."""
+    return comparison if hasattr(comparison, "figures") else _TableOnly(TextTable(*comparison_table(spec, comparison)))
+
+
+def plot_comparison_of(spec: AnySpec, comparison: Any, path: Path) -> None:
     """Draw one comparison into a PNG, SVG or PDF file."""
+    if hasattr(comparison, "figures"):
+        from detent.page.draw import draw_figures
+
+        draw_figures(comparison.figures(), path)
+        return
     if isinstance(comparison, DriveComparison):
         from detent.methods.print_head import report as print_report
         from detent.page import plots as figures

@@ -1,6 +1,7 @@
 """How the page writes numbers, directions and tables."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
 from math import isnan
 
@@ -118,6 +119,44 @@ def duration(seconds: float) -> str:
         return f"{minutes}{GAP}min {rest:02d}{GAP}s"
     hours, rest = divmod(round(seconds / 60), 60)
     return f"{hours}{GAP}h {rest:02d}{GAP}min"
+
+
+def milliseconds(seconds: float) -> str:
+    """Write a time in milliseconds, with its unit."""
+    return f"{number(round(seconds * 1e3, 6))}{GAP}ms"
+
+
+def length(value: float) -> str:
+    """Write a small length [m] in micrometres, and one that is not small in millimetres.
+
+    >>> [length(value).replace(GAP, " ") for value in (5.69e-6, 0.4219e-3, 0.0994)]
+    ['5.7 µm', '422 µm', '99.4 mm']
+    """
+    if abs(value) >= 1e-3:
+        return f"{number(value * 1e3)}{GAP}mm"
+    return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
+
+
+@dataclass(frozen=True, slots=True)
+class CountUnit:
+    """The smallest way that an axis knows: its size [m or rad] and what it is called, "step" or "pulse"."""
+
+    size: float
+    word: str
+
+    @property
+    def words(self) -> str:
+        """The plural."""
+        return self.word + "s"
+
+    def counts(self, value: float) -> str:
+        """Write a way in counts, with two digits.
+
+        >>> CountUnit(6.61e-6, "step").counts(5.69e-6), CountUnit(5e-6, "pulse").counts(5e-6)
+        ('0.86 steps', '1 pulse')
+        """
+        text = number(value / self.size, 2)
+        return f"{text} {self.word if text == '1' else self.words}"
 
 
 def micrometres(length: float) -> str:

@@ -8,7 +8,6 @@ from detent.methods.moves import charts as servo_charts
 from detent.methods.moves.comparison_section import comparison_charts, comparison_section
 from detent.methods.moves.page_data import FilteredMove, MoveResult, PhaseMove, ServoReportData, Worst
 from detent.methods.moves.summary import in_counts, length
-from detent.methods.print_head.charts import page_data
 from detent.page.chart import Chart
 from detent.page.page import (
     ZOOM_HINT,
@@ -24,6 +23,7 @@ from detent.page.page import (
     section,
     small_print,
 )
+from detent.page.paper import printed_pages
 from detent.page.words import GAP, arrow, count, duration, further, number, offset_cell, table
 
 MOST_MOVES = 500
@@ -48,7 +48,7 @@ def make_servo_page(data: ServoReportData) -> Page:
     Page
         For `detent.page.page.write_page`.
     """
-    paper = page_data(data.marks, data.tolerance) if len(data.marks) else None
+    paper = printed_pages(data.marks, data.tolerance) if len(data.marks) else None
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
         "body": [

@@ -10,29 +10,9 @@ from dataclasses import dataclass, field
 from detent.methods.filtered_servo.comparison import FeedbackComparison
 from detent.methods.phase_servo.hold_comparison import HoldComparison
 from detent.methods.phase_servo.noise_comparison import NoiseComparison
-from detent.methods.print_head.page_data import Marks
+from detent.page.paper import Marks
 from detent.page.parts import Event, Note, Numbers
-
-
-@dataclass(frozen=True, slots=True)
-class CountUnit:
-    """The smallest way that the axis knows.
-
-    Attributes
-    ----------
-    size : float
-        Travel of one [m].
-    word : str
-        What it is called: "step", "pulse".
-    """
-
-    size: float
-    word: str
-
-    @property
-    def words(self) -> str:
-        """The plural."""
-        return self.word + "s"
+from detent.page.words import CountUnit
 
 
 @dataclass(frozen=True, slots=True)

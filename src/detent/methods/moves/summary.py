@@ -4,11 +4,11 @@ import math
 import statistics
 from collections.abc import Callable
 
-from detent.methods.moves.page_data import CountUnit, MoveFigures, Worst
+from detent.methods.moves.page_data import MoveFigures, Worst
 from detent.methods.moves.run import MoveRecord, MoveRun, ServoSpec
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.print_head.run import Direction, PrintRun
-from detent.page.words import GAP, count, duration, number
+from detent.page.words import GAP, CountUnit, count, duration, length, number
 
 SOONEST = 1e-6
 """An axis that says so by less than this before it is within the tolerance says so in time [s]."""
@@ -129,51 +129,9 @@ def _milliseconds(seconds: float) -> str:
     return f"{number(seconds * 1e3)} ms"
 
 
-def length(value: float) -> str:
-    """Write a small length in micrometres, and one that is not small in millimetres.
-
-    Parameters
-    ----------
-    value : float
-        Length [m].
-
-    Returns
-    -------
-    str
-        With its unit.
-
-    Examples
-    --------
-    >>> [length(value).replace(GAP, " ") for value in (5.69e-6, 0.4219e-3, 0.0994)]
-    ['5.7 µm', '422 µm', '99.4 mm']
-    """
-    if abs(value) >= 1e-3:
-        return f"{number(value * 1e3)}{GAP}mm"
-    return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
-
-
 def in_counts(value: float, unit: CountUnit) -> str:
-    """Write a length in the smallest way that the axis knows.
-
-    Parameters
-    ----------
-    value : float
-        Length [m].
-    unit : CountUnit
-        What to count.
-
-    Returns
-    -------
-    str
-        Two digits and what is counted.
-
-    Examples
-    --------
-    >>> in_counts(5.69e-6, CountUnit(6.61e-6, "step")), in_counts(5e-6, CountUnit(5e-6, "pulse"))
-    ('0.86 steps', '1 pulse')
-    """
-    text = number(value / unit.size, 2)
-    return f"{text} {unit.word if text == '1' else unit.words}"
+    """Write a length in the smallest way that the axis knows."""
+    return unit.counts(value)
 
 
 def interference_text(run: MoveRun) -> str:
