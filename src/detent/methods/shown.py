@@ -10,12 +10,8 @@ from detent.methods.cascade.replay import ReplayRun
 from detent.methods.cascade.run import CascadeRun
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.compared import AnyComparison
-from detent.methods.filtered_servo.comparison import FeedbackComparison
 from detent.methods.moves.run import MoveRun, ServoSpec
-from detent.methods.moves.summary import move_summary_rows
-from detent.methods.moves.summary import summary_rows as print_summary_rows
-from detent.methods.phase_servo.hold_comparison import HoldComparison
-from detent.methods.phase_servo.noise_comparison import NoiseComparison
+from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.print_head.comparison import DriveComparison
 from detent.methods.print_head.run import PrintRun
 from detent.methods.print_head.schema import PrintHeadSpec
@@ -29,10 +25,10 @@ from detent.methods.stepper_envelope.run import StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.page.figure import Figure
 from detent.page.frame import Comparison as PageComparison
+from detent.page.frame import Page as FramePage
 from detent.page.page import Page
 from detent.page.table import TextTable
 from detent.record.trace import Trace
-from detent.units import format_quantity
 
 Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
 """Title, heads and rows."""
@@ -44,6 +40,8 @@ C = TypeVar("C")
 def summary_rows(spec: AnySpec, result: AnyResult) -> list[tuple[str, str]]:
     """The figures of a run that a person wants first."""
     if isinstance(result, PrintRun):
+        from detent.methods.print_head.summary import summary_rows as print_summary_rows
+
         return print_summary_rows(result)
     if isinstance(spec, RotaryTableSpec) and isinstance(result, SequenceRun):
         from detent.methods.rotary_table.summary import sequence_summary_rows
@@ -55,7 +53,14 @@ def summary_rows(spec: AnySpec, result: AnyResult) -> list[tuple[str, str]]:
         return stage_summary_rows(spec, result)
     if isinstance(spec, CascadeSpec):
         return _cascade_summary(spec, result)
-    return move_summary_rows(*_servo(spec, result))
+    return _servo_summary(*_servo(spec, result))
+
+
+def _servo_summary(spec: ServoSpec, run: MoveRun) -> list[tuple[str, str]]:
+    from detent.methods.filtered_servo.page import filtered_summary
+    from detent.methods.phase_servo.page import phase_summary
+
+    return phase_summary(spec, run) if isinstance(spec, PhaseServoSpec) else filtered_summary(spec, run)
 
 
 def _cascade_summary(spec: CascadeSpec, result: AnyResult) -> list[tuple[str, str]]:
@@ -76,7 +81,7 @@ def _servo(spec: AnySpec, result: AnyResult) -> tuple[ServoSpec, MoveRun]:
 
 def report_of(
     spec: AnySpec, result: AnyResult, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
-) -> Page:
+) -> Page | FramePage:
     """The report of a run."""
     if isinstance(spec, PrintHeadSpec) and isinstance(result, PrintRun):
         from detent.methods.print_head.page import make_print_page
@@ -129,21 +134,14 @@ def _stage_report(
 
 
 def _servo_report(
-    spec: ServoSpec, result: MoveRun, trace: Trace | None, comparisons: Comparisons, settings: dict[str, str]
-) -> Page:
-    from detent.methods.moves.page import make_servo_page
-    from detent.methods.moves.report import servo_report
+    spec: ServoSpec, result: MoveRun, trace: Trace | None, comparisons: Any, settings: dict[str, str]
+) -> FramePage:
+    from detent.methods.filtered_servo.page import filtered_page
+    from detent.methods.phase_servo.page import phase_page
 
-    data = servo_report(
-        spec,
-        result,
-        trace,
-        noise=_first(comparisons, NoiseComparison),
-        hold=_first(comparisons, HoldComparison),
-        feedback=_first(comparisons, FeedbackComparison),
-        settings=settings,
-    )
-    return make_servo_page(data)
+    if isinstance(spec, PhaseServoSpec):
+        return phase_page(spec, result, trace, comparisons, settings)
+    return filtered_page(spec, result, trace, comparisons, settings)
 
 
 def _first(found: Sequence[object], kind: type[C]) -> C | None:
@@ -188,12 +186,8 @@ def _plotter(comparison: AnyComparison) -> Callable[[Any, Path], None]:
     from detent.methods.cascade import comparison_section as cascade_comparisons
     from detent.methods.rotary_table import comparison_section as table_comparisons
     from detent.methods.stepper_envelope import stage_figures
-    from detent.page import plot_looks as comparison_figures
 
     plotters: dict[type, Callable[[Any, Path], None]] = {
-        NoiseComparison: comparison_figures.plot_noise,
-        HoldComparison: comparison_figures.plot_hold,
-        FeedbackComparison: comparison_figures.plot_feedback,
         AngleComparison: table_comparisons.plot_angle,
         StepComparison: stage_figures.plot_steps,
         JerkComparison: stage_figures.plot_jerk,
@@ -212,9 +206,6 @@ def comparison_table(spec: AnySpec, comparison: AnyComparison) -> Table:
     from detent.methods.stepper_envelope import stage_figures
 
     tables: dict[type, Callable[[Any], Table]] = {
-        NoiseComparison: _noise_table,
-        HoldComparison: _hold_table,
-        FeedbackComparison: _feedback_table,
         AngleComparison: table_comparisons.angle_table,
         StepComparison: stage_figures.steps_table,
         JerkComparison: stage_figures.jerk_table,
@@ -231,53 +222,3 @@ def _drive_table(spec: PrintHeadSpec, found: DriveComparison) -> Table:
         for k, speed in enumerate(found.speeds)
     ]
     return f"Steady speed error, right / left ({drift_text(spec)})", ("speed", *found.methods), rows
-
-
-def _noise_table(found: NoiseComparison) -> Table:
-    heads = ("pulses put in", "this servo, + pulses", "- pulses", "incremental servo, + pulses", "- pulses")
-    rows = [
-        (str(n), *(_range(rest[k, sign]) for rest in (found.absolute, found.incremental) for sign in (0, 1)))
-        for k, n in enumerate(found.pulses)
-    ]
-    title = (
-        f"Where a move of {found.pitches} pitches ends, in steps of {format_quantity(found.step, 'm')} from its target "
-        f"(right / left; a pitch off from {found.margin} pulses on)"
-    )
-    return title, heads, rows
-
-
-def _range(pair: Any) -> str:
-    """Right and left, as whole numbers where they are far, else with two digits."""
-    return " / ".join(f"{value:+.0f}" if abs(value) >= 10 else f"{value:+.2f}" for value in pair)
-
-
-def _hold_table(found: HoldComparison) -> Table:
-    rows: list[tuple[str, ...]] = []
-    for case in (*found.still, *found.loaded):
-        late = case.t > case.t[-1] - 0.1
-        last = case.displacement[late]
-        rows.append((case.name, f"{last.max() - last.min():.2f}", f"{last.mean():+.2f}", f"{case.integral[-1]:g}"))
-    return "Standing still, last 0.1 s, in steps", ("servo", "peak to peak", "mean displacement", "integral"), rows
-
-
-def _feedback_table(found: FeedbackComparison) -> Table:
-    heads = (
-        "speed feedback", "window", "B", "A", "KV", "std of speed word", "std of E", "force ripple", "stop overshoot",
-        "gain margin",
-    )  # fmt: skip
-    rows = [
-        (
-            case.name,
-            format_quantity(case.sample_period, "s"),
-            str(case.scale),
-            "none" if case.coefficient == 1 else f"{case.coefficient:g}",
-            f"{case.kv:.0f}/s",
-            f"{case.std_speed:.3g}",
-            f"{case.std_error:.3g}",
-            format_quantity(case.force_ripple, "N", 3),
-            "does not settle" if not case.stable else f"{case.stop_overshoot:.0f} pulses",
-            f"{case.gain_margin:.2f}",
-        )
-        for case in found.cases
-    ]
-    return f"At {found.rate:g} pulses/s", heads, rows
