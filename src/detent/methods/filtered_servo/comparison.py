@@ -242,7 +242,8 @@ def _word_charts(found: FeedbackComparison) -> list[Chart]:
     if not len(without.t) or not len(with_filter.t):
         return []
     t = without.t - without.t[0]
-    rows = np.minimum(np.searchsorted(with_filter.t - with_filter.t[0], t), len(with_filter.t) - 1)
+    nearest: Any = np.searchsorted(with_filter.t - with_filter.t[0], t)
+    rows = np.minimum(nearest, len(with_filter.t) - 1)
 
     def pair(before: Numbers, after: Numbers) -> list[Curve]:
         """The same quantity without and with the filter."""

@@ -303,7 +303,7 @@ def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
         title=f"Move {count(move.number)}, {length(_way(move))} to the {side}",
         caption=f"Shown is {shown.why}. {view.captions[0]}",
         charts=time_charts(timeline, view.panels(shown)),
-        events=marks,
+        events=events,
     )
 
 
