@@ -490,14 +490,16 @@ def test_compare_as_json(tmp_path: Path) -> None:
         "method", "constants", "errors_right", "errors_left", "mean_error", "time_to_band",
     }  # fmt: skip
     assert data["title"] == "Steady speed error, right / left (machine as in its file)"
-    assert (tmp_path / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    page = (tmp_path / "comparison.html").read_text(encoding="utf-8")
+    assert "Steady speed error, right / left (machine as in its file)" in page
+    assert "This file is complete" in page
 
 
 def test_a_comparison_on_an_obstructed_axis_is_status_1() -> None:
     answer = call("compare", AXIS, *OBSTACLE)
     assert answer.status == 1
     assert answer.err.startswith("comparison of drives: CALCULATE PARAMETERS failed: the head is obstructed")
-    assert not Path("comparison.png").exists()
+    assert not Path("comparison.html").exists()
 
 
 # ---- plot, registers

@@ -123,7 +123,7 @@ def duration(seconds: float) -> str:
 
 def milliseconds(seconds: float) -> str:
     """Write a time in milliseconds, with its unit."""
-    return f"{number(round(seconds * 1e3, 6))}{GAP}ms"
+    return f"{number(seconds * 1e3)}{GAP}ms"
 
 
 def length(value: float) -> str:

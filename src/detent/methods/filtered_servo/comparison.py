@@ -241,9 +241,8 @@ def _word_charts(found: FeedbackComparison) -> list[Chart]:
     without, with_filter = found.cases[:2]
     if not len(without.t) or not len(with_filter.t):
         return []
-    t = without.t - without.t[0]
-    nearest: Any = np.searchsorted(with_filter.t - with_filter.t[0], t)
-    rows = np.minimum(nearest, len(with_filter.t) - 1)
+    t: Numbers = without.t - without.t[0]
+    rows = [min(row, len(with_filter.t) - 1) for row in np.searchsorted(with_filter.t - with_filter.t[0], t).tolist()]
 
     def pair(before: Numbers, after: Numbers) -> list[Curve]:
         """The same quantity without and with the filter."""

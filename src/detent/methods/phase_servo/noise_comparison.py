@@ -151,8 +151,10 @@ def _rest_charts(found: NoiseComparison) -> list[Chart]:
     label, levels = "right of the target [step]", [(side * NOISE_BAND, "") for side in (-1, 1)]
     panels = [
         Panel(name="noise", label=label, height=300, zero=True, curves=[*counted, *stops]),
-        Panel(name="noise-near", label="off [step]", height=180, zero=True, span=(-1.2, 1.2), levels=levels, curves=stops,
-              title=f"Magnified: no stop on the target may be more than {NOISE_BAND:g} steps off (dashed)"),
+        Panel(
+            name="noise-near", label="off [step]", height=180, zero=True, span=(-1.2, 1.2), levels=levels, curves=stops,
+            title=f"Magnified: no stop on the target may be more than {NOISE_BAND:g} steps off (dashed)",
+        ),
     ]  # fmt: skip
     marks = {"marks": [{"x": side * found.margin, "label": "limit"} for side in (-1, 1)]}
     return [line_chart(panel, x, "− pulses put in   [pulse]   + pulses put in") | marks for panel in panels]
