@@ -152,7 +152,7 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "run: huge --every": (["run", AXIS, *job, "--every", "99999999999999999999"], "--every"),
         "run: --every in words": (["run", AXIS, *job, "--every", "often"], "--every"),
         "compare: missing file": (["compare", missing], "missing.toml: came no such file"),
-        "compare: no picture": (["compare", AXIS, "--figure", "a.txt"], "cannot be saved as '.txt'; use one of .png"),
+        "compare: no picture": (["compare", AXIS, "--figure", "a.txt"], "cannot be saved as '.txt'; use one of .html"),
         "compare: no folder": (["compare", AXIS, "--figure", "no/a.png"], "cannot be written .no folder no"),
         "compare: too slow": (["compare", AXIS, "--set", "limits.speed=5 in/s"], "comparison of drives: came .* raise"),
         "plot: missing file": (["plot", "no.h5"], "no.h5: came no such file"),
