@@ -142,19 +142,19 @@ def phase_move() -> None:
 
 
 def noise() -> None:
-    """Spurious pulses: what `detent compare` draws."""
+    """Spurious pulses: what `detent compare --figure` draws."""
     from detent.methods.phase_servo.noise_comparison import compare_noise
-    from detent.page.plot_looks import plot_noise
+    from detent.page.draw import draw_figures
 
-    plot_noise(compare_noise(phase_axis().spec), FOLDER / "noise.svg")
+    draw_figures(compare_noise(phase_axis().spec).figures(), FOLDER / "noise.svg")
 
 
 def hold() -> None:
     """Standing at the target: the other figure of `detent compare`."""
     from detent.methods.phase_servo.hold_comparison import compare_hold
-    from detent.page.plot_looks import plot_hold
+    from detent.page.draw import draw_figures
 
-    plot_hold(compare_hold(phase_axis().spec), FOLDER / "hold.svg")
+    draw_figures(compare_hold(phase_axis().spec).figures(), FOLDER / "hold.svg")
 
 
 def clock_order() -> None:
@@ -379,9 +379,8 @@ def damping() -> None:
 def feedback_table() -> None:
     """The comparison as a table, for the page."""
     import generate
-    from detent.methods.shown import comparison_table
 
-    _, heads, rows = comparison_table(slide().spec, feedback())
+    _, heads, rows = feedback().table
     short = {"speed feedback": "", "std of speed word": "std of y", "stop overshoot": "overshoot"}
     text = generate.table(tuple(short.get(head, head) for head in heads), [tuple(row) for row in rows])
     (FOLDER / "feedback.md").write_text(text, encoding="utf-8")

@@ -152,7 +152,7 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "run: huge --every": (["run", AXIS, *job, "--every", "99999999999999999999"], "--every"),
         "run: --every in words": (["run", AXIS, *job, "--every", "often"], "--every"),
         "compare: missing file": (["compare", missing], "missing.toml: came no such file"),
-        "compare: no picture": (["compare", AXIS, "--figure", "a.txt"], "cannot be saved as '.txt'; use one of .png"),
+        "compare: no picture": (["compare", AXIS, "--figure", "a.txt"], "cannot be saved as '.txt'; use one of .html"),
         "compare: no folder": (["compare", AXIS, "--figure", "no/a.png"], "cannot be written .no folder no"),
         "compare: too slow": (["compare", AXIS, "--set", "limits.speed=5 in/s"], "comparison of drives: came .* raise"),
         "plot: missing file": (["plot", "no.h5"], "no.h5: came no such file"),
@@ -490,14 +490,16 @@ def test_compare_as_json(tmp_path: Path) -> None:
         "method", "constants", "errors_right", "errors_left", "mean_error", "time_to_band",
     }  # fmt: skip
     assert data["title"] == "Steady speed error, right / left (machine as in its file)"
-    assert (tmp_path / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    page = (tmp_path / "comparison.html").read_text(encoding="utf-8")
+    assert "Steady speed error, right / left (machine as in its file)" in page
+    assert "This file is complete" in page
 
 
 def test_a_comparison_on_an_obstructed_axis_is_status_1() -> None:
     answer = call("compare", AXIS, *OBSTACLE)
     assert answer.status == 1
     assert answer.err.startswith("comparison of drives: CALCULATE PARAMETERS failed: the head is obstructed")
-    assert not Path("comparison.png").exists()
+    assert not Path("comparison.html").exists()
 
 
 # ---- plot, registers

@@ -1,7 +1,8 @@
 """`detent compare`: the method beside its alternatives."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,32 +15,67 @@ def compare(
     file: File,
     overrides: Set = None,
     figure: Annotated[
-        Path, typer.Option("--figure", help="PNG, SVG or PDF; a second comparison gets a 2 in its name.")
-    ] = Path("comparison.png"),
+        Path,
+        typer.Option(
+            "--figure",
+            help="A page (.html) of all comparisons, or a picture: PNG, SVG or PDF; the picture of a second comparison "
+            "gets a 2 in its name.",
+        ),
+    ] = Path("comparison.html"),
     *,
     as_json: Json = False,
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
-    from detent.page.plots import check_figure_path
+    from detent.page.frame import comparison_page
+    from detent.page.plots import SUFFIXES, check_figure_path
+    from detent.page.render import write_page
 
-    check_figure_path(figure)
+    check_figure_path(figure, (".html", *SUFFIXES))
     axis = load(file, overrides or [])
     say_if_cold()
-    files: list[Path] = []
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "running the axis in several ways")
-        comparisons = axis.compare(progress)
-        for number, found in enumerate(comparisons, 1):
-            files.append(figure if number == 1 else figure.with_stem(f"{figure.stem}-{number}"))
-            progress(0.9, "drawing")
-            axis.method.plot(axis.spec, found, files[-1])
-    tables = [axis.method.table(axis.spec, found) for found in comparisons]
+        found = axis.compare(progress)
+        told = [_told(axis, one) for one in found]
+        progress(0.9, "drawing")
+        if figure.suffix.lower() == ".html":
+            files = [figure]
+            write_page(figure, comparison_page(axis.name, told, {"axis file": axis.file.file}))
+        else:
+            files = [figure if k == 1 else figure.with_stem(f"{figure.stem}-{k}") for k in range(1, len(found) + 1)]
+            for one, path in zip(found, files, strict=True):
+                _draw(axis, one, path)
     if as_json:
-        data = [{"title": title} | found.to_dict() for (title, _, _), found in zip(tables, comparisons, strict=True)]
+        data = [{"title": one.table.title} | came.to_dict() for one, came in zip(told, found, strict=True)]
         print_json({"comparisons": data, "files": [str(path) for path in files]})
         return
-    for title, heads, rows in tables:
-        print_table(title, heads, rows, right=True)
+    for one in told:
+        print_table(*one.table, right=True)
     for path in files:
-        print(f"figure: {path}")
+        print(f"{'page' if path.suffix.lower() == '.html' else 'figure'}: {path}")
+
+
+def _told(axis: Any, one: Any) -> Any:
+    from detent.page.table import TextTable
+
+    return one if hasattr(one, "figures") else _TableOnly(TextTable(*axis.method.table(axis.spec, one)))
+
+
+def _draw(axis: Any, one: Any, path: Path) -> None:
+    from detent.page.draw import draw_figures
+
+    if hasattr(one, "figures"):
+        draw_figures(one.figures(), path)
+    else:
+        axis.method.plot(axis.spec, one, path)
+
+
+@dataclass(frozen=True, slots=True)
+class _TableOnly:
+    """A comparison that does not draw its figures itself yet."""
+
+    table: Any
+
+    def figures(self) -> tuple[Any, ...]:
+        return ()

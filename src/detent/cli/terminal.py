@@ -44,7 +44,7 @@ def make_console(*, stderr: bool = False) -> Any:
     return console
 
 
-def print_table(title: str, heads: Iterable[str], rows: Iterable[tuple[Any, ...]], *, right: bool = False) -> None:
+def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]], *, right: bool = False) -> None:
     """A table whose cells are taken as they are; `right` aligns all but the first column to the right."""
     from rich.table import Table
     from rich.text import Text

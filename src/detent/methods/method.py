@@ -17,6 +17,7 @@ from detent.files.findings import Caution, Contradiction, Derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
+    from detent.page.frame import Page as FramePage
     from detent.page.page import Page
     from detent.record.capture import Clocking
     from detent.record.machine import Progress
@@ -173,7 +174,7 @@ class Method(Protocol[SpecT]):
         """The figures of a run that a person wants first."""
         ...
 
-    def page(self, spec: SpecT, result: Any, shown: Shown) -> "Page":
+    def page(self, spec: SpecT, result: Any, shown: Shown) -> "Page | FramePage":
         """The report of a run."""
         ...
 

@@ -83,6 +83,10 @@ class Panel:
         Lower and upper end of the vertical axis; what the curves need unless given.
     levels : sequence of (float, str)
         Values marked by a dashed line, with their names.
+    title : str
+        Above the plot area, where a figure has several.
+    about : str
+        What it shows, for those who cannot see it; both axes' labels unless given.
     """
 
     name: str
@@ -92,6 +96,8 @@ class Panel:
     zero: bool = False
     span: tuple[float, float] | None = None
     levels: Sequence[tuple[float, str]] = ()
+    title: str = ""
+    about: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -315,6 +321,8 @@ def rounded(values: Numbers, digits: int) -> list[float | None]:
 
 def _chart(panel: Panel, kept: Numbers | slice) -> Chart:
     chart: Chart = {"id": panel.name, "yLabel": panel.label, "height": panel.height}
+    told = {"title": panel.title, "about": panel.about}
+    chart |= {name: text for name, text in told.items() if text}
     if panel.zero:
         chart["zero"] = True
     if panel.span:

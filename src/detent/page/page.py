@@ -9,7 +9,6 @@ his own.
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -18,7 +17,9 @@ from typing import Any, Literal, NotRequired, TypedDict
 
 from detent import __version__
 from detent.errors import DetentError
+from detent.page import frame, render
 from detent.page.chart import SCALES, Chart
+from detent.page.frame import Card
 from detent.page.parts import Event, Note
 from detent.page.words import count, further, number, table
 
@@ -54,7 +55,7 @@ class Page(TypedDict):
     version: NotRequired[str]
 
 
-def write_page(path: str | Path, page: Page) -> None:
+def write_page(path: str | Path, page: Page | frame.Page) -> None:
     """Write a page as one self-contained HTML file.
 
     Parameters
@@ -69,6 +70,9 @@ def write_page(path: str | Path, page: Page) -> None:
     DetentError
         The file cannot be written.
     """
+    if isinstance(page, frame.Page):
+        render.write_page(path, page)
+        return
     path = Path(path)
     part = path.with_name(path.name + ".part")
     try:
@@ -147,29 +151,6 @@ def headline(level: Literal["good", "warn", "bad"], verdict: str, name: str, *, 
         f'<header><p class="kicker">{escape(kicker)}</p>\n'
         f'<h1>{badge} {escape(name)}</h1>\n<p class="lead">{escape(lead)}</p></header>'
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """One figure that everybody wants to know, in large type.
-
-    Attributes
-    ----------
-    title : str
-        What it is.
-    value, unit : str
-        The figure, written out.
-    below : str
-        What to compare it with.
-    bad : bool
-        It is not as it should be.
-    """
-
-    title: str
-    value: str
-    unit: str
-    below: str
-    bad: bool = False
 
 
 def cards(shown: Iterable[Card]) -> str:

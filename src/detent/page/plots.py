@@ -236,13 +236,15 @@ def _method_colour(index: int, methods: int) -> str:
     return COLOURS[0] if index == methods - 1 else others[index % len(others)]
 
 
-def check_figure_path(path: str | Path) -> Path:
+def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> Path:
     """Refuse a target that cannot take a figure, before any work is done.
 
     Parameters
     ----------
     path : str or Path
         Target.
+    suffixes : sequence of str
+        Those allowed.
 
     Returns
     -------
@@ -255,8 +257,8 @@ def check_figure_path(path: str | Path) -> Path:
         The suffix names no kind of figure, or the folder is not there.
     """
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
-        raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
+    if path.suffix.lower() not in suffixes:
+        raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(suffixes)}")
     if not path.parent.is_dir():
         raise DetentError(f"{path}: cannot be written (no folder {path.parent}); make it, or choose another place")
     return path

@@ -1,8 +1,11 @@
 """How the page writes numbers, directions and tables."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
 from math import isnan
+
+from markupsafe import Markup
 
 from detent.page.parts import INCH
 
@@ -118,6 +121,44 @@ def duration(seconds: float) -> str:
     return f"{hours}{GAP}h {rest:02d}{GAP}min"
 
 
+def milliseconds(seconds: float) -> str:
+    """Write a time in milliseconds, with its unit."""
+    return f"{number(seconds * 1e3)}{GAP}ms"
+
+
+def length(value: float) -> str:
+    """Write a small length [m] in micrometres, and one that is not small in millimetres.
+
+    >>> [length(value).replace(GAP, " ") for value in (5.69e-6, 0.4219e-3, 0.0994)]
+    ['5.7 µm', '422 µm', '99.4 mm']
+    """
+    if abs(value) >= 1e-3:
+        return f"{number(value * 1e3)}{GAP}mm"
+    return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
+
+
+@dataclass(frozen=True, slots=True)
+class CountUnit:
+    """The smallest way that an axis knows: its size [m or rad] and what it is called, "step" or "pulse"."""
+
+    size: float
+    word: str
+
+    @property
+    def words(self) -> str:
+        """The plural."""
+        return self.word + "s"
+
+    def counts(self, value: float) -> str:
+        """Write a way in counts, with two digits.
+
+        >>> CountUnit(6.61e-6, "step").counts(5.69e-6), CountUnit(5e-6, "pulse").counts(5e-6)
+        ('0.86 steps', '1 pulse')
+        """
+        text = number(value / self.size, 2)
+        return f"{text} {self.word if text == '1' else self.words}"
+
+
 def micrometres(length: float) -> str:
     """Write a small length [m] in micrometres, with its unit.
 
@@ -150,21 +191,10 @@ def inches_per_second(speed: float) -> str:
     return number(round(abs(speed) / INCH, 2))
 
 
-def arrow(direction: int) -> str:
-    """Mark a direction with its colour and an arrow.
-
-    Parameters
-    ----------
-    direction : int
-        +1 or -1.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+def arrow(direction: int) -> Markup:
+    """An arrow to the right for +1, to the left for -1, in the colour of the direction."""
     name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
-    return f'<span class="arrow {name}">{sign} {name}</span>'
+    return Markup('<span class="arrow {}">{} {}</span>').format(name, sign, name)
 
 
 def bar_cell(value: float, longest: float, *, over: bool = False) -> str:

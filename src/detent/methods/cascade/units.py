@@ -3,9 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from detent.methods.moves.summary import length
 from detent.methods.rotary_table.summary import ARCSEC, SMALL, angle, degrees
-from detent.page.words import GAP, number
+from detent.page.words import GAP, length, number
 
 MICRO = 1e-3
 """Lengths below this are drawn in micrometres [m]."""

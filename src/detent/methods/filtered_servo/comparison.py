@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from detent.analysis.arguments import require_positive
@@ -20,9 +21,14 @@ from detent.methods.filtered_servo.derive import Machine as Figures
 from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
+from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.table import Cell, Table, TextTable
+from detent.page.words import GAP, count, number
 from detent.record.machine import Machine, Progress
 from detent.record.recorder import Recorder, make_trace
 from detent.record.trace import Trace
+from detent.units import format_quantity
 
 RATE = 1037.0
 """Rate of the specification [pulses/s]: not a whole number of pulses in a window of 5 ms."""
@@ -144,6 +150,37 @@ class FeedbackComparison:
     gain: float
     tau_m: float
 
+    @property
+    def table(self) -> TextTable:
+        """What every case costs and brings."""
+        heads = (
+            "speed feedback", "window", "B", "A", "KV", "std of speed word", "std of E", "force ripple",
+            "stop overshoot", "gain margin",
+        )  # fmt: skip
+        return TextTable(f"At {self.rate:g} pulses/s", heads, [_text_row(case) for case in self.cases])
+
+    def figures(self) -> tuple[Figure, ...]:
+        """Words at constant speed, and all cases as a table."""
+        heads = [("", False), ("TS [ms]", True), ("B", True), ("A", True), ("KV [1/s]", True),
+                 ("speed word, std [pulse]", True), ("drive word, std [count]", True),
+                 ("drive word, from \u2026 to", True), ("force ripple, std [N]", True),
+                 ("overshoot at stop [pulse]", True), ("gain margin", True)]  # fmt: skip
+        caption = (
+            "The ways to quieten a counted speed, all on this axis. A longer window delays and may not be stable; a "
+            "smaller multiplier takes the damping. KV is speed over following error; the last column says by how much "
+            f"the loop's gain (here {count(round(self.gain))}{GAP}1/s²) could grow before it oscillates, after the "
+            "exact sampled model."
+        )
+        table = Table(heads=heads, rows=[_page_row(case) for case in self.cases])
+        return (
+            Figure(
+                title="Drive at constant speed, with and without the filter",
+                caption=_quieter(self),
+                charts=_word_charts(self),
+            ),
+            Figure(title="The filter and its alternatives", caption=caption, table=table),
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
         found = {name: _finite(getattr(self, name)) for name in ("rate", "gain", "tau_m")}
@@ -153,6 +190,72 @@ class FeedbackComparison:
 def _finite(value: Any) -> Any:
     """JSON has no words for infinity and NaN."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _text_row(case: FeedbackCase) -> tuple[str, ...]:
+    return (
+        case.name,
+        format_quantity(case.sample_period, "s"),
+        str(case.scale),
+        "none" if case.coefficient == 1 else f"{case.coefficient:g}",
+        f"{case.kv:.0f}/s",
+        f"{case.std_speed:.3g}",
+        f"{case.std_error:.3g}",
+        format_quantity(case.force_ripple, "N", 3),
+        "does not settle" if not case.stable else f"{case.stop_overshoot:.0f} pulses",
+        f"{case.gain_margin:.2f}",
+    )
+
+
+def _page_row(case: FeedbackCase) -> list[str | Cell]:
+    low, high = case.error_range
+    margin = f"× {number(case.gain_margin)}" if math.isfinite(case.gain_margin) else "any"
+    rest = math.isnan(case.stop_overshoot)
+    return [
+        Cell(text=Markup("<b>{}</b>").format(case.name), nowrap=True),
+        number(case.sample_period * 1e3),
+        number(case.scale),
+        "\u2013" if case.coefficient == 1 else number(case.coefficient),
+        number(case.kv) if case.stable else "\u2013",
+        number(case.std_speed),
+        number(case.std_error),
+        f"{number(low, 2)} \u2026 {number(high, 2)}",
+        number(case.force_ripple),
+        Cell(text="never at rest" if rest else number(case.stop_overshoot), over=rest),
+        Cell(text=margin if case.stable else f"{margin}: unstable", over=not case.stable),
+    ]
+
+
+def _quieter(found: FeedbackComparison) -> str:
+    without, with_filter = found.cases[:2]
+    quieter = f", {number(without.std_error / with_filter.std_error, 2)} times quieter" if with_filter.std_error else ""
+    return (
+        f"At a constant {number(found.rate, 4)} pulses per second the counted speed cannot be a whole number: it jumps "
+        "between two, and without a filter every jump, times B, reaches the motor. Look for: the filtered drive word"
+        f"{quieter} at the same following error."
+    )
+
+
+def _word_charts(found: FeedbackComparison) -> list[Chart]:
+    """Without the filter and with it; none if one of the two did not come as far as constant speed."""
+    without, with_filter = found.cases[:2]
+    if not len(without.t) or not len(with_filter.t):
+        return []
+    t: Numbers = without.t - without.t[0]
+    rows = [min(row, len(with_filter.t) - 1) for row in np.searchsorted(with_filter.t - with_filter.t[0], t).tolist()]
+
+    def pair(before: Numbers, after: Numbers) -> list[Curve]:
+        """The same quantity without and with the filter."""
+        return [
+            Curve(label="without the filter", colour="left", width=1, step=True, y=before),
+            Curve(label="with the filter", colour="speed", width=2, step=True, y=after[rows]),
+        ]
+
+    speeds, drives = pair(without.speed_word, with_filter.speed_word), pair(without.error, with_filter.error)
+    return time_charts(Timeline(name="feedback", t=t), [
+        Panel(name="feedback-speed", label="speed word [pulse]", height=180, curves=speeds),
+        Panel(name="feedback-drive", label="drive word [count]", zero=True, curves=drives),
+    ])  # fmt: skip
 
 
 def compare_feedback(

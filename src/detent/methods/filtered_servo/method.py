@@ -1,7 +1,6 @@
 """The filtered servo as a method: what its package brings."""
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
@@ -9,13 +8,12 @@ from detent.files.findings import Caution, Derived
 from detent.methods.filtered_servo.checks import RULES, find_cautions
 from detent.methods.filtered_servo.derive import derive
 from detent.methods.filtered_servo.schema import FilteredServoSpec, fill_derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
-from detent.units import format_quantity
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
@@ -97,46 +95,12 @@ class FilteredServo(Method[FilteredServoSpec]):
 
     def summary(self, spec: FilteredServoSpec, result: Any) -> list[tuple[str, str]]:
         """Moves, times, worst errors."""
-        from detent.methods.moves.summary import move_summary_rows
+        from detent.methods.filtered_servo.page import filtered_summary
 
-        return move_summary_rows(spec, result)
+        return filtered_summary(spec, result)
 
     def page(self, spec: FilteredServoSpec, result: Any, shown: Shown) -> "Page":
         """The report."""
-        from detent.methods.moves.page import make_servo_page
-        from detent.methods.moves.report import servo_report
+        from detent.methods.filtered_servo.page import filtered_page
 
-        found = next(iter(shown.comparisons), None)
-        return make_servo_page(servo_report(spec, result, shown.trace, feedback=found, settings=shown.settings))
-
-    def table(self, spec: FilteredServoSpec, comparison: Any) -> Table:
-        """The filter beside its alternatives."""
-        del spec
-        found = comparison
-        heads = (
-            "speed feedback", "window", "B", "A", "KV", "std of speed word", "std of E", "force ripple",
-            "stop overshoot", "gain margin",
-        )  # fmt: skip
-        rows = [
-            (
-                case.name,
-                format_quantity(case.sample_period, "s"),
-                str(case.scale),
-                "none" if case.coefficient == 1 else f"{case.coefficient:g}",
-                f"{case.kv:.0f}/s",
-                f"{case.std_speed:.3g}",
-                f"{case.std_error:.3g}",
-                format_quantity(case.force_ripple, "N", 3),
-                "does not settle" if not case.stable else f"{case.stop_overshoot:.0f} pulses",
-                f"{case.gain_margin:.2f}",
-            )
-            for case in found.cases
-        ]
-        return f"At {found.rate:g} pulses/s", heads, rows
-
-    def plot(self, spec: FilteredServoSpec, comparison: Any, path: Path) -> None:
-        """The filter beside its alternatives."""
-        from detent.page.plot_looks import plot_feedback
-
-        del spec
-        plot_feedback(comparison, path)
+        return filtered_page(spec, result, shown.trace, shown.comparisons, shown.settings)

@@ -1,287 +1,399 @@
-"""The page about a run of moves on a servo axis: did it arrive, how fast and how well, and how the axis did it."""
+"""The page about a list of moves: did it arrive, how fast and how well, and how the axis did it.
 
-from html import escape
-from math import isnan
-from typing import Any
+It knows no method: what one shows of itself comes as a `MoveView`.
+"""
 
-from detent.methods.moves import charts as servo_charts
-from detent.methods.moves.comparison_section import comparison_charts, comparison_section
-from detent.methods.moves.page_data import FilteredMove, MoveResult, PhaseMove, ServoReportData, Worst
-from detent.methods.moves.summary import in_counts, length
-from detent.methods.print_head.charts import page_data
-from detent.page.chart import Chart
-from detent.page.page import (
-    ZOOM_HINT,
-    Card,
-    Page,
-    cards,
-    chart_slot,
-    event_table,
-    figure,
-    headline,
-    notes,
-    paper_figure,
-    section,
-    small_print,
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from detent.methods.moves.run import MoveRecord, MoveRun
+from detent.methods.moves.summary import MoveFigures, arrived, interference_text, settled
+from detent.page.chart import Band, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
+from detent.page.parts import Event, Note, Numbers
+from detent.page.run_page import (
+    LONGEST,
+    Stretch,
+    happened,
+    has,
+    made_card,
+    median_of,
+    page_title,
+    recorded_whole,
+    run_headline,
+    stopped_after,
+    stretch,
+    time_card,
+    warnings,
+    whole_or_first,
 )
-from detent.page.words import GAP, arrow, count, duration, further, number, offset_cell, table
+from detent.page.table import Cell, left_out, long_table, offset_cell, way_cell
+from detent.page.words import CountUnit, count, duration, length, milliseconds, number
+from detent.record.trace import Trace
 
-MOST_MOVES = 500
-"""Moves in the table: more than anybody reads."""
-
-PAPER_CAPTION = "Each character stands where the carriage stood for it at the end of its dwell."
+POSITION, VELOCITY, TARGET = "train.position", "train.velocity", "gauge.target"
+"""Signals that every axis of moves records."""
 
 FEWEST_MOVES = 5
 """Moves below which a histogram says less than the table."""
 
+FINEST_BAR = 0.1
+"""Narrowest bar of the histogram [µm]."""
 
-def make_servo_page(data: ServoReportData) -> Page:
-    """What the page is made of.
+CLOSE = 5
+"""The approach begins where this many tolerances are left to the target."""
 
-    Parameters
-    ----------
-    data : ServoReportData
-        What to show.
+MM, UM = 1e3, 1e6
 
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
-    paper = page_data(data.marks, data.tolerance) if len(data.marks) else None
-    return {
-        "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
-        "body": [
-            _headline(data), _cards(data), notes(data.notes), _result(data, paper), _how(data),
-            comparison_section(data), _moves(data), small_print(data.settings),
+
+@dataclass(frozen=True, slots=True)
+class ShownMove:
+    """The move that is shown in detail, why this one, and its rows on a clock that starts with its command."""
+
+    run: MoveRun
+    move: MoveRecord
+    why: str
+    rows: Stretch
+
+    @property
+    def settled(self) -> float:
+        """When it was within the tolerance for good [s]; NaN if it was not."""
+        return settled(self.run, self.move)
+
+    @property
+    def to_go(self) -> Numbers:
+        """Target less true position [m]."""
+        return self.move.target - self.rows[POSITION]
+
+
+class MoveView(Protocol):
+    """What a method shows of itself on the page of a list of moves."""
+
+    @property
+    def name(self) -> str:
+        """Name of the axis."""
+        ...
+
+    @property
+    def unit(self) -> CountUnit:
+        """The smallest way that the axis knows."""
+        ...
+
+    @property
+    def max_speed(self) -> float:
+        """Limit of the axis [m/s]."""
+        ...
+
+    @property
+    def signals(self) -> Sequence[str]:
+        """Signals that a move is drawn from beside position, velocity and target."""
+        ...
+
+    @property
+    def captions(self) -> tuple[str, str]:
+        """What to look for in the whole move, and in the words at its end."""
+        ...
+
+    def panels(self, shown: ShownMove) -> list[Panel]:
+        """Plot areas of the whole move, ids "move-...", from top to bottom."""
+        ...
+
+    def bands(self, shown: ShownMove, /) -> list[Band]:
+        """Stretches of the move with a ground of their own."""
+        ...
+
+    def words(self, rows: Stretch) -> list[Curve]:
+        """Words of the control [count] while it comes to rest."""
+        ...
+
+    def events(self, shown: ShownMove) -> dict[str, float]:
+        """What happens in the move, and when [s]; NaN if it does not."""
+        ...
+
+    def text_figure(self, run: MoveRun, /) -> Figure | None:
+        """The text on paper, of an axis that prints."""
+        ...
+
+
+def moves_page(
+    view: MoveView,
+    run: MoveRun,
+    trace: Trace | None,
+    comparisons: Sequence[Comparison] = (),
+    settings: dict[str, str] | None = None,
+) -> Page:
+    """The page of a run of moves; figures whose signals were not recorded are left out."""
+    figures = MoveFigures(run)
+    text = view.text_figure(run) if run.job.kind == "text" and run.moves else None
+    result = [text, _job_figure(figures, trace), _rest_figure(view, figures)]
+    return Page(
+        title=page_title(view.name, run),
+        headline=_headline(view, figures),
+        cards=_cards(view, figures),
+        notes=_notes(figures),
+        sections=[
+            Section("What came out", [figure for figure in result if figure]),
+            Section("How the axis did it", _move_figures(view, figures, trace)),
+            comparison_section(comparisons),
+            Section("Move by move", [_every_move(run)] if run.moves else []),
         ],
-        "charts": all_charts(data),
-        "paper": paper,
-        "version": data.version,
-    }  # fmt: skip
-
-
-def all_charts(data: ServoReportData) -> list[Chart]:
-    """Every chart of the page.
-
-    Parameters
-    ----------
-    data : ServoReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
-    drawn: list[Chart] = []
-    if data.path:
-        drawn.append(servo_charts.job_chart(data.path))
-    if len(data.moves) >= FEWEST_MOVES:
-        drawn.append(servo_charts.rest_chart(data.moves, data.tolerance))
-    if data.detail:
-        drawn += servo_charts.move_charts(data.detail)
-        drawn += servo_charts.approach_charts(data.detail, data.unit, data.tolerance)
-    return drawn + comparison_charts(data)
+        settings=settings or {},
+    )
 
 
 # ---- what came out, in one glance
 
 
-def _word(data: ServoReportData) -> str:
-    return "character" if data.kind == "text" else "move"
-
-
-def _headline(data: ServoReportData) -> str:
-    figures = data.figures
-    kicker = f"Simulated run of the axis {data.axis_name}"
-    asked = count(figures.asked, _word(data))
-    if not data.done:
-        done = f"Stopped after {count(figures.arrived)} of {asked}, {duration(figures.seconds)} into the job."
-        lead = f"{done} {data.failure[:1].upper()}{data.failure[1:].rstrip('.')}."
-        return headline("bad", "Not done", data.job_name, kicker=kicker, lead=lead)
+def _headline(view: MoveView, figures: MoveFigures) -> Headline:
+    run, asked = figures.run, count(figures.asked, figures.word)
+    if not run.done:
+        return run_headline(view.name, run, stopped_after(len(figures.there), asked, figures.seconds))
     lead = f"{asked} in {duration(figures.seconds)}."
-    if figures.error:
-        counts = f"{number(figures.error.value / data.unit.size, 2)} {data.unit.words}"
-        lead += (
-            f" At the end of every dwell the axis stood within {length(figures.error.value)} ({counts}) of its target."
-        )
-    if figures.early:
-        lead += (
-            f" But in {count(figures.early_moves, 'move')} it said that it had arrived before it was there for good."
-        )
-        return headline("warn", "Done, but ready too early", data.job_name, kicker=kicker, lead=lead)
-    return headline("good", "Done", data.job_name, kicker=kicker, lead=lead)
+    if error := figures.error:
+        counts = f"{number(error.value / view.unit.size, 2)} {view.unit.words}"
+        lead += f" At the end of every dwell the axis stood within {length(error.value)} ({counts}) of its target."
+    if not figures.early:
+        return run_headline(view.name, run, lead)
+    moves = count(len(figures.early), "move")
+    lead += f" But in {moves} it said that it had arrived before it was there for good."
+    return run_headline(view.name, run, lead, doubt="Done, but ready too early")
 
 
-def _cards(data: ServoReportData) -> str:
-    figures, word = data.figures, _word(data)
-    rate = f"{number(figures.rate)} {word}s per second"
-    seconds, _, time_unit = duration(figures.seconds).partition(GAP)
+def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
+    run, words = figures.run, figures.word + "s"
     shown = [
-        Card(f"{word.capitalize()}s", count(figures.arrived), f"of {count(figures.asked)}", "arrived and stayed",
-             bad=figures.arrived < figures.asked),
-        Card("Time", seconds, time_unit, rate if data.done else "until it stopped"),
-    ]  # fmt: skip
-    if figures.worst_time:
-        worst = f"median; worst {number(figures.worst_time.value * 1e3)}{GAP}ms, {_whose(figures.worst_time)}"
-        shown.append(Card("Settled after", number(figures.median_time * 1e3), "ms", worst))
-    if figures.overshoot:
-        shown.append(_length_card("Worst overshoot", figures.overshoot, data))
-    if figures.error:
-        shown.append(
-            _length_card(
-                "Worst error at rest", figures.error, data, f", allowed {length(data.tolerance)}",
-                bad=figures.error.value > data.tolerance,
-            )
-        )  # fmt: skip
-    if figures.peak_speed:
-        below = f"{_whose(figures.peak_speed)}, limit {number(data.max_speed * 1e3)}"
-        shown.append(Card("Peak speed", number(figures.peak_speed.value * 1e3), "mm/s", below))
-    return cards(shown)
+        made_card(words.capitalize(), len(figures.there), figures.asked, "arrived and stayed"),
+        time_card(
+            figures.seconds, f"{number(run.moves_per_second)} {words} per second" if run.done else "until it stopped"
+        ),
+    ]
+    if longest := figures.longest:
+        below = f"median; worst {milliseconds(longest.value)}, {_whose(longest.of)}"
+        median = median_of(figures.went, lambda move: move.move_time)
+        shown.append(card("Settled after", milliseconds(median), below))
+    for title, found, limit in (
+        ("Worst overshoot", figures.overshoot, math.inf),
+        ("Worst error at rest", figures.error, run.tolerance),
+    ):
+        if found:
+            allowed = f", allowed {length(limit)}" if math.isfinite(limit) else ""
+            below = f"{view.unit.counts(found.value)}, {_whose(found.of)}{allowed}"
+            shown.append(card(title, length(found.value), below, bad=found.value > limit))
+    if fastest := figures.peak_speed:
+        below = f"{_whose(fastest.of)}, limit {number(view.max_speed * MM)}"
+        shown.append(Card("Peak speed", number(fastest.value * MM), "mm/s", below))
+    return shown
 
 
-def _length_card(title: str, worst: Worst, data: ServoReportData, more: str = "", *, bad: bool = False) -> Card:
-    value, _, unit = length(worst.value).partition(GAP)
-    below = f"{in_counts(worst.value, data.unit)}, {_whose(worst)}{more}"
-    return Card(title, value, unit, below, bad=bad)
+def _whose(move: MoveRecord) -> str:
+    return f"move {count(move.number)}"
 
 
-def _whose(worst: Worst) -> str:
-    return f"move {count(worst.move)}"
+def _notes(figures: MoveFigures) -> list[Note]:
+    notes = warnings(figures.run.warnings)
+    if early := figures.earliest:
+        text = (
+            f"{_whose(early.of)}: the axis said that it had arrived {number(early.value * 1e3)} ms before it was "
+            "within the tolerance for good; what the host does in that time is done beside the target"
+        )
+        notes.append(Note("warning", text))
+    noise = interference_text(figures.run)
+    return [*notes, Note("note", f"interference on the pulse lines: {noise}")] if noise else notes
 
 
-# ---- figures
+# ---- the whole job
 
 
-def _result(data: ServoReportData, paper: dict[str, Any] | None) -> str:
-    text = paper_figure("The text", PAPER_CAPTION, paper) if paper else ""
-    return section("What came out", text, _job_figure(data), _rest_figure(data))
+def _job_figure(figures: MoveFigures, trace: Trace | None) -> Figure | None:
+    rows = stretch(trace, (POSITION, TARGET), figures.run.time_ready) if figures.run.moves else None
+    if rows is None:
+        return None
+    end = int(np.searchsorted(rows.t, float(rows.t[0]) + LONGEST, side="right"))
+    curves = [
+        Curve(label="target", colour="muted", dash=(6, 4), step=True, y=rows[TARGET][:end] * MM, digits=4),
+        Curve(label="true position", colour="speed", width=2, y=rows[POSITION][:end] * MM, digits=4),
+    ]
+    timeline = Timeline(name="job", t=rows.t[:end], label="time since the axis was ready", unit="s")
+    return Figure(
+        # A long job is drawn in part, and of a very long one only the beginning is recorded.
+        title=whole_or_first(float(rows.t[end - 1]), figures.seconds, "The whole job"),
+        caption="Where the axis was and where it had to go. Look for: the line on the dashes at the end of every move.",
+        charts=time_charts(timeline, [Panel(name="job", label="position [mm]", height=260, curves=curves)]),
+    )
 
 
-def _job_figure(data: ServoReportData) -> str:
-    if not data.path:
-        return ""
-    # A long job is drawn in part, and of a very long one only the beginning is recorded.
-    shown, seconds = min(float(data.path.t[-1]), servo_charts.PATH_SECONDS), data.figures.seconds
-    whole = shown > 0.99 * seconds
-    title = "The whole job" if whole else f"The first {duration(shown)} of {duration(seconds)}"
-    caption = "Where the axis was and where it had to go. Look for: the line on the dashes at the end of every move."
-    return figure(title, caption, chart_slot("job", "Position and target over time"), ZOOM_HINT)
-
-
-def _rest_figure(data: ServoReportData) -> str:
-    if len(data.moves) < FEWEST_MOVES:
-        return ""
-    error = data.figures.error
-    outside = " (outside the figure)" if error and error.value < data.tolerance / 1.5 else ""
+def _rest_figure(view: MoveView, figures: MoveFigures) -> Figure | None:
+    run, error = figures.run, figures.error
+    if len(run.moves) < FEWEST_MOVES or error is None:
+        return None
+    outside = " (outside the figure)" if error.value < run.tolerance / 1.5 else ""
     caption = (
         "How far from its target the axis stood at the end of each dwell. Look for: narrow heaps around zero; heaps "
         "that stand apart mean that it matters from which side the axis comes. "
-        f"Allowed: ±{length(data.tolerance)}{outside}; a {data.unit.word} is {length(data.unit.size)}."
+        f"Allowed: ±{length(run.tolerance)}{outside}; a {view.unit.word} is {length(view.unit.size)}."
     )
-    return figure("Error at rest", caption, chart_slot("rest", "Histogram of the error at the end of the dwell"))
+    return Figure(title="Error at rest", caption=caption, charts=[_rest_chart(run)])
 
 
-def _how(data: ServoReportData) -> str:
-    detail = data.detail
-    if not detail:
-        return ""
-    path = detail.path
-    way = path.target - path.start
-    side = "right" if way > 0 else "left"
-    title = f"Move {count(path.number)}, {length(abs(way))} to the {side}"
-    slots = [("move-speed", "Speed over time")]
-    if isinstance(detail, PhaseMove):
-        slots += [("move-to-go", "Way to go over time"), ("move-drive", "Drive word over time")]
-    else:
-        slots += [
-            ("move-counted", "Counted speed, before and after the filter"),
-            ("move-deviation", "Following error over time"),
-            ("move-drive", "Drive word over time"),
-        ]
-    content = "".join(chart_slot(name, label) for name, label in slots)
-    whole = figure(title, f"{_why(path.why)} {_move_caption(detail)}", content, ZOOM_HINT + event_table(path.events))
-    return section("How the axis did it", whole, _approach_figure(data, detail))
+def _rest_chart(run: MoveRun) -> Chart:
+    """Moves over the place where they ended: right of the target is where the error is negative."""
+    heaps: list[Heap] = []
+    for name, right in (("right", True), ("left", False)):
+        errors = np.array([move.error for move in run.moves if (move.target > move.start) == right], dtype=float)
+        heaps.append(Heap(label=f"moved to the {name}", colour=name, at=-errors * UM, counts=np.ones(len(errors))))
+    labels = ("← left of the target   [µm]   right of it →", "moves")
+    return histogram_chart("rest", heaps, labels, finest=FINEST_BAR, limit=run.tolerance * UM)
 
 
-def _why(why: str) -> str:
-    return f"Shown is {escape(why)}."
+# ---- one move
 
 
-def _move_caption(detail: PhaseMove | FilteredMove) -> str:
-    if isinstance(detail, PhaseMove):
-        return (
-            "Until shortly before the target the speed follows a table of the way still to go, counted in pulses; "
-            "then position mode begins, and the phase of the resolver itself says where to stop. Look for: speed on "
-            "the dashes while braking, and a drive that comes to rest."
-        )
-    return (
-        "The slide follows the command pulses at a distance that grows with speed: the following error less the speed "
-        "word is the drive. Look for: the filtered speed word, smooth where the counted one jumps by whole pulses "
-        "times B."
+def _move_figures(view: MoveView, figures: MoveFigures, trace: Trace | None) -> list[Figure]:
+    needed = (POSITION, VELOCITY, TARGET, *view.signals)
+    if trace is None or not has(trace, needed):
+        return []
+    move, why = _telling(figures, trace)
+    rows = stretch(trace, needed, move.begin, move.end) if move else None
+    if move is None or rows is None:
+        return []
+    shown = ShownMove(figures.run, move, why, rows)
+    return [_whole_figure(view, shown), *_approach_figures(view, shown)]
+
+
+def _telling(figures: MoveFigures, trace: Trace) -> tuple[MoveRecord | None, str]:
+    """The most telling of the moves that were recorded whole, and why this one.
+
+    It is the one that failed, else the one that was ready by far too early, else the one of middle length.
+    """
+    whole = recorded_whole(trace, figures.run.moves)
+    failed = [move for move in whole if not arrived(figures.run, move)]
+    if failed:
+        return failed[-1], "the move that failed"
+    early = figures.earliest
+    if early and early.of in whole:
+        return early.of, "the move that was ready too early"
+    went = sorted((move for move in whole if _way(move) > figures.run.tolerance), key=_way)
+    return (went[(len(went) - 1) // 2], "the move of middle length") if went else (None, "")
+
+
+def _way(move: MoveRecord) -> float:
+    return abs(move.target - move.start)
+
+
+def _events(view: MoveView, shown: ShownMove) -> list[Event]:
+    lasted = shown.move.end - shown.move.begin
+    events = happened(view.events(shown), lasted)
+    return events if arrived(shown.run, shown.move) else [*events, Event(lasted, "the run ends here")]
+
+
+def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
+    move, events = shown.move, _events(view, shown)
+    side = "right" if move.target > move.start else "left"
+    # The command itself comes shortly before the first row.
+    marks = [Event(max(event.t, float(shown.rows.t[0])), event.text) for event in events]
+    timeline = Timeline(
+        name="move", t=shown.rows.t, label="time since the command", bands=view.bands(shown), events=marks
+    )
+    return Figure(
+        title=f"Move {count(move.number)}, {length(_way(move))} to the {side}",
+        caption=f"Shown is {shown.why}. {view.captions[0]}",
+        charts=time_charts(timeline, view.panels(shown)),
+        events=events,
     )
 
 
-def _approach_figure(data: ServoReportData, detail: PhaseMove | FilteredMove) -> str:
-    if not detail.path.approach:
-        return ""
-    counts = in_counts(data.tolerance, data.unit)
+def true_speed(shown: ShownMove) -> Curve:
+    """The curve that every picture of a move has."""
+    return Curve(label="true speed", colour="speed", width=2, y=shown.rows[VELOCITY] * MM)
+
+
+def drive_curve(words: Numbers) -> Curve:
+    """The drive word over time."""
+    return Curve(label="drive word", colour="drive", width=2, step=True, y=words, digits=2)
+
+
+def _approach_figures(view: MoveView, shown: ShownMove) -> list[Figure]:
+    """How the axis came to rest; an axis that has given up on its way comes to none."""
+    if math.isnan(shown.move.ready):
+        return []
+    unit, tolerance = view.unit, shown.run.tolerance
     caption = (
-        f"The end of the same move, magnified: position less target, in {data.unit.words} of {length(data.unit.size)}. "
-        f"Arrived means within ±{counts} (dashed); the numbers are those above. "
+        f"The end of the same move, magnified: how far right of its target the axis is, in {unit.words} of "
+        f"{length(unit.size)}. Arrived means within ±{unit.counts(tolerance)} (dashed); the numbers are those above. "
+        f"{view.captions[1]}"
     )
-    if isinstance(detail, PhaseMove):
-        caption += (
-            "Below: the absolute error word, the integral and the drive word that they make with the speed. Look for: "
-            "no way back out of the dashed lines, and stillness after the stop."
-        )
-    else:
-        caption += (
-            "Below: following error less filtered speed is the drive word. Look for: few swings around the target; "
-            "the lag of the filter costs damping."
-        )
-    content = chart_slot("approach-place", "Position less target over time") + chart_slot(
-        "approach-words", "Words of the control over time"
+    return [Figure(title="Coming to rest", caption=caption, charts=_approach_charts(view, shown))]
+
+
+def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
+    """From `CLOSE` tolerances to the target, or more if the move ended farther away, until after the last event."""
+    events, t = _events(view, shown), shown.rows.t
+    begin = shown.rows.first(np.abs(shown.to_go) <= max(CLOSE * shown.run.tolerance, 1.5 * abs(float(shown.to_go[-1]))))
+    last = events[-1].t
+    rows = shown.rows.between(begin, min(last + 0.15 * (last - begin), float(t[-1])))
+    place, limit = (rows[POSITION] - shown.move.target) / view.unit.size, shown.run.tolerance / view.unit.size
+    within = [(shown.settled, float(t[-1]))] if shown.settled < t[-1] else []
+    timeline = Timeline(
+        name="approach",
+        t=rows.t,
+        label="time since the command",
+        bands=[Band(label="within the tolerance", colour="good", spans=within)],
+        events=events,  # all of them: those in sight have the numbers of the figure above
     )
-    return figure("Coming to rest", caption, content, ZOOM_HINT)
+    return time_charts(timeline, [
+        Panel(
+            name="approach-place", label=f"right of the target [{view.unit.word}]", height=260, zero=True,
+            span=_span_around(place, limit),
+            levels=[(limit, f"+{view.unit.counts(shown.run.tolerance)}"),
+                    (-limit, f"−{view.unit.counts(shown.run.tolerance)}")],
+            curves=[Curve(label="true position", colour="speed", width=2, y=place)],
+        ),
+        Panel(name="approach-words", label="words [count]", height=180, zero=True, curves=view.words(rows)),
+    ])  # fmt: skip
+
+
+def _span_around(place: Numbers, limit: float) -> tuple[float, float]:
+    """Ends of an axis that shows the whole curve, and both limits with their names."""
+    low, high = min(float(place.min()), -limit), max(float(place.max()), limit)
+    room = high - low
+    # More above: the numbers of the events stand there.
+    return round(low - 0.1 * room, 3), round(high + 0.25 * room, 3)
 
 
 # ---- table
 
 
-def _moves(data: ServoReportData) -> str:
-    if not data.moves:
-        return ""
-    labelled = any(move.label for move in data.moves)
+def _every_move(run: MoveRun) -> Figure:
+    labelled = any(move.label for move in run.moves)
     heads = [("move", True), *([("character", False)] if labelled else []), ("start [s]", True), ("from [mm]", True),
              ("to [mm]", True), ("way [mm]", False), ("ready after [ms]", True), ("settled after [ms]", True),
-             ("overshoot [µm]", True), ("off target [µm]", True)]  # fmt: skip
-    longest = max(abs(move.offset) for move in data.moves) or 1.0
-    rows = [_row(data, move, longest, labelled=labelled) for move in data.moves[:MOST_MOVES]]
+             ("overshoot [µm]", True), ("error [µm]", True)]  # fmt: skip
+    longest = max(abs(move.error) for move in run.moves) or 1.0
+    rows = [_row(run, move, longest, labelled=labelled) for move in run.moves]
     caption = (
-        f"Ready is what the axis says; settled, within ±{length(data.tolerance)} for good, is what is true. Off "
-        "target: at the end of the dwell, plus is to the right of it."
+        f"Ready is what the axis says; settled, within ±{length(run.tolerance)} for good, is what is true. Error: "
+        "target less position at the end of the dwell, plus if the axis stands to the left of its target."
     )
-    left_out = len(data.moves) - len(rows)
-    if left_out > 0:
-        caption += f" {further(left_out, 'move')} in the JSON summary only."
-    return section("Move by move", figure("Every move", caption, table(heads, rows, tall=True)))
+    return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))
 
 
-def _row(data: ServoReportData, move: MoveResult, longest: float, *, labelled: bool) -> list[str]:
-    late = not isnan(move.ready) and move.settled > move.ready + 1e-6
-    settled = number(move.settled * 1e3)
-    way = f"{arrow(1 if move.way > 0 else -1)} {number(abs(move.way) * 1e3, 4)}"
+def _row(run: MoveRun, move: MoveRecord, longest: float, *, labelled: bool) -> list[str | Cell]:
+    ready, there = move.ready - move.begin, settled(run, move)
+    way = way_cell(1 if move.target > move.start else -1, number(_way(move) * MM, 4))
     return [
         count(move.number),
-        *([escape(move.label)] if labelled else []),
-        f"{move.begin:.3f}",
-        f"{move.start * 1e3:.3f}",
-        f"{move.target * 1e3:.3f}",
-        f'<td class="nowrap">{way if abs(move.way) > data.tolerance else "stays"}</td>',
-        number(move.ready * 1e3),
-        f'<td class="n over">{settled}</td>' if late or isnan(move.settled) else settled,
-        number(move.overshoot * 1e6, 2),
-        offset_cell(move.offset * 1e6, longest * 1e6, over=abs(move.offset) > data.tolerance),
+        *([move.label] if labelled else []),
+        f"{move.begin - run.time_ready:.3f}",
+        f"{move.start * MM:.3f}",
+        f"{move.target * MM:.3f}",
+        way if _way(move) > run.tolerance else Cell(text="stays", nowrap=True),
+        number(ready * 1e3),
+        Cell(text=number(there * 1e3), over=math.isnan(there) or (not math.isnan(ready) and there > ready + 1e-6)),
+        number(move.overshoot * UM, 2),
+        offset_cell(move.error * UM, longest * UM, over=abs(move.error) > run.tolerance),
     ]

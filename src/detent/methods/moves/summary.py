@@ -1,17 +1,13 @@
-"""The figures of a run that a person wants first, as rows of text for the terminal."""
+"""The figures of a run of moves that a person wants first, and the same as rows for the terminal."""
 
 import math
-import statistics
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
-from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.page_data import CountUnit, MoveFigures, Worst
 from detent.methods.moves.run import MoveRecord, MoveRun
-from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.methods.print_head.run import Direction, PrintRun
-from detent.page.words import GAP, count, duration, number
-
-ServoSpec = PhaseServoSpec | FilteredServoSpec
+from detent.page.run_page import Worst, median_of, worst
+from detent.page.words import GAP, CountUnit, count, duration, length, milliseconds, number
 
 SOONEST = 1e-6
 """An axis that says so by less than this before it is within the tolerance says so in time [s]."""
@@ -24,254 +20,135 @@ FAULT_WORDS = {
 }
 """What interference did, as `MoveRun.faults` names it, in words for one and for several."""
 
-
-def summary_rows(run: PrintRun) -> list[tuple[str, str]]:
-    """Name and text of each figure; what a run did not come to is left out.
-
-    Parameters
-    ----------
-    run : PrintRun
-        Printed or not.
-
-    Returns
-    -------
-    list of (str, str)
-        Such as ("lines", "11 of 11, on 1 page").
-    """
-    asked = len(run.job.lines)
-    rows = [("lines", f"{_plain(len(run.lines))} of {_plain(asked)}, on {_plain(run.job.pages, 'page')}")]
-    if run.lines:
-        rows += [
-            ("characters", f"{_plain(run.characters)}, {run.characters_per_second:.0f} per second"),
-            ("time", f"{run.print_time:.2f} s, after {run.time_ready:.2f} s of homing and identification"),
-            ("speeds", ", ".join(f"{s / 6:.4g} in/s ({_plain(n, 'line')})" for s, n in run.speeds.items())),
-            ("turn-arounds", f"{_plain(run.turn_arounds)}; runs back before a line: {_plain(run.repositions)}"),
-            ("column error", f"worst {run.worst_error * 1e6:.1f} µm, rms {run.rms_error * 1e6:.1f} µm"),
-        ]
-    rows += [(f"identified, {side}", _direction(line)) for side, line in run.identified.items() if line.speed_fast]
-    return [*rows, ("motor", f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J")]
+WorstMove = Worst[MoveRecord] | None
 
 
-def _direction(line: Direction) -> str:
-    return (
-        f"slope K {line.slope} (true {line.true_slope:.1f}), "
-        f"friction {line.friction} counts (true {line.true_friction:.1f})"
-    )
+def arrived(run: MoveRun, move: MoveRecord) -> bool:
+    """Whether a move ended within the tolerance, and the axis said so."""
+    return not math.isnan(move.ready) and abs(move.error) <= run.tolerance
 
 
-def _plain(value: int, word: str = "") -> str:
-    """A count with ordinary spaces: what a terminal shows and a script splits."""
-    return count(value, word).replace("\u202f", " ")
+def settled(run: MoveRun, move: MoveRecord) -> float:
+    """Time from the command until within the tolerance for good [s]; NaN for a move that ended outside."""
+    return move.move_time if abs(move.error) <= run.tolerance else math.nan
 
 
-# ---- runs of moves
+def approach(move: MoveRecord) -> float:
+    """Time from the mode switch until within the tolerance for good [s]; NaN for an axis of one mode."""
+    return math.nan if math.isnan(move.switched) else max(move.settled - move.switched, 0.0)
 
 
-def move_summary_rows(spec: ServoSpec, run: MoveRun) -> list[tuple[str, str]]:
-    """Name and text of each figure of a run of moves; what a run did not come to is left out.
+@dataclass(frozen=True)
+class MoveFigures:
+    """Extremes and medians of a run, done or not; None and NaN where no move has the figure."""
 
-    Parameters
-    ----------
-    spec : PhaseServoSpec or FilteredServoSpec
-        The axis.
-    run : MoveRun
-        Done or not.
+    run: MoveRun
 
-    Returns
-    -------
-    list of (str, str)
-        Such as ("moves", "10 of 10").
-    """
-    figures, unit = move_figures(run), count_unit(spec)
-    word = "characters" if run.job.kind == "text" else "moves"
-    rows = [(word, f"{count(figures.arrived)} of {count(figures.asked)}")]
+    @property
+    def word(self) -> str:
+        """What is counted: each move of a text is a character."""
+        return "character" if self.run.job.kind == "text" else "move"
+
+    @property
+    def asked(self) -> int:
+        """Moves of the job."""
+        return len(self.run.job.moves)
+
+    @property
+    def seconds(self) -> float:
+        """From the first readiness to the end of the job [s]."""
+        return max(self.run.time_end - self.run.time_ready, 0.0) if self.run.moves else 0.0
+
+    @cached_property
+    def there(self) -> list[MoveRecord]:
+        """Moves that arrived."""
+        return [move for move in self.run.moves if arrived(self.run, move)]
+
+    @cached_property
+    def went(self) -> list[MoveRecord]:
+        """Those that went farther than the tolerance."""
+        return [move for move in self.there if abs(move.target - move.start) > self.run.tolerance]
+
+    @cached_property
+    def early(self) -> list[MoveRecord]:
+        """Those of which the axis said so before they were within the tolerance for good."""
+        return [move for move in self.there if move.settled - move.ready > SOONEST]
+
+    @property
+    def earliest(self) -> WorstMove:
+        """The one that said so earliest, and by how much [s]."""
+        return worst(self.early, lambda move: move.settled - move.ready)
+
+    @property
+    def longest(self) -> WorstMove:
+        """The longest time to settle [s]."""
+        return worst(self.went, lambda move: move.move_time)
+
+    @property
+    def overshoot(self) -> WorstMove:
+        """Farthest beyond a target [m]."""
+        return worst(self.run.moves, lambda move: move.overshoot)
+
+    @property
+    def error(self) -> WorstMove:
+        """Largest magnitude of the error at the end of a dwell [m]."""
+        return worst(self.run.moves, lambda move: abs(move.error))
+
+    @property
+    def peak_speed(self) -> WorstMove:
+        """Largest speed [m/s]."""
+        return worst(self.run.moves, lambda move: move.peak_speed)
+
+
+def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
+    """Name and text of each figure of a run of moves; what a run did not come to is left out."""
+    figures = MoveFigures(run)
+    words = figures.word + "s"
+    rows = [(words, f"{count(len(figures.there))} of {count(figures.asked)}")]
     if run.moves:
+        rate = f", {number(run.moves_per_second)} {words} per second" if run.done else ""
         rows += [
-            ("time", duration(figures.seconds) + (f", {number(figures.rate)} {word} per second" if run.done else "")),
-            *_settling_rows(figures, run.tolerance),
-            *_worst_row("overshoot", figures.overshoot, unit),
-            *_worst_row("error at rest", figures.error, unit),
+            ("time", duration(figures.seconds) + rate),
+            *_settling(figures),
+            *_worst(figures.overshoot, "overshoot", unit),
+            *_worst(figures.error, "error at rest", unit),
         ]
-    if figures.early:
-        moves = count(figures.early_moves, "move")
-        rows.append(
-            ("ready too early", f"{moves}, by up to {_milliseconds(figures.early.value)} {_whose(figures.early)}")
-        )
-    if figures.peak_speed:
-        rows.append(("peak speed", f"{number(figures.peak_speed.value * 1e3)} mm/s {_whose(figures.peak_speed)}"))
+    if early := figures.earliest:
+        moves = count(len(figures.early), "move")
+        rows.append(("ready too early", f"{moves}, by up to {milliseconds(early.value)} {_whose(early.of)}"))
+    if fastest := figures.peak_speed:
+        rows.append(("peak speed", f"{number(fastest.value * 1e3)} mm/s {_whose(fastest.of)}"))
     rows.append(("motor", f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J"))
     noise = interference_text(run)
     rows += [("interference", noise)] if noise else []
     return [(name, text.replace(GAP, " ")) for name, text in rows]
 
 
-def _settling_rows(figures: MoveFigures, tolerance: float) -> list[tuple[str, str]]:
-    within = f"until within {length(tolerance)} for good"
-    rows = [
-        ("settling", figures.median_time, figures.worst_time, f"from the command {within}"),
-        ("final approach", figures.median_approach, figures.worst_approach, f"from the mode switch {within}"),
-    ]
+def _settling(figures: MoveFigures) -> list[tuple[str, str]]:
+    within = f"until within {length(figures.run.tolerance)} for good"
+    switched = [move for move in figures.went if not math.isnan(move.switched)]
     return [
-        (name, f"median {_milliseconds(median)}, worst {_milliseconds(worst.value)} {_whose(worst)}, {span}")
-        for name, median, worst, span in rows
-        if worst
+        *_times(figures.went, lambda move: move.move_time, "settling", f"from the command {within}"),
+        *_times(switched, approach, "final approach", f"from the mode switch {within}"),
     ]
 
 
-def _worst_row(name: str, worst: Worst | None, unit: CountUnit) -> list[tuple[str, str]]:
-    if worst is None:
+def _times(moves: list[MoveRecord], time: Callable[[MoveRecord], float], name: str, span: str) -> list[tuple[str, str]]:
+    longest = worst(moves, time)
+    if longest is None:
         return []
-    return [(name, f"worst {length(worst.value)}, {in_counts(worst.value, unit)} {_whose(worst)}")]
+    text = f"median {milliseconds(median_of(moves, time))}, worst {milliseconds(longest.value)} {_whose(longest.of)}"
+    return [(name, f"{text}, {span}")]
 
 
-def _whose(worst: Worst) -> str:
-    return f"(move {count(worst.move)})"
+def _worst(found: WorstMove, name: str, unit: CountUnit) -> list[tuple[str, str]]:
+    return [(name, f"worst {length(found.value)}, {unit.counts(found.value)} {_whose(found.of)}")] if found else []
 
 
-def _milliseconds(seconds: float) -> str:
-    return f"{number(seconds * 1e3)} ms"
-
-
-def length(value: float) -> str:
-    """Write a small length in micrometres, and one that is not small in millimetres.
-
-    Parameters
-    ----------
-    value : float
-        Length [m].
-
-    Returns
-    -------
-    str
-        With its unit.
-
-    Examples
-    --------
-    >>> [length(value).replace(GAP, " ") for value in (5.69e-6, 0.4219e-3, 0.0994)]
-    ['5.7 µm', '422 µm', '99.4 mm']
-    """
-    if abs(value) >= 1e-3:
-        return f"{number(value * 1e3)}{GAP}mm"
-    return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
-
-
-def in_counts(value: float, unit: CountUnit) -> str:
-    """Write a length in the smallest way that the axis knows.
-
-    Parameters
-    ----------
-    value : float
-        Length [m].
-    unit : CountUnit
-        What to count.
-
-    Returns
-    -------
-    str
-        Two digits and what is counted.
-
-    Examples
-    --------
-    >>> in_counts(5.69e-6, CountUnit(6.61e-6, "step")), in_counts(5e-6, CountUnit(5e-6, "pulse"))
-    ('0.86 steps', '1 pulse')
-    """
-    text = number(value / unit.size, 2)
-    return f"{text} {unit.word if text == '1' else unit.words}"
+def _whose(move: MoveRecord) -> str:
+    return f"(move {count(move.number)})"
 
 
 def interference_text(run: MoveRun) -> str:
-    """Say what interference did to the pulse lines.
-
-    Parameters
-    ----------
-    run : MoveRun
-        The run.
-
-    Returns
-    -------
-    str
-        Such as "30 pulses put in, 2 speed samples lost"; empty if it did nothing.
-    """
+    """What interference did to the pulse lines: "30 pulses put in, 2 speed samples lost"; empty if it did nothing."""
     return ", ".join(count(n, *FAULT_WORDS[kind]) for kind, n in run.faults.items() if n)
-
-
-def count_unit(spec: ServoSpec) -> CountUnit:
-    """The smallest way that an axis knows.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec or FilteredServoSpec
-        The axis.
-
-    Returns
-    -------
-    CountUnit
-        A step of the phase servo, a pulse of the filtered servo.
-    """
-    if isinstance(spec, PhaseServoSpec):
-        return CountUnit(spec.step, "step")
-    return CountUnit(spec.pulse, "pulse")
-
-
-def arrived(run: MoveRun, move: MoveRecord) -> bool:
-    """Whether a move ended within the tolerance, and the axis said so.
-
-    Parameters
-    ----------
-    run : MoveRun
-        The run.
-    move : MoveRecord
-        One of its moves.
-
-    Returns
-    -------
-    bool
-        True if it did.
-    """
-    return not math.isnan(move.ready) and abs(move.error) <= run.tolerance
-
-
-def move_figures(run: MoveRun) -> MoveFigures:
-    """Medians and extremes of a run.
-
-    Parameters
-    ----------
-    run : MoveRun
-        Done or not.
-
-    Returns
-    -------
-    MoveFigures
-        Times to settle are those of moves that arrived and were longer than the tolerance.
-    """
-    there = [move for move in run.moves if arrived(run, move)]
-    went = [move for move in there if abs(move.target - move.start) > run.tolerance]
-    switched = [move for move in went if not math.isnan(move.switched)]
-    late = [move for move in there if move.settled - move.ready > SOONEST]
-    return MoveFigures(
-        asked=len(run.job.moves),
-        arrived=len(there),
-        seconds=max(run.time_end - run.time_ready, 0.0) if run.moves else 0.0,
-        rate=run.moves_per_second,
-        median_time=statistics.median(move.move_time for move in went) if went else math.nan,
-        worst_time=_worst(went, lambda move: move.move_time),
-        median_approach=statistics.median(_approach(move) for move in switched) if switched else math.nan,
-        worst_approach=_worst(switched, _approach),
-        overshoot=_worst(run.moves, lambda move: move.overshoot),
-        error=_worst(run.moves, lambda move: abs(move.error)),
-        peak_speed=_worst(run.moves, lambda move: move.peak_speed),
-        early=_worst(late, lambda move: move.settled - move.ready),
-        early_moves=len(late),
-    )
-
-
-def _approach(move: MoveRecord) -> float:
-    """From the mode switch until within the tolerance for good [s]."""
-    return max(move.settled - move.switched, 0.0)
-
-
-def _worst(moves: list[MoveRecord], figure: Callable[[MoveRecord], float]) -> Worst | None:
-    if not moves:
-        return None
-    found = max(moves, key=figure)
-    return Worst(figure(found), found.number)

@@ -15,6 +15,12 @@ from detent.methods.phase_servo.derive import Machine as Figures
 from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench, change_method
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
+from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.parts import Event
+from detent.page.run_page import happened
+from detent.page.table import TextTable
+from detent.page.words import GAP, length, number
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder
 
@@ -123,6 +129,36 @@ class HoldComparison:
     stop_at: float
     step: float
 
+    @property
+    def table(self) -> TextTable:
+        """How every case stands in the end."""
+        heads = ("servo", "peak to peak", "mean displacement", "integral")
+        rows = [
+            (case.name, f"{case.swing:.2f}", f"{case.rest:+.2f}", f"{case.integral[-1]:g}")
+            for case in (*self.still, *self.loaded)
+        ]
+        return TextTable("Standing still, last 0.1 s, in steps", heads, rows)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """At rest: unloaded and hunting, then pushed."""
+        swings = [f"{case.name} {number(round(case.swing, 2), 2)}" for case in self.still]
+        still = (
+            "A digital servo that never reads zero swings for ever from one step to the next. Here a dead band opens a "
+            f"moment after the arrival, and an integrator works outside it. A step is {length(self.step)}. "
+            f"Swing at the end, peak to peak in steps: {', '.join(swings)}."
+        )
+        rests = [f"{case.name} {number(round(case.rest, 2), 2)}" for case in self.loaded]
+        loaded = (
+            f"A force of {number(self.push)}{GAP}N pushes the carriage to the right after it has arrived. The error "
+            "alone makes too little drive to push back; the integral counts up until the motor holds the force. "
+            f"Where it stands at the end, in steps right of the target: {', '.join(rests)}."
+        )
+        events = _events(self)
+        return (
+            Figure(title="Standing still", caption=still, charts=_still_charts(self)),
+            Figure(title="Under load", caption=loaded, charts=_loaded_charts(self, events), events=events),
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
         found: dict[str, Any] = {name: getattr(self, name) for name in ("push", "push_at", "stop_at", "step")}
@@ -141,6 +177,49 @@ LOADED: tuple[Variant, ...] = (
     ("with integrator", "from the stop on the integral counts until it balances the push", {"integrator": True}),
     ("without integrator", "nothing but the error itself balances the push", {"integrator": False}),
 )
+
+
+def _still_charts(found: HoldComparison) -> list[Chart]:
+    """A chart per case on one scale, without the first half of the settling, beside which nothing could be seen."""
+    shown = [_since(case, found.stop_at) for case in found.still]
+    reach = max((float(np.abs(case.displacement[part]).max()) for case, part in zip(found.still, shown, strict=True)))
+    span = (round(-1.1 * reach, 3), round(1.1 * reach, 3))
+    drawn: list[Chart] = []
+    for index, (case, part) in enumerate(zip(found.still, shown, strict=True)):
+        curve = Curve(label="true position", colour="speed", y=case.displacement[part])
+        panel = Panel(
+            name=f"still-{index}", label="off [step]", height=140, zero=True, span=span, curves=[curve],
+            title=f"{case.name}: {case.about}", about=f"Displacement over time, {case.name}",
+        )  # fmt: skip
+        drawn += time_charts(Timeline(name="still", t=case.t[part]), [panel])
+    return drawn
+
+
+def _loaded_charts(found: HoldComparison, events: list[Event]) -> list[Chart]:
+    """Both cases in one chart of the place and one of the integral."""
+    part = _since(found.loaded[0], found.push_at)
+    t = found.loaded[0].t[part]
+    places: list[Curve] = []
+    integrals: list[Curve] = []
+    for case, colour, dash in zip(found.loaded, ("speed", "left"), (None, (6, 4)), strict=True):
+        place, integral = np.interp(t, case.t, case.displacement), np.interp(t, case.t, case.integral)
+        places.append(Curve(label=case.name, colour=colour, width=2, dash=dash, y=place))
+        integrals.append(Curve(label=case.name, colour=colour, width=2, dash=dash, step=True, y=integral))
+    return time_charts(Timeline(name="loaded", t=t, events=events), [
+        Panel(name="loaded-place", label="right of the target [step]", height=220, zero=True, curves=places),
+        Panel(name="loaded-integral", label="integral [count]", height=160, zero=True, curves=integrals),
+    ])  # fmt: skip
+
+
+def _since(case: HoldCase, moment: float) -> slice:
+    """Rows from halfway between the arrival and a moment [s] on."""
+    return slice(int(np.searchsorted(case.t, (float(case.t[0]) + moment) / 2)), None)
+
+
+def _events(found: HoldComparison) -> list[Event]:
+    push = f"a force of {number(found.push)}{GAP}N pushes from now on"
+    texts = {push: found.push_at, "stop: dead band and integrator take over": found.stop_at}
+    return happened(texts, math.inf)
 
 
 def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> HoldComparison:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 from detent.methods.phase_servo.checks import RULES, find_cautions
 from detent.methods.phase_servo.derive import derive
@@ -14,7 +14,7 @@ from detent.methods.phase_servo.schema import PhaseServoSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
@@ -106,32 +106,12 @@ class PhaseServo(Method[PhaseServoSpec]):
 
     def summary(self, spec: PhaseServoSpec, result: Any) -> list[tuple[str, str]]:
         """Moves, times, worst errors."""
-        from detent.methods.moves.summary import move_summary_rows
+        from detent.methods.phase_servo.page import phase_summary
 
-        return move_summary_rows(spec, result)
+        return phase_summary(spec, result)
 
     def page(self, spec: PhaseServoSpec, result: Any, shown: Shown) -> "Page":
         """The report."""
-        from detent.methods.moves.page import make_servo_page
-        from detent.methods.moves.report import servo_report
+        from detent.methods.phase_servo.page import phase_page
 
-        noise, hold = (*shown.comparisons, None, None)[:2]
-        return make_servo_page(servo_report(spec, result, shown.trace, noise=noise, hold=hold, settings=shown.settings))
-
-    def table(self, spec: PhaseServoSpec, comparison: Any) -> Table:
-        """Where moves end under noise, or how the servos stand still."""
-        from detent.methods.phase_servo.tables import comparison_table
-
-        del spec
-        return comparison_table(comparison)
-
-    def plot(self, spec: PhaseServoSpec, comparison: Any, path: Path) -> None:
-        """The servos side by side."""
-        from detent.methods.phase_servo.noise_comparison import NoiseComparison
-        from detent.page import plot_looks
-
-        del spec
-        if isinstance(comparison, NoiseComparison):
-            plot_looks.plot_noise(comparison, path)
-        else:
-            plot_looks.plot_hold(comparison, path)
+        return phase_page(spec, result, shown.trace, shown.comparisons, shown.settings)

@@ -16,8 +16,13 @@ from detent.axisfile.tables import BurstTable, InterferenceTable
 from detent.errors import DetentError
 from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench, change_method
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
+from detent.page.chart import Chart, Curve, Panel, line_chart
+from detent.page.figure import Figure
+from detent.page.table import TextTable
+from detent.page.words import count
 from detent.record.machine import Progress
 from detent.sensing.interference import ENTRIES
+from detent.units import format_quantity
 
 PULSES = (0, 1, 2, 5, 8, 12, 16, 20, 30)
 """Numbers of spurious pulses of tests 25 and 26."""
@@ -34,6 +39,9 @@ LONGEST_STOP = 0.1
 READINGS = 20
 READING = 0.5e-3
 """The rest point is the mean of so many readings so far apart [s]: more than a period of the limit cycle."""
+
+NOISE_BAND = 0.6
+"""How far off an absolute stop may be, whatever the noise (phase-servo test 25) [steps]."""
 
 SIGNS = ("+", "-")
 DIRECTIONS = ("right", "left")
@@ -72,21 +80,84 @@ class NoiseComparison:
     margin: int
     pitches: int
 
+    @property
+    def table(self) -> TextTable:
+        """Rest points in steps, right and left."""
+        heads = ("pulses put in", "this servo, + pulses", "- pulses", "incremental servo, + pulses", "- pulses")
+        rows = [
+            (str(n), *(_range(rest[k, sign]) for rest in (self.absolute, self.incremental) for sign in (0, 1)))
+            for k, n in enumerate(self.pulses)
+        ]
+        title = (
+            f"Where a move of {self.pitches} pitches ends, in steps of {format_quantity(self.step, 'm')} from its "
+            f"target (right / left; a pitch off from {self.margin} pulses on)"
+        )
+        return TextTable(title, heads, rows)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """Rest points over pulses, and the same magnified."""
+        caption = (
+            f"Noise puts pulses on the counting lines during a move of {count(self.pitches, 'pitch', 'pitches')}. A "
+            "servo that only counts stops as far off its target as pulses came, and keeps the error. This one stops on "
+            "its target, because the phase of the resolver says where that is. Its limit: more than "
+            f"{count(self.margin, 'pulse')} in one move, and it stops exactly one pitch off."
+        )
+        title = "Noise on the pulse lines: where the axis comes to rest"
+        return (Figure(title=title, caption=caption, charts=_rest_charts(self)),)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: a row for each number of pulses, sign and direction."""
         rows = [
             {
-                "pulses": count,
+                "pulses": pulses,
                 "sign": sign,
                 "direction": direction,
                 "absolute": float(self.absolute[k, i, j]),
                 "incremental": float(self.incremental[k, i, j]),
             }
-            for k, count in enumerate(self.pulses)
+            for k, pulses in enumerate(self.pulses)
             for i, sign in enumerate(SIGNS)
             for j, direction in enumerate(DIRECTIONS)
         ]
         return {name: getattr(self, name) for name in ("step", "counts", "margin", "pitches")} | {"rest": rows}
+
+
+def _range(pair: Any) -> str:
+    """Right and left, as whole numbers where they are far, else with two digits."""
+    return " / ".join(f"{value:+.0f}" if abs(value) >= 10 else f"{value:+.2f}" for value in pair)
+
+
+def _rest_charts(found: NoiseComparison) -> list[Chart]:
+    """Rest point [step] against the pulses that noise has put in, of both servos and directions, - to the left."""
+    pulses = np.array(found.pulses)
+    # From the most - pulses over none, which both signs share, to the most + pulses; a ring needs room at either end.
+    x = np.concatenate((-pulses[:0:-1], pulses))
+    x = np.concatenate(([1.05 * x[0]], x, [1.05 * x[-1]]))
+
+    def against(rest: Numbers, direction: int) -> Numbers:
+        return np.concatenate(([np.nan], rest[:0:-1, 1, direction], rest[:, 0, direction], [np.nan]))
+
+    # The lines are straight by their nature; what lies between two points of this servo nobody has tried.
+    counted = [
+        Curve(label="only incremental, moving right", colour="muted", width=2, y=against(found.incremental, 0)),
+        Curve(
+            label="only incremental, moving left", colour="muted", width=2, dash=(8, 4), y=against(found.incremental, 1)
+        ),
+    ]
+    stops = [
+        Curve(label="this servo, moving right", colour="right", rings=11, y=against(found.absolute, 0)),
+        Curve(label="this servo, moving left", colour="left", rings=6, y=against(found.absolute, 1)),
+    ]
+    label, levels = "right of the target [step]", [(side * NOISE_BAND, "") for side in (-1, 1)]
+    panels = [
+        Panel(name="noise", label=label, height=300, zero=True, curves=[*counted, *stops]),
+        Panel(
+            name="noise-near", label="off [step]", height=180, zero=True, span=(-1.2, 1.2), levels=levels, curves=stops,
+            title=f"Magnified: no stop on the target may be more than {NOISE_BAND:g} steps off (dashed)",
+        ),
+    ]  # fmt: skip
+    marks = {"marks": [{"x": side * found.margin, "label": "limit"} for side in (-1, 1)]}
+    return [line_chart(panel, x, "− pulses put in   [pulse]   + pulses put in") | marks for panel in panels]
 
 
 def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress | None = None) -> NoiseComparison:

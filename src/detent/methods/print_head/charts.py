@@ -1,6 +1,4 @@
-"""The charts of a print head's page, and the pages that it printed, as data for the scripts that draw them."""
-
-from typing import Any, cast
+"""The charts of a print head's page, as data for the script that draws them."""
 
 import numpy as np
 
@@ -9,7 +7,6 @@ from detent.methods.print_head.page_data import (
     ColumnErrors,
     HeadPath,
     IdentifiedLine,
-    Marks,
     SpeedProfile,
     TurnAround,
 )
@@ -23,7 +20,6 @@ from detent.page.chart import (
     Timeline,
     histogram_chart,
     line_chart,
-    rounded,
     spans_of,
     time_charts,
 )
@@ -32,9 +28,6 @@ from detent.page.thin import thin_indices
 
 PATH_SECONDS = 30.0
 """Time that the figure of the head's path shows: more than this is a grey block on any screen."""
-
-MARKS = 100_000
-"""Characters that a report draws: a megabyte of it. Beyond them whole pages are left out, and the report says so."""
 
 
 def _transition(t: Numbers, on: Numbers) -> Band:
@@ -189,60 +182,3 @@ def identified_chart(line: IdentifiedLine) -> Chart:
         curves=curves,
     )
     return line_chart(panel, speeds * SPEED_STEP / INCH, "speed [in/s]")
-
-
-def page_data(marks: Marks, limit: float) -> dict[str, Any]:
-    """Give the printed pages, line by line, for drawing characters where they landed; at most `MARKS` of them.
-
-    Parameters
-    ----------
-    marks : Marks
-        Everything struck.
-    limit : float
-        Largest good column error [m].
-
-    Returns
-    -------
-    dict
-        Pages with their lines; columns and widths in 1/120 in, heights in 1/48 in, offsets in micrometres; the factor
-        that makes the errors visible; how many pages were left out.
-    """
-    numbers, sizes = np.unique(marks.page, return_counts=True)
-    kept = numbers[: max(1, int(np.searchsorted(np.cumsum(sizes), MARKS, side="right")))]
-    worst = float(np.abs(marks.offset).max()) if len(marks) else 0.0
-    column = np.round(marks.column / INCH * 120, 2)
-    extent = float((column + marks.width / INCH * 120).max()) if len(marks) else 0.0
-    return {
-        "pages": [_one_page(marks, int(number)) for number in kept],
-        "leftOut": len(numbers) - len(kept),
-        "limit": round(limit * 1e6, 2),
-        "columns": round(extent, 1),
-        "magnify": _magnification(worst),
-    }
-
-
-def _magnification(worst: float) -> int:
-    """Choose the factor that draws the worst error [m] a character wide or a little less."""
-    if worst <= 0:
-        return 1
-    wanted = 0.1 * INCH / worst
-    return max((n for k in range(7) for n in (10**k, 2 * 10**k, 5 * 10**k) if n <= wanted), default=1)
-
-
-def _one_page(marks: Marks, number: int) -> dict[str, Any]:
-    rows = np.flatnonzero(np.asarray(marks.page) == number)
-    starts = np.flatnonzero(np.diff(marks.line[rows], prepend=marks.line[rows[0]] - 1))
-    lines: list[dict[str, Any]] = []
-    for row in np.split(rows, starts[1:]):
-        order = row[np.argsort(marks.column[row], kind="stable")]
-        lines.append({
-            "n": int(marks.line[order[0]]),
-            "d": int(marks.direction[order[0]]),
-            "y": round(float(marks.baseline[order[0]]) / INCH * 48, 2),
-            "text": "".join([marks.characters[index] for index in cast("list[int]", order.tolist())]),
-            "x": rounded(marks.column[order] / INCH * 120, 2),
-            "off": rounded(marks.offset[order] * 1e6, 2),
-            "w": round(float(np.median(marks.width[order])) / INCH * 120, 2),
-            "bold": np.flatnonzero(marks.strikes[order] > 1).tolist(),
-        })  # fmt: skip
-    return {"number": number, "lines": lines}

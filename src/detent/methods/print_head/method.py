@@ -95,7 +95,7 @@ class PrintHead(Method[PrintHeadSpec]):
 
     def summary(self, spec: PrintHeadSpec, result: Any) -> list[tuple[str, str]]:
         """Lines, times, speeds, column error, what was identified."""
-        from detent.methods.moves.summary import summary_rows
+        from detent.methods.print_head.summary import summary_rows
 
         del spec
         return summary_rows(result)

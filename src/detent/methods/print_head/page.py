@@ -22,6 +22,7 @@ from detent.page.page import (
     side_by_side,
     small_print,
 )
+from detent.page.paper import printed_pages
 from detent.page.parts import INCH
 from detent.page.words import (
     GAP,
@@ -53,7 +54,7 @@ def make_print_page(data: ReportData) -> Page:
     Page
         For `detent.page.page.write_page`.
     """
-    paper = print_charts.page_data(data.marks, data.column_limit) if len(data.marks) else None
+    paper = printed_pages(data.marks, data.column_limit) if len(data.marks) else None
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'printed' if data.printed else 'not printed'}",
         "body": [

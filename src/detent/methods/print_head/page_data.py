@@ -9,17 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from detent.errors import DetentError
+from detent.page.paper import Marks
 from detent.page.parts import INCH, Event, Note, Numbers
 
 SPEED_STEP = INCH / 6
 """One speed value of the specification [m/s]: s = 6 v with v in in/s (2.1)."""
 COLUMN = INCH / 120
 """The finest column grid of a daisy-wheel printer [m]."""
-
-
-def _no_numbers() -> Numbers:
-    return np.empty(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,61 +74,6 @@ class LineResult:
     characters: int
     worst_error: float
     rms_error: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Marks:
-    """Every character struck, in the order of striking; all arrays have shape (n,).
-
-    Attributes
-    ----------
-    characters : sequence of str
-        One character each.
-    page, line : ndarray of int
-        Page (from 1) and line number in the job (from 1).
-    baseline : ndarray
-        Distance of the baseline from the top of its page [m].
-    column : ndarray
-        Where the mark belongs: left edge of its cell, from column 0 of the paper [m].
-    landed : ndarray
-        Where that edge landed, from column 0 of the paper [m].
-    width : ndarray
-        Width that the job gave the character [m]: 1/10 in for pica.
-    direction : ndarray of int
-        +1 or -1: which way the head moved.
-    strikes : ndarray of int
-        How often struck at this spot: more than 1 is bold.
-
-    Raises
-    ------
-    DetentError
-        The arrays are not of one length.
-    """
-
-    characters: Sequence[str] = ()
-    page: Numbers = field(default_factory=_no_numbers)
-    line: Numbers = field(default_factory=_no_numbers)
-    baseline: Numbers = field(default_factory=_no_numbers)
-    column: Numbers = field(default_factory=_no_numbers)
-    landed: Numbers = field(default_factory=_no_numbers)
-    width: Numbers = field(default_factory=_no_numbers)
-    direction: Numbers = field(default_factory=_no_numbers)
-    strikes: Numbers = field(default_factory=_no_numbers)
-
-    def __post_init__(self) -> None:
-        struck = len(self.characters)
-        for name in ("page", "line", "baseline", "column", "landed", "width", "direction", "strikes"):
-            given = len(getattr(self, name))
-            if given != struck:
-                raise DetentError(f"report: {struck} characters but {given} values of {name!r}; give one per character")
-
-    def __len__(self) -> int:
-        return len(self.characters)
-
-    @property
-    def offset(self) -> Numbers:
-        """How far right of its column each mark landed [m]: landed - column, the opposite sign of a control error."""
-        return self.landed - self.column
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,8 +3,6 @@
 import math
 from html import escape
 
-from detent.methods.moves.page_data import CountUnit
-from detent.methods.moves.summary import in_counts
 from detent.methods.rotary_table.charts import KINDS, left_out_signals, line_charts, line_end, turn_charts
 from detent.methods.rotary_table.comparison_section import comparison_charts, comparison_section
 from detent.methods.rotary_table.page_data import StepResult, TableReportData, TurnDetail, WorstStep
@@ -23,7 +21,7 @@ from detent.page.page import (
     section,
     small_print,
 )
-from detent.page.words import GAP, count, duration, further, offset_cell, table
+from detent.page.words import GAP, CountUnit, count, duration, further, offset_cell, table
 
 MOST_STEPS = 500
 """Steps in the table: more than anybody reads."""
@@ -109,7 +107,7 @@ def _is_off(data: TableReportData) -> bool:
 
 
 def _counts(data: TableReportData, value: float) -> str:
-    return in_counts(value, CountUnit(data.count, "count"))
+    return CountUnit(data.count, "count").counts(value)
 
 
 def _cards(data: TableReportData) -> str:

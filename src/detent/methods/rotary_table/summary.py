@@ -3,12 +3,10 @@
 import math
 from collections.abc import Callable, Sequence
 
-from detent.methods.moves.page_data import CountUnit
-from detent.methods.moves.summary import in_counts
 from detent.methods.rotary_table.page_data import SequenceFigures, WorstStep
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.page.words import GAP, count, duration, number
+from detent.page.words import GAP, CountUnit, count, duration, number
 
 ARCSEC = math.pi / 180 / 3600
 """A second of arc [rad]."""
@@ -38,7 +36,7 @@ def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple
     if run.steps:
         rows.append(("time", duration(figures.seconds)))
     if figures.error:
-        texts = in_counts(figures.error.value, unit), angle(figures.error.value)
+        texts = unit.counts(figures.error.value), angle(figures.error.value)
         rows.append(("error at rest", f"worst {texts[0]}, {texts[1]} {_whose(figures.error)}"))
     if figures.deviation:
         rows.append(("travel", _travel(figures)))

@@ -1,212 +1,262 @@
+import json
 import math
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.page_reader import Reader, charts_of, paper_of
-from tests.unit.methods.moves.samples import filtered_report, phase_move, phase_report, result
+from tests.unit.methods.moves.samples import STEP, TOLERANCE, View, record, run_of, six_moves, trace_of
+from tests.unit.page.samples import plain_chart
 
-from detent.methods.moves import page as servo_page
-from detent.methods.moves.page import make_servo_page
-from detent.methods.moves.page_data import JobPath, ServoReportData, Worst
-from detent.methods.print_head.page_data import Marks
-from detent.page.page import render_page, write_page
-from detent.page.parts import INCH
-
-
-def read(report: ServoReportData) -> str:
-    return Reader(render_page(make_servo_page(report))).text
+from detent.methods.moves.page import POSITION, TARGET, moves_page
+from detent.methods.moves.run import MoveRun
+from detent.page.figure import Figure
+from detent.page.frame import Page
+from detent.page.table import Cell, TextTable
+from detent.record.trace import Trace
 
 
-def cells_of(html: str) -> list[list[str]]:
-    rows = re.findall(r"<tr>(.*?)</tr>", html, flags=re.DOTALL)
-    return [[Reader(cell).text for cell in re.findall(r"<td.*?</td>", row, flags=re.DOTALL)] for row in rows]
+def page_of(run: MoveRun, trace: Trace | None = None) -> Page:
+    return moves_page(View(), run, trace)
 
 
-def text_report(**changes: object) -> ServoReportData:
-    struck = list("ab<c")
-    column = np.arange(4) * 0.1 * INCH
-    marks = Marks(
-        characters=struck, page=np.array([1, 1, 1, 2]), line=np.array([1, 1, 2, 67]),
-        baseline=np.full(4, INCH / 6), column=column, landed=column + 1e-6, width=np.full(4, 0.1 * INCH),
-        direction=np.ones(4), strikes=np.ones(4),
-    )  # fmt: skip
-    moves = [result(n, 0.0, 0.01, label=char) for n, char in enumerate(struck, 1)]
-    return replace(phase_report(kind="text", marks=marks, moves=moves), **changes)
+def ids_of(page: Page) -> list[str]:
+    return [chart["id"] for chart in page.charts]
 
 
-def test_the_first_lines_say_what_happened() -> None:
-    text = read(phase_report())
-    assert "Simulated run of the axis wire & pulley" in text
-    assert "✔ Done list.csv" in text
-    assert (
-        "6 moves in 0.600 s. At the end of every dwell the axis stood within 2 µm (0.20 steps) of its target." in text
-    )
-    assert "4 characters in" not in text
+def chart_of(page: Page, name: str) -> dict:
+    return next(chart for chart in page.charts if chart["id"] == name)
+
+
+def curves_of(chart: dict) -> dict:
+    return {series["label"]: series["y"] for series in chart["series"]}
+
+
+def card_of(page: Page, title: str) -> tuple[str, str, bool]:
+    (found,) = [one for one in page.cards if one.title == title]
+    return found.value, found.unit, found.bad
+
+
+def rows_of(page: Page) -> list[list[str]]:
+    table = page.sections[-1].shown[0].table
+    assert table is not None
+    return [[cell.text if isinstance(cell, Cell) else cell for cell in row] for row in table.rows]
+
+
+def test_a_page_shows_the_job_the_rests_a_move_and_every_move() -> None:
+    page = page_of(six_moves(), trace_of(six_moves()))
+    assert (page.headline.level, page.headline.verdict) == ("good", "Done")
+    assert [section.title for section in page.sections if section.shown] == [
+        "What came out", "How the axis did it", "Move by move",
+    ]  # fmt: skip
+    assert ids_of(page) == ["job", "rest", "move-speed", "approach-place", "approach-words"]
+    assert all(figure.caption for figure in page.figures)
+    assert json.loads(json.dumps(page.charts, allow_nan=False)) == page.charts
 
 
 def test_the_cards_carry_the_figures() -> None:
-    text = read(phase_report())
-    assert "Moves6 of 6arrived and stayed" in text
-    assert "Time0.600 s10 moves per second" in text
-    assert "Settled after82 msmedian; worst 90 ms, move 4" in text
-    assert "Worst overshoot5 µm0.50 steps, move 3" in text
-    assert "Worst error at rest2 µm0.20 steps, move 5, allowed 20 µm" in text
-    assert "Peak speed346 mm/smove 6, limit 350" in text
-    assert 'class="card bad"' not in render_page(make_servo_page(phase_report()))
+    run = run_of(*(replace(one, overshoot=1e-6 * one.number, peak_speed=0.1 * one.number) for one in six_moves().moves))
+    page = page_of(run)
+    assert card_of(page, "Moves") == ("6", "of 6", False)
+    assert card_of(page, "Time") == ("0.600", "s", False)
+    assert card_of(page, "Settled after") == ("82.0", "ms", False)
+    assert card_of(page, "Worst overshoot") == ("6", "µm", False)
+    assert card_of(page, "Worst error at rest") == ("2", "µm", False)
+    assert card_of(page, "Peak speed") == ("600", "mm/s", False)
+    assert "move 6" in next(one.below for one in page.cards if one.title == "Peak speed")
 
 
 def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
-    report = phase_report()
-    figures = replace(report.figures, arrived=1, error=Worst(422e-6, 2), worst_time=None, median_time=math.nan)
-    failed = replace(report, done=False, failure="move 2 to <5 mm>: did not arrive", figures=figures)
-    text = read(failed)
-    assert "✘ Not done list.csv" in text
-    assert "Stopped after 1 of 6 moves, 0.600 s into the job. Move 2 to <5 mm>: did not arrive. " in text
-    assert "Time0.600 suntil it stopped" in text
-    assert "Settled after" not in text
-    assert "✔" not in text
-    assert render_page(make_servo_page(failed)).count('class="card bad"') == 2
+    run = run_of(record(1, 0.0, 0.02), record(2, 0.02, 0.0, error=422e-6), asked=6, failure="move 2: did not arrive.")
+    page = page_of(run)
+    assert (page.headline.level, page.headline.verdict) == ("bad", "Not done")
+    assert page.headline.lead.endswith("Move 2: did not arrive.")
+    assert "1 of 6" in page.headline.lead
+    assert [one.title for one in page.cards if one.bad] == ["Moves", "Worst error at rest"]
+    assert page.title.endswith("not done")
 
 
 def test_an_axis_that_speaks_too_early_gets_no_praise() -> None:
-    report = phase_report()
-    early = replace(report, figures=replace(report.figures, early=Worst(2e-3, 4), early_moves=2))
-    text = read(early)
-    assert "! Done, but ready too early list.csv" in text
-    assert "But in 2 moves it said that it had arrived before it was there for good." in text
-    assert "✔" not in text
+    run = run_of(record(1, 0.0, 0.02), record(2, 0.02, 0.0, settled=0.6 + 0.0851), warnings=["headroom"])
+    page = page_of(run)
+    assert (page.headline.level, page.headline.verdict) == ("warn", "Done, but ready too early")
+    assert [note.level for note in page.notes] == ["warning", "warning"]
+    assert page.notes[0].text == "headroom"
+    assert page.notes[1].text.startswith("move 2: ")
+    assert "2.10 ms" in page.notes[1].text
 
 
-def test_the_move_is_told_with_its_events_and_why_it_is_shown() -> None:
-    html = render_page(make_servo_page(phase_report()))
-    text = Reader(html).text
-    assert "Move 2, 20 mm to the right" in text
-    assert "Shown is the move of middle length." in text
-    assert ["2", "80.0", "mode switch"] in cells_of(html)
-    assert ["1", "0.0", "set <strobe>"] in cells_of(html)
-    assert "in steps of 10 µm. Arrived means within ±2 steps" in text
-    to_left = read(phase_report(detail=phase_move(start=0.03)))
-    assert "Move 2, 10.0 mm to the left" in to_left
+def test_interference_is_noted() -> None:
+    faults = {"inserted": 30, "removed": 0, "lost samples": 0, "corrupted": 0}
+    (note,) = page_of(run_of(record(1, 0.0, 0.02), faults=faults)).notes
+    assert note.level == "note"
+    assert "30 pulses put in" in note.text
 
 
-def test_an_axis_that_never_stood_still_has_no_figure_of_its_rest() -> None:
-    html = render_page(make_servo_page(phase_report(detail=phase_move(approach=None))))
-    assert "Coming to rest" not in html
-    assert "approach-place" not in {chart["id"] for chart in charts_of(html)}
-
-
-def test_every_move_stands_in_the_table() -> None:
-    report = phase_report(moves=[
-        result(1, 0.0, 0.02, offset=1.5e-6),
-        result(2, 0.02, 0.02, ready=0.003, settled=0.0),
-        result(3, 0.02, 0.0, settled=0.085),
-        result(4, 0.0, 0.01, ready=math.nan, settled=math.nan, offset=-422e-6),
-    ])  # fmt: skip
-    html = render_page(make_servo_page(report))
-    cells = cells_of(html)
-    assert ["1", "0.000", "0.000", "20.000", "→ right 20", "83", "82", "5", "+1.5"] in cells
-    assert ["2", "0.100", "20.000", "20.000", "stays", "3", "0", "5", "−2"] in cells
-    assert ["3", "0.200", "20.000", "0.000", "← left 20", "83", "85", "5", "−2"] in cells
-    assert ["4", "0.300", "0.000", "10.000", "→ right 10", "–", "–", "5", "−422"] in cells
-    # Settled after ready, not settled, and beyond the tolerance.
-    assert html.count('<td class="n over">') == 3
-
-
-def test_a_long_table_is_cut_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(servo_page, "MOST_MOVES", 4)
-    html = render_page(make_servo_page(phase_report()))
-    assert "2 further moves are in the JSON summary only." in Reader(html).text
-    assert sum(len(row) == 9 for row in cells_of(html)) == 4
-
-
-def test_few_moves_make_no_histogram() -> None:
-    few = phase_report(moves=phase_report().moves[:4])
-    assert "rest" not in {chart["id"] for chart in charts_of(render_page(make_servo_page(few)))}
-    assert "Error at rest" not in read(few).partition("What came out")[2]
-    assert "rest" in {chart["id"] for chart in charts_of(render_page(make_servo_page(phase_report())))}
+def test_the_job_is_position_over_target_since_it_was_ready() -> None:
+    chart = chart_of(page_of(six_moves(), trace_of(six_moves())), "job")
+    at = chart["x"].index(0.09)
+    drawn = curves_of(chart)
+    assert (drawn["target"][at], drawn["true position"][at]) == (10.0, 9.998)
+    assert chart["x"][0] == 0.0
 
 
 def test_a_job_that_is_drawn_in_part_says_so() -> None:
-    report = phase_report()
-    assert "The whole job" in read(report)
-    t = np.arange(0, 80, 0.1)
-    long = JobPath(t=t, position=t, target=t)
-    figures = replace(report.figures, seconds=80.0)
-    assert "The first 30 s of 80 s" in read(replace(report, path=long, figures=figures))
-    # The trace ends before the job does.
-    assert "The first 0.599 s of 80 s" in read(replace(report, figures=figures))
+    run = six_moves()
+    title = page_of(run, trace_of(run)).sections[0].shown[0].title
+    assert page_of(run, trace_of(run, until=1.0)).sections[0].shown[0].title != title
+    t = np.linspace(0.5, 100.5, 200_000)
+    long = replace(run, time_end=100.5)
+    chart = chart_of(page_of(long, Trace(columns={"t": t, POSITION: np.sin(t), TARGET: np.sin(t)})), "job")
+    assert 29.99 < chart["x"][-1] <= 30.01
 
 
-def test_the_page_is_well_formed_and_every_chart_has_its_place() -> None:
-    for report, ids in (
-        (phase_report(), {"job", "rest", "move-speed", "move-to-go", "move-drive", "approach-place", "approach-words",
-                          "noise", "still-0", "still-1", "still-2", "loaded-place", "loaded-integral"}),
-        (filtered_report(), {"job", "rest", "move-speed", "move-counted", "move-deviation", "move-drive",
-                             "approach-place", "approach-words", "feedback-speed", "feedback-drive"}),
-    ):  # fmt: skip
-        html = render_page(make_servo_page(report))
-        page = Reader(html)
-        assert page.open == []
-        assert len(page.ids) == len(set(page.ids))
-        assert {chart["id"] for chart in charts_of(html)} == ids
-        assert ids <= set(page.ids)
-        assert html.count('class="chart"') == len(ids)
-        assert page.fetched == []
+def test_each_rest_is_counted_on_its_side_once_right_of_the_target_being_right() -> None:
+    errors = (-3e-6, -3e-6, 6e-6, 0.0, 0.0)
+    right = (True, True, False, True, False)
+    moves = [
+        record(n, 0.0 if side else 0.1, 0.1 if side else 0.0, error=error)
+        for n, (error, side) in enumerate(zip(errors, right, strict=True), 1)
+    ]
+    run = run_of(*moves, tolerance=5e-6)
+    chart = chart_of(page_of(run), "rest")
+    drawn = {name: dict(zip(chart["x"], y, strict=True)) for name, y in curves_of(chart).items()}
+    assert {x: y for x, y in drawn["moved to the right"].items() if y} == {3.0: 2, 0.0: 1}
+    assert {x: y for x, y in drawn["moved to the left"].items() if y} == {-6.0: 1, 0.0: 1}
+    assert [mark["x"] for mark in chart["marks"]] == [-5.0, 5.0]
 
 
-def test_parts_that_are_absent_leave_no_trace() -> None:
-    report = phase_report()
-    nothing = replace(
-        report.figures, arrived=0, seconds=0.0, rate=0.0, median_time=math.nan, worst_time=None, overshoot=None,
-        error=None, peak_speed=None,
-    )  # fmt: skip
-    bare = replace(
-        report, done=False, failure="Not ready.", figures=nothing, moves=(), path=None, detail=None, noise=None,
-        hold=None, notes=(), settings={},
-    )  # fmt: skip
-    html = render_page(make_servo_page(bare))
-    assert charts_of(html) == []
-    assert paper_of(html) is None
-    assert "<h2>" not in html
-    assert "Stopped after 0 of 6 moves, 0 s into the job. Not ready. " in Reader(html).text
-    assert "nan" not in Reader(html).text.lower()
+def test_few_moves_make_no_histogram() -> None:
+    few = run_of(*(record(n, 0.0, 0.02) for n in range(1, 5)))
+    assert "rest" not in ids_of(page_of(few))
+    assert "rest" in ids_of(page_of(six_moves()))
+
+
+def shown(page: Page) -> Figure:
+    (section,) = [section for section in page.sections if section.title == "How the axis did it"]
+    return section.shown[0]
+
+
+def test_the_move_of_middle_length_is_shown_with_what_happened_in_order() -> None:
+    run = run_of(record(1, 0.0, 0.03), record(2, 0.03, 0.02), record(3, 0.02, 0.04), record(4, 0.04, 0.04))
+    figure = shown(page_of(run, trace_of(run)))
+    assert figure.title.startswith("Move 3, ")
+    assert [event.text for event in figure.events] == ["set <strobe>", "mode switch", "ready"]
+    assert figure.charts[0]["events"] == [0.0, 80.0, 83.0]
+    assert figure.charts[0]["bands"][0]["spans"] == [[80.0, 99.0]]
+
+
+def test_the_command_is_marked_though_it_comes_before_the_first_row() -> None:
+    run = six_moves()
+    trace = trace_of(run)
+    late = Trace(columns=trace.columns | {"t": trace.time + 6e-5})
+    figure = shown(page_of(run, late))
+    assert figure.charts[0]["events"][0] == figure.charts[0]["x"][0] == 0.06
+    assert figure.events[0].t == 0.0
+
+
+def test_the_move_that_failed_is_shown_first_of_all() -> None:
+    run = run_of(record(1, 0.0, 0.02), record(2, 0.02, 0.0, error=422e-6), asked=3)
+    figure = shown(page_of(run, trace_of(run)))
+    assert figure.title.startswith("Move 2, ")
+    assert figure.events[-1].text == "the run ends here"
+
+
+def test_the_move_that_was_ready_too_early_comes_before_the_middle_one() -> None:
+    late = record(3, 0.02, 0.04, settled=0.7 + 0.084), record(4, 0.04, 0.0, settled=0.8 + 0.085)
+    run = run_of(record(1, 0.0, 0.03), record(2, 0.03, 0.02), *late)
+    assert shown(page_of(run, trace_of(run))).title.startswith("Move 4, ")
+
+
+def test_the_approach_is_magnified_in_counts_and_keeps_the_numbers_of_the_events() -> None:
+    run = run_of(record(1, 0.0, 0.02, error=-5e-6))
+    page = page_of(run, trace_of(run))
+    place, words = chart_of(page, "approach-place"), chart_of(page, "approach-words")
+    # From 5 tolerances away, 100 µm; the last 1 % is made from 70 to 80 ms.
+    assert place["x"][0] == 75.0
+    drawn = curves_of(place)["true position"]
+    assert drawn[-1] == pytest.approx(0.5)  # plus is right of the target, where the error is negative
+    assert [level["y"] for level in place["levels"]] == [TOLERANCE / STEP, -TOLERANCE / STEP]
+    assert place["events"] == [0.0, 80.0, 83.0]  # number 1 is out of sight, the others keep theirs
+    assert place["bands"][0]["spans"] == [[82.0, 99.0]]
+    assert place["yRange"][0] < min(drawn)
+    assert place["yRange"][1] > 2.0
+    assert words["x"] == place["x"]
+
+
+def test_a_move_that_ended_outside_has_no_stretch_within_the_tolerance() -> None:
+    run = run_of(record(1, 0.0, 0.02, error=30e-6), asked=2)
+    assert chart_of(page_of(run, trace_of(run)), "approach-place")["bands"][0]["spans"] == []
+
+
+def test_an_axis_that_has_given_up_comes_to_no_rest() -> None:
+    run = run_of(record(1, 0.0, 0.02, ready=math.nan, error=5e-3), asked=2)
+    assert ids_of(page_of(run, trace_of(run))) == ["job", "move-speed"]
+
+
+def test_every_move_stands_in_the_table() -> None:
+    run = run_of(
+        record(1, 0.0, 0.02, error=-1.5e-6),
+        record(2, 0.02, 0.02, ready=0.6 + 0.003, settled=0.5),
+        record(3, 0.02, 0.0, settled=0.7 + 0.085),
+        record(4, 0.0, 0.01, ready=math.nan, error=422e-6),
+        asked=4,
+    )
+    rows = rows_of(page_of(run))
+    assert [str(row[4]) for row in rows][1] == "stays"
+    assert rows[0][:4] + rows[0][5:] == ["1", "0.000", "0.000", "20.000", "83.0", "82.0", "5", "−1.5"]
+    assert rows[1][5:] == ["3.00", "0", "5", "+2"]
+    assert rows[2][:4] + rows[2][5:] == ["3", "0.200", "20.000", "0.000", "83.0", "85.0", "5", "+2"]
+    assert rows[3][5:] == ["–", "–", "5", "+422"]
+    table = page_of(run).sections[-1].shown[0].table
+    assert table is not None
+    over = [(k, n) for k, row in enumerate(table.rows) for n, cell in enumerate(row) if getattr(cell, "over", False)]
+    assert over == [(2, 6), (3, 6), (3, 8)]
 
 
 def test_a_text_stands_on_paper_and_its_characters_in_the_table() -> None:
-    html = render_page(make_servo_page(text_report()))
-    paper = paper_of(html)
-    assert paper
-    assert [line["text"] for page in paper["pages"] for line in page["lines"]] == ["ab", "<", "c"]
-    assert (paper["limit"], paper["magnify"]) == (20.0, 2000)
-    text = Reader(html).text
-    assert "Errors × 2 000" in text
-    assert {"true-size", "magnified", "page-back", "page-next"} <= set(Reader(html).ids)
-    assert "6 characters in 0.600 s." in text
-    assert "Time0.600 s10 characters per second" in text
-    assert ["3", "<", "0.200", "0.000", "10.000", "→ right 10", "83", "82", "5", "−2"] in cells_of(html)
+    run = six_moves(kind="text")
+    run.moves = [replace(move, label=label) for move, label in zip(run.moves, "ab<cde", strict=True)]
+    page = page_of(run)
+    assert page.paper == {"pages": [{}], "of": list("ab<cde")}
+    assert [row[1] for row in rows_of(page)] == list("ab<cde")
+    assert page.cards[0].title == "Characters"
+    assert page_of(six_moves()).paper is None
 
 
-def test_pages_of_a_text_that_are_not_drawn_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("detent.methods.print_head.charts.MARKS", 3)
-    html = render_page(make_servo_page(text_report()))
-    assert "1 further page is not drawn." in Reader(html).text
-    assert "page-next" not in Reader(html).ids
+def test_parts_that_are_absent_leave_no_trace() -> None:
+    page = page_of(run_of(asked=6, failure="Not ready."), trace_of(six_moves()))
+    assert page.figures == []
+    assert page.headline.level == "bad"
+    assert not any("nan" in one.value for one in page.cards)
 
 
-def test_what_names_and_labels_say_cannot_break_the_page() -> None:
-    evil = "</script><b>$data</b>"
-    report = text_report(axis_name=evil, job_name=evil, moves=[result(1, 0.0, 0.01, label=evil)], settings={"a": evil})
-    page = Reader(render_page(make_servo_page(report)))
-    assert page.open == []
-    # Twice in the title of the window, then axis, job, character and small print.
-    assert page.text.count(evil) == 6
+@pytest.mark.parametrize(("left_out", "drawn"), [
+    ("word", ["job", "rest"]), (TARGET, ["rest"]), (POSITION, ["rest"]), ("train.velocity", ["job", "rest"]),
+])  # fmt: skip
+def test_a_trace_without_a_needed_signal_gives_a_page_without_its_figures(left_out: str, drawn: list[str]) -> None:
+    trace = trace_of(six_moves())
+    part = Trace(columns={name: trace[name] for name in trace if name != left_out})
+    assert ids_of(page_of(six_moves(), part)) == drawn
 
 
-def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
-    target = tmp_path / "moves.html"
-    write_page(target, make_servo_page(phase_report(version="9.9")))
-    assert target.read_text(encoding="utf-8") == render_page(make_servo_page(phase_report(version="9.9")))
-    assert "Written by detent 9.9." in target.read_text(encoding="utf-8")
+def test_of_a_trace_that_ends_early_only_whole_moves_are_shown() -> None:
+    run = run_of(record(1, 0.0, 0.01), record(2, 0.01, 0.03), record(3, 0.03, 0.06))
+    assert shown(page_of(run, trace_of(run))).title.startswith("Move 2, ")
+    assert shown(page_of(run, trace_of(run, until=0.65))).title.startswith("Move 1, ")
+    assert ids_of(page_of(run, trace_of(run, until=0.55))) == ["job"]
+    assert ids_of(page_of(run, trace_of(run, until=0.505))) == []
+
+
+class Found:
+    """A comparison with one figure."""
+
+    table = TextTable("numbers", ("a",), [("1",)])
+
+    def figures(self) -> tuple[Figure, ...]:
+        return (Figure(title="beside", charts=[plain_chart("beside")]),)
+
+
+def test_comparisons_and_small_print_stand_on_the_page() -> None:
+    page = moves_page(View(), six_moves(), None, [Found()], {"seed": "7"})
+    assert ids_of(page) == ["rest", "beside"]
+    assert page.settings == {"seed": "7"}

@@ -14,13 +14,11 @@ from detent.methods.print_head.page_data import (
     ColumnErrors,
     HeadPath,
     IdentifiedLine,
-    Marks,
     ReportData,
     SpeedProfile,
     TurnAround,
 )
 from detent.page.chart import POINTS
-from detent.page.parts import INCH
 
 
 def test_the_profile_is_speed_over_drive_in_the_units_of_the_trade(profile: SpeedProfile) -> None:
@@ -136,39 +134,6 @@ def test_identified_lines_go_through_friction_and_top_speed(identified: tuple[Id
     assert by_name["power-on default"][0] == 32
     assert [value for value in by_name["measured"] if value is not None] == [67, 174]
     assert [series["label"] for series in charts.identified_chart(identified[1])["series"]] == ["identified"]
-
-
-def test_the_page_keeps_text_place_and_offset(marks: Marks) -> None:
-    data = charts.page_data(marks, 50e-6)
-    assert data["leftOut"] == 0
-    assert data["limit"] == 50.0
-    assert data["columns"] == 48.0
-    first, second = data["pages"]
-    assert first == {
-        "number": 1,
-        "lines": [
-            {"n": 1, "d": 1, "y": 24.0, "text": "Hi", "x": [0.0, 12.0], "off": [1.0, -2.0], "w": 12.0, "bold": []}
-        ],
-    }
-    # Printed from right to left, read from left to right.
-    assert second["lines"][0]["text"] == "&<"
-    assert second["lines"][0]["bold"] == [1]
-    assert second["lines"][0]["off"] == [0.0, 60.0]
-
-
-def test_too_many_marks_leave_whole_pages_out(marks: Marks, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(charts, "MARKS", 3)
-    data = charts.page_data(marks, 50e-6)
-    assert [page["number"] for page in data["pages"]] == [1]
-    assert data["leftOut"] == 1
-
-
-@pytest.mark.parametrize(
-    ("worst", "factor"),
-    [(0.0, 1), (10.0, 1), (1.9e-6, 1000), (60e-6, 20), (0.1 * INCH / 50 * 0.999, 50), (0.1 * INCH / 50 * 1.01, 20)],
-)
-def test_errors_are_magnified_to_at_most_a_character(worst: float, factor: int) -> None:
-    assert charts._magnification(worst) == factor
 
 
 def test_every_colour_is_in_the_style_light_and_dark(report: ReportData) -> None:

@@ -162,7 +162,7 @@ def test_lines_without_marks_are_counted_and_have_no_error(report: ReportData) -
 
 def test_pages_that_are_not_drawn_are_counted(report: ReportData, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "not drawn" not in Reader(render_page(make_print_page(report))).text
-    monkeypatch.setattr("detent.methods.print_head.charts.MARKS", 3)
+    monkeypatch.setattr("detent.page.paper.MARKS", 3)
     assert "1 further page is not drawn." in Reader(render_page(make_print_page(report))).text
 
 

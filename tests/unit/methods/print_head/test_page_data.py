@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detent.errors import DetentError
-from detent.methods.print_head.page_data import COLUMN, SPEED_STEP, ColumnErrors, Marks
+from detent.methods.print_head.page_data import COLUMN, SPEED_STEP, ColumnErrors
 from detent.page.parts import INCH
 
 
@@ -12,20 +11,6 @@ def test_the_units_of_the_specification() -> None:
     top_speed = 240 * SPEED_STEP
     assert top_speed == pytest.approx(40 * INCH)
     assert round(COLUMN * 1e6, 2) == 211.67
-
-
-def test_offset_is_positive_to_the_right_of_the_column(marks: Marks) -> None:
-    np.testing.assert_allclose(marks.offset, [1e-6, -2e-6, 60e-6, 0.0], atol=1e-12)
-
-
-def test_marks_of_unequal_length_are_refused() -> None:
-    with pytest.raises(DetentError, match="report: 2 characters but 0 values of 'page'; give one per character"):
-        Marks(characters="ab")
-
-
-def test_no_marks_at_all_is_a_page_without_ink() -> None:
-    assert len(Marks()) == 0
-    assert Marks().offset.size == 0
 
 
 def test_bins_lie_about_zero_and_hold_all_columns(errors: ColumnErrors) -> None:

@@ -1,0 +1,85 @@
+"""Pages as HTML: a single file that needs nothing else, made by the templates in template/.
+
+Style, script and data are inside, and the page's own security policy forbids it to fetch anything. Figures are drawn in
+the browser by uPlot (MIT, see vendor/). The templates escape everything that is not `Markup`.
+"""
+
+import json
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from detent import __version__
+from detent.errors import DetentError
+from detent.page.figure import about
+from detent.page.frame import Page
+from detent.page.words import further
+
+LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}
+"""Of notes, in the order of the page."""
+
+SIGNS = {"good": "✔", "warn": "!", "bad": "✘"}
+
+FOR_THE_PAGE = {"title", "about"}
+"""What is said of a chart outside the plot area."""
+
+
+def write_page(path: str | Path, page: Page) -> None:
+    """Write a page as one self-contained HTML file, in place of one that is there; DetentError if that fails."""
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        # A file name need not be valid UTF-8; the page must be.
+        part.write_text(render_page(page), encoding="utf-8", errors="replace")
+        part.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+
+
+def render_page(page: Page) -> str:
+    """A whole HTML document."""
+    order = list(LEVELS)
+    return (
+        _templates()
+        .get_template("page.html.j2")
+        .render(
+            page=page,
+            notes=sorted(page.notes, key=lambda note: order.index(note.level)),
+            charts=[{key: value for key, value in chart.items() if key not in FOR_THE_PAGE} for chart in page.charts],
+            version=page.version or __version__,
+            signs=SIGNS,
+            levels=LEVELS,
+            asset=_asset,
+            embedded=_embedded,
+            about=about,
+            further=further,
+        )
+    )
+
+
+@cache
+def _templates() -> Environment:
+    return Environment(
+        loader=PackageLoader("detent.page", "template"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+
+
+def _asset(name: str) -> Markup:
+    return Markup(resources.files("detent.page").joinpath(name).read_text(encoding="utf-8"))  # noqa: S704 - our own
+
+
+def _embedded(name: str, payload: dict[str, Any]) -> Markup:
+    """JSON in a script element that it cannot end, whatever it says."""
+    text = json.dumps(payload, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    safe = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+    return Markup(f'<script type="application/json" id="{name}">{safe}</script>')  # noqa: S704 - escaped above
