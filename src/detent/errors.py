@@ -131,18 +131,6 @@ TABLE_REFUSAL_TEXT: dict[int, str] = {
 def describe_sb1(code: int) -> str:
     """Say what a status byte means and what to do.
 
-    Parameters
-    ----------
-    code : int
-        SB1 as the axis computer sent it, 0..255; several bits may be set.
-
-    Returns
-    -------
-    str
-        One sentence per set bit, joined by "; also: ".
-
-    Examples
-    --------
     >>> describe_sb1(0)
     'done'
     >>> describe_sb1(0x04)

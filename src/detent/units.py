@@ -101,21 +101,13 @@ _OUNCE_OR_POUND = re.compile(r"\b(oz|lb)\b")
 
 
 class QuantityError(ValueError):
-    """A text is not a quantity of the wanted kind.
-
-    Attributes
-    ----------
-    allowed : str
-        What would be accepted, with an example.
-    remedy : str
-        What to do about it.
-    """
+    """A text is not a quantity of the wanted kind."""
 
     def __init__(self, reason: str, allowed: str, remedy: str) -> None:
         super().__init__(f"{reason}; allowed: {allowed}; do: {remedy}")
         self.reason = reason
-        self.allowed = allowed
-        self.remedy = remedy
+        self.allowed = allowed  # what would be accepted, with an example
+        self.remedy = remedy  # what to do about it
 
 
 def describe_kind(unit: str) -> tuple[str, str]:
@@ -126,25 +118,6 @@ def describe_kind(unit: str) -> tuple[str, str]:
 def parse_quantity(text: str, unit: str) -> float:
     """Read a quantity such as ``"12 mm"`` as a number of `unit`.
 
-    Parameters
-    ----------
-    text : str
-        A number and a unit. ``"in"`` is the inch, ``"count"`` a pure number, ``ozf`` and ``lbf`` the forces.
-    unit : str
-        Unit of the result, a coherent SI unit of `KINDS`; ``"%"`` gives the fraction (``"+10 %"`` is 0.1).
-
-    Returns
-    -------
-    float
-        The value in `unit`, correctly rounded, always finite.
-
-    Raises
-    ------
-    QuantityError
-        The text has no unit, an unknown one or one of another dimension; the message holds an example.
-
-    Examples
-    --------
     >>> parse_quantity("3 in", "m")
     0.0762
     >>> parse_quantity("-2.5 %", "%")
@@ -170,17 +143,6 @@ def parse_quantity(text: str, unit: str) -> float:
 def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     """Write an SI value for people, with a prefix that keeps the number short.
 
-    Parameters
-    ----------
-    value : float
-        Value in `unit`; for ``"%"`` the fraction.
-    unit : str
-        A unit of `KINDS`, or empty for a pure number.
-    digits : int
-        Significant digits, at least 1.
-
-    Examples
-    --------
     >>> format_quantity(0.0762, "m")
     '76.2 mm'
     >>> format_quantity(0.1, "%")
@@ -200,8 +162,6 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
 def in_degrees(value: float, unit: str) -> tuple[float, str]:
     """An angle as people read it, and the unit of that: degrees, or rpm from ten turns a second.
 
-    Examples
-    --------
     >>> in_degrees(math.pi, "rad/s"), in_degrees(200 * math.pi, "rad/s")
     ((180.0, 'deg/s'), (6000.0, 'rpm'))
     """

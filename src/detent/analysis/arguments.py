@@ -8,26 +8,6 @@ from detent.errors import DetentError
 def require_positive(name: str, value: float, unit: str, meaning: str, *, infinite: bool = False) -> None:
     """Refuse a constant that is not above 0.
 
-    Parameters
-    ----------
-    name : str
-        The constant as the caller writes it, such as ``SampledLoop.gain``.
-    value : float
-        What came [`unit`].
-    unit : str
-        Unit of the value; empty for a pure number.
-    meaning : str
-        What the constant is, for the remedy: "state ...".
-    infinite : bool
-        Whether infinity is a meaningful value.
-
-    Raises
-    ------
-    DetentError
-        The value is 0, negative, not a number, or infinite where that means nothing.
-
-    Examples
-    --------
     >>> require_positive("SampledLoop.gain", 4000.0, "1/s^2", "drive word to acceleration")
     """
     if value > 0 and (infinite or isfinite(value)):

@@ -183,8 +183,6 @@ class ServoTransfer:
 def slowest_first(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Poles by rate of decay, the slowest first; of a pair the one above the real axis first.
 
-    Examples
-    --------
     >>> slowest_first(np.array([-3, -1 - 2j, -1 + 2j])).tolist()
     [(-1+2j), (-1-2j), (-3+0j)]
     """

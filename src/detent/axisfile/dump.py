@@ -11,18 +11,7 @@ from detent.files.fields import Table, file_key, is_named, table_of, unit_of
 
 
 def dump_spec(spec: AxisSpec) -> str:
-    """Write a specification as an axis file, with every value stated in SI units.
-
-    Parameters
-    ----------
-    spec : AxisSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    str
-        TOML; loading it gives an equal specification, to the last bit.
-    """
+    """Write a specification as an axis file, with every value stated in SI units."""
     return "\n".join(_table_lines(spec, ())).lstrip("\n") + "\n"
 
 

@@ -37,15 +37,6 @@ ROTARY_UNITS = {
 def unit_in(motion: str, unit: str) -> str:
     """Unit of an axis's quantity, by that of a linear axis.
 
-    Parameters
-    ----------
-    motion : str
-        ``"linear"`` or ``"rotary"``.
-    unit : str
-        Unit for a linear axis.
-
-    Examples
-    --------
     >>> unit_in("rotary", "N/m"), unit_in("linear", "N/m"), unit_in("rotary", "ohm")
     ('N*m/rad', 'N/m', 'ohm')
     """
@@ -54,19 +45,7 @@ def unit_in(motion: str, unit: str) -> str:
 
 @cache
 def rotary_model(model: type[TableT]) -> type[TableT]:
-    """The same table for an axis that turns.
-
-    Parameters
-    ----------
-    model : type of Table
-        Table of a linear axis, or the model of the whole file.
-
-    Returns
-    -------
-    type of Table
-        A subclass with the same keys, whose quantities, those of the tables below included, have the units of
-        `ROTARY_UNITS`; examples are given in them too. The model itself where there is nothing to exchange.
-    """
+    """The same table for an axis that turns."""
     changed = {name: _rotary_field(field) for name, field in model.model_fields.items()}
     fields = {name: field for name, field in changed.items() if field is not None}
     if not fields:

@@ -11,8 +11,6 @@ The command is limited, and the integral then does not wind up: it does not inte
 further beyond its limit (clamping). Back-calculation would need one more time constant, which
 nobody measures, and discharges an integral that holds a weight as soon as a fast move touches the limit.
 
-References
-----------
 Astrom, Hagglund: Advanced PID Control (2006), sections 3.3 (derivative filter), 3.5 (windup, conditional integration).
 Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feed-forward).
 """

@@ -178,19 +178,6 @@ def next_entry(r: StepRule, up: Entries, down: Entries) -> int:
 
     No other step of the loop takes the tables: handing an array on counts its references up and down, and four counts
     cost more than a whole decision.
-
-    Parameters
-    ----------
-    r : StepRule
-        State.
-    up, down : int16 array, shape (N + 1,)
-        Table of each direction by the position that a step departs from: zone number above the ramp index, negative
-        where no step is allowed, as `up[N]` and `down[0]` always are.
-
-    Returns
-    -------
-    int
-        The entry, or OUTSIDE.
     """
     if not 0 <= r.position < len(up):
         return OUTSIDE
@@ -200,20 +187,7 @@ def next_entry(r: StepRule, up: Entries, down: Entries) -> int:
 
 @hot_step
 def next_step(p: StepRuleParams, r: StepRule, entry: int) -> int:
-    """Decide about the next step, and make it.
-
-    Parameters
-    ----------
-    p, r : StepRuleParams, StepRule
-        Parameters and state.
-    entry : int
-        What `next_entry` has read.
-
-    Returns
-    -------
-    int
-        IDLE, STEP (its frequency stands in `word`) or PAUSE.
-    """
+    """Decide about the next step, and make it."""
     if not take_inputs(r, entry):
         return IDLE
     if r.state == FAULT:
@@ -249,19 +223,7 @@ def start_move(r: StepRule, heading: int, turns: int = 0) -> None:
 
 
 def deflect(p: StepRuleParams, r: StepRule, word: int, last: int, heading: int) -> None:
-    """The operator takes over and asks for a frequency.
-
-    Parameters
-    ----------
-    p, r : StepRuleParams, StepRule
-        Parameters and state.
-    word : int
-        Frequency [Hz] or, with reload words, period [tick]; 0 releases.
-    last : int
-        Last index of the ramp list.
-    heading : int
-        1 or -1.
-    """
+    """The operator takes over and asks for a frequency [Hz], or with reload words a period [tick]; 0 releases."""
     r.manual, r.heading, r.event = 1, heading, 0
     r.request_word = word
     words = list(p.ramp[: last + 1])

@@ -47,13 +47,5 @@ def frequency(p: StepTimerParams, r: StepTimer) -> float:
 
 
 def reload_values(hz: ArrayLike, clock_hz: int) -> NDArray[np.int64]:
-    """Period of each frequency in whole ticks, shape as `hz` [tick].
-
-    Parameters
-    ----------
-    hz : array_like of float
-        Frequencies above 0 [Hz].
-    clock_hz : int
-        Ticks per second.
-    """
+    """Period of each frequency in whole ticks, shape as `hz` [tick]."""
     return np.rint(clock_hz / np.asarray(hz, float)).astype(np.int64)

@@ -58,38 +58,13 @@ class Table(BaseModel, frozen=True):
 
 
 def required(doc: str, example: str, *, allowed: str = "", **bounds: float) -> Any:
-    """Declare a key that must be stated.
-
-    Parameters
-    ----------
-    doc : str
-        Meaning of the key, one sentence without a full stop.
-    example : str
-        A value as TOML text, used in messages and in the reference.
-    allowed : str
-        Range in words, where the bounds in SI would be hard to recognise.
-    **bounds : float
-        ``gt``, ``ge``, ``lt``, ``le`` in the SI unit of the field, or ``min_length``, ``max_length`` of a text or a
-        list. The numbers of a list are bounded by its type: ``list[Annotated[int, Ge(0)]]``.
-    """
+    """Declare a key that must be stated."""
     constraints: dict[str, Any] = dict(bounds)
     return Field(description=doc, examples=[example], json_schema_extra={"allowed": allowed}, **constraints)
 
 
 def optional(doc: str, default: object, *, derived: str = "", allowed: str = "", **bounds: float) -> Any:
-    """Declare a key that may be left out.
-
-    Parameters
-    ----------
-    doc : str
-        Meaning of the key, one sentence without a full stop.
-    default : object
-        Value in the SI unit of the field; a callable makes it from the table's other values.
-    derived : str
-        Where the default comes from, in words, when it depends on other keys.
-    allowed, **bounds
-        As in `required`.
-    """
+    """Declare a key that may be left out."""
     constraints: dict[str, Any] = dict(bounds)
     constraints["default_factory" if callable(default) else "default"] = default
     return Field(description=doc, json_schema_extra={"allowed": allowed, "derived": derived}, **constraints)
@@ -97,38 +72,16 @@ def optional(doc: str, default: object, *, derived: str = "", allowed: str = "",
 
 @dataclass(frozen=True, slots=True)
 class Naming:
-    """How the user may name tables.
+    """How the user may name tables."""
 
-    Attributes
-    ----------
-    placeholder : str
-        What stands for the name in the reference, such as ``"NUMBER"``.
-    pattern : str
-        Regular expression that every name matches as a whole.
-    allowed : str
-        The same in words.
-    example : str
-        A name that would do.
-    """
-
-    placeholder: str
-    pattern: str
-    allowed: str
-    example: str
+    placeholder: str  # what stands for the name in the reference, such as ``"NUMBER"``
+    pattern: str  # regular expression that every name matches as a whole
+    allowed: str  # the same in words
+    example: str  # a name that would do
 
 
 def named(doc: str, naming: Naming, **bounds: int) -> Any:
-    """Declare tables that the user names, as in ``[position.3]``; the field's type is ``dict[str, SomeTable]``.
-
-    Parameters
-    ----------
-    doc : str
-        Meaning of one of them, one sentence without a full stop.
-    naming : Naming
-        What their names may be.
-    **bounds : int
-        ``min_length`` and ``max_length``: how many there may be. Without the first there may be none.
-    """
+    """Declare tables that the user names, as in ``[position.3]``; the field's type is ``dict[str, SomeTable]``."""
     extra: dict[str, Any] = {"name": naming.placeholder, "pattern": naming.pattern, "allowed": naming.allowed}
     constraints: dict[str, Any] = dict(bounds)
     if "min_length" not in bounds:

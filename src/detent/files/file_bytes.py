@@ -15,8 +15,6 @@ _REMEDY = "check the name of the recording"
 def kind_of(path: Path) -> str:
     """Ending of a file's name in small letters, that of the packing left out.
 
-    Examples
-    --------
     >>> kind_of(Path("run.CSV")), kind_of(Path("run.json.gz"))
     ('.csv', '.json')
     """
@@ -25,22 +23,7 @@ def kind_of(path: Path) -> str:
 
 
 def check_file(path: Path, limit: int, allowed: str) -> None:
-    """Refuse a file that is absent, empty, too large, or no file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    limit : int
-        Most bytes.
-    allowed : str
-        What the file may be, for messages.
-
-    Raises
-    ------
-    InputError
-        It is none that can be read.
-    """
+    """Refuse a file that is absent, empty, too large, or no file."""
     try:
         size = path.stat().st_size
         if path.is_dir():
@@ -59,27 +42,7 @@ def check_file(path: Path, limit: int, allowed: str) -> None:
 
 
 def read_bytes(path: Path, limit: int, allowed: str) -> bytes:
-    """Read a file, unpacked if its name ends in ``.gz``.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    limit : int
-        Most bytes, unpacked.
-    allowed : str
-        What the file may be, for messages.
-
-    Returns
-    -------
-    bytes
-        At least one.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, is damaged, or too large.
-    """
+    """Read a file, unpacked if its name ends in ``.gz``."""
     check_file(path, limit, allowed)
     is_packed = path.suffix.lower() == PACKED
     try:

@@ -47,18 +47,10 @@ def count_figure(name: str, value: float, formula: str, unit: str = "count") -> 
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """Keys that do not go together.
+    """Keys that do not go together."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        Dotted keys the rule looked at, the one to blame first.
-    allowed, remedy : str
-        As in `FileProblem`.
-    """
-
-    keys: tuple[str, ...]
-    allowed: str
+    keys: tuple[str, ...]  # dotted keys the rule looked at, the one to blame first
+    allowed: str  # and remedy: as in `FileProblem`
     remedy: str
 
     @property

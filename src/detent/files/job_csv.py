@@ -23,18 +23,10 @@ _WHOLE_NUMBER = re.compile(r"([+-]?)0*([0-9]{1,9})")
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """What the header says about a column.
+    """What the header says about a column."""
 
-    Attributes
-    ----------
-    name : str
-        Key of its values; empty for a column that is not read.
-    unit : str
-        Unit of its numbers, as the user wrote it.
-    """
-
-    name: str = ""
-    unit: str = ""
+    name: str = ""  # key of its values; empty for a column that is not read
+    unit: str = ""  # unit of its numbers, as the user wrote it
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,37 +44,19 @@ class Line:
 
 
 class JobTable:
-    """The lines of one file, and what is wrong with them.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    problems : list of FileProblem
-        Where to note what is wrong.
-
-    Attributes
-    ----------
-    header : Line
-        The header; without cells where there is none, or where it cannot be read.
-    columns : list of Column
-        One per cell of the header, once `read_header` has been called.
-    separator : str
-        Between cells.
-    """
+    """The lines of one file, and what is wrong with them."""
 
     def __init__(self, file: str, text: str, problems: list[FileProblem]) -> None:
         self._file, self.problems = file, problems
         self._lines = _telling_lines(text)
         number, header = next(self._lines, (0, ""))
-        self.separator = ";" if ";" in header else ","
+        self.separator = ";" if ";" in header else ","  # between cells
         cells = list(self._split(number, header)) if number else []
         while cells and not cells[-1]:  # spreadsheets end lines with empty cells
             cells.pop()
+        # the header; without cells where there is none, or where it cannot be read
         self.header = Line(number, header, tuple(cells))
-        self.columns: list[Column] = []
+        self.columns: list[Column] = []  # one per cell of the header, once `read_header` has been called
 
     def read_header(self, read_heading: Callable[[str], Column]) -> None:
         """Read the columns, each with a function that may refuse it."""
@@ -116,13 +90,7 @@ class JobTable:
         return values
 
     def quantity(self, column: Column, cell: str) -> str:
-        """Number of a cell with the unit of its column, as `detent.units.parse_quantity` reads it.
-
-        Raises
-        ------
-        RefusedValueError
-            The cell is no plain number.
-        """
+        """Number of a cell with the unit of its column, as `detent.units.parse_quantity` reads it."""
         number = cell
         if self.separator == ";" and _COMMA_NUMBER.fullmatch(cell):
             number = cell.replace(",", ".")
@@ -175,24 +143,7 @@ def split_heading(cell: str) -> tuple[str, str | None]:
 
 
 def check_unit(name: str, unit: str, si_unit: str, suggested: str, cell: str) -> None:
-    """Refuse a unit that a column cannot have.
-
-    Parameters
-    ----------
-    name, unit : str
-        Of the column, from its heading; an empty unit where it states none.
-    si_unit : str
-        Unit behind the border.
-    suggested : str
-        Unit that messages suggest.
-    cell : str
-        The heading, for messages.
-
-    Raises
-    ------
-    RefusedValueError
-        The unit measures something else, is unknown, or is missing.
-    """
+    """Refuse a unit that a column cannot have."""
     kind, _ = describe_kind(si_unit)
     try:
         parse_quantity(f"1 {unit}", si_unit)
@@ -202,13 +153,7 @@ def check_unit(name: str, unit: str, si_unit: str, suggested: str, cell: str) ->
 
 
 def read_count(cell: str) -> int:
-    """Read a number of repeats.
-
-    Raises
-    ------
-    RefusedValueError
-        It is no whole number from 1 to `detent.methods.moves.job.MOST_MOVES`.
-    """
+    """Read a number of repeats."""
     match = _WHOLE_NUMBER.fullmatch(cell)
     if match is None:
         allowed = f"a whole number from 1 to {MOST_MOVES}"

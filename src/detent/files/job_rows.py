@@ -11,22 +11,11 @@ EXAMPLE_UNITS = {"m": "mm", "s": "ms", "m/s": "mm/s", "rad": "deg", "rad/s": "de
 
 
 class JobRows(Generic[AnyMove]):
-    """The rows of one file as far as they could be read, and all that is wrong with it.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-
-    Attributes
-    ----------
-    problems : list of FileProblem
-        What is wrong, in the order it was found.
-    """
+    """The rows of one file as far as they could be read, and all that is wrong with it."""
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.problems: list[FileProblem] = []
+        self.problems: list[FileProblem] = []  # what is wrong, in the order it was found
         self._rows: list[tuple[AnyMove, int]] = []
 
     @property
@@ -39,20 +28,7 @@ class JobRows(Generic[AnyMove]):
         self._rows.append((move, int(times)))
 
     def written_out(self, repeat: int = 1, *, missing: str = "add a move with a target") -> tuple[AnyMove, ...]:
-        """All moves, numbered, of a job that does the list `repeat` times.
-
-        Parameters
-        ----------
-        repeat : int
-            1 or more.
-        missing : str
-            What to do about a file without any.
-
-        Raises
-        ------
-        InputError
-            There are problems, no moves, or too many.
-        """
+        """All moves, numbered, of a job that does the list `repeat` times."""
         if self.problems:
             raise InputError(InputError(self.problems).problems[:MOST_PROBLEMS])
         if not self._rows:
@@ -63,13 +39,7 @@ class JobRows(Generic[AnyMove]):
 
 
 def check_count(value: int) -> int:
-    """Check a number of repeats.
-
-    Raises
-    ------
-    RefusedValueError
-        It is below 1, or beyond `MOST_MOVES`.
-    """
+    """Check a number of repeats."""
     if 1 <= value <= MOST_MOVES:
         return value
     remedy = "leave it out to do it once" if value < 1 else "lower it"
@@ -77,13 +47,7 @@ def check_count(value: int) -> int:
 
 
 def check_dwell(value: float) -> float:
-    """Check how long something stands after a move [s].
-
-    Raises
-    ------
-    RefusedValueError
-        It is negative.
-    """
+    """Check how long something stands after a move [s]."""
     if value < 0:
         raise RefusedValueError("", f"0 {EXAMPLE_UNITS['s']} or more", "write how long the axis stands after the move")
     return value

@@ -14,27 +14,7 @@ _REMEDY = "check the name after --job"
 
 
 def read_text(path: str | PathLike[str], kinds: Collection[str], allowed: str) -> str:
-    """Read a job file of UTF-8 text.
-
-    Parameters
-    ----------
-    path : str or path
-        The file.
-    kinds : collection of str
-        Endings of names that are taken, in small letters, each a key of `MAX_BYTES`.
-    allowed : str
-        What the file may be, in words, for messages.
-
-    Returns
-    -------
-    str
-        Its text, without a byte order mark, not blank.
-
-    Raises
-    ------
-    InputError
-        There is no such file, it is of another kind, too large, empty, or not UTF-8.
-    """
+    """Read a job file of UTF-8 text."""
     return decode_utf8(Path(path), read_data(Path(path), kinds, allowed))
 
 
@@ -68,13 +48,7 @@ def read_data(file: Path, kinds: Collection[str], allowed: str) -> bytes:
 
 
 def decode_utf8(file: Path, data: bytes) -> str:
-    """Text of a file in UTF-8, without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        It is not UTF-8; the place of the first byte that is not is told.
-    """
+    """Text of a file in UTF-8, without a byte order mark."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

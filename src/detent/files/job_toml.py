@@ -19,29 +19,6 @@ class JobTables:
 
     Where a list is spelled otherwise than by headers, as in ``move = [{...}]``, messages give the place of the list and
     the number of the table.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    names : tuple of str
-        Lists of tables that the file may have; it is a file of the last of them.
-    problems : list of FileProblem
-        Where to note what is wrong; errors of syntax are put there at once.
-
-    Attributes
-    ----------
-    top : dict
-        Everything at the top of the file, the lists too.
-    is_whole : bool
-        False when lines were left out: then a missing key proves nothing.
-
-    Raises
-    ------
-    InputError
-        Not even the tables are trustworthy.
     """
 
     def __init__(self, file: str, text: str, names: tuple[str, ...], problems: list[FileProblem]) -> None:
@@ -50,6 +27,8 @@ class JobTables:
             raise InputError(source.problems)
         problems += source.problems
         self.file, self.problems = file, problems
+        # top: everything at the top of the file, the lists too; is_whole: False when lines were left out: then a
+        # missing key proves nothing
         self.top, self.is_whole = source.tables, source.is_whole
         self._places, self._lines = source.places, text.splitlines()
         headers = [(number, found[2]) for number, line in enumerate(self._lines) if (found := _HEADER.match(line))]
@@ -92,19 +71,7 @@ class JobTables:
         self.problems.append(problem)
 
     def unknown(self, key: str, value: object, keys: tuple[str, ...], inside: Mapping[str, str]) -> RefusedValueError:
-        """Error for what stands outside the tables and is not known there.
-
-        Parameters
-        ----------
-        key : str
-            The unknown key or table.
-        value : object
-            Its value.
-        keys : tuple of str
-            Keys that may stand there.
-        inside : mapping
-            Per key that belongs into a table the name of the table's list.
-        """
+        """Error for what stands outside the tables and is not known there."""
         lists = tuple(self._tables)
         is_table = isinstance(value, dict | list)
         near = difflib.get_close_matches(key.lower(), lists if is_table else (*keys, *lists), n=1, cutoff=0.6)

@@ -7,20 +7,12 @@ MAX_SHOWN = 60
 
 
 class RefusedValueError(Exception):
-    """A value will not do; whoever reads the file adds its place.
-
-    Attributes
-    ----------
-    came : str
-        What is wrong with it; empty where the value as written says it.
-    allowed, remedy : str
-        What would be accepted, and what to do.
-    """
+    """A value will not do; whoever reads the file adds its place."""
 
     def __init__(self, came: str, allowed: str, remedy: str) -> None:
         super().__init__(came, allowed, remedy)
-        self.came = came
-        self.allowed = allowed
+        self.came = came  # what is wrong with it; empty where the value as written says it
+        self.allowed = allowed  # and remedy: what would be accepted, and what to do
         self.remedy = remedy
 
 
@@ -31,29 +23,7 @@ def short(text: str) -> str:
 
 
 def read_text_quantity(key: str, value: object, unit: str, example: str = "") -> float:
-    """Read the value of a key of a TOML file: a text with a number and its unit.
-
-    Parameters
-    ----------
-    key : str
-        For messages.
-    value : object
-        As the parser gives it.
-    unit : str
-        Unit of the result, a coherent SI unit of `detent.units.KINDS`.
-    example : str, optional
-        Quantity that messages suggest; that of the unit's kind unless given.
-
-    Returns
-    -------
-    float
-        The value in `unit`, finite.
-
-    Raises
-    ------
-    RefusedValueError
-        It is no such quantity.
-    """
+    """Read the value of a key of a TOML file: a text with a number and its unit."""
     if isinstance(value, str):
         try:
             return parse_quantity(value, unit)
@@ -65,13 +35,7 @@ def read_text_quantity(key: str, value: object, unit: str, example: str = "") ->
 
 
 def read_whole_number(key: str, value: object) -> int:
-    """Read the value of a key of a TOML file: a whole number.
-
-    Raises
-    ------
-    RefusedValueError
-        It is none.
-    """
+    """Read the value of a key of a TOML file: a whole number."""
     if isinstance(value, int) and not isinstance(value, bool):
         return value
     raise RefusedValueError("", "a whole number", f"write a whole number without quotes, as in {key} = 3")

@@ -21,34 +21,15 @@ _KEYS = {"bare_key", "quoted_key", "dotted_key"}
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a key stands.
+    """Where a key stands."""
 
-    Attributes
-    ----------
-    line, column : int
-        Of the key's first character, from 1; columns count characters.
-    text : str
-        The value as written, or the header of a table.
-    """
-
-    line: int
+    line: int  # and column: of the key's first character, from 1; columns count characters
     column: int
-    text: str
+    text: str  # the value as written, or the header of a table
 
 
 def locate_keys(text: str) -> dict[Path, Place]:
-    """Find every key and table header of a TOML text.
-
-    Parameters
-    ----------
-    text : str
-        TOML, possibly with errors: what can be read around them is found.
-
-    Returns
-    -------
-    dict
-        From the path of a key, such as ``("limits", "travel")``, to its first place.
-    """
+    """Find every key and table header of a TOML text."""
     source = text.encode()
     places: dict[Path, Place] = {}
     for path, key, value in _walk(_parser().parse(source).root_node, ()):

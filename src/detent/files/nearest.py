@@ -20,17 +20,6 @@ UNITS = "check the units of what it depends on"
 def at_most(value: float, unit: str, digits: int = 4) -> str:
     """Write the largest short number that is not above a bound, in quotes as in the file.
 
-    Parameters
-    ----------
-    value : float
-        The bound in `unit`, above 0.
-    unit : str
-        A unit of `units.KINDS` that is written with a prefix of powers of ten, or in degrees.
-    digits : int
-        Significant digits.
-
-    Examples
-    --------
     >>> at_most(0.407166, "m/s")
     '"407.1 mm/s"'
     """
@@ -40,8 +29,6 @@ def at_most(value: float, unit: str, digits: int = 4) -> str:
 def at_least(value: float, unit: str, digits: int = 4) -> str:
     """Write the smallest short number that is not below a bound; parameters as `at_most`.
 
-    Examples
-    --------
     >>> at_least(0.407166, "m/s")
     '"407.2 mm/s"'
     """
@@ -67,17 +54,7 @@ def put(key: str, text: object) -> str:
 
 
 def offer(model: type[Table], key: str, text: object) -> str:
-    """`put`, if the key accepts the value at all; empty where the value lies beyond the key's own bounds.
-
-    Parameters
-    ----------
-    model : type of Table
-        Model of the whole file.
-    key : str
-        Dotted key of a number or a quantity.
-    text : object
-        A number, or a quantity in quotes.
-    """
+    """`put`, if the key accepts the value at all; empty where the value lies beyond the key's own bounds."""
     field = field_at(model, tuple(key.split(".")))
     unit = unit_of(field)
     value = parse_quantity(str(text).strip('"'), unit) if unit else float(str(text))

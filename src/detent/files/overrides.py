@@ -29,36 +29,15 @@ _NUMBER = re.compile(r"[+-]?[0-9][0-9_]*(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 @dataclass(slots=True)
 class Overrides:
-    """What overrides came to.
+    """What overrides came to."""
 
-    Attributes
-    ----------
-    texts : dict
-        By path: the value as written, of each override that was put into the tables.
-    problems : list of FileProblem
-        What is wrong with the others.
-    """
-
+    # by path: the value as written, of each override that was put into the tables
     texts: dict[Path, str] = field(default_factory=dict[Path, str])
-    problems: list[FileProblem] = field(default_factory=list[FileProblem])
+    problems: list[FileProblem] = field(default_factory=list[FileProblem])  # what is wrong with the others
 
 
 def apply_overrides(tables: dict[str, Any], overrides: Sequence[str], model: type[Table]) -> Overrides:
-    """Put values of ``--set`` over those of a file; an unknown key is a problem at once.
-
-    Parameters
-    ----------
-    tables : dict
-        What the file says; changed in place.
-    overrides : sequence of str
-        Such as ``"drive.supply=34 V"``.
-    model : type of Table
-        Model of the whole file.
-
-    Returns
-    -------
-    Overrides
-    """
+    """Put values of ``--set`` over those of a file; an unknown key is a problem at once."""
     known, found = dict(leaf_fields(model)), Overrides()
     for text in overrides:
         key, equals, value = (part.strip() for part in text.partition("="))

@@ -37,19 +37,7 @@ MAX_ELEMENTS = 3
 
 
 class Reporter:
-    """Makes problems of one file (and its overrides) with their places.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    places : dict
-        Where its keys stand.
-    overrides : dict
-        Text of each value given by ``--set``, by path.
-    root : type of Table
-        Model of the whole file.
-    """
+    """Makes problems of one file (and its overrides) with their places."""
 
     def __init__(self, file: str, places: dict[Path, Place], overrides: dict[Path, str], root: type[Table]) -> None:
         self._file = file
@@ -189,13 +177,7 @@ def key_path(location: Sequence[str | int]) -> Path:
 
 
 def field_at(root: type[Table], path: Path) -> FieldInfo:
-    """Declaration of the key at a path.
-
-    Raises
-    ------
-    KeyError
-        The schema has no such key.
-    """
+    """Declaration of the key at a path."""
     table: type[Table] | None = root
     field: FieldInfo | None = None
     for key in path:

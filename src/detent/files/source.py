@@ -24,40 +24,18 @@ _UNQUOTED_WORD = re.compile(r"[A-Za-z_][\w -]*")
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """An axis file after reading.
+    """An axis file after reading."""
 
-    Attributes
-    ----------
-    file : str
-        The file as the user named it.
-    tables : dict
-        What TOML makes of the text, lines with syntax errors left out.
-    places : dict
-        Where each key stands.
-    problems : tuple of FileProblem
-        Errors of syntax.
-    is_whole : bool
-        False when lines were left out: then a missing key proves nothing.
-    is_readable : bool
-        False when not even the tables are trustworthy.
-    """
-
-    file: str
-    tables: dict[str, Any]
-    places: dict[tuple[str, ...], Place]
-    problems: tuple[FileProblem, ...] = ()
-    is_whole: bool = True
-    is_readable: bool = True
+    file: str  # the file as the user named it
+    tables: dict[str, Any]  # what TOML makes of the text, lines with syntax errors left out
+    places: dict[tuple[str, ...], Place]  # where each key stands
+    problems: tuple[FileProblem, ...] = ()  # errors of syntax
+    is_whole: bool = True  # False when lines were left out: then a missing key proves nothing
+    is_readable: bool = True  # False when not even the tables are trustworthy
 
 
 def read_source(path: Path | str) -> Source:
-    """Read and parse an axis file.
-
-    Raises
-    ------
-    InputError
-        There is no such file, or it is no text.
-    """
+    """Read and parse an axis file."""
     return parse_source(str(path), _read_text(Path(path)))
 
 

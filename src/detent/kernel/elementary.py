@@ -5,8 +5,6 @@ plain Python, compiled steps and a firmware in C agree bit for bit, where the co
 sum (C: ``-ffp-contract=off``). Results are within one unit in the last place, finite input never gives a NaN, and an
 exponential too large or too small is infinite or 0, as in C.
 
-References
-----------
 W. J. Cody, W. Waite: Software Manual for the Elementary Functions (1980): reduction by a constant in parts.
 FDLIBM 5.3 (Sun Microsystems, 1993; e_exp.c, k_sin.c, k_cos.c, e_rem_pio2.c): the constants, and the order of the sums.
 """

@@ -100,28 +100,7 @@ def write_row(r: Any, count: int, trace: Bytes, picks: Offsets, every: int) -> N
 def advance(  # noqa: PLR0913 - an axis, how long, and where its rows go
     p: Any, r: Any, most: int, trace: Bytes, picks: Offsets, every: int, *feed: Any
 ) -> int:
-    """Run up to `most` ticks; stops early where the axis waits for its host.
-
-    Parameters
-    ----------
-    p, r : Registers
-        Parameters and state of an axis.
-    most : int
-        Most ticks to run.
-    trace : uint8 array, shape (rows, bytes)
-        One row per record, the registers at ticks divisible by `every`; row number ``tick // every`` modulo rows.
-    picks : int64 array, shape (bytes,)
-        Byte offsets in the state that make a row.
-    every : int
-        Ticks between two records; 0 records nothing.
-    *feed
-        Arrays that the host has laid ready for the axis, as its tick takes them; see `lay_ready`.
-
-    Returns
-    -------
-    int
-        Ticks run.
-    """
+    """Run up to `most` ticks; stops early where the axis waits for its host."""
     done = 0
     while done < most:
         stretch = until_row(r.tick, most - done, every)

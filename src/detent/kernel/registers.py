@@ -101,17 +101,7 @@ class Leaf:
 
 
 def register(doc: str, *, unit: str = "", length: int = 0) -> Any:
-    """Declare a register.
-
-    Parameters
-    ----------
-    doc : str
-        What the value means, in the field's words.
-    unit : str
-        SI unit or "count", "tick", "code"; empty for a pure number or flag.
-    length : int
-        0 for one value, else the number of elements of an array field.
-    """
+    """Declare a register."""
     return _Declaration(doc, unit, length)
 
 
@@ -161,8 +151,6 @@ class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIss
 class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     """Base of every register file; an instance starts with all bits zero.
 
-    Examples
-    --------
     >>> class Counter(Registers):
     ...     count: u1 = register("pulses", unit="count")
     >>> counter = Counter()
@@ -207,13 +195,7 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
         return bytes(self)
 
     def restore(self, state: bytes) -> None:
-        """Put a snapshot back.
-
-        Raises
-        ------
-        ValueError
-            The snapshot is of another size, so of another declaration.
-        """
+        """Put a snapshot back."""
         size = ctypes.sizeof(self)
         if len(state) != size:
             raise ValueError(

@@ -73,11 +73,6 @@ def find_disagreements(draft: Draft) -> None:
 
     A sign is turned and a known factor taken out, as both are certain once the signals are alike in everything else;
     a factor that is none of `FACTORS` is told and left. Where both units were guessed nothing is changed.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units, changed in place.
     """
     position = draft.values.get("position")
     if position is None or np.ptp(position) <= 5 * grain(position):

@@ -27,43 +27,16 @@ servos are made with 5 to 5000 rows a second, seldom more."""
 
 @dataclass
 class Chosen:
-    """Columns of a table by their roles.
+    """Columns of a table by their roles."""
 
-    Attributes
-    ----------
-    columns : dict
-        From a role to the name of its column.
-    choices : dict
-        From a role to what the user says; only roles that the user names.
-    guesses : list of str
-        What was guessed.
-    """
-
-    columns: dict[str, str] = field(default_factory=dict[str, str])
+    columns: dict[str, str] = field(default_factory=dict[str, str])  # from a role to the name of its column
+    # from a role to what the user says; only roles that the user names
     choices: dict[str, Choice] = field(default_factory=dict[str, Choice])
-    guesses: list[str] = field(default_factory=list[str])
+    guesses: list[str] = field(default_factory=list[str])  # what was guessed
 
 
 def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
-    """Find the column of each signal.
-
-    Parameters
-    ----------
-    table : RawTable
-        The columns.
-    mapping : ColumnMapping
-        What the user says; only the other signals are guessed.
-
-    Returns
-    -------
-    Chosen
-        With the time, unless the period is stated, and at least one signal.
-
-    Raises
-    ------
-    InputError
-        A stated column is not there, or there is no column for the time, or no signal.
-    """
+    """Find the column of each signal."""
     chosen = Chosen(choices={role: choice for role, choice in mapping.columns.items() if choice.column})
     problems: list[FileProblem] = []
     for role, choice in chosen.choices.items():
@@ -152,27 +125,7 @@ def _fits_unit(unit: str, role: str) -> bool:
 
 
 def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft:
-    """Put the chosen columns into a draft, with what their numbers mean.
-
-    Parameters
-    ----------
-    table : RawTable
-        The columns, no longer rotated.
-    chosen : Chosen
-        Which of them are read.
-    mapping : ColumnMapping
-        What the user says.
-
-    Returns
-    -------
-    Draft
-        Numbers of the file, with their conversions.
-
-    Raises
-    ------
-    InputError
-        A factor names no constant.
-    """
+    """Put the chosen columns into a draft, with what their numbers mean."""
     draft = Draft(table.file, table.rows, np.empty(0), {}, {}, {}, findings=table.findings)
     draft.guesses = [*table.notes, *chosen.guesses]
     constants = {**table.constants, **mapping.constants}

@@ -49,13 +49,7 @@ def unwrap_clock(draft: Draft) -> None:
 
 
 def mend_counters(draft: Draft) -> None:
-    """Undo the wraps of counters, and the reading of signed numbers as unsigned.
-
-    Parameters
-    ----------
-    draft : Draft
-        Numbers of the file with a rising time, changed in place.
-    """
+    """Undo the wraps of counters, and the reading of signed numbers as unsigned."""
     for role in list(draft.values):
         values = draft.values[role]
         if role in POSITIONS:
@@ -95,24 +89,6 @@ def find_wraps(values: Values, t: Values, modulus: float, *, is_stated: bool = F
     as fast as the rows around, if the range is added or subtracted. Where the user states the range, half of it is
     enough.
 
-    Parameters
-    ----------
-    values : ndarray
-        Numbers of the file, shape (n,).
-    t : ndarray
-        Time in any unit, shape (n,), strictly rising.
-    modulus : float
-        Range of the counter, in numbers of the file.
-    is_stated : bool
-        True where the user says so.
-
-    Returns
-    -------
-    ndarray
-        Indices of the first samples behind a wrap.
-
-    Examples
-    --------
     >>> counter = np.array([65500.0, 65520, 4, 24])
     >>> find_wraps(counter, np.arange(4.0), 65536)
     array([2])
@@ -133,22 +109,7 @@ def find_wraps(values: Values, t: Values, modulus: float, *, is_stated: bool = F
 
 
 def unwrap(values: Values, where: NDArray[np.intp], modulus: float) -> Values:
-    """Undo wraps.
-
-    Parameters
-    ----------
-    values : ndarray
-        Numbers of the file, shape (n,).
-    where : ndarray
-        Indices of the first samples behind a wrap.
-    modulus : float
-        Range of the counter.
-
-    Returns
-    -------
-    ndarray
-        Shape (n,); the first sample keeps its number.
-    """
+    """Undo wraps."""
     turns = np.zeros(len(values))
     turns[where] = -np.sign(values[where] - values[where - 1])
     return values + modulus * np.cumsum(turns)

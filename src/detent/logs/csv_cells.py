@@ -31,8 +31,6 @@ def is_moment(cell: str) -> bool:
 def read_cell(cell: str, decimal: str) -> float | None:
     """Number of one cell: NaN where it says nothing, None where it is no number.
 
-    Examples
-    --------
     >>> read_cell("1,5", ","), read_cell("n/a", ","), read_cell("1.2.3", ",")
     (1.5, nan, None)
     """

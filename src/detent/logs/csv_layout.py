@@ -23,58 +23,30 @@ _COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
 
 @dataclass(frozen=True, slots=True)
 class FileOptions:
-    """What the user says about a file, whatever its kind.
+    """What the user says about a file, whatever its kind."""
 
-    Attributes
-    ----------
-    separator : str
-        Between the cells of a text table; empty: guessed.
-    decimal : str
-        Decimal sign of a text table, ``"."`` or ``","``; empty: guessed.
-    header : int or None
-        Line of the header of a text table, from 1; 0 for none; None: guessed.
-    table : str
-        Group, structure or list to read from a file that holds several; empty: the whole file.
-    period : float or None
-        Time between two rows [s] of a file without a column for the time.
-    """
-
-    separator: str = ""
-    decimal: str = ""
-    header: int | None = None
-    table: str = ""
-    period: float | None = None
+    separator: str = ""  # between the cells of a text table; empty: guessed
+    decimal: str = ""  # decimal sign of a text table, ``"."`` or ``","``; empty: guessed
+    header: int | None = None  # line of the header of a text table, from 1; 0 for none; None: guessed
+    table: str = ""  # group, structure or list to read from a file that holds several; empty: the whole file
+    period: float | None = None  # time between two rows [s] of a file without a column for the time
 
 
 @dataclass(slots=True)
 class CsvLayout:
-    """How one text table is laid out.
+    """How one text table is laid out."""
 
-    Attributes
-    ----------
-    separator, decimal : str
-        As of `FileOptions`, both stated.
-    first : int
-        Index of the first line of numbers.
-    width : int
-        Cells of a usual row; less than there are columns where the last are always empty.
-    names, units : list of str
-        Per column, from the header; a unit is empty where none is stated.
-    text_columns, moment_columns : set of int
-        Columns that hold words, and those that hold dates with times of day.
-    notes : list of str
-        What was guessed.
-    """
-
-    separator: str
+    separator: str  # and decimal: as of `FileOptions`, both stated
     decimal: str
-    first: int
-    width: int
+    first: int  # index of the first line of numbers
+    width: int  # cells of a usual row; less than there are columns where the last are always empty
+    # names, units: per column, from the header; a unit is empty where none is stated
     names: list[str] = field(default_factory=list[str])
     units: list[str] = field(default_factory=list[str])
+    # text_columns, moment_columns: columns that hold words, and those that hold dates with times of day
     text_columns: set[int] = field(default_factory=set[int])
     moment_columns: set[int] = field(default_factory=set[int])
-    notes: list[str] = field(default_factory=list[str])
+    notes: list[str] = field(default_factory=list[str])  # what was guessed
 
 
 def is_telling(line: str) -> bool:
@@ -97,25 +69,6 @@ def guess_layout(file: str, lines: Sequence[str], options: FileOptions) -> CsvLa
     The separator is the one that gives the most cells that are numbers in rows of one width. The first such row is the
     first row of numbers; the header is the line above it, which may be a comment; a line of nothing but units may stand
     between them.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    lines : sequence of str
-        Its lines.
-    options : FileOptions
-        What the user says; nothing of it is guessed.
-
-    Returns
-    -------
-    CsvLayout
-        With at least one column.
-
-    Raises
-    ------
-    InputError
-        There are no rows of numbers, or the header is not where the user says.
     """
     begin = options.header or 0
     sample = [index for index in range(begin, len(lines)) if is_telling(lines[index])][:SAMPLE_LINES]

@@ -6,13 +6,7 @@ from detent.logs.draft import Draft
 
 
 def take_out_delays(draft: Draft) -> None:
-    """Take stated delays out, by straight lines between samples; samples without values on both sides are removed.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units, changed in place.
-    """
+    """Take stated delays out, by straight lines between samples; samples without values on both sides are removed."""
     if not draft.delays:
         return
     inside = np.ones(len(draft), dtype=np.bool_)

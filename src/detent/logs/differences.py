@@ -64,16 +64,6 @@ def paired_changes(position: Values, velocity: Values, t: Values) -> tuple[Value
 
     Over a window the change of the position is the integral of the velocity, whatever the stamps; both see the same
     window, so that neither is delayed against the other, and rounding counts once per window.
-
-    Parameters
-    ----------
-    position, velocity, t : ndarray
-        Shape (n,); the velocity in units of the position per unit of the time.
-
-    Returns
-    -------
-    tuple of ndarray
-        By the velocity and by the position, both of shape (m,); windows across gaps are left out.
     """
     rows = window_rows(position)
     path = integral(velocity, t)
@@ -83,20 +73,7 @@ def paired_changes(position: Values, velocity: Values, t: Values) -> tuple[Value
 
 
 def likeness(ours: Values, theirs: Values, *, is_centred: bool = False) -> Likeness:
-    """Correlation of two series about zero, or about their means, and the factor between them.
-
-    Parameters
-    ----------
-    ours, theirs : ndarray
-        Shape (n,).
-    is_centred : bool
-        True to take the means away first.
-
-    Returns
-    -------
-    Likeness
-        Zeros where one of them says nothing.
-    """
+    """Correlation of two series about zero, or about their means, and the factor between them."""
     if len(ours) < 2:
         return Likeness(0.0, 0.0)
     if is_centred:
@@ -112,17 +89,7 @@ def likeness(ours: Values, theirs: Values, *, is_centred: bool = False) -> Liken
 def correlation_curve(ours: Values, theirs: Values, most: int) -> Values:
     """Correlation of two series, about their means, for each shift of the first.
 
-    Parameters
-    ----------
-    ours, theirs : ndarray
-        Shape (n,), n > 2 `most`.
-    most : int
-        Rows of the largest shift, to both sides.
-
-    Returns
-    -------
-    ndarray
-        Shape (2 most + 1,); the value at ``most + k`` is that of the first taken from k rows later.
+    Shape (2 most + 1,); the value at ``most + k`` is that of the first taken from k rows later.
     """
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.

@@ -17,18 +17,7 @@ from detent.logs.stuck import find_stuck
 
 
 def clean(draft: Draft) -> None:
-    """Find and mend what is wrong with a recording; afterwards it is in SI units.
-
-    Parameters
-    ----------
-    draft : Draft
-        Numbers of the file, changed in place; findings are added to it.
-
-    Raises
-    ------
-    InputError
-        Too few samples are left.
-    """
+    """Find and mend what is wrong with a recording; afterwards it is in SI units."""
     mend_clock(draft)
     mend_missing(draft)
     mend_counters(draft)

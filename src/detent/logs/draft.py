@@ -12,48 +12,21 @@ from detent.logs.log_units import Conversion
 
 @dataclass
 class Draft:
-    """Columns of a recording, by their roles.
+    """Columns of a recording, by their roles."""
 
-    Attributes
-    ----------
-    file : str
-        The file as the user named it.
-    rows : ndarray
-        Row of the file of each sample, shape (n,).
-    t : ndarray
-        Time, shape (n,).
-    values : dict
-        From a role to its numbers, shape (n,).
-    conversions : dict
-        From a role, ``time`` too, to how its numbers become SI units.
-    sources : dict
-        From a role, ``time`` too, to where it comes from.
-    bits : dict
-        From a role to the width of its counter, where stated.
-    delays : dict
-        From a role to its stated delay [s].
-    guessed_units : set
-        Roles whose unit was guessed.
-    has_clock : bool
-        False where the time was made from a stated period.
-    findings : list of Finding
-        What was found so far.
-    guesses : list of str
-        What was guessed so far.
-    """
-
-    file: str
-    rows: Rows
-    t: Values
-    values: dict[str, Values]
-    conversions: dict[str, Conversion]
-    sources: dict[str, Source]
+    file: str  # the file as the user named it
+    rows: Rows  # row of the file of each sample, shape (n,)
+    t: Values  # time, shape (n,)
+    values: dict[str, Values]  # from a role to its numbers, shape (n,)
+    conversions: dict[str, Conversion]  # from a role, ``time`` too, to how its numbers become SI units
+    sources: dict[str, Source]  # from a role, ``time`` too, to where it comes from
+    # from a role to the width of its counter, where stated
     bits: dict[str, int] = field(default_factory=dict[str, int])
-    delays: dict[str, float] = field(default_factory=dict[str, float])
-    guessed_units: set[str] = field(default_factory=set[str])
-    has_clock: bool = True
-    findings: list[Finding] = field(default_factory=list[Finding])
-    guesses: list[str] = field(default_factory=list[str])
+    delays: dict[str, float] = field(default_factory=dict[str, float])  # from a role to its stated delay [s]
+    guessed_units: set[str] = field(default_factory=set[str])  # roles whose unit was guessed
+    has_clock: bool = True  # False where the time was made from a stated period
+    findings: list[Finding] = field(default_factory=list[Finding])  # what was found so far
+    guesses: list[str] = field(default_factory=list[str])  # what was guessed so far
 
     def __len__(self) -> int:
         return len(self.t)
@@ -104,8 +77,6 @@ class Draft:
 def tell_count(count: int, what: str) -> str:
     """A number of things in a sentence.
 
-    Examples
-    --------
     >>> tell_count(1, "row"), tell_count(3, "row")
     ('1 row', '3 rows')
     """

@@ -29,38 +29,17 @@ _LOSES = 0.5
 
 
 class Motion(NamedTuple):
-    """A motion smoothed over windows, across no gap.
+    """A motion smoothed over windows, across no gap."""
 
-    Attributes
-    ----------
-    samples : ndarray
-        Samples it stands for, shape (m,).
-    x, v, a : ndarray
-        Position, velocity, acceleration, shape (m,).
-    rows : int
-        Rows of the window.
-    """
-
-    samples: NDArray[np.int64]
-    x: Values
+    samples: NDArray[np.int64]  # samples it stands for, shape (m,)
+    x: Values  # and v, a: position, velocity, acceleration, shape (m,)
     v: Values
     a: Values
-    rows: int
+    rows: int  # rows of the window
 
 
 def find_motion(draft: Draft) -> Motion | None:
-    """Velocity and acceleration from the position, by a parabola through each window.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units.
-
-    Returns
-    -------
-    Motion or None
-        None where there is no position, or it hardly moves.
-    """
+    """Velocity and acceleration from the position, by a parabola through each window."""
     position = draft.values.get("position")
     if position is None or np.ptp(position) <= 20 * grain(position):
         return None
@@ -98,11 +77,6 @@ def find_wrong_effort(draft: Draft) -> None:
     The effort is fitted by the terms of the equation above. Its sign is wrong where the parts of inertia and friction
     are negative together; friction that feeds an axis does not exist. An effort is left as it is: which of the two,
     effort or position, counts the other way the recording does not tell.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units.
     """
     motion = find_motion(draft)
     if motion is None:

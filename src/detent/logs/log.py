@@ -63,34 +63,17 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing wrong with a recording.
+    """One thing wrong with a recording."""
 
-    Attributes
-    ----------
-    kind : Kind
-        What it is.
-    signal : str
-        Role of the signal, or empty for whole rows.
-    rows : tuple of (int, int)
-        Stretches of rows of the file, first and last, both counted from 1 below the header; empty where the finding is
-        about all of them.
-    text : str
-        What was found, with its figures.
-    action : Action
-        What was done.
-    advice : str
-        What the user does about it; empty where nothing is left to do.
-    severity : Severity
-        How much it matters.
-    """
-
-    kind: Kind
-    signal: str
+    kind: Kind  # what it is
+    signal: str  # role of the signal, or empty for whole rows
+    # stretches of rows of the file, first and last, both counted from 1 below the header; empty where the finding is
+    # about all of them
     rows: tuple[tuple[int, int], ...]
-    text: str
-    action: Action
-    advice: str = ""
-    severity: Severity = Severity.WARNING
+    text: str  # what was found, with its figures
+    action: Action  # what was done
+    advice: str = ""  # what the user does about it; empty where nothing is left to do
+    severity: Severity = Severity.WARNING  # how much it matters
 
     def __str__(self) -> str:
         """Give the finding as one line."""
@@ -105,59 +88,30 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a signal came from.
+    """Where a signal came from."""
 
-    Attributes
-    ----------
-    column : str
-        Column of the file.
-    unit : str
-        Unit of its numbers, as stated or guessed.
-    factor, offset : float
-        ``value = factor * number + offset``, the value in SI units. A correction by a finding (a wrong unit, a wrong
-        sign) is part of them; what unwrapping a counter added is not.
-    """
-
-    column: str
-    unit: str
+    column: str  # column of the file
+    unit: str  # unit of its numbers, as stated or guessed
+    # factor, offset: ``value = factor * number + offset``, the value in SI units. A correction by a finding (a wrong
+    # unit, a wrong sign) is part of them; what unwrapping a counter added is not
     factor: float
     offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A recorded run.
+    """A recorded run."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the file.
-    t : ndarray
-        Time [s], shape (n,), strictly increasing.
-    signals : dict
-        From a role of `roles.ROLES` to its values in SI units (or counts), shape (n,), all finite.
-    units : dict
-        From a role, ``time`` too, to the unit of its values; empty for a pure number.
-    columns : dict
-        From a role, ``time`` too, to the column it came from.
-    rows : ndarray
-        Row of the file that each sample came from, from 1 below the header, shape (n,).
-    findings : tuple of Finding
-        What was wrong, and what was done.
-    guesses : tuple of str
-        What was not stated and had to be guessed, and what was passed over.
-    constants : dict
-        Single numbers and texts that the file holds beside its columns.
-    """
-
-    name: str
-    t: Values
+    name: str  # name of the file
+    t: Values  # time [s], shape (n,), strictly increasing
+    # from a role of `roles.ROLES` to its values in SI units (or counts), shape (n,), all finite
     signals: dict[str, Values]
-    units: dict[str, str]
-    columns: dict[str, Source]
-    rows: Rows
-    findings: tuple[Finding, ...] = ()
-    guesses: tuple[str, ...] = ()
+    units: dict[str, str]  # from a role, ``time`` too, to the unit of its values; empty for a pure number
+    columns: dict[str, Source]  # from a role, ``time`` too, to the column it came from
+    rows: Rows  # row of the file that each sample came from, from 1 below the header, shape (n,)
+    findings: tuple[Finding, ...] = ()  # what was wrong, and what was done
+    guesses: tuple[str, ...] = ()  # what was not stated and had to be guessed, and what was passed over
+    # single numbers and texts that the file holds beside its columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
 
     def __len__(self) -> int:
@@ -174,18 +128,7 @@ class Log:
         return float(np.median(np.diff(self.t)))
 
     def mask(self, *kinds: Kind) -> NDArray[np.bool_]:
-        """Samples in the rows of findings of some kinds.
-
-        Parameters
-        ----------
-        *kinds : Kind
-            Kinds of findings.
-
-        Returns
-        -------
-        ndarray
-            Shape (n,); a finding without rows marks none.
-        """
+        """Samples in the rows of findings of some kinds."""
         found = np.zeros(len(self.t), dtype=np.bool_)
         for finding in self.findings:
             for first, last in finding.rows if finding.kind in kinds else ():
@@ -210,18 +153,6 @@ class Log:
 def row_ranges(rows: Sequence[int] | NDArray[np.integer]) -> tuple[tuple[int, int], ...]:
     """Put row numbers together to stretches.
 
-    Parameters
-    ----------
-    rows : sequence of int
-        Row numbers, rising.
-
-    Returns
-    -------
-    tuple of (int, int)
-        First and last row of each stretch.
-
-    Examples
-    --------
     >>> row_ranges([3, 4, 5, 9])
     ((3, 5), (9, 9))
     """
@@ -237,8 +168,6 @@ def row_ranges(rows: Sequence[int] | NDArray[np.integer]) -> tuple[tuple[int, in
 def tell_rows(ranges: Sequence[tuple[int, int]]) -> str:
     """Name stretches of rows in a sentence.
 
-    Examples
-    --------
     >>> tell_rows([(3, 5), (9, 9)])
     'rows 3-5, 9'
     >>> tell_rows([])

@@ -52,8 +52,6 @@ class Conversion(NamedTuple):
 def split_heading(cell: str) -> tuple[str, str]:
     """Name and unit of a heading; an empty unit where it states none.
 
-    Examples
-    --------
     >>> split_heading("position [mm]"), split_heading("time(ms)"), split_heading("enc1_mm"), split_heading("t/s")
     (('position', 'mm'), ('time', 'ms'), ('enc1', 'mm'), ('t', 's'))
     >>> split_heading("motor.velocity")
@@ -87,22 +85,8 @@ def bits_of(unit: str) -> int | None:
 
 
 def find_conversion(text: str, unit: str) -> Conversion | None:
-    """How numbers in a unit become numbers in another.
+    """How numbers in a unit become numbers in another; None where the text is no unit of this kind.
 
-    Parameters
-    ----------
-    text : str
-        The unit as written, with a number before it or without.
-    unit : str
-        A unit of `detent.units.KINDS`, or ``count``, ``count/s``, ``count/s^2``, ``K``, or empty for a pure number.
-
-    Returns
-    -------
-    Conversion or None
-        None where the text is no unit of this kind.
-
-    Examples
-    --------
     >>> find_conversion("0.5 mm", "m")
     Conversion(unit='m', factor=0.0005, offset=0.0)
     >>> find_conversion("steps", "count"), find_conversion("steps", "m")

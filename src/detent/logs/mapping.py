@@ -48,52 +48,26 @@ _MOST_BITS = 63
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Which column a signal comes from, and how its numbers become values.
+    """Which column a signal comes from, and how its numbers become values."""
 
-    Attributes
-    ----------
-    column : str
-        Name of the column, or its number from 1; empty where the signal is not to be read.
-    unit : str
-        Unit of the column, with a number before it or without; empty: that of the heading, or guessed.
-    factor : float or str
-        What the numbers are multiplied with, or the name of a constant of the file or of the mapping.
-    offset : float
-        What is added then, in `unit`.
-    sign : int
-        1 or -1.
-    bits : int or None
-        Width of the counter behind the numbers, where it wraps at another than 16 or 32.
-    delay : float
-        By how much the signal was recorded too late [s].
-    """
-
-    column: str
-    unit: str = ""
+    column: str  # name of the column, or its number from 1; empty where the signal is not to be read
+    unit: str = ""  # unit of the column, with a number before it or without; empty: that of the heading, or guessed
+    # what the numbers are multiplied with, or the name of a constant of the file or of the mapping
     factor: float | str = 1.0
-    offset: float = 0.0
-    sign: int = 1
-    bits: int | None = None
-    delay: float = 0.0
+    offset: float = 0.0  # what is added then, in `unit`
+    sign: int = 1  # 1 or -1
+    bits: int | None = None  # width of the counter behind the numbers, where it wraps at another than 16 or 32
+    delay: float = 0.0  # by how much the signal was recorded too late [s]
 
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """What the user says about a recording.
+    """What the user says about a recording."""
 
-    Attributes
-    ----------
-    columns : dict
-        From a role of `roles.ROLES` to the choice of its column.
-    file : FileOptions
-        How the file is laid out.
-    constants : dict
-        Numbers by names, for `Choice.factor`.
-    """
-
+    # from a role of `roles.ROLES` to the choice of its column
     columns: dict[str, Choice] = field(default_factory=dict[str, Choice])
-    file: FileOptions = field(default_factory=FileOptions)
-    constants: dict[str, float] = field(default_factory=dict[str, float])
+    file: FileOptions = field(default_factory=FileOptions)  # how the file is laid out
+    constants: dict[str, float] = field(default_factory=dict[str, float])  # numbers by names, for `Choice.factor`
 
     def overridden(self, other: "ColumnMapping") -> "ColumnMapping":
         """Give the mapping with what another says in place of what it says."""
@@ -107,23 +81,7 @@ class ColumnMapping:
 
 
 def load_mapping(path: str | Path) -> ColumnMapping:
-    """Read a mapping file.
-
-    Parameters
-    ----------
-    path : str or Path
-        A TOML file, as the head of this module shows.
-
-    Returns
-    -------
-    ColumnMapping
-        What it says.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or says something wrong; all that is wrong is told.
-    """
+    """Read a mapping file."""
     allowed = "a mapping file (TOML)"
     text = decode_utf8(Path(path), read_bytes(Path(path), MAX_BYTES, allowed))
     source = parse_source(str(path), text)
@@ -139,24 +97,6 @@ def load_mapping(path: str | Path) -> ColumnMapping:
 def parse_options(options: Sequence[str]) -> ColumnMapping:
     """Read options: ``position=qm [m]``, ``force=-vir [35.15 N]``, ``velocity=`` (not to be read), ``decimal=comma``.
 
-    Parameters
-    ----------
-    options : sequence of str
-        A role or a key of ``[log]``, an equals sign, and what to take. A minus before the name of a column turns the
-        signal round.
-
-    Returns
-    -------
-    ColumnMapping
-        What they say.
-
-    Raises
-    ------
-    InputError
-        One is not understood.
-
-    Examples
-    --------
     >>> parse_options(["force=-vir [35.15 N]"]).columns["force"]
     Choice(column='vir', unit='35.15 N', factor=1.0, offset=0.0, sign=-1, bits=None, delay=0.0)
     """

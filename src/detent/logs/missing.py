@@ -17,11 +17,6 @@ def mend_missing(draft: Draft) -> None:
 
     A signal of `SLOW` keeps its last value. Of other signals one with more than `MOST` of its cells empty is left out;
     rows with empty cells of the rest are removed, so that what is left was measured.
-
-    Parameters
-    ----------
-    draft : Draft
-        Numbers of the file with a rising time, changed in place.
     """
     absent = {role: np.isnan(values) for role, values in draft.values.items()}
     for role, gone in absent.items():

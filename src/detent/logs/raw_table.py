@@ -37,55 +37,30 @@ class Item(NamedTuple):
 
 
 class BrokenRow(NamedTuple):
-    """A row of a text file that does not fit its header.
+    """A row of a text file that does not fit its header."""
 
-    Attributes
-    ----------
-    row : int
-        Its number below the header, from 1.
-    cells : tuple of float or None
-        Its cells that say something; None for one that is no number.
-    reason : str
-        What is wrong with it.
-    """
-
-    row: int
-    cells: tuple[float | None, ...]
-    reason: str
+    row: int  # its number below the header, from 1
+    cells: tuple[float | None, ...]  # its cells that say something; None for one that is no number
+    reason: str  # what is wrong with it
 
 
 @dataclass
 class RawTable:
-    """The columns of one file.
+    """The columns of one file."""
 
-    Attributes
-    ----------
-    file : str
-        The file as the user named it.
-    columns : dict
-        From the name of a column to its numbers, shape (n,), in the order of the file; NaN where a cell is empty.
-    rows : ndarray
-        Number of each row in the file, from 1 below the header, shape (n,).
-    units : dict
-        From the name of a column to the unit its heading states, as written.
-    constants : dict
-        Single numbers and texts beside the columns.
-    notes : list of str
-        What had to be guessed about the file, and what was passed over.
-    broken : list of BrokenRow
-        Rows that are not among the columns.
-    findings : list of Finding
-        What was found and done so far.
-    """
-
-    file: str
+    file: str  # the file as the user named it
+    # from the name of a column to its numbers, shape (n,), in the order of the file; NaN where a cell is empty
     columns: dict[str, Values] = field(default_factory=dict[str, Values])
+    # number of each row in the file, from 1 below the header, shape (n,)
     rows: Rows = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    # from the name of a column to the unit its heading states, as written
     units: dict[str, str] = field(default_factory=dict[str, str])
+    # single numbers and texts beside the columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
+    # what had to be guessed about the file, and what was passed over
     notes: list[str] = field(default_factory=list[str])
-    broken: list[BrokenRow] = field(default_factory=list[BrokenRow])
-    findings: list[Finding] = field(default_factory=list[Finding])
+    broken: list[BrokenRow] = field(default_factory=list[BrokenRow])  # rows that are not among the columns
+    findings: list[Finding] = field(default_factory=list[Finding])  # what was found and done so far
 
     def told_columns(self) -> str:
         """Names of the columns for a message."""
@@ -99,25 +74,6 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
 
     Arrays of one length are its columns; single values are constants; a matrix gives one column per column of its own.
     Where arrays differ in length, those as long as the one called time are taken, otherwise the commonest length.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    items : iterable of Item
-        What it holds.
-    allowed : str
-        What a file of this kind should hold, for messages.
-
-    Returns
-    -------
-    RawTable
-        At least one column, at least one row.
-
-    Raises
-    ------
-    InputError
-        There are no columns, or too many numbers.
     """
     table = RawTable(file)
     vectors: list[Item] = []
@@ -155,13 +111,7 @@ def add_column(table: RawTable, item: Item) -> None:
 
 
 def check_size(file: str, rows: int, columns: int) -> None:
-    """Refuse what would fill the memory.
-
-    Raises
-    ------
-    InputError
-        There are more numbers than `MAX_CELLS` or more columns than `MAX_COLUMNS`.
-    """
+    """Refuse what would fill the memory."""
     if rows * columns > MAX_CELLS or columns > MAX_COLUMNS:
         allowed = f"up to {MAX_COLUMNS} columns and {MAX_CELLS // 1_000_000} million numbers"
         remedy = "cut the recording into pieces, or save only the columns needed"

@@ -30,23 +30,6 @@ def read_mat(path: Path, options: FileOptions) -> RawTable:
     """Read a MATLAB file: version 4 to 7 with SciPy, version 7.3, which is HDF5, as such.
 
     Fields of structures give names joined by points; ``table`` names the structure to read.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileOptions
-        Of which ``table`` counts.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no such file, or holds no vectors of numbers.
     """
     files: Any = importlib.import_module("scipy.io")
     check_file(path, MAX_BYTES, ALLOWED_MAT)
@@ -65,25 +48,7 @@ def read_mat(path: Path, options: FileOptions) -> RawTable:
 
 
 def read_npz(path: Path, options: FileOptions) -> RawTable:
-    """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileOptions
-        Of which ``table`` counts: the array to read.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no such file, or holds no vectors of numbers.
-    """
+    """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused."""
     check_file(path, MAX_BYTES, ALLOWED_NPZ)
     items: list[Item] = []
     try:

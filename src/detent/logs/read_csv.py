@@ -30,23 +30,6 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     """Read a text table.
 
     Rows that do not fit the header, or hold what is no number in a column of numbers, are put aside as broken.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileOptions
-        How it is laid out, as far as the user says it.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no text, no table, too large, or mostly broken.
     """
     table = RawTable(str(path))
     lines = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table).splitlines()
@@ -74,13 +57,7 @@ def _check_broken(table: RawTable, layout: CsvLayout, lines: list[str], numbers:
 
 
 def decode(path: Path, data: bytes, table: RawTable) -> str:
-    """Text of a file: UTF-8, UTF-16 with its mark, or else the encoding of western Windows.
-
-    Raises
-    ------
-    InputError
-        It holds NUL bytes, as no text does.
-    """
+    """Text of a file: UTF-8, UTF-16 with its mark, or else the encoding of western Windows."""
     if data.startswith(_UTF16):
         return data.decode("utf-16", "replace")
     if b"\0" in data:

@@ -28,23 +28,6 @@ def read_hdf5(path: Path, options: FileOptions) -> RawTable:
 
     Of a file with several groups that hold vectors, the one with the most is read unless ``table`` names another.
     Units stand in an attribute ``unit`` or ``units`` of a dataset.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileOptions
-        Of which ``table`` counts: the group or dataset to read.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no such file, or holds no vectors of numbers.
     """
     import h5py
 

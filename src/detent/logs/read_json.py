@@ -42,23 +42,6 @@ def read_json(path: Path, options: FileOptions) -> RawTable:
 
     Records are objects, or lists of equal length; objects in them give names joined by points. A list of records may
     stand in an object, whose other values are constants; of several such lists ``table`` names one.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its name ends in ``.jsonl`` or ``.ndjson`` for one record per line.
-    options : FileOptions
-        Of which ``table`` counts.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no JSON, or holds no recording.
     """
     file = str(path)
     text = decode_utf8(path, read_bytes(path, MAX_BYTES, ALLOWED))

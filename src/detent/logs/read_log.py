@@ -24,27 +24,7 @@ _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 
 
 def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None, options: Sequence[str] = ()) -> Log:
-    """Read a recording of a machine, and find what is wrong with it.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file of one of `read_table.READERS`: CSV, HDF5, Parquet, MATLAB, NPZ, JSON.
-    mapping : ColumnMapping, str or Path, optional
-        What its columns are, or the mapping file that says it; guessed as far as it says nothing.
-    options : sequence of str
-        The same in short, such as ``position=qm [m]``; they override the mapping.
-
-    Returns
-    -------
-    Log
-        Signals in SI units, what was found and done, and what was guessed.
-
-    Raises
-    ------
-    InputError
-        The file, the mapping or an option is wrong, or nothing usable is left.
-    """
+    """Read a recording of a machine, and find what is wrong with it."""
     stated = load_mapping(mapping) if isinstance(mapping, str | Path) else mapping or ColumnMapping()
     stated = stated.overridden(parse_options(options))
     table = read_table(path, stated.file)

@@ -20,25 +20,7 @@ ALLOWED = "a Parquet file with columns of numbers"
 
 
 def read_parquet(path: Path, options: FileOptions) -> RawTable:
-    """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    options : FileOptions
-        None of it says anything about such a file.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is no such file, pyarrow is not installed, or there are no columns of numbers.
-    """
+    """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit."""
     del options
     check_file(path, MAX_BYTES, ALLOWED)
     try:

@@ -25,25 +25,7 @@ _TEXTS = frozenset(kind for kind, reader in READERS.items() if reader in {read_c
 
 
 def read_table(path: str | Path, options: FileOptions | None = None) -> RawTable:
-    """Read the columns of a recording.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file whose name ends in one of `READERS`, and in ``.gz`` behind that if it is text packed with gzip.
-    options : FileOptions, optional
-        What the user says about it; everything is guessed without.
-
-    Returns
-    -------
-    RawTable
-        At least one column and one row.
-
-    Raises
-    ------
-    InputError
-        It is of no kind that is read, or cannot be read.
-    """
+    """Read the columns of a recording."""
     path = Path(path)
     kind = kind_of(path)
     is_packed = path.suffix.lower() == ".gz"

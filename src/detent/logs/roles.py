@@ -15,23 +15,13 @@ EFFORTS = ("force", "torque", "current", "voltage", "command")
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a signal is.
+    """What a signal is."""
 
-    Attributes
-    ----------
-    name : str
-        Key of the signal.
-    meaning : str
-        What it is, for messages and the documentation.
-    units : tuple of str
-        Units that it may have behind the border: of an axis that moves straight, of one that turns, in counts.
-    names : tuple of str
-        What columns of it are called, the most telling first: words in small letters, to be found whole and in order.
-    """
-
-    name: str
-    meaning: str
+    name: str  # key of the signal
+    meaning: str  # what it is, for messages and the documentation
+    # units that it may have behind the border: of an axis that moves straight, of one that turns, in counts
     units: tuple[str, ...]
+    # what columns of it are called, the most telling first: words in small letters, to be found whole and in order
     names: tuple[str, ...]
 
 
@@ -84,8 +74,6 @@ _LEAST_FUZZY = 6
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a column's name, in small letters.
 
-    Examples
-    --------
     >>> words_of("inputSignal"), words_of("goal_position"), words_of("enc1")
     (('input', 'signal'), ('goal', 'position'), ('enc', '1'))
     """
@@ -95,20 +83,6 @@ def words_of(name: str) -> tuple[str, ...]:
 def rank(name: str, role: str) -> int | None:
     """How well the name of a column fits a role.
 
-    Parameters
-    ----------
-    name : str
-        Its name, without a unit.
-    role : str
-        A key of `ROLES`.
-
-    Returns
-    -------
-    int or None
-        0 for the best; None where the name does not say that the column is of this role.
-
-    Examples
-    --------
     >>> rank("Time", "time"), rank("Current Error", "current"), rank("enconder", "position") is not None
     (1, None, True)
     """

@@ -41,13 +41,6 @@ def mend_rotation(table: RawTable, time: str) -> None:
     column runs like a clock for at least `SHORTEST` rows, the cells are rotated by the distance of the two. If the
     first row lacks as many cells as the others have too many in front, the lines of the file are broken in the wrong
     places: then the first cells of a line belong to the row before. Otherwise the cells of each row belong together.
-
-    Parameters
-    ----------
-    table : RawTable
-        The columns, changed in place; what was found is added to its findings.
-    time : str
-        Name of the column for the time.
     """
     if len(table.rows) < SHORTEST:
         return
@@ -129,11 +122,6 @@ def _edges(theirs: Values, ours: Values) -> tuple[int, int]:
 
     A column may run evenly by chance where the clock is in its place. So both ends are cut where the least is missed:
     by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
-
-    Parameters
-    ----------
-    theirs, ours : float64 array, shape (n,)
-        By what share of a clock's step each step of the column, and of the clock, misses it.
     """
     n, cut = len(theirs), 1.0 - np.minimum(theirs, ours)
     inside, outside = np.r_[0.0, np.cumsum(theirs)], np.r_[0.0, np.cumsum(ours), float(ours.sum())]

@@ -37,11 +37,6 @@ def find_saturation(draft: Draft) -> None:
     A cut-off signal piles up at one number: it stays there for `SHORTEST` rows and more, and is there far more often
     than at any number beside it. That it is cut off, and not commanded so, is certain where the number is a full scale
     (255, 1023, 100) or both ends lie at the same distance from zero; otherwise it is noted only.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units.
     """
     for role in LIMITED:
         if role in draft.values:

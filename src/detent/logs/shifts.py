@@ -26,11 +26,6 @@ def find_shifts(draft: Draft) -> None:
     is left where it is. A position that runs ahead of its reference, and a force, torque or current that comes after
     the acceleration that it makes, are against nature: then one of the two was recorded with a delay. That a position
     follows its reference with a delay is what loops do, and no finding.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units, changed in place.
     """
     motion = find_motion(draft)
     if motion is None or len(draft) < _FEWEST:
@@ -62,20 +57,7 @@ def _tell(draft: Draft, role: str, text: str, lag: float) -> None:
 
 
 def find_lag(ours: Values, theirs: Values, *, prefers_earlier: bool = False) -> float:
-    """By how many rows one series comes after another, by the peak of their correlation.
-
-    Parameters
-    ----------
-    ours, theirs : ndarray
-        Shape (n,).
-    prefers_earlier : bool
-        Of a periodic motion, whose shifts are alike a period apart, take one by which the first comes earlier.
-
-    Returns
-    -------
-    float
-        Rows, with a fraction; 0 where the series are not alike, or the shift explains too little.
-    """
+    """By how many rows one series comes after another, by the peak of their correlation."""
     most = min(FARTHEST, len(ours) // 4)
     curve = correlation_curve(ours, theirs, most)
     peak = _nearest_peak(curve, most, prefers_earlier=prefers_earlier)

@@ -43,16 +43,6 @@ def mend_clock(draft: Draft) -> None:
     In this order: rows without a time are removed; a clock that wraps is unwrapped; rows that are in the file twice are
     removed; of a clock that starts again the longest stretch is kept; rows out of order are put into their place or
     removed; repeated stamps are spread out if they are many, otherwise their rows are removed.
-
-    Parameters
-    ----------
-    draft : Draft
-        Numbers of the file, changed in place.
-
-    Raises
-    ------
-    InputError
-        Fewer than `FEWEST` samples are left.
     """
     absent = np.isnan(draft.t)
     if absent.any():
@@ -202,11 +192,6 @@ def look_at_clock(draft: Draft) -> None:
     Steps count in usual steps (the median). A recording is irregular if more than `JITTER` of its steps deviate from a
     whole number of usual ones by more than `JITTER`. Of an even recording, a step of 1.5 or more is rows missing; of an
     irregular one, a step of 2.5 or more, as a late row does not yet mean a lost one.
-
-    Parameters
-    ----------
-    draft : Draft
-        In seconds, strictly rising.
     """
     steps = np.diff(draft.t)
     usual = float(np.median(steps))
@@ -232,18 +217,7 @@ def look_at_clock(draft: Draft) -> None:
 
 
 def stretches(t: Values) -> list[slice]:
-    """Stretches of samples without a gap: no step in them is 2.5 usual ones or more.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), strictly rising.
-
-    Returns
-    -------
-    list of slice
-        All samples, in order.
-    """
+    """Stretches of samples without a gap: no step in them is 2.5 usual ones or more."""
     steps = np.diff(t)
     cuts = np.flatnonzero(steps >= 2.5 * np.median(steps)) + 1
     bounds = [0, *cuts.tolist(), len(t)]

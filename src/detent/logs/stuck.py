@@ -34,11 +34,6 @@ def find_stuck(draft: Draft) -> None:
     equal numbers alone proves nothing, since an axis may rest. It is held against a twin: a position against the
     integral of the velocity, the other encoder or the reference, a velocity against the position. Of a noisy signal
     without a twin, such as a current, a run must be longer than chance allows while the axis moves.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units; constant signals are taken out.
     """
     for role in [role for role in draft.values if role in _MEASURED or role == "command"]:
         _find_constant(draft, role)

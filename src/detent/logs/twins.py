@@ -29,27 +29,13 @@ _SMALL_WINDOW = 4
 
 
 class Twin(NamedTuple):
-    """Another signal that says the same as one.
+    """Another signal that says the same as one."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called in a sentence.
-    way : ndarray
-        The way by the other, to the scale of the one, shape (n,).
-    disagreement : ndarray
-        The way by the one less that by the other, shape (n,).
-    grain : float
-        Resolution of the positions.
-    drift : float
-        Resolution of the velocity, by which its integral can drift per second; 0 between positions.
-    """
-
-    name: str
-    way: Values
-    disagreement: Values
-    grain: float
-    drift: float
+    name: str  # what it is called in a sentence
+    way: Values  # the way by the other, to the scale of the one, shape (n,)
+    disagreement: Values  # the way by the one less that by the other, shape (n,)
+    grain: float  # resolution of the positions
+    drift: float  # resolution of the velocity, by which its integral can drift per second; 0 between positions
 
     def way_in(self, first: int, last: int) -> float:
         """Way in some samples, by whichever of the two says more."""
@@ -62,20 +48,7 @@ class Twin(NamedTuple):
 
 
 def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
-    """Find the signals that a position or a velocity can be held against.
-
-    Parameters
-    ----------
-    draft : Draft
-        In SI units.
-    role : str
-        ``position``, ``position_load`` or ``velocity``.
-
-    Yields
-    ------
-    Twin
-        One for each signal that moves as this one does, outside the stretches in which this one stays the same.
-    """
+    """Find the signals that a position or a velocity can be held against."""
     values, t = draft.values[role], draft.t
     base = draft.unit(role).partition("/")[0]
     found: list[tuple[str, Values, Values, float]] = []

@@ -33,22 +33,6 @@ def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
 
     Savitzky and Golay, Analytical Chemistry 36 (1964) 1627.
 
-    Parameters
-    ----------
-    values : ndarray
-        Evenly spaced samples, shape (n,), n >= rows.
-    period : float
-        Their distance.
-    rows : int
-        Samples of a window, odd, at least 3.
-
-    Returns
-    -------
-    ndarray
-        Shape (3, n - rows + 1).
-
-    Examples
-    --------
     >>> parabolas(np.arange(7.0) ** 2, 1.0, 5).round(6)
     array([[ 4.,  9., 16.],
            [ 4.,  6.,  8.],

@@ -16,27 +16,13 @@ from detent.methods.registry import METHODS
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class EffectiveRow:
-    """One value in effect.
+    """One value in effect."""
 
-    Attributes
-    ----------
-    key : str
-        Dotted key.
-    value : str
-        Value with its SI unit (prefixed).
-    written : str
-        Value as it was written; empty for a default.
-    origin : str
-        "FILE line 12", "default", "catalogue NAME" or "--set".
-    doc : str
-        Meaning of the key.
-    """
-
-    key: str
-    value: str
-    written: str
-    origin: str
-    doc: str
+    key: str  # dotted key
+    value: str  # value with its SI unit (prefixed)
+    written: str  # value as it was written; empty for a default
+    origin: str  # "FILE line 12", "default", "catalogue NAME" or "--set"
+    doc: str  # meaning of the key
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -68,18 +54,7 @@ class CheckReport:
 
 
 def check_spec(axis: AxisFile) -> CheckReport:
-    """Look an axis over.
-
-    Parameters
-    ----------
-    axis : AxisFile
-        As `read_axis` returns it: without problems.
-
-    Returns
-    -------
-    CheckReport
-        Values in effect with their origin, derived figures, warnings.
-    """
+    """Look an axis over."""
     header = axis.spec.axis
     method = METHODS[header.method]
     warnings = tuple(method.cautions(axis.spec))

@@ -38,24 +38,13 @@ MOTION_KEY: Path = ("axis", "motion")
 
 @dataclass(frozen=True, slots=True)
 class AxisFile:
-    """A specification and where each of its values came from.
+    """A specification and where each of its values came from."""
 
-    Attributes
-    ----------
-    file : str
-        The file as the user named it.
-    spec : AxisSpec
-        The specification of its method, in SI units.
-    origins : dict
-        By dotted key: "line 12", "--set" or "catalogue NAME"; keys left to their default are absent.
-    texts : dict
-        By dotted key: the value as written, where it was written.
-    """
-
-    file: str
-    spec: AxisSpec
+    file: str  # the file as the user named it
+    spec: AxisSpec  # the specification of its method, in SI units
+    # by dotted key: "line 12", "--set" or "catalogue NAME"; keys left to their default are absent
     origins: dict[str, str]
-    texts: dict[str, str]
+    texts: dict[str, str]  # by dotted key: the value as written, where it was written
 
 
 @dataclass(slots=True)
@@ -70,25 +59,7 @@ class _Layers:
 
 
 def load_spec(path: FilePath | str, overrides: Sequence[str] = ()) -> AxisSpec:
-    """Load an axis file.
-
-    Parameters
-    ----------
-    path : Path or str
-        The axis file (TOML).
-    overrides : sequence of str
-        Values that replace the file's, such as ``"drive.supply=34 V"`` or ``"method.span=steady"``.
-
-    Returns
-    -------
-    AxisSpec
-        The specification of the method the file names: all values, defaults filled, in SI units.
-
-    Raises
-    ------
-    InputError
-        With every problem of the file and of the overrides.
-    """
+    """Load an axis file."""
     return read_axis(path, overrides).spec
 
 

@@ -9,45 +9,20 @@ from detent.methods.registry import METHODS
 
 @dataclass(frozen=True, slots=True)
 class ReferenceRow:
-    """One key of the axis file.
+    """One key of the axis file."""
 
-    Attributes
-    ----------
-    key : str
-        Dotted key.
-    unit : str
-        SI unit the value is converted to; empty for numbers, words and switches.
-    default : str
-        Value that holds when the key is left out; empty when it must be stated.
-    required : bool
-        True when it must be stated (in its table, if that is given at all).
-    doc : str
-        Meaning.
-    allowed : str
-        What it may be.
-    example : str
-        A value as TOML text, for keys that must be stated.
-    """
-
-    key: str
-    unit: str
-    default: str
-    required: bool
-    doc: str
-    allowed: str
-    example: str
+    key: str  # dotted key
+    unit: str  # SI unit the value is converted to; empty for numbers, words and switches
+    default: str  # value that holds when the key is left out; empty when it must be stated
+    required: bool  # True when it must be stated (in its table, if that is given at all)
+    doc: str  # meaning
+    allowed: str  # what it may be
+    example: str  # a value as TOML text, for keys that must be stated
 
 
 def reference_rows(method: str) -> tuple[ReferenceRow, ...]:
     """All keys a method's axis file knows, in the order of the schema.
 
-    Parameters
-    ----------
-    method : str
-        A control method, one of `METHODS`.
-
-    Examples
-    --------
     >>> row = reference_rows("print_head")[3]
     >>> row.key, row.unit, row.required
     ('limits.travel', 'm', True)

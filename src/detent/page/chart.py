@@ -25,165 +25,71 @@ SCALES: dict[str, tuple[float, int]] = {"ms": (1e3, 3), "s": (1.0, 5)}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One curve of a plot area.
+    """One curve of a plot area."""
 
-    Attributes
-    ----------
-    label : str
-        As in the legend.
-    colour : str
-        Name of a colour of template/report.css: "speed", "drive", "current", "right", "left", "ink", "muted".
-    y : ndarray
-        Values in the unit of the plot area, shape (n,); NaN is a gap.
-    digits : int
-        Digits kept after the point.
-    width : float, optional
-        Width of the line [px]; 1.5 unless given.
-    dash : (int, int), optional
-        Length of dash and gap [px]; drawn through unless given.
-    step : bool
-        Each value holds until the next one, as the outputs of a computer do.
-    rings : int, optional
-        Diameter [px] of rings drawn at the points, instead of a line.
-    thin : int
-        Rows of a long recording that are chosen for this curve's sake; 0 if it may use those of the others.
-    fill : bool
-        Tint the ground between the curve and zero.
-    """
-
-    label: str
-    colour: str
-    y: Numbers
-    digits: int = 3
-    width: float | None = None
-    dash: tuple[int, int] | None = None
-    step: bool = False
-    rings: int | None = None
+    label: str  # as in the legend
+    colour: str  # name of a colour of template/report.css: "speed", "drive", "current", "right", "left", "ink", "muted"
+    y: Numbers  # values in the unit of the plot area, shape (n,); NaN is a gap
+    digits: int = 3  # digits kept after the point
+    width: float | None = None  # width of the line [px]; 1.5 unless given
+    dash: tuple[int, int] | None = None  # length of dash and gap [px]; drawn through unless given
+    step: bool = False  # each value holds until the next one, as the outputs of a computer do
+    rings: int | None = None  # diameter [px] of rings drawn at the points, instead of a line
+    # rows of a long recording that are chosen for this curve's sake; 0 if it may use those of the others
     thin: int = POINTS
-    fill: bool = False
+    fill: bool = False  # tint the ground between the curve and zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One plot area: its curves and what stands behind them.
+    """One plot area: its curves and what stands behind them."""
 
-    Attributes
-    ----------
-    name : str
-        Id of the element it is drawn in, one of its kind on the page.
-    label : str
-        Of the vertical axis, with unit: "speed [in/s]".
-    curves : sequence of Curve
-        All of one length; the first is drawn first.
-    height : int
-        Height [px].
-    zero : bool
-        Draw a line at zero where it is in sight.
-    span : (float, float), optional
-        Lower and upper end of the vertical axis; what the curves need unless given.
-    levels : sequence of (float, str)
-        Values marked by a dashed line, with their names.
-    title : str
-        Above the plot area, where a figure has several.
-    about : str
-        What it shows, for those who cannot see it; both axes' labels unless given.
-    """
-
-    name: str
-    label: str
-    curves: Sequence[Curve]
-    height: int = 220
-    zero: bool = False
+    name: str  # id of the element it is drawn in, one of its kind on the page
+    label: str  # of the vertical axis, with unit: "speed [in/s]"
+    curves: Sequence[Curve]  # all of one length; the first is drawn first
+    height: int = 220  # height [px]
+    zero: bool = False  # draw a line at zero where it is in sight
+    # lower and upper end of the vertical axis; what the curves need unless given
     span: tuple[float, float] | None = None
-    levels: Sequence[tuple[float, str]] = ()
-    title: str = ""
-    about: str = ""
+    levels: Sequence[tuple[float, str]] = ()  # values marked by a dashed line, with their names
+    title: str = ""  # above the plot area, where a figure has several
+    about: str = ""  # what it shows, for those who cannot see it; both axes' labels unless given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """Stretches of time with a ground of their own.
+    """Stretches of time with a ground of their own."""
 
-    Attributes
-    ----------
-    label : str
-        Written at the foot of each stretch that has room for it.
-    colour : {"good", "brake"}
-        Name of the ground.
-    spans : sequence of (float, float)
-        Begin and end of each stretch [s].
-    """
-
-    label: str
-    colour: Literal["good", "brake"]
-    spans: Sequence[tuple[float, float]]
+    label: str  # written at the foot of each stretch that has room for it
+    colour: Literal["good", "brake"]  # name of the ground
+    spans: Sequence[tuple[float, float]]  # begin and end of each stretch [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timeline:
-    """Time below one or more plot areas, and what happens at its moments.
+    """Time below one or more plot areas, and what happens at its moments."""
 
-    Attributes
-    ----------
-    name : str
-        Plot areas with the same name share their cursor.
-    t : ndarray
-        Moments of the curves' values [s], rising, shape (n,).
-    label : str
-        What it counts from: "time since the move began".
-    unit : {"ms", "s"}
-        Unit in which the page shows it.
-    bands : sequence of Band
-        Behind every plot area.
-    events : sequence of Event
-        Drawn across every plot area, numbered in the first one as in `page.event_table`.
-    """
-
-    name: str
-    t: Numbers
-    label: str = "time"
-    unit: Literal["ms", "s"] = "ms"
-    bands: Sequence[Band] = ()
-    events: Sequence[Event] = ()
+    name: str  # plot areas with the same name share their cursor
+    t: Numbers  # moments of the curves' values [s], rising, shape (n,)
+    label: str = "time"  # what it counts from: "time since the move began"
+    unit: Literal["ms", "s"] = "ms"  # unit in which the page shows it
+    bands: Sequence[Band] = ()  # behind every plot area
+    events: Sequence[Event] = ()  # drawn across every plot area, numbered in the first one as in `page.event_table`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heap:
-    """One group of a histogram.
+    """One group of a histogram."""
 
-    Attributes
-    ----------
-    label, colour : str
-        As of a curve.
-    at : ndarray
-        Places on the horizontal axis, in its unit, shape (n,).
-    counts : ndarray of int
-        How often each place occurs, shape (n,).
-    """
-
-    label: str
+    label: str  # and colour: as of a curve
     colour: str
-    at: Numbers
-    counts: Numbers
+    at: Numbers  # places on the horizontal axis, in its unit, shape (n,)
+    counts: Numbers  # how often each place occurs, shape (n,)
 
 
 def spans_of(t: Numbers, on: Numbers) -> list[tuple[float, float]]:
-    """Find the stretches of time in which something holds.
+    """Find the stretches of time in which something holds [s].
 
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], rising, shape (n,).
-    on : ndarray of bool
-        Whether it holds, shape (n,).
-
-    Returns
-    -------
-    list of (float, float)
-        From the first moment at which it holds to the first at which it does not, or to the last of all [s].
-
-    Examples
-    --------
     >>> import numpy as np
     >>> spans_of(np.arange(6.0), np.array([0, 1, 1, 0, 0, 1]))
     [(1.0, 3.0), (5.0, 5.0)]
@@ -194,42 +100,12 @@ def spans_of(t: Numbers, on: Numbers) -> list[tuple[float, float]]:
 
 
 def line_chart(panel: Panel, x: Numbers, label: str, *, digits: int = 4) -> Chart:
-    """Draw one plot area over any horizontal axis, every row of it.
-
-    Parameters
-    ----------
-    panel : Panel
-        What to draw.
-    x : ndarray
-        Horizontal places of the curves' values, rising, shape (n,).
-    label : str
-        Of the horizontal axis, with unit.
-    digits : int
-        Digits of `x` kept after the point.
-
-    Returns
-    -------
-    dict
-        One chart.
-    """
+    """Draw one plot area over any horizontal axis, every row of it."""
     return _chart(panel, slice(None)) | {"x": rounded(x, digits), "xLabel": label}
 
 
 def time_charts(timeline: Timeline, panels: Sequence[Panel]) -> list[Chart]:
-    """Draw plot areas above one another over the same time, with as many rows as a screen can show.
-
-    Parameters
-    ----------
-    timeline : Timeline
-        What they share; the curves have its length.
-    panels : sequence of Panel
-        From top to bottom, at least one.
-
-    Returns
-    -------
-    list of dict
-        One chart per panel; only the last names the time.
-    """
+    """Draw plot areas above one another over the same time, with as many rows as a screen can show."""
     scale, digits = SCALES[timeline.unit]
     chosen = [thin_indices(curve.y, curve.thin) for panel in panels for curve in panel.curves if curve.thin]
     kept = np.unique(np.concatenate(chosen or [thin_indices(timeline.t, POINTS)]))
@@ -250,26 +126,7 @@ def time_charts(timeline: Timeline, panels: Sequence[Panel]) -> list[Chart]:
 def histogram_chart(
     name: str, heaps: Sequence[Heap], labels: tuple[str, str], *, finest: float, limit: float = inf
 ) -> Chart:
-    """Count values per bin, centred on zero, in one or two groups side by side.
-
-    Parameters
-    ----------
-    name : str
-        Id of the element it is drawn in.
-    heaps : sequence of Heap
-        One, or two; the first stands left.
-    labels : (str, str)
-        Of the horizontal axis, with unit, and of the vertical one.
-    finest : float
-        Narrowest bar, in the unit of the horizontal axis, > 0.
-    limit : float
-        Largest good magnitude; marked on both sides where the values come near it.
-
-    Returns
-    -------
-    dict
-        One chart.
-    """
+    """Count values per bin, centred on zero, in one or two groups side by side."""
     seen = [float(np.abs(heap.at[heap.counts > 0]).max(initial=0.0)) for heap in heaps]
     largest = max(*seen, finest / 2)
     step = max(_nice_step(largest / 15), finest)
@@ -297,20 +154,6 @@ def histogram_chart(
 def rounded(values: Numbers, digits: int) -> list[float | None]:
     """Round numbers for a page; what is not finite becomes a gap.
 
-    Parameters
-    ----------
-    values : ndarray
-        Numbers, shape (n,).
-    digits : int
-        Digits kept after the point.
-
-    Returns
-    -------
-    list of float or None
-        As JSON can hold them.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> rounded(np.array([1.2345, np.nan]), 2)
     [1.23, None]

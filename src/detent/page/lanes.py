@@ -21,64 +21,25 @@ DIGITS = 4
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A stretch of the horizontal axis.
+    """A stretch of the horizontal axis."""
 
-    Attributes
-    ----------
-    begin, end : float
-        Its ends, in the unit of the axis.
-    short : str
-        Written inside where there is room.
-    text : str
-        Told below the chart while the cursor is over it.
-    """
-
-    begin: float
+    begin: float  # and end: its ends, in the unit of the axis
     end: float
-    short: str
-    text: str
+    short: str  # written inside where there is room
+    text: str  # told below the chart while the cursor is over it
 
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """Bars of one kind.
+    """Bars of one kind."""
 
-    Attributes
-    ----------
-    label : str
-        Name of the lane; about ten characters have room beside it.
-    colour : str
-        As of a curve.
-    bars : sequence of Bar
-        In any order.
-    """
-
-    label: str
-    colour: str
-    bars: Sequence[Bar]
+    label: str  # name of the lane; about ten characters have room beside it
+    colour: str  # as of a curve
+    bars: Sequence[Bar]  # in any order
 
 
 def lane_chart(name: str, lanes: Sequence[Lane], span: tuple[float, float], label: str, *, sync: str = "") -> Chart:
-    """Draw lanes above one another.
-
-    Parameters
-    ----------
-    name : str
-        Id of the element it is drawn in.
-    lanes : sequence of Lane
-        From top to bottom, at least one.
-    span : (float, float)
-        Ends of the horizontal axis; bars are cut there.
-    label : str
-        Of the horizontal axis, with unit.
-    sync : str
-        Name of a `chart.Timeline` that is drawn below and names the axis; empty for none.
-
-    Returns
-    -------
-    dict
-        One chart without curves.
-    """
+    """Draw lanes above one another."""
     shown = [
         (lane, [bar for bar in lane.bars if bar.end > span[0] and bar.begin < span[1] and bar.end > bar.begin])
         for lane in lanes

@@ -32,44 +32,19 @@ ZOOM_HINT = '<p class="hint">Drag across to zoom in, double-click to zoom out.</
 
 
 class Page(TypedDict):
-    """What a page is made of.
+    """What a page is made of."""
 
-    Attributes
-    ----------
-    title : str
-        Title of the window, as text.
-    body : sequence of str
-        Headline, cards, notes, sections and small print as HTML, from top to bottom; empty ones leave no trace.
-    charts : sequence of dict
-        Charts, each drawn in the slot of its id.
-    paper : dict, optional
-        The printed page, drawn by template/paper.js in the element "paper"; None if nothing is on paper.
-    version : str, optional
-        Of detent; the package's own if empty.
-    """
-
-    title: str
+    title: str  # title of the window, as text
+    # headline, cards, notes, sections and small print as HTML, from top to bottom; empty ones leave no trace
     body: Sequence[str]
-    charts: Sequence[Chart]
+    charts: Sequence[Chart]  # charts, each drawn in the slot of its id
+    # the printed page, drawn by template/paper.js in the element "paper"; None if nothing is on paper
     paper: NotRequired[dict[str, Any] | None]
-    version: NotRequired[str]
+    version: NotRequired[str]  # of detent; the package's own if empty
 
 
 def write_page(path: str | Path, page: Page | frame.Page) -> None:
-    """Write a page as one self-contained HTML file.
-
-    Parameters
-    ----------
-    path : str or Path
-        Target; replaced if it exists.
-    page : Page
-        What it is made of.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Write a page as one self-contained HTML file."""
     if isinstance(page, frame.Page):
         render.write_page(path, page)
         return
@@ -85,18 +60,7 @@ def write_page(path: str | Path, page: Page | frame.Page) -> None:
 
 
 def render_page(page: Page) -> str:
-    """Make a page as text.
-
-    Parameters
-    ----------
-    page : Page
-        What it is made of.
-
-    Returns
-    -------
-    str
-        A whole HTML document.
-    """
+    """Make a page as text."""
     paper = page.get("paper")
     return Template(_asset("template/report.html")).substitute(
         title=escape(page["title"]),
@@ -126,26 +90,7 @@ def _embedded(name: str, payload: dict[str, Any]) -> str:
 
 
 def headline(level: Literal["good", "warn", "bad"], verdict: str, name: str, *, kicker: str, lead: str) -> str:
-    """Say what happened: a badge and a name, and one or two sentences below them.
-
-    Parameters
-    ----------
-    level : {"good", "warn", "bad"}
-        Colour and sign of the badge.
-    verdict : str
-        Text of the badge: "Printed".
-    name : str
-        What was run, as text.
-    kicker : str
-        Small line above, as text.
-    lead : str
-        Sentences below, as text.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Say what happened: a badge and a name, and one or two sentences below them."""
     badge = f'<span class="badge {level}">{SIGNS[level]} {escape(verdict)}</span>'
     return (
         f'<header><p class="kicker">{escape(kicker)}</p>\n'
@@ -154,18 +99,7 @@ def headline(level: Literal["good", "warn", "bad"], verdict: str, name: str, *, 
 
 
 def cards(shown: Iterable[Card]) -> str:
-    """Place cards side by side.
-
-    Parameters
-    ----------
-    shown : iterable of Card
-        From left to right.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Place cards side by side."""
     items = "".join(
         f'<div class="card{" bad" if card.bad else ""}"><dt>{escape(card.title)}</dt>'
         f'<dd class="value">{escape(card.value)} <small>{escape(card.unit)}</small></dd>'
@@ -176,18 +110,7 @@ def cards(shown: Iterable[Card]) -> str:
 
 
 def notes(told: Sequence[Note]) -> str:
-    """List notes, errors first, then warnings.
-
-    Parameters
-    ----------
-    told : sequence of Note
-        In any order.
-
-    Returns
-    -------
-    str
-        HTML; empty if there are none.
-    """
+    """List notes, errors first, then warnings."""
     order = list(LEVELS)
     items = "\n".join(
         f'<li class="note {note.level}"><b>{LEVELS[note.level]}</b>{escape(note.text)}</li>'
@@ -200,63 +123,18 @@ def notes(told: Sequence[Note]) -> str:
 
 
 def section(title: str, *figures: str) -> str:
-    """Put figures under a title.
-
-    Parameters
-    ----------
-    title : str
-        As text.
-    *figures : str
-        HTML; empty ones are left out.
-
-    Returns
-    -------
-    str
-        HTML; empty if no figure is left.
-    """
+    """Put figures under a title."""
     shown = [figure for figure in figures if figure]
     return "\n".join([f"<h2>{escape(title)}</h2>", *shown]) if shown else ""
 
 
 def figure(title: str, caption: str, content: str, after: str = "") -> str:
-    """Frame charts or a table under a title and a caption that says what to look at.
-
-    Parameters
-    ----------
-    title : str
-        As text.
-    caption : str
-        As HTML.
-    content : str
-        As HTML: slots of charts, or a table.
-    after : str
-        As HTML: a hint, a table of events.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Frame charts or a table under a title and a caption that says what to look at."""
     return f"<figure><figcaption><h3>{escape(title)}</h3><p>{caption}</p></figcaption>\n{content}\n{after}</figure>"
 
 
 def paper_figure(title: str, caption: str, paper: Mapping[str, Any]) -> str:
-    """Frame the printed page, with the buttons that template/paper.js serves.
-
-    Parameters
-    ----------
-    title : str
-        As text.
-    caption : str
-        As HTML; what magnifying the errors does is added.
-    paper : mapping
-        As `print_charts.page_data` gives it.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Frame the printed page, with the buttons that template/paper.js serves."""
     factor, left_out = count(paper["magnify"]), int(paper["leftOut"])
     controls = (
         '<span class="group"><button id="true-size" aria-pressed="true">True size</button>'
@@ -275,55 +153,18 @@ def paper_figure(title: str, caption: str, paper: Mapping[str, Any]) -> str:
 
 
 def chart_slot(name: str, label: str) -> str:
-    """Make the place where a chart is drawn.
-
-    Parameters
-    ----------
-    name : str
-        Id of the chart.
-    label : str
-        What it shows, for those who cannot see it.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Make the place where a chart is drawn."""
     return f'<div class="chart" id="{escape(name)}" role="img" aria-label="{escape(label)}"></div>'
 
 
 def side_by_side(shown: Mapping[str, str]) -> str:
-    """Place charts beside one another, where the screen is wide enough.
-
-    Parameters
-    ----------
-    shown : mapping of str to str
-        Title of each as text, and its slot as HTML, from left to right.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Place charts beside one another, where the screen is wide enough."""
     items = "".join(f'<div><p class="chart-title">{escape(title)}</p>{slot}</div>' for title, slot in shown.items())
     return f'<div class="pair">{items}</div>'
 
 
 def event_table(events: Sequence[Event], unit: Literal["ms", "s"] = "ms") -> str:
-    """List the numbered moments of a figure.
-
-    Parameters
-    ----------
-    events : sequence of Event
-        In the order of their numbers.
-    unit : {"ms", "s"}
-        Unit of time of the figure.
-
-    Returns
-    -------
-    str
-        HTML, with the drive only if one of them has it; empty if there are none.
-    """
+    """List the numbered moments of a figure."""
     if not events:
         return ""
     scale, digits = SCALES[unit]
@@ -338,17 +179,6 @@ def event_table(events: Sequence[Event], unit: Literal["ms", "s"] = "ms") -> str
 
 
 def small_print(settings: Mapping[str, str]) -> str:
-    """Say how the run was made, at the end of the page.
-
-    Parameters
-    ----------
-    settings : mapping of str to str
-        Name and value, as text: axis file, seed, command.
-
-    Returns
-    -------
-    str
-        HTML; empty if there are none.
-    """
+    """Say how the run was made, at the end of the page."""
     rows = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in settings.items())
     return section("How this run was made", f'<dl class="settings">{rows}</dl>' if rows else "")

@@ -15,34 +15,17 @@ INCH = 0.0254
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A moment worth a mark in a figure.
+    """A moment worth a mark in a figure."""
 
-    Attributes
-    ----------
-    t : float
-        Moment [s], on the clock of the figure it belongs to.
-    text : str
-        What happened, in a few words: "stop begins, IR part subtracted".
-    drive : int, optional
-        Drive value right after the event [count], right positive.
-    """
-
-    t: float
-    text: str
-    drive: int | None = None
+    t: float  # moment [s], on the clock of the figure it belongs to
+    text: str  # what happened, in a few words: "stop begins, IR part subtracted"
+    drive: int | None = None  # drive value right after the event [count], right positive
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something the reader should know, in one or two sentences.
+    """Something the reader should know, in one or two sentences."""
 
-    Attributes
-    ----------
-    level : {"note", "warning", "error"}
-        How much it matters: for information; look at it; the reason why it failed.
-    text : str
-        What it is, with value and limit, and what to do.
-    """
-
+    # how much it matters: for information; look at it; the reason why it failed
     level: Literal["note", "warning", "error"]
-    text: str
+    text: str  # what it is, with value and limit, and what to do

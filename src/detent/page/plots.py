@@ -51,24 +51,7 @@ STYLE: dict[str, Any] = {
 def plot_signals(
     trace: Trace, signals: Sequence[str], path: str | Path, t_range: tuple[float, float] | None = None
 ) -> None:
-    """Draw signals over time, one plot area per unit, above one another.
-
-    Parameters
-    ----------
-    trace : Trace
-        Where the signals are.
-    signals : sequence of str
-        Names, or patterns with ``*`` such as ``motor.*``.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-    t_range : (float, float), optional
-        First and last moment [s]; all of the trace by default.
-
-    Raises
-    ------
-    DetentError
-        A signal is not there, the stretch holds nothing, or the file cannot be written.
-    """
+    """Draw signals over time, one plot area per unit, above one another."""
     path = check_figure_path(path)
     names = trace.match(signals)
     if not names:
@@ -126,20 +109,7 @@ def _broken(name: str, unit: str) -> str:
 
 
 def plot_comparison(comparison: Comparison, path: str | Path) -> None:
-    """Draw how far off speed each way of choosing the drive value is, and how it starts.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Steady speed errors and, optionally, speed against time.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The figures do not fit together, or the file cannot be written.
-    """
+    """Draw how far off speed each way of choosing the drive value is, and how it starts."""
     path = check_figure_path(path)
     shape = (len(comparison.methods), len(comparison.speeds), 2)
     if comparison.errors.shape != shape:
@@ -199,26 +169,8 @@ def _draw_starts(area: Axes, comparison: Comparison) -> None:
 
 
 def settling_time(t: Numbers, speed: Numbers, target: float, band: float) -> float | None:
-    """Find the moment from which the speed stays within a band.
+    """Find the moment from which the speed stays within a band [s].
 
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,).
-    speed : ndarray
-        Speed [m/s], shape (n,).
-    target : float
-        Middle of the band [m/s].
-    band : float
-        Half-width as a fraction of `target`.
-
-    Returns
-    -------
-    float or None
-        Time [s] of the first row of the last stretch inside; None if it ends outside.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> settling_time(np.arange(5.0), np.array([0.0, 1.0, 0.9, 1.0, 1.0]), 1.0, 0.01)
     3.0
@@ -237,25 +189,7 @@ def _method_colour(index: int, methods: int) -> str:
 
 
 def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> Path:
-    """Refuse a target that cannot take a figure, before any work is done.
-
-    Parameters
-    ----------
-    path : str or Path
-        Target.
-    suffixes : sequence of str
-        Those allowed.
-
-    Returns
-    -------
-    Path
-        The same.
-
-    Raises
-    ------
-    DetentError
-        The suffix names no kind of figure, or the folder is not there.
-    """
+    """Refuse a target that cannot take a figure, before any work is done."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(suffixes)}")
@@ -266,25 +200,7 @@ def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> P
 
 @contextmanager
 def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
-    """Give an empty figure and write it at the end, without pyplot: no window, no global state.
-
-    Parameters
-    ----------
-    path : Path
-        Target, as `check_figure_path` has found it good; replaced if it exists.
-    width, height : float
-        Size [in].
-
-    Yields
-    ------
-    Figure
-        A matplotlib figure in the style of all figures.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Give an empty figure [in] and write it at the end, without pyplot: no window, no global state."""
     mpl: Any = importlib.import_module("matplotlib")
     figures: Any = importlib.import_module("matplotlib.figure")
     # Around drawing and saving: matplotlib looks some settings up only when it writes.

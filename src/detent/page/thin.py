@@ -9,20 +9,6 @@ from numpy.typing import NDArray
 def thin_indices(values: NDArray[Any], points: int) -> NDArray[np.intp]:
     """Choose rows that draw like all rows: the smallest and the largest of each of `points` / 2 equal stretches.
 
-    Parameters
-    ----------
-    values : ndarray
-        The signal, shape (n,), NaN allowed.
-    points : int
-        How many rows to keep at most, apart from the first and the last; at least 2.
-
-    Returns
-    -------
-    ndarray of int
-        Row numbers, rising, each once, with the first and the last row; all of them if n <= `points`.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> spike = np.zeros(1000)
     >>> spike[617] = 5.0

@@ -103,22 +103,7 @@ _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 
 
 def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
-    """Draw a timing diagram; its height grows with the signals.
-
-    Parameters
-    ----------
-    waveforms : Waveforms
-        What to show, 1 to 40 signals. Those of one block stand together, in the order in which the blocks first appear.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-    marks : sequence of (int, str), optional
-        Moments since power-on [ps], inside the window, each marked by a line with a text above it.
-
-    Raises
-    ------
-    DetentError
-        There is no signal or there are too many, a mark lies outside the window, or the file cannot be written.
-    """
+    """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
     path = check_figure_path(path)
     _check(waveforms, marks, path)
     scale = _scale(waveforms)

@@ -16,20 +16,6 @@ GAP = "\u202f"
 def count(value: int, word: str = "", plural: str = "") -> str:
     """Write a whole number with groups of three digits, and the word it counts.
 
-    Parameters
-    ----------
-    value : int
-        The number.
-    word, plural : str
-        What is counted; the plural is `word` + "s" unless given.
-
-    Returns
-    -------
-    str
-        Such as "2 912 characters" or "1 page".
-
-    Examples
-    --------
     >>> count(2912, "line").replace(GAP, " ")
     '2 912 lines'
     """
@@ -42,20 +28,6 @@ def count(value: int, word: str = "", plural: str = "") -> str:
 def further(value: int, word: str) -> str:
     """Begin a sentence about what is left out.
 
-    Parameters
-    ----------
-    value : int
-        How many, at least 1.
-    word : str
-        What is counted.
-
-    Returns
-    -------
-    str
-        Such as "1 further line is" or "12 further lines are".
-
-    Examples
-    --------
     >>> further(1, "line"), further(12, "line")
     ('1 further line is', '12 further lines are')
     """
@@ -65,20 +37,6 @@ def further(value: int, word: str) -> str:
 def number(value: float | None, digits: int = 3) -> str:
     """Write a number with so many significant digits and no exponent; "-" for None and NaN.
 
-    Parameters
-    ----------
-    value : float, optional
-        The number.
-    digits : int
-        Significant digits, >= 1; digits before the point are never dropped.
-
-    Returns
-    -------
-    str
-        Such as "0.382", "170", "-60".
-
-    Examples
-    --------
     >>> number(0.38249), number(1234.6), number(170.0), number(None)
     ('0.382', '1235', '170', '\u2013')
     """
@@ -97,18 +55,6 @@ def number(value: float | None, digits: int = 3) -> str:
 def duration(seconds: float) -> str:
     """Write a time as a person says it.
 
-    Parameters
-    ----------
-    seconds : float
-        Time [s], >= 0.
-
-    Returns
-    -------
-    str
-        Such as "31.4 s", "2 min 05 s", "1 h 03 min".
-
-    Examples
-    --------
     >>> [duration(value).replace(GAP, " ") for value in (0.1334, 31.42, 125.0, 3780.0)]
     ['0.133 s', '31.4 s', '2 min 05 s', '1 h 03 min']
     """
@@ -160,34 +106,12 @@ class CountUnit:
 
 
 def micrometres(length: float) -> str:
-    """Write a small length [m] in micrometres, with its unit.
-
-    Parameters
-    ----------
-    length : float
-        Length [m].
-
-    Returns
-    -------
-    str
-        Such as "1.9 µm".
-    """
+    """Write a small length [m] in micrometres, with its unit."""
     return f"{number(length * 1e6, 2)}{GAP}µm"
 
 
 def inches_per_second(speed: float) -> str:
-    """Write a speed [m/s] in in/s, without its unit.
-
-    Parameters
-    ----------
-    speed : float
-        Speed [m/s].
-
-    Returns
-    -------
-    str
-        Such as "40" or "13.3".
-    """
+    """Write a speed [m/s] in in/s, without its unit."""
     return number(round(abs(speed) / INCH, 2))
 
 
@@ -198,22 +122,7 @@ def arrow(direction: int) -> Markup:
 
 
 def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
-    """Make a cell of a table with a bar before its number, so that rows can be compared at a glance.
-
-    Parameters
-    ----------
-    value : float
-        What it shows, >= 0; NaN for nothing.
-    longest : float
-        Value of the longest bar in the column, > 0.
-    over : bool
-        The value is beyond its limit.
-
-    Returns
-    -------
-    str
-        HTML, with its own attributes.
-    """
+    """Make a cell of a table with a bar before its number, so that rows can be compared at a glance."""
     if isnan(value):
         return '<td class="n">\u2013</td>'
     bar = f'<span class="bar" style="width:{48 * value / longest:.0f}px"></span>'
@@ -221,43 +130,13 @@ def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
 
 
 def offset_cell(offset: float, longest: float, *, over: bool = False) -> str:
-    """Make a cell of a table with a bar for a magnitude before the figure with its sign.
-
-    Parameters
-    ----------
-    offset : float
-        What it shows; NaN for nothing.
-    longest : float
-        Magnitude of the longest bar in the column, > 0.
-    over : bool
-        The value is beyond its limit.
-
-    Returns
-    -------
-    str
-        HTML, with its own attributes.
-    """
+    """Make a cell of a table with a bar for a magnitude before the figure with its sign."""
     cell = bar_cell(abs(offset), longest, over=over)
     return cell.replace("</span>", f"</span>{'+' if offset > 0 else '−' if offset < 0 else ''}")
 
 
 def table(heads: Sequence[tuple[str, bool]], rows: Iterable[Sequence[str]], *, tall: bool = False) -> str:
-    """Make a table that scrolls within itself on a narrow screen.
-
-    Parameters
-    ----------
-    heads : sequence of (str, bool)
-        Title of each column as text, and whether it holds numbers (aligned to the right).
-    rows : iterable of sequence of str
-        Cells as HTML; a cell that starts with "<td" brings its own attributes.
-    tall : bool
-        Limit the height and scroll inside.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Make a table that scrolls within itself on a narrow screen."""
     head = "".join(f'<th scope="col"{_aligned(numeric)}>{escape(title)}</th>' for title, numeric in heads)
     numerics = [numeric for _, numeric in heads]
     body = "\n".join(

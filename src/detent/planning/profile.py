@@ -3,8 +3,6 @@
 A move from rest to rest is time-optimal within its limits, worked out by ruckig (MIT licence); with an infinite jerk it
 is a trapezoid. It begins at a sample; its end, which mostly lies between two, is reached at the next.
 
-References
-----------
 Berscheid, Kroeger: Jerk-limited Real-time Trajectory Generation with Arbitrary Target States. RSS 2021.
 """
 
@@ -27,26 +25,11 @@ MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """What a move may do.
+    """What a move may do."""
 
-    Attributes
-    ----------
-    speed : float
-        [m/s], above 0 and finite.
-    acceleration : float
-        [m/s^2], above 0 and finite.
-    jerk : float
-        [m/s^3], above 0; infinite for a trapezoid of the speed.
-
-    Raises
-    ------
-    DetentError
-        A limit is outside what is said above.
-    """
-
-    speed: float
-    acceleration: float
-    jerk: float = math.inf
+    speed: float  # [m/s], above 0 and finite
+    acceleration: float  # [m/s^2], above 0 and finite
+    jerk: float = math.inf  # [m/s^3], above 0; infinite for a trapezoid of the speed
 
     def __post_init__(self) -> None:
         """Refuse what no axis could do."""
@@ -60,18 +43,10 @@ class MotionLimits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """A reference, one entry per sample.
+    """A reference, one entry per sample."""
 
-    Attributes
-    ----------
-    period : float
-        Time between two samples [s].
-    position, velocity, acceleration : ndarray
-        [m], [m/s], [m/s^2], shape (samples,), contiguous float64.
-    """
-
-    period: float
-    position: Numbers
+    period: float  # time between two samples [s]
+    position: Numbers  # and velocity, acceleration: [m], [m/s], [m/s^2], shape (samples,), contiguous float64
     velocity: Numbers
     acceleration: Numbers
 
@@ -89,28 +64,6 @@ class Profile:
 def plan_move(start: float, target: float, limits: MotionLimits, period: float) -> Profile:
     """Time-optimal move from rest to rest.
 
-    Parameters
-    ----------
-    start, target : float
-        [m], finite.
-    limits : MotionLimits
-        What the move may do.
-    period : float
-        Time between two samples [s], above 0.
-
-    Returns
-    -------
-    Profile
-        From the sample at which the move begins, at `start` with the first acceleration of the move, to the first one
-        at rest at `target`; a single sample where these are equal.
-
-    Raises
-    ------
-    DetentError
-        Start or target is not finite, the period not above 0, the profile too long, or ruckig finds none.
-
-    Examples
-    --------
     >>> move = plan_move(0.0, 0.1, MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0), period=1e-3)
     >>> move.count, float(move.position[-1]), float(move.velocity.max())
     (351, 0.1, 0.5)
@@ -144,27 +97,6 @@ def profile_of_recording(
     Positions between the samples, and the derivatives that were not recorded, come from the cubic spline through them.
     Steps of a coarse encoder become peaks of the acceleration: filter such a recording first, or leave the
     feed-forward of the acceleration out.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), strictly increasing, n >= 2; the profile begins at ``t[0]``.
-    position : ndarray
-        [m], shape (n,), finite.
-    period : float
-        Time between two samples of the profile [s], above 0.
-    velocity, acceleration : ndarray, optional
-        As recorded [m/s], [m/s^2], shape (n,), finite.
-
-    Returns
-    -------
-    Profile
-        To the last sample not behind ``t[-1]``.
-
-    Raises
-    ------
-    DetentError
-        Shapes differ, a value is not finite, the time does not increase, or the profile is too long.
     """
     _check_recording(t, position, velocity, acceleration)
     _check_place(0.0, 0.0, period)

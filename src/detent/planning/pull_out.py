@@ -25,18 +25,10 @@ class PullOut(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class FirstOrderPullOut:
-    """T_po0 / sqrt(1 + (f/f_c)^2), stepper-envelope specification 3.1.
+    """T_po0 / sqrt(1 + (f/f_c)^2), stepper-envelope specification 3.1."""
 
-    Attributes
-    ----------
-    torque : float
-        Pull-out torque at standstill T_po0 [N m].
-    corner_hz : float
-        Step frequency at which it has fallen to 1/sqrt 2 [Hz].
-    """
-
-    torque: float
-    corner_hz: float
+    torque: float  # pull-out torque at standstill T_po0 [N m]
+    corner_hz: float  # step frequency at which it has fallen to 1/sqrt 2 [Hz]
 
     def __post_init__(self) -> None:
         above_zero(self, "torque", "corner_hz")
@@ -50,23 +42,6 @@ class FirstOrderPullOut:
 class WindingPullOut:
     """Two-phase hybrid or permanent-magnet motor on a supply of limited voltage and current.
 
-    Attributes
-    ----------
-    holding_torque : float
-        Both phases at the rated current [N m].
-    rated_current, current : float
-        Rated, and set at the drive, per phase [A].
-    supply : float
-        Voltage that drives the current [V].
-    resistance : float
-        Winding and drive, per phase [ohm].
-    inductance : float
-        Per phase [H].
-    teeth : float
-        Rotor teeth, a quarter of the steps per turn.
-
-    Notes
-    -----
     With the rotor's linked flux times teeth ``k = T_hold / (sqrt 2 I_rated)``, the electrical frequency
     ``w = 2 pi f / 4`` and ``Z = sqrt(R^2 + (w L)^2)``, a voltage drive pulls out at ``k (V / Z - w psi R / Z^2)``
     (P. Acarnley, Stepping Motors, 4th ed., IEE 2002, chapter 5), V the fundamental of the square wave and psi the flux.
@@ -75,13 +50,13 @@ class WindingPullOut:
     safety factor of the ramp is for.
     """
 
-    holding_torque: float
-    rated_current: float
-    current: float
-    supply: float
-    resistance: float
-    inductance: float
-    teeth: float
+    holding_torque: float  # both phases at the rated current [N m]
+    rated_current: float  # and current: rated, and set at the drive, per phase [A]
+    current: float  # [A]
+    supply: float  # voltage that drives the current [V]
+    resistance: float  # winding and drive, per phase [ohm]
+    inductance: float  # per phase [H]
+    teeth: float  # rotor teeth, a quarter of the steps per turn
 
     def __post_init__(self) -> None:
         above_zero(self, "holding_torque", "rated_current", "current", "supply", "resistance", "inductance", "teeth")
@@ -102,18 +77,11 @@ class WindingPullOut:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredPullOut:
-    """Points of a published curve, straight lines between them.
+    """Points of a published curve, straight lines between them."""
 
-    Attributes
-    ----------
-    hz : sequence of float
-        Step frequencies, rising [Hz]; below the first one its torque holds, above the last there is none.
-    torque : sequence of float
-        Pull-out torque at each [N m].
-    """
-
+    # step frequencies, rising [Hz]; below the first one its torque holds, above the last there is none
     hz: Sequence[float]
-    torque: Sequence[float]
+    torque: Sequence[float]  # pull-out torque at each [N m]
 
     def __post_init__(self) -> None:
         if len(self.hz) != len(self.torque) or len(self.hz) < 2:
@@ -135,13 +103,7 @@ class MeasuredPullOut:
 
 
 def above_zero(record: object, *names: str) -> None:
-    """Refuse attributes that are not numbers above 0.
-
-    Raises
-    ------
-    ValueError
-        The first that is not.
-    """
+    """Refuse attributes that are not numbers above 0."""
     for name in names:
         value = getattr(record, name)
         if not (isfinite(value) and value > 0):

@@ -40,33 +40,7 @@ class Zone:
 
 
 class ZoneMap:
-    """Speed limit of every step.
-
-    Parameters
-    ----------
-    steps : int
-        N, steps of the whole travel.
-    max_hz : float
-        Limit of every step that lies in no zone [Hz].
-    zones : sequence of Zone
-        Must not overlap.
-    also : sequence of float
-        Limits to number although no step has them: those of the other direction, whose table one control unit shares.
-
-    Attributes
-    ----------
-    edges : int64 array, shape (Z + 1,)
-        Where the limit changes, 0 and N included.
-    numbers : int32 array, shape (Z,)
-        Number of each stretch's limit in `limits`.
-    limits : tuple of float
-        Each limit once, the largest first [Hz].
-
-    Raises
-    ------
-    ValueError
-        A zone is empty, leaves the travel, overlaps another one or has no frequency; there are more than 16 limits.
-    """
+    """Speed limit of every step."""
 
     def __init__(self, steps: int, max_hz: float, zones: Sequence[Zone] = (), also: Sequence[float] = ()) -> None:
         if steps < 1:
@@ -80,10 +54,13 @@ class ZoneMap:
         for zone in self.zones:
             rows += [(zone.begin, zone.max_hz), (zone.end, max_hz)]
         kept = [row for row, following in pairwise([*rows, (steps, 0.0)]) if row[0] < following[0]]
+        # each limit once, the largest first [Hz]
         self.limits = tuple(sorted({*also, *(hz for _, hz in kept)}, reverse=True))
         if len(self.limits) > MAX_LIMITS:
             raise ValueError(f"the zones have {len(self.limits)} different limits, must be {MAX_LIMITS} or fewer")
+        # where the limit changes, 0 and N included
         self.edges = np.array([*(begin for begin, _ in kept), steps], np.int64)
+        # number of each stretch's limit in `limits`
         self.numbers = np.array([self.limits.index(hz) for _, hz in kept], np.int32)
 
     def _check_places(self) -> None:
@@ -107,47 +84,16 @@ class ZoneMap:
 
 @dataclass(frozen=True, slots=True)
 class StopEdit:
-    """What came of moving a stop.
+    """What came of moving a stop."""
 
-    Attributes
-    ----------
-    stop : int
-        Position where the motor will stop.
-    overrun : bool
-        The position asked for was too near to come down from the present speed; `stop` is the nearest possible one.
-    written : int
-        Table entries rewritten, sentinels included.
-    """
-
-    stop: int
+    stop: int  # position where the motor will stop
+    # the position asked for was too near to come down from the present speed; `stop` is the nearest possible one
     overrun: bool
-    written: int
+    written: int  # table entries rewritten, sentinels included
 
 
 class StepEnvelope:
-    """Table of one direction.
-
-    Parameters
-    ----------
-    ramp : StepRamp
-        Ramp list, at most 2048 entries.
-    zones : ZoneMap
-        Limits of this direction, in positions of the axis.
-    direction : int
-        1 for growing positions, -1 for falling ones.
-    start, stop : int
-        Extremes in positions of the axis: where a move begins and ends. Without them, the ends of the travel.
-
-    Attributes
-    ----------
-    entries : int16 array, shape (N + 1,)
-        By the position that the step departs from; the last one in the direction of motion is always a sentinel.
-
-    Raises
-    ------
-    ValueError
-        The ramp is too long, the direction is neither 1 nor -1, or an extreme lies outside the travel.
-    """
+    """Table of one direction."""
 
     def __init__(
         self, ramp: StepRamp, zones: ZoneMap, direction: int = 1, start: int | None = None, stop: int | None = None
@@ -168,6 +114,7 @@ class StepEnvelope:
         self._stop = n if stop is None else self._along(stop)
         level = (caps | np.arange(len(caps)) << INDEX_BITS).astype(np.int16)[self._map.numbers]
         travelled = np.append(np.repeat(level, np.diff(self._map.edges)), np.int16(SENTINEL))
+        # by the position that the step departs from; the last one in the direction of motion is always a sentinel
         self.entries: NDArray[np.int16] = np.ascontiguousarray(travelled[::direction])
         # The same memory in the order of travel: this direction's first step first.
         self._travelled = self.entries[::direction]
@@ -226,39 +173,13 @@ class StepEnvelope:
         return max(end - begin, 0)
 
     def move_start(self, position: int) -> int:
-        """Move the start extreme; a motor that runs must be at least its ramp index away from the new place.
-
-        Parameters
-        ----------
-        position : int
-            New place, 0..N.
-
-        Returns
-        -------
-        int
-            Entries rewritten: at most a ramp length on both sides of the old and of the new place.
-        """
+        """Move the start extreme; a motor that runs must be at least its ramp index away from the new place."""
         former, self._start = self._start, self._along(position)
         reach = len(self.ramp)
         return sum(self._write(place - reach + 1, place + reach) for place in {former, self._start})
 
     def move_stop(self, position: int, at: int | None = None, index: int = -1) -> StopEdit:
-        """Move the stop extreme, at rest or between two steps of a run in this direction.
-
-        Parameters
-        ----------
-        position : int
-            New place, 0..N.
-        at : int, optional
-            Where the motor is; None when it rests or runs the other way.
-        index : int
-            Its ramp index, -1 at rest: it needs so many more steps to come down.
-
-        Returns
-        -------
-        StopEdit
-            Where it will stop. Work and rewriting do not depend on N.
-        """
+        """Move the stop extreme, at rest or between two steps of a run in this direction."""
         wanted = self._along(position)
         nearest = 0 if at is None or index < 0 else self._along(at) + index
         former, self._stop = self._stop, min(max(wanted, nearest), self.steps)
@@ -294,23 +215,12 @@ def turn_envelopes(
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeMemory:
-    """What a method keeps in memory [byte].
+    """What a method keeps in memory [byte]."""
 
-    Attributes
-    ----------
-    tables : int
-        Both directions, 16 bits a step.
-    compact : int
-        One direction with 8-bit ramp indices; 0 where the ramp has more than 255 entries.
-    ramp : int
-        Ramp list, 16 bits an entry.
-    conventional : int
-        What the comparison methods store: three extremes of 32 bits, and 32 + 16 bits a zone; they compute instead.
-    """
-
-    tables: int
-    compact: int
-    ramp: int
+    tables: int  # both directions, 16 bits a step
+    compact: int  # one direction with 8-bit ramp indices; 0 where the ramp has more than 255 entries
+    ramp: int  # ramp list, 16 bits an entry
+    # what the comparison methods store: three extremes of 32 bits, and 32 + 16 bits a zone; they compute instead
     conventional: int
 
 

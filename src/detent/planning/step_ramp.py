@@ -23,27 +23,13 @@ MAX_HZ = 65535
 
 @dataclass(frozen=True, slots=True)
 class StepperMotor:
-    """What a stepper can do.
+    """What a stepper can do."""
 
-    Attributes
-    ----------
-    steps_per_turn : int
-        200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree.
-    rotor_inertia : float
-        [kg m^2].
-    holding_torque : float
-        Peak of the static torque curve [N m].
-    pull_out : callable
-        Pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`.
-    unloaded_start_hz : float
-        Start frequency of the bare rotor [Hz].
-    """
-
-    steps_per_turn: int
-    rotor_inertia: float
-    holding_torque: float
-    pull_out: PullOut
-    unloaded_start_hz: float
+    steps_per_turn: int  # 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
+    rotor_inertia: float  # [kg m^2]
+    holding_torque: float  # peak of the static torque curve [N m]
+    pull_out: PullOut  # pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`
+    unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
 
     def __post_init__(self) -> None:
         above_zero(self, "steps_per_turn", "rotor_inertia", "holding_torque", "unloaded_start_hz")
@@ -56,25 +42,13 @@ class StepperMotor:
 
 @dataclass(frozen=True, slots=True)
 class StepperLoad:
-    """What hangs on the shaft: coupling, spindle and the mass that the spindle moves.
+    """What hangs on the shaft: coupling, spindle and the mass that the spindle moves."""
 
-    Attributes
-    ----------
-    pitch : float
-        Travel per turn of the spindle [m].
-    mass : float
-        Moved mass [kg].
-    spindle_inertia, coupling_inertia : float
-        [kg m^2].
-    friction_torque : float
-        Coulomb friction at the shaft [N m].
-    """
-
-    pitch: float
-    mass: float
-    spindle_inertia: float
-    coupling_inertia: float
-    friction_torque: float
+    pitch: float  # travel per turn of the spindle [m]
+    mass: float  # moved mass [kg]
+    spindle_inertia: float  # and coupling_inertia: [kg m^2]
+    coupling_inertia: float  # [kg m^2]
+    friction_torque: float  # Coulomb friction at the shaft [N m]
 
     def __post_init__(self) -> None:
         above_zero(self, "pitch")
@@ -90,22 +64,7 @@ class StepperLoad:
 
 
 def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float) -> float:
-    """Frequency at which a rotor swings about a step: sqrt(teeth T_hold / J) / 2 pi, teeth a quarter of the steps.
-
-    Parameters
-    ----------
-    steps_per_turn : int
-        Full steps.
-    holding_torque : float
-        [N m].
-    inertia : float
-        Of the rotor, with its load or without [kg m^2].
-
-    Returns
-    -------
-    float
-        [Hz].
-    """
+    """Frequency at which a rotor swings about a step: sqrt(teeth T_hold / J) / 2 pi, teeth a quarter of the steps."""
     return sqrt(steps_per_turn / 4 * holding_torque / inertia) / (2 * pi)
 
 
@@ -120,25 +79,7 @@ def travel_per_step(motor: StepperMotor, load: StepperLoad) -> float:
 
 
 def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1) -> float:
-    """Frequency at which the loaded motor starts and stops without losing steps [Hz].
-
-    Parameters
-    ----------
-    motor, load : StepperMotor, StepperLoad
-        Motor and load.
-    safety : float
-        Reserve for age and temperature, 1 or more.
-
-    Returns
-    -------
-    float
-        f_start0 / sqrt(1 + J_load/J_rotor) / safety [Hz].
-
-    Raises
-    ------
-    ValueError
-        The reserve is below 1.
-    """
+    """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
     if not safety >= 1:
         raise ValueError(f"safety is {safety}, must be 1 or more")
     return motor.unloaded_start_hz / sqrt(1 + load.inertia / motor.rotor_inertia) / safety
@@ -147,28 +88,7 @@ def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1)
 def acceleration_limit(
     motor: StepperMotor, load: StepperLoad, max_acceleration: float, safety_factor: float = 2.0
 ) -> Callable[[float], float]:
-    """Acceleration that motor and load allow, as a function of the step frequency.
-
-    Parameters
-    ----------
-    motor, load : StepperMotor, StepperLoad
-        Motor and load.
-    max_acceleration : float
-        Limit a_lin of the linear part [step/s^2].
-    safety_factor : float
-        SF: the pull-out torque is divided by it, 1 or more.
-
-    Returns
-    -------
-    callable
-        a(f) = min(a_lin, (T_po(f)/SF - T_fric) / (J theta)) [step/s^2] for f [Hz]; below 0 where the torque does not
-        even overcome the friction.
-
-    Raises
-    ------
-    ValueError
-        The acceleration is not above 0, or the safety factor is below 1.
-    """
+    """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""
     if not 0 < max_acceleration < float("inf"):
         raise ValueError(f"max_acceleration is {max_acceleration} step/s^2, must be above 0 and finite")
     if not safety_factor >= 1:
@@ -185,18 +105,8 @@ def acceleration_limit(
 def needed_torque(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64]) -> NDArray[np.float64]:
     """Torque that the motor must give in each step of a run.
 
-    Parameters
-    ----------
-    motor, load : StepperMotor, StepperLoad
-        Motor and load.
-    hz : float64 array, shape (n,)
-        Frequencies of steps that follow one another in one direction, above 0 [Hz].
-
-    Returns
-    -------
-    float64 array, shape (n,)
-        Magnitude of J theta a + T_fric with a = (f_i^2 - f_(i-1)^2) / 2, 0 in the first step [N m]: the inverse of
-        the ramp's rule; friction helps to brake.
+    Magnitude of J theta a + T_fric with a = (f_i^2 - f_(i-1)^2) / 2, 0 in the first step [N m]: the inverse of the
+    ramp's rule; friction helps to brake.
     """
     acceleration = np.diff(hz**2, prepend=hz[:1] ** 2) / 2
     return np.abs(total_inertia(motor, load) * motor.step_angle * acceleration + load.friction_torque)
@@ -214,15 +124,9 @@ def torque_margin(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepRamp:
-    """The frequencies of a run-up from rest, one per step.
+    """The frequencies of a run-up from rest, one per step."""
 
-    Attributes
-    ----------
-    hz : float64 array, shape (L,)
-        Strictly increasing; `hz[0]` is the frequency to start and to stop at [Hz].
-    """
-
-    hz: NDArray[np.float64]
+    hz: NDArray[np.float64]  # strictly increasing; `hz[0]` is the frequency to start and to stop at [Hz]
 
     def __len__(self) -> int:
         return len(self.hz)
@@ -244,28 +148,6 @@ class StepRamp:
 def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], float]) -> StepRamp:
     """Ramp list from the start frequency up; braking uses it backwards (friction helps, so that is the safe side).
 
-    Parameters
-    ----------
-    start_hz : float
-        The lower one of start and stop frequency [Hz].
-    max_hz : float
-        Where the list ends at the latest, the limit of the motor's drive [Hz].
-    acceleration : callable
-        Permissible acceleration [step/s^2] at a frequency [Hz]; 0 or less ends the list.
-
-    Returns
-    -------
-    StepRamp
-        At least one entry. It ends below `max_hz` where a step gains less than 0.5 Hz, or where the frequency after it
-        could not be held.
-
-    Raises
-    ------
-    ValueError
-        The frequencies are not in 0 < start <= max <= 65535 Hz.
-
-    Notes
-    -----
     f^2 grows by 2 a(f) per step, with a(f) at the middle of the step. It is f^2 that is summed up: at constant
     acceleration the entries are then those of sqrt(f_start^2 + 2 a n) to the last bit, and an index found by
     comparison with a round frequency is the right one.

@@ -93,17 +93,7 @@ def lost_steps(p: RotorParams, r: StepperRotor) -> int:
 
 
 def fill_curve(p: RotorParams, pull_out: Callable[[float], float], max_hz: float) -> None:
-    """Fill the torque curve up to the largest frequency the motor is driven at.
-
-    Parameters
-    ----------
-    p : RotorParams
-        Filled in place.
-    pull_out : callable
-        Pull-out torque [N m] at a step frequency [Hz], above 0 at standstill.
-    max_hz : float
-        Largest step frequency [Hz].
-    """
+    """Fill the torque curve up to the largest frequency the motor is driven at."""
     p.intervals_per_hz = INTERVALS / max_hz
     standstill = pull_out(0.0)
     p.curve[:] = [pull_out(max_hz * k / INTERVALS) / standstill for k in range(INTERVALS + 1)]

@@ -6,8 +6,6 @@ At rest it is whatever holds the mass, up to the force that breaks it loose. The
 round with the motion; what is left of an amplifier's zero or of a balanced weight is part of it. Units are those of a
 linear axis; a rotary one has rad for m and N.m for N.
 
-References
-----------
 Armstrong-Helouvry, Dupont, Canudas de Wit: A survey of models, analysis tools and compensation methods for the control
 of machines with friction. Automatica 30 (1994), section 2.
 """

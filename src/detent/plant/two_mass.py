@@ -233,16 +233,6 @@ def fastest_rate(p: TwoMassParams) -> float:
     """Largest magnitude of the eigenvalues of motor, coupling and load [1/s].
 
     Times the tick it should be 1 at most: a swing of that rate then loses 0.7 % of its amplitude per radian.
-
-    Parameters
-    ----------
-    p : TwoMassParams
-        Constants; `period` does not matter.
-
-    Returns
-    -------
-    float
-        [1/s]. Linearised at the stiffest place: flanks in contact, pendulum hanging down, the steepest friction.
     """
     w = p.winding
     drags = [_steepest(m.friction) for m in (p.motor, p.load)]

@@ -19,27 +19,16 @@ MOST_TICKS = 200_000
 
 @dataclass(frozen=True, slots=True)
 class Clocking:
-    """How the registers of a method change inside its base tick.
+    """How the registers of a method change inside its base tick."""
 
-    Attributes
-    ----------
-    rows_per_tick : int
-        Rows recorded in a tick: 1, or the clocks of a method whose logic runs faster than its tick.
-    phases : mapping of str to Phase
-        When inside such a row a register changes, by path or block.
-    clocks : mapping of str to ((float, float), str)
-        Clocks that are no registers: part of the row in which they are high, and what they do.
-    between : mapping of str to callable
-        Registers that change a second time within a row: from the recorded columns, their value in the first half.
-    needs : tuple of str
-        Registers that `between` works from.
-    """
-
+    # rows recorded in a tick: 1, or the clocks of a method whose logic runs faster than its tick
     rows_per_tick: int = 1
-    phases: Mapping[str, Phase] | None = None
+    phases: Mapping[str, Phase] | None = None  # when inside such a row a register changes, by path or block
+    # clocks that are no registers: part of the row in which they are high, and what they do
     clocks: Mapping[str, tuple[tuple[float, float], str]] | None = None
+    # registers that change a second time within a row: from the recorded columns, their value in the first half
     between: Mapping[str, Callable[[Any], NDArray[Any]]] | None = None
-    needs: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()  # registers that `between` works from
 
 
 class CaptureDoneError(Exception):
@@ -47,19 +36,7 @@ class CaptureDoneError(Exception):
 
 
 class Capture:
-    """Stands in for a recorder: lets a run pass until the stretch begins, and records it tick by tick.
-
-    Parameters
-    ----------
-    registers : type of Registers
-        Class of the axis's state.
-    leaves : sequence of Leaf
-        What to record.
-    begin, end : int
-        First tick of the stretch, and the first after it.
-    rows_per_tick : int
-        As of `Clocking`.
-    """
+    """Stands in for a recorder: lets a run pass until the stretch begins, and records it tick by tick."""
 
     def __init__(
         self, registers: type[Registers], leaves: Sequence[Leaf], begin: int, end: int, rows_per_tick: int
@@ -106,47 +83,18 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """What a timing diagram shows.
+    """What a timing diagram shows."""
 
-    Attributes
-    ----------
-    at, duration : float
-        Begin, since power-on, and length [s].
-    signals : tuple of str
-        Registers, or patterns.
-    title : str
-        As of `Waveforms`.
-    """
-
-    at: float
-    duration: float
-    signals: tuple[str, ...]
-    title: str = ""
+    at: float  # and duration: begin, since power-on, and length [s]
+    duration: float  # [s]
+    signals: tuple[str, ...]  # registers, or patterns
+    title: str = ""  # as of `Waveforms`
 
 
 def capture(
     registers: type[Registers], clocking: Clocking, tick: float, run: Callable[[Any], Any], stretch: Stretch
 ) -> Waveforms:
-    """Run an axis until a moment and record every clock of a stretch from there.
-
-    Parameters
-    ----------
-    registers : type of Registers
-        Class of the axis's state.
-    clocking : Clocking
-        How its registers change.
-    tick : float
-        Base tick [s].
-    run : callable
-        Runs the job with the recorder it is given.
-    stretch : Stretch
-        What to record.
-
-    Raises
-    ------
-    DetentError
-        A signal is unknown, the stretch is empty or too long, or the run ends before it.
-    """
+    """Run an axis until a moment and record every clock of a stretch from there."""
     begin, ticks = round(stretch.at / tick), max(1, round(stretch.duration / tick))
     if stretch.at < 0 or stretch.duration <= 0 or ticks > MOST_TICKS:
         longest = format_quantity(MOST_TICKS * tick, "s")

@@ -25,38 +25,17 @@ S = TypeVar("S", bound=Registers)
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """The compiled loop of an axis.
+    """The compiled loop of an axis."""
 
-    Attributes
-    ----------
-    tick : float
-        Base tick [s].
-    advance : callable
-        ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its
-        host.
-    by_clocks : callable, optional
-        ``by_clocks(params, state, ticks, trace, picks)``: the same, recording every clock inside a tick.
-    """
-
-    tick: float
+    tick: float  # base tick [s]
+    # ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its host
     advance: Callable[..., int]
+    # ``by_clocks(params, state, ticks, trace, picks)``: the same, recording every clock inside a tick
     by_clocks: Callable[..., int] | None = None
 
 
 class Machine(Generic[P, S]):
-    """A simulated axis.
-
-    Parameters
-    ----------
-    params : Registers
-        What does not change.
-    state : Registers
-        The registers; the field ``tick`` counts base ticks.
-    loop : Loop
-        What advances them.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    """
+    """A simulated axis."""
 
     def __init__(self, params: P, state: S, loop: Loop, recorder: AnyRecorder | None = None) -> None:
         self.params, self.state, self.tick, self.recorder = params, state, loop.tick, recorder

@@ -19,20 +19,7 @@ Sink = Callable[[NDArray[np.void]], None]
 
 
 def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf]:
-    """Leaves of the named registers, each once, in the order asked.
-
-    Parameters
-    ----------
-    registers : type of Registers
-        Class of the recorded state.
-    names : iterable of str
-        Dotted paths, or patterns with ``*`` such as ``head.*``; ``all`` is every register but arrays.
-
-    Raises
-    ------
-    DetentError
-        A name is no register, or an array; the message names the nearest.
-    """
+    """Leaves of the named registers, each once, in the order asked."""
     leaves = {leaf.path: leaf for leaf in registers.leaves()}
     single = [leaf for leaf in leaves.values() if not leaf.length]
     chosen: dict[str, Leaf] = {}
@@ -60,21 +47,7 @@ def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -
 
 
 class Recorder:
-    """Rows of chosen registers at every n-th tick.
-
-    Parameters
-    ----------
-    registers : type of Registers
-        Class of the recorded state; its leaf ``tick`` gives the time.
-    names : sequence of str
-        Registers to record, see `choose_leaves`.
-    every : int
-        Ticks between two rows.
-    period : float
-        Time of one tick [s].
-    sink : callable, optional
-        Takes each block of rows (structured array with ``t`` [s] first); without it blocks stay in memory for `trace`.
-    """
+    """Rows of chosen registers at every n-th tick."""
 
     def __init__(
         self, registers: type[Registers], names: Sequence[str], *, every: int, period: float, sink: Sink | None = None

@@ -66,23 +66,7 @@ class Trace:
         return name in self.columns
 
     def __getitem__(self, name: str) -> Column:
-        """Give one column.
-
-        Parameters
-        ----------
-        name : str
-            Column name, such as ``motor.current``.
-
-        Returns
-        -------
-        ndarray
-            Shape (n,); unit `self.units[name]`.
-
-        Raises
-        ------
-        DetentError
-            There is no such column; the text names the nearest and all that exist.
-        """
+        """Give one column."""
         if name not in self.columns:
             raise unknown_column(name, list(self.columns))
         return self.columns[name]
@@ -171,38 +155,14 @@ class Trace:
 
 
 def unknown_column(name: str, known: Sequence[str]) -> DetentError:
-    """Make the error for a column that is not there.
-
-    Parameters
-    ----------
-    name : str
-        What was asked for.
-    known : sequence of str
-        What there is.
-
-    Returns
-    -------
-    DetentError
-        Its text names the nearest column first.
-    """
+    """Make the error for a column that is not there."""
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return DetentError(f"trace: no signal {name!r}{hint}; it holds: {', '.join(known) or 'none'}")
 
 
 def check_columns(columns: Mapping[str, Column]) -> None:
-    """Refuse columns that do not make a trace.
-
-    Parameters
-    ----------
-    columns : mapping of str to ndarray
-        As of `Trace`.
-
-    Raises
-    ------
-    DetentError
-        The first thing that is wrong, with the column's name and what came.
-    """
+    """Refuse columns that do not make a trace."""
     if next(iter(columns), None) != TIME:
         first = next(iter(columns), "nothing")
         raise DetentError(f"trace: the first column must be 't' (time in s), got {first!r}; put the time first")

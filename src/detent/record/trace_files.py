@@ -47,18 +47,6 @@ def save_csv(trace: Trace, path: str | Path) -> None:
 
     Floats carry every digit needed to read the same bits back (17 at most), integers stay integers, booleans
     become 0 and 1. Descriptions and attributes are not in the file.
-
-    Parameters
-    ----------
-    trace : Trace
-        What to write.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
     """
     _write_csv(trace.columns, [trace.label(name) for name in trace], Path(path))
 
@@ -84,20 +72,7 @@ def _texts(values: Column) -> list[str]:
 
 
 def save_parquet(trace: Trace, path: str | Path) -> None:
-    """Write a trace as Parquet; units and descriptions are in the fields' metadata, attributes in the schema's.
-
-    Parameters
-    ----------
-    trace : Trace
-        What to write.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        pyarrow is not installed (the text names the extra), or the file cannot be written.
-    """
+    """Write a trace as Parquet; units and descriptions are in the fields' metadata, attributes in the schema's."""
     _write_parquet(trace.columns, trace.units, trace.docs, trace.attributes, Path(path))
 
 
@@ -129,20 +104,7 @@ def _write_parquet(
 
 
 def convert_trace(store: str | Path, path: str | Path) -> None:
-    """Write an HDF5 trace again as CSV or Parquet, in constant memory however long it is.
-
-    Parameters
-    ----------
-    store : str or Path
-        HDF5 file.
-    path : str or Path
-        Target ending in ``.csv`` or ``.parquet``.
-
-    Raises
-    ------
-    DetentError
-        The suffix is none of these, the store holds no trace, or the target cannot be written.
-    """
+    """Write an HDF5 trace again as CSV or Parquet, in constant memory however long it is."""
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".parquet"):
         raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use .csv or .parquet")
@@ -159,20 +121,7 @@ def convert_trace(store: str | Path, path: str | Path) -> None:
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
-    """Write a trace in the format its suffix names.
-
-    Parameters
-    ----------
-    trace : Trace
-        What to write.
-    path : str or Path
-        Target ending in ``.h5``, ``.hdf5``, ``.csv`` or ``.parquet``.
-
-    Raises
-    ------
-    DetentError
-        The suffix is none of these, or the file cannot be written.
-    """
+    """Write a trace in the format its suffix names."""
     writers: dict[str, Callable[[Trace, str | Path], None]] = {
         ".h5": save_hdf5, ".hdf5": save_hdf5, ".csv": save_csv, ".parquet": save_parquet,
     }  # fmt: skip
@@ -270,13 +219,7 @@ def _read_columns(path: Path, first: list[str]) -> list[Column]:
 
 
 def need_parquet() -> None:
-    """Refuse before any work what cannot be written at its end.
-
-    Raises
-    ------
-    DetentError
-        pyarrow is not installed; the text names the extra.
-    """
+    """Refuse before any work what cannot be written at its end."""
     _pyarrow()
 
 

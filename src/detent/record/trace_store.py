@@ -25,20 +25,7 @@ FORMAT = "detent trace 1"
 
 
 def save_hdf5(trace: Trace, path: str | Path) -> None:
-    """Write a trace as HDF5: one dataset per column under ``/trace``, units in attributes.
-
-    Parameters
-    ----------
-    trace : Trace
-        What to write.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Write a trace as HDF5: one dataset per column under ``/trace``, units in attributes."""
     dtype = np.dtype([(name, values.dtype) for name, values in trace.columns.items()])
     with TraceWriter(path, dtype, units=trace.units, docs=trace.docs, attributes=trace.attributes) as writer:
         writer.append_columns(trace.columns)
@@ -51,24 +38,6 @@ class TraceWriter:
     ``with`` block by an exception closes it too - what was recorded up to a failure is what one wants to look at - with
     the attribute ``complete`` = 0.
 
-    Parameters
-    ----------
-    path : str or Path
-        Target, replaced if it exists.
-    dtype : numpy.dtype
-        Structured type of the blocks to come: the column names and their widths; ``t`` first.
-    units, docs : mapping of str to str
-        As of `Trace`.
-    attributes : mapping of str to str, float or int
-        As of `Trace`; stored at the root.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be made, or the columns do not make a trace.
-
-    Examples
-    --------
     >>> import numpy as np, tempfile, pathlib
     >>> row = np.dtype([("t", "f8"), ("motor.current", "f8")])
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "run.h5"
@@ -127,33 +96,11 @@ class TraceWriter:
             self._sets[name] = dataset
 
     def append(self, block: NDArray[np.void]) -> None:
-        """Add rows.
-
-        Parameters
-        ----------
-        block : ndarray
-            Structured array, shape (n,), with the fields of the writer's dtype.
-
-        Raises
-        ------
-        DetentError
-            The writer is closed, a field is missing, or the time runs backwards.
-        """
+        """Add rows."""
         self.append_columns({name: block[name] for name in (block.dtype.names or ())})
 
     def append_columns(self, columns: Mapping[str, Column]) -> None:
-        """Add rows given as columns.
-
-        Parameters
-        ----------
-        columns : mapping of str to ndarray
-            Every column of the writer, each of shape (n,).
-
-        Raises
-        ------
-        DetentError
-            As of `append`.
-        """
+        """Add rows given as columns."""
         if self._file is None:
             raise DetentError(f"{self.path}: the trace is closed; append rows before close()")
         if tuple(columns) != self._names:
@@ -175,13 +122,7 @@ class TraceWriter:
         self.rows, self._last_time = end, time[-1]
 
     def close(self, *, complete: bool = True) -> None:
-        """Finish the file and give it its name; a second call does nothing.
-
-        Parameters
-        ----------
-        complete : bool
-            Whether the run came to its end; stored as attribute ``complete`` (1 or 0).
-        """
+        """Finish the file and give it its name; a second call does nothing."""
         if self._file is None:
             return
         with writing(self.path):

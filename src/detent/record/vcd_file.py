@@ -58,18 +58,6 @@ def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
 
     The same waveforms give the same bytes. Time is counted in the coarsest of 1, 10, 100 ps, ns or µs that hits every
     change.
-
-    Parameters
-    ----------
-    waveforms : Waveforms
-        What to write; at least one signal.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        There is no signal, or the file cannot be written.
     """
     path = Path(path)
     if not waveforms.signals:
@@ -130,25 +118,7 @@ def _scope_name(title: str) -> str:
 
 
 def load_vcd(path: str | Path) -> Waveforms:
-    """Read a VCD file in which every signal has a defined value from the beginning, as detent writes it.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    Waveforms
-        Signals in the order of the file, by block; units and descriptions are empty, since VCD has none. The title is
-        the outermost scope, where there is only one.
-
-    Raises
-    ------
-    InputError
-        The file is absent, is not VCD, or holds what `Waveforms` does not: strings, undefined levels, times finer than
-        a picosecond.
-    """
+    """Read a VCD file in which every signal has a defined value from the beginning, as detent writes it."""
     path = Path(path)
     if not path.is_file():
         raise InputError.of_file(str(path), "no such file", "a VCD file", "check the name and the folder")

@@ -34,23 +34,11 @@ _NAME = re.compile(r"[!-~]+")
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """When inside a tick a register takes its new value.
+    """When inside a tick a register takes its new value."""
 
-    Parameters
-    ----------
-    changes_at : float
-        Fraction of the tick, 0 <= changes_at < 1.
-    pulse : (float, float), optional
-        Fractions of the tick, 0 <= from < to <= 1: the value is shown between the two only, and 0 in the rest of the
-        tick. Replaces `changes_at`.
-
-    Raises
-    ------
-    DetentError
-        A fraction lies outside, or both are given.
-    """
-
-    changes_at: float = 0.0
+    changes_at: float = 0.0  # fraction of the tick, 0 <= changes_at < 1
+    # fractions of the tick, 0 <= from < to <= 1: the value is shown between the two only, and 0 in the rest of the
+    # tick. Replaces `changes_at`
     pulse: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -230,7 +218,7 @@ def waveforms_from_rows(
     rows: NDArray[np.void],
     leaves: Sequence[Leaf],
     *,
-    period: float,
+    period: float,  # period T of a tick [s], at least 1 ps
     phases: Mapping[str, Phase] | None = None,
     title: str = "",
 ) -> Waveforms:
@@ -240,34 +228,6 @@ def waveforms_from_rows(
     register inside the first tick nothing is known of it: the first value is carried back. Where that matters, record
     one tick more and cut it off with `Waveforms.window`.
 
-    Parameters
-    ----------
-    rows : ndarray
-        Structured array, shape (n,), n >= 1: ``tick`` (the tick counter after the tick) and one field per register.
-    leaves : sequence of Leaf
-        The registers to show, in order; those of one value.
-    period : float
-        Period T of a tick [s], at least 1 ps.
-    phases : mapping of str to Phase, optional
-        When registers change: by path (``tracker.plus``) or by block (``tracker``); of several that fit, the longest
-        holds. Without an entry a register changes as its tick begins.
-    title : str
-        As of `Waveforms`.
-
-    Returns
-    -------
-    Waveforms
-        From the begin of the first tick to the end of the last, changes only. A ``u1`` without unit that holds only 0
-        and 1 is a flag of 1 bit; any other register has its full width.
-
-    Raises
-    ------
-    DetentError
-        There are no rows, a tick is missing between two rows, a register was not recorded or is an array, the period
-        is no time, or a pulse is shorter than a picosecond.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> from detent.kernel.registers import Registers, register, u1
     >>> class Divider(Registers):
@@ -287,26 +247,7 @@ def waveforms_from_rows(
 
 
 def clock_waveform(name: str, period: float, ticks: range, *, high: tuple[float, float], doc: str = "") -> Waveform:
-    """Make the waveform of a clock, which is no register: high in the same part of every tick.
-
-    Parameters
-    ----------
-    name : str
-        Such as ``clocks.ck1``.
-    period : float
-        Period of a tick [s], at least 1 ps.
-    ticks : range
-        The ticks shown, step 1; tick k spans [k·T, (k + 1)·T). ``range(0, 4)`` are the first four after power-on.
-    high : (float, float)
-        Part of the tick in which the clock is high, 0 <= from < to <= 1.
-    doc : str
-        What the clock does.
-
-    Raises
-    ------
-    DetentError
-        The range is empty, the fractions lie outside a tick, or the period is no time.
-    """
+    """Make the waveform of a clock, which is no register: high in the same part of every tick."""
     period_ps = _checked_period(period)
     if not len(ticks) or ticks.step != 1 or ticks.start < 0:
         raise DetentError(f"clock {name!r}: came {ticks!r}; allowed: ticks from 0 on, step 1; give those to show")

@@ -74,18 +74,6 @@ def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float
     With the electrical angle x the secondary carries ``(1 + gain) sin(wt) cos(x) + cos(wt + quadrature) sin(x)``,
     compared with `offset`. Written as ``a sin(wt) + b cos(wt)`` it crosses the offset where
     ``sin(wt + atan2(b, a)) = offset / sqrt(a^2 + b^2)``.
-
-    Parameters
-    ----------
-    p : DetectorParams
-        Filled in place.
-    gain : float
-        Amplitude of the first winding over the second, less one.
-    quadrature : float
-        Angle by which the windings miss 90 degrees [rad].
-    offset : float
-        Of the comparator, as a fraction of the secondary's amplitude. Together the three may displace an edge by
-        less than a quarter of a turn; more is cut off.
     """
     p.rise.used = p.fall.used = 1 if gain or quadrature or offset else 0
     for k in range(POINTS + 1):

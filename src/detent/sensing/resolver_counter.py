@@ -42,19 +42,7 @@ def count_phase(p: ResolverParams, r: Resolver, shaft: int) -> None:
 
 
 def fill_resolver(p: ResolverParams, gain: float, quadrature: float, offset: float) -> None:
-    """Fill the error table from the faults of windings and comparator, as `phase_detector.fill_errors` explains.
-
-    Parameters
-    ----------
-    p : ResolverParams
-        Filled in place.
-    gain : float
-        Amplitude of the first winding over the second, less one.
-    quadrature : float
-        Angle by which the windings miss 90 degrees [rad].
-    offset : float
-        Of the comparator, as a fraction of the output's amplitude.
-    """
+    """Fill the error table from the faults of windings and comparator, as `phase_detector.fill_errors` explains."""
     detector = DetectorParams()
     fill_errors(detector, gain, quadrature, offset)
     p.errors = detector.rise

@@ -16,17 +16,10 @@ def _entries(file: str) -> dict[str, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Motors of one kind, in one TOML file of ``[[motor]]`` tables.
+    """Motors of one kind, in one TOML file of ``[[motor]]`` tables."""
 
-    Attributes
-    ----------
-    file : str
-        Name of the file, beside this module.
-    keys : tuple of str
-        Keys of an entry that stand in for keys of the same name in ``[motor]``; the others document the motor.
-    """
-
-    file: str
+    file: str  # name of the file, beside this module
+    # keys of an entry that stand in for keys of the same name in ``[motor]``; the others document the motor
     keys: tuple[str, ...]
 
     def entries(self) -> dict[str, dict[str, Any]]:
@@ -36,8 +29,6 @@ class Catalogue:
     def constants(self, name: str) -> dict[str, str | int] | None:
         """Constants of a motor as an axis file would state them, or None when the catalogue has no such motor.
 
-        Examples
-        --------
         >>> STEPPER_MOTORS.constants("MotionKing 17HS4401")["steps_per_turn"]
         200
         """

@@ -21,31 +21,15 @@ from detent.logs.log import Log
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """What one method says about one log.
+    """What one method says about one log."""
 
-    Attributes
-    ----------
-    name, title : str
-        The word it is asked for by, and a few words for people.
-    log : str
-        Name of the log.
-    estimates : tuple of Estimate
-        What was found.
-    reason : str
-        Why there is nothing, or why it is not to be trusted; empty where neither is so.
-    notes : tuple of str
-        What to know about it.
-    details : dict
-        All of it, as plain data for JSON.
-    """
-
-    name: str
+    name: str  # and title: the word it is asked for by, and a few words for people
     title: str
-    log: str
-    estimates: tuple[Estimate, ...]
-    reason: str
-    notes: tuple[str, ...]
-    details: dict[str, Any]
+    log: str  # name of the log
+    estimates: tuple[Estimate, ...]  # what was found
+    reason: str  # why there is nothing, or why it is not to be trusted; empty where neither is so
+    notes: tuple[str, ...]  # what to know about it
+    details: dict[str, Any]  # all of it, as plain data for JSON
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; a number that is not finite is None."""
@@ -141,42 +125,14 @@ ANALYSES: dict[str, tuple[str, Callable[[Log, str, float], Found]]] = {
 
 
 def check_names(names: Sequence[str]) -> None:
-    """Refuse a name that no analysis has.
-
-    Raises
-    ------
-    DetentError
-        Naming those there are.
-    """
+    """Refuse a name that no analysis has."""
     for name in names:
         if name not in ANALYSES:
             raise DetentError(f"analysis: came {name}; allowed: {', '.join(ANALYSES)}; name one of these")
 
 
 def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysis:
-    """Ask a log for one thing.
-
-    Parameters
-    ----------
-    log : Log
-        As `read_log` gives it.
-    name : str
-        A key of `ANALYSES`.
-    effort : str
-        Role of the signal that drives the axis; the first that the log holds by default.
-    mass : float
-        Effort per acceleration, where it is known: the friction map then needs no steady speeds.
-
-    Returns
-    -------
-    Analysis
-        With a reason where the log cannot tell.
-
-    Raises
-    ------
-    DetentError
-        There is no analysis of that name.
-    """
+    """Ask a log for one thing."""
     check_names([name])
     title, method = ANALYSES[name]
     try:

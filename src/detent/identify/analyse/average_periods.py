@@ -39,24 +39,6 @@ def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
     variance of the noise is taken from neighbouring lines together, as noise of the sensor that is the same in all of
     them, and a disturbance that the axis answers to as it does to the excitation. A drift from period to period is
     taken out first.
-
-    Parameters
-    ----------
-    periods : Periods
-        Excitation and answer.
-    settle : int
-        Periods left out at the beginning.
-
-    Returns
-    -------
-    FrequencyResponse
-        At the excited lines alone: those in front of the widest gap in amplitude, above a thousandth of the strongest
-        and well above their own scatter.
-
-    Raises
-    ------
-    DetentError
-        Less than two periods are left, or nothing is excited.
     """
     kept = len(periods.signals[0]) - settle
     if settle < 0 or kept < 2:
@@ -125,20 +107,6 @@ def noise_parts(noise: Values, power: Values, reach: int) -> tuple[Values, Value
 
     Noise of the sensor is alike in neighbouring lines; a disturbance is answered as the excitation is. About a
     resonance that noise is as narrow as the resonance, and a mean over lines would blur it.
-
-    Parameters
-    ----------
-    noise : ndarray
-        Variance of each line by its scatter, shape (n,).
-    power : ndarray
-        Squared magnitude of the answer, shape (n,).
-    reach : int
-        Neighbours to each side.
-
-    Returns
-    -------
-    tuple of ndarray
-        a and b of each line, shape (n,).
     """
     unit = float(power.max())
     noise, power = noise / unit, power / unit

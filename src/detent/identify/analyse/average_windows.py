@@ -28,28 +28,7 @@ FEWEST_ROWS = 64
 
 
 def average_windows(t: Values, excitation: Values, answer: Values, step_hz: float | None = None) -> FrequencyResponse:
-    """Response by Welch's method: Hann windows that overlap by half, ``H1 = S_uy / S_uu``.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), without gaps; uneven stamps are put on an even grid by straight lines.
-    excitation, answer : ndarray
-        Input and output, shape (n,).
-    step_hz : float, optional
-        Distance of two frequencies [Hz]; that of a window of an eighth of the recording by default. A resonance that is
-        narrower than 1.5 of it comes out too flat.
-
-    Returns
-    -------
-    FrequencyResponse
-        Where the excitation has more than 1e-4 of its strongest power density.
-
-    Raises
-    ------
-    DetentError
-        The recording is too short for the step, or the excitation stays the same.
-    """
+    """Response by Welch's method: Hann windows that overlap by half, ``H1 = S_uy / S_uu``."""
     signals: Any = import_module("scipy.signal")  # it states no types
     mean, excitation, answer, grid = _even(t, excitation, answer)
     rows = len(excitation) // WINDOWS if step_hz is None else round(1.0 / (step_hz * mean))
@@ -84,13 +63,6 @@ def independent_windows(rows: int, window: int) -> float:
     P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70, equation for the variance with overlap:
     neighbours share a sixth of their values' products.
 
-    Parameters
-    ----------
-    rows, window : int
-        Samples of the recording and of a window.
-
-    Examples
-    --------
     >>> round(independent_windows(1000, 125), 1)
     13.3
     """

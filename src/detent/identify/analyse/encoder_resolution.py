@@ -47,42 +47,17 @@ class _Grid(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """Resolution of an encoder.
+    """Resolution of an encoder."""
 
-    Attributes
-    ----------
-    step : float
-        Smallest difference between two positions, in their unit; nan where there is none.
-    counts : int
-        Counts between the lowest and the highest position; 0 where no step was found.
-    share : float
-        Share of the positions on the grid.
-    reason : str
-        Why there is none; empty where a step was found.
-    """
-
-    step: float
-    counts: int
-    share: float
-    reason: str = ""
+    step: float  # smallest difference between two positions, in their unit; nan where there is none
+    counts: int  # counts between the lowest and the highest position; 0 where no step was found
+    share: float  # share of the positions on the grid
+    reason: str = ""  # why there is none; empty where a step was found
 
 
 def estimate_resolution(position: Values) -> Resolution:
     """Find the step of an encoder in its positions.
 
-    Parameters
-    ----------
-    position : ndarray
-        Positions in any unit, shape (n,).
-
-    Returns
-    -------
-    Resolution
-        A file that rounds more coarsely than the encoder gives the step of the file; one that rounds to a tenth of a
-        count or finer does not matter.
-
-    Examples
-    --------
     >>> found = estimate_resolution(0.25e-3 * np.array([0, 3, 8, 13, 11, 22, 20, 29, 24, 35]))
     >>> round(found.step, 9), found.counts
     (0.00025, 35)

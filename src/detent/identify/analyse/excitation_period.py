@@ -29,24 +29,13 @@ _BETTER = 1.05
 
 @dataclass(frozen=True, slots=True)
 class Periods:
-    """Signals of a recording, cut into periods of their excitation.
+    """Signals of a recording, cut into periods of their excitation."""
 
-    Attributes
-    ----------
-    signals : tuple of ndarray
-        Each of shape (periods, samples of a period).
-    step : float
-        Time between two samples [s].
-    mismatch : float
-        What differs between two periods of the excitation that follow one another, rms, as a part of its rms.
-    grid : str
-        What was done to put samples on a grid, for a person.
-    """
-
-    signals: tuple[Values, ...]
-    step: float
+    signals: tuple[Values, ...]  # each of shape (periods, samples of a period)
+    step: float  # time between two samples [s]
+    # what differs between two periods of the excitation that follow one another, rms, as a part of its rms
     mismatch: float
-    grid: str
+    grid: str  # what was done to put samples on a grid, for a person
 
     @property
     def duration(self) -> float:
@@ -60,18 +49,6 @@ def find_period(values: Values) -> float | None:
     The autocorrelation compares the two parts that overlap, so that noise lowers it at each lag alike. Peaks many
     periods away then give the fraction of a row.
 
-    Parameters
-    ----------
-    values : ndarray
-        Evenly spaced samples, shape (n,).
-
-    Returns
-    -------
-    float or None
-        Rows, with a fraction; None where less than three periods are there, or the signal does not repeat.
-
-    Examples
-    --------
     >>> find_period(np.sin(np.arange(1000) / 10.0)).__round__(2)
     62.83
     """
@@ -97,18 +74,7 @@ def find_period(values: Values) -> float | None:
 
 
 def autocorrelation(values: Values) -> Values:
-    """Correlation of a signal with itself, some rows later, over the part in which the two overlap.
-
-    Parameters
-    ----------
-    values : ndarray
-        Shape (n,).
-
-    Returns
-    -------
-    ndarray
-        Shape (n,); 1 at lag 0, and 0 for a constant.
-    """
+    """Correlation of a signal with itself, some rows later, over the part in which the two overlap."""
     signals: Any = import_module("scipy.signal")  # it states no types
     centred = values - values.mean()
     products = np.asarray(signals.correlate(centred, centred, mode="full", method="fft"))[len(values) - 1 :]
@@ -129,29 +95,7 @@ def _summit(curve: Values, top: int) -> float:
 def cut_periods(
     t: Values, excitation: Values, others: Sequence[Values] = (), period: float | None = None
 ) -> Periods | None:
-    """Cut signals along the periods of the first of them.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), strictly rising, without gaps.
-    excitation : ndarray
-        What repeats, shape (n,).
-    others : sequence of ndarray
-        Other signals, shape (n,).
-    period : float, optional
-        Its period [s]; it is found in the data where it is not stated.
-
-    Returns
-    -------
-    Periods or None
-        The excitation first, then the others. None where no period was found.
-
-    Raises
-    ------
-    DetentError
-        The stated period does not fit three times into the recording.
-    """
+    """Cut signals along the periods of the first of them."""
     mean = float(t[-1] - t[0]) / (len(t) - 1)
     if period is not None and not 2 * mean <= period <= (t[-1] - t[0] + mean) / FEWEST:
         raise DetentError(

@@ -16,36 +16,17 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
-    """Response of an axis at some frequencies.
+    """Response of an axis at some frequencies."""
 
-    Attributes
-    ----------
-    frequency : ndarray
-        Rising [Hz], shape (n,).
-    response : ndarray of complex
-        Output over input, shape (n,).
-    coherence : ndarray
-        Part of the power of the output that the input explains, 0..1, shape (n,).
-    deviation : ndarray
-        Standard deviation of the response: of its magnitude, as a part of it, and of its phase [rad]; shape (n,).
-    averages : float
-        Periods, or independent windows, that were averaged.
-    resolution : float
-        Width over which the response is an average [Hz]; 0 for a periodic excitation.
-    method : str
-        How it was found, with its figures.
-    input_unit, output_unit : str
-        Units of the two, empty for a pure number.
-    """
-
-    frequency: Values
-    response: Complex
-    coherence: Values
+    frequency: Values  # rising [Hz], shape (n,)
+    response: Complex  # output over input, shape (n,)
+    coherence: Values  # part of the power of the output that the input explains, 0..1, shape (n,)
+    # standard deviation of the response: of its magnitude, as a part of it, and of its phase [rad]; shape (n,)
     deviation: Values
-    averages: float
-    resolution: float
-    method: str
-    input_unit: str = ""
+    averages: float  # periods, or independent windows, that were averaged
+    resolution: float  # width over which the response is an average [Hz]; 0 for a periodic excitation
+    method: str  # how it was found, with its figures
+    input_unit: str = ""  # and output_unit: units of the two, empty for a pure number
     output_unit: str = ""
 
     def __len__(self) -> int:
@@ -80,24 +61,10 @@ class FrequencyResponse:
 
 
 def response_deviation(coherence: Values, averages: float) -> Values:
-    """Standard deviation of a response by its coherence.
+    """Standard deviation of a response by its coherence: of the magnitude, as a part of it, and of the phase [rad].
 
     ``sqrt((1 - g2) / (2 n g2))``: J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, section 9.2.4.
 
-    Parameters
-    ----------
-    coherence : ndarray
-        0..1, shape (n,).
-    averages : float
-        Independent averages.
-
-    Returns
-    -------
-    ndarray
-        Of the magnitude, as a part of it, and of the phase [rad], shape (n,).
-
-    Examples
-    --------
     >>> response_deviation(np.array([0.9]), 10).round(4)
     array([0.0745])
     """

@@ -46,64 +46,33 @@ OVER_NOISE = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Dip:
-    """Whether friction falls from its value at the lowest speed, in one direction.
+    """Whether friction falls from its value at the lowest speed, in one direction."""
 
-    Attributes
-    ----------
-    direction : str
-        ``"positive"`` or ``"negative"``.
-    is_found : bool
-        True where it does, significantly.
-    depth : Estimate or None
-        Friction of the lowest bin less that of the smallest, as magnitudes; None where there are not two bins.
-    speed : float
-        Where friction is smallest; nan without a depth.
-    """
-
-    direction: str
-    is_found: bool
+    direction: str  # ``"positive"`` or ``"negative"``
+    is_found: bool  # True where it does, significantly
+    # friction of the lowest bin less that of the smallest, as magnitudes; None where there are not two bins
     depth: Estimate | None
-    speed: float
+    speed: float  # where friction is smallest; nan without a depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionMap:
-    """Friction over the speed; arrays of shape (k,), one entry per bin that was accepted, by rising velocity.
+    """Friction over the speed; arrays of shape (k,), one entry per bin that was accepted, by rising velocity."""
 
-    Attributes
-    ----------
-    effort, unit, speed_unit : str
-        Role and unit of what drives, unit of the speed.
-    mass : float
-        By how much the effort rises with the acceleration; 0 where only steady stretches were used.
-    speed, friction : float64 array
-        Mean velocity and friction of the bins, signed.
-    error, low, high : float64 array
-        Standard error and 95 % interval of the friction.
-    windows, samples : float64 array
-        Independent windows, and samples, behind each.
-    dips : tuple of Dip
-        One for each direction.
-    refused : tuple of str
-        Bins that have samples, but too few windows.
-    reason : str
-        Why there is no map; empty where there is one.
-    """
-
-    effort: str
+    effort: str  # and unit, speed_unit: role and unit of what drives, unit of the speed
     unit: str
     speed_unit: str
-    mass: float
-    speed: Values
+    mass: float  # by how much the effort rises with the acceleration; 0 where only steady stretches were used
+    speed: Values  # and friction: mean velocity and friction of the bins, signed
     friction: Values
-    error: Values
+    error: Values  # and low, high: standard error and 95 % interval of the friction
     low: Values
     high: Values
-    windows: Values
+    windows: Values  # and samples: independent windows, and samples, behind each
     samples: Values
-    dips: tuple[Dip, ...] = ()
-    refused: tuple[str, ...] = ()
-    reason: str = ""
+    dips: tuple[Dip, ...] = ()  # one for each direction
+    refused: tuple[str, ...] = ()  # bins that have samples, but too few windows
+    reason: str = ""  # why there is no map; empty where there is one
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -111,28 +80,7 @@ class FrictionMap:
 
 
 def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) -> FrictionMap:
-    """Average the friction of a recording per bin of speed and direction.
-
-    Parameters
-    ----------
-    log : Log
-        With position or velocity, and an effort.
-    effort : str
-        Role of the effort; the most direct one by default.
-    mass : float
-        Effort per acceleration [kg for a force]; 0 to use steady stretches only.
-    bins : int
-        Bins of each direction.
-
-    Returns
-    -------
-    FrictionMap
-
-    Raises
-    ------
-    DetentError
-        A signal is missing, the mass is negative, or there are no bins.
-    """
+    """Average the friction of a recording per bin of speed and direction; without `mass`, of steady stretches only."""
     if not mass >= 0 or not np.isfinite(mass):
         raise DetentError(f"friction map: came a mass of {mass:g}; allowed: 0 or above; 0 takes steady stretches only")
     if bins < 1:
@@ -274,17 +222,7 @@ def _window_rows(moving: _Moving, member: NDArray[np.int64]) -> int:
 def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
     """Rows over which a residual remembers: integral of its correlation, over the log, gaps left out.
 
-    Parameters
-    ----------
-    residual : float64 array, shape (m,)
-        With a mean of 0.
-    place : int64 array, shape (m,)
-        Rows of the log that they belong to, rising.
-
-    Returns
-    -------
-    float
-        ``1 + 2 sum rho_k``, the sum up to the first lag beyond five times itself (Sokal's window); at least 1.
+    ``1 + 2 sum rho_k``, the sum up to the first lag beyond five times itself (Sokal's window); at least 1.
     """
     power = float(residual @ residual)
     if not len(residual) or power <= 0.0:

@@ -13,28 +13,14 @@ DEGREES = ((16, 4), (9, 3), (6, 2))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalPolynomial:
-    """A polynomial in time from its place.
+    """A polynomial in time from its place."""
 
-    Attributes
-    ----------
-    width : float
-        Half the time that it was fitted over [s]; coefficients are for ``time / width``.
-    coefficients : float64 array, shape (k,)
-        By rising powers.
-    covariance : float64 array, shape (k, k)
-        Of the coefficients.
-    degrees : int
-        Degrees of freedom behind it.
-    low, high : float
-        First and last time that it was fitted over, from its place [s].
-    """
-
-    width: float
-    coefficients: Values
-    covariance: Values
-    degrees: int
-    low: float
-    high: float
+    width: float  # half the time that it was fitted over [s]; coefficients are for ``time / width``
+    coefficients: Values  # by rising powers
+    covariance: Values  # of the coefficients
+    degrees: int  # degrees of freedom behind it
+    low: float  # and high: first and last time that it was fitted over, from its place [s]
+    high: float  # [s]
 
     def at(self, time: float, order: int = 0) -> float:
         """Value or derivative at a time from its place."""
@@ -74,23 +60,7 @@ class LocalPolynomial:
 def fit_local_polynomial(
     t: Values, y: Values, place: float, noise: Values, floor: float = 0.0
 ) -> LocalPolynomial | None:
-    """Fit a polynomial about a place.
-
-    Parameters
-    ----------
-    t, y : float64 array, shape (n,)
-        Time [s], rising, and values.
-    place : float
-        Time that it counts from [s].
-    noise, floor
-        A series of the noise of `y`, and white noise beside it: as in
-        `detent.identify.fit.stationary.known_noise_covariance`.
-
-    Returns
-    -------
-    LocalPolynomial or None
-        None with fewer samples than the lowest degree wants.
-    """
+    """Fit a polynomial about a place; None with fewer samples than the lowest degree wants."""
     degree = next((degree for least, degree in DEGREES if len(t) >= least), 0)
     if not degree:
         return None

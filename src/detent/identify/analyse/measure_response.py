@@ -20,28 +20,7 @@ from detent.logs.stamps import stretches
 def measure_response(
     t: Values, excitation: Values, answer: Values, *, period: float | None = None, settle: int = 1
 ) -> FrequencyResponse:
-    """Measure a frequency response, by periods where the excitation has some, otherwise by windows.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), strictly rising. Of a recording with gaps the longest stretch without one is taken.
-    excitation, answer : ndarray
-        Input and output in any units, shape (n,).
-    period : float, optional
-        Period of the excitation [s]; it is found in the data where it is not stated.
-    settle : int
-        Periods left out at the beginning, in which the axis settles; 0 or more.
-
-    Returns
-    -------
-    FrequencyResponse
-
-    Raises
-    ------
-    DetentError
-        Arrays differ in length, the recording is too short or holds no excitation, or the stated period does not fit.
-    """
+    """Measure a frequency response, by periods where the excitation has some, otherwise by windows."""
     t, excitation, answer = _longest_stretch(t, excitation, answer)
     periods = cut_periods(t, excitation, [answer], period)
     if periods is not None and len(periods.signals[0]) >= settle + 2:
@@ -57,29 +36,7 @@ def measure_response(
 def response_of(
     log: Log, effort: str | None = None, position: str = "position", *, period: float | None = None
 ) -> FrequencyResponse:
-    """Measure the response of the position to the effort in a log.
-
-    Parameters
-    ----------
-    log : Log
-        A recorded run.
-    effort : str, optional
-        Role of the input; the first of force, torque, current, voltage and command that the log has.
-    position : str
-        Role of the output, such as ``position`` or ``position_load``.
-    period : float, optional
-        Period of the excitation [s]; it is found in the data where it is not stated.
-
-    Returns
-    -------
-    FrequencyResponse
-        With the units of the two.
-
-    Raises
-    ------
-    DetentError
-        The log does not hold the two, or no response can be made of them.
-    """
+    """Measure the response of the position to the effort in a log."""
     chosen = effort or next((role for role in EFFORTS if role in log.signals), "")
     for role, wanted in ((chosen, effort or f"one of {', '.join(EFFORTS)}"), (position, position)):
         if role not in log.signals:

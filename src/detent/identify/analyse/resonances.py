@@ -53,34 +53,20 @@ _METHOD = "two masses fitted to the frequency response"
 
 @dataclass(frozen=True, eq=False)
 class Resonances:
-    """What the frequency responses of an axis say about its masses.
+    """What the frequency responses of an axis say about its masses."""
 
-    Attributes
-    ----------
-    estimates : dict of Estimate by name
-        ``gain`` (acceleration per effort, below the resonance), ``viscous`` [1/s]; where there is a resonance
-        ``resonance`` [Hz], ``resonance.damping`` [1]; with the encoder of the motor ``delay`` [s], ``antiresonance``
-        [Hz], ``antiresonance.damping`` [1], ``mass_ratio`` (load over motor) [1]; where the total mass is known
-        ``mass.total``, and of two masses ``mass.motor``, ``mass.load``, ``stiffness``, ``damping``.
-    frequency : ndarray
-        Lines [Hz], shape (n,).
-    fitted : ndarray of complex
-        Responses of the model at the lines, shape (outputs, n).
-    outputs : tuple of str
-        ``motor``, ``load`` or both.
-    scatter : float
-        What neither model nor noise explain, as a part of the response, the median over lines: friction, backlash,
-        other resonances.
-    reason : str
-        Why the resonances are not to be trusted; empty where they are.
-    """
-
+    # ``gain`` (acceleration per effort, below the resonance), ``viscous`` [1/s]; where there is a resonance
+    # ``resonance`` [Hz], ``resonance.damping`` [1]; with the encoder of the motor ``delay`` [s], ``antiresonance``
+    # [Hz], ``antiresonance.damping`` [1], ``mass_ratio`` (load over motor) [1]; where the total mass is known
+    # ``mass.total``, and of two masses ``mass.motor``, ``mass.load``, ``stiffness``, ``damping``
     estimates: dict[str, Estimate]
-    frequency: Values
-    fitted: NDArray[np.complex128]
-    outputs: tuple[str, ...]
+    frequency: Values  # lines [Hz], shape (n,)
+    fitted: NDArray[np.complex128]  # responses of the model at the lines, shape (outputs, n)
+    outputs: tuple[str, ...]  # ``motor``, ``load`` or both
+    # what neither model nor noise explain, as a part of the response, the median over lines: friction, backlash, other
+    # resonances
     scatter: float
-    reason: str
+    reason: str  # why the resonances are not to be trusted; empty where they are
 
     @property
     def is_trusted(self) -> bool:
@@ -110,30 +96,6 @@ def fit_resonances(
 ) -> Resonances:
     """Fit two masses to the responses of one or both encoders to the effort.
 
-    Parameters
-    ----------
-    motor, load : FrequencyResponse, optional
-        Position of the motor, and of the load, over the effort; one at least. Both are from one recording and in the
-        same unit.
-    total_mass : Estimate, optional
-        Mass [kg] or moment of inertia [kg*m^2] of both; it is found from the gain where the effort is a force or torque
-        in the units of the response.
-    hold : float
-        Time between two samples [s] of an effort that is held between samples, as the command to an amplifier is; 0 for
-        an effort that was measured as it acted.
-
-    Returns
-    -------
-    Resonances
-        With a reason where the data hold no resonance that can be trusted.
-
-    Raises
-    ------
-    DetentError
-        No response is given, or too few of its lines stand out of the noise.
-
-    References
-    ----------
     G. Ellis, "Control System Design Guide", 4th ed., 2012, chapter 16.
     """
     responses = [response for response in (motor, load) if response is not None]

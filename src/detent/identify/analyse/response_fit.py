@@ -43,61 +43,27 @@ _LEAST_FREE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """What is fitted.
+    """What is fitted."""
 
-    Attributes
-    ----------
-    frequency : ndarray
-        [Hz], shape (n,).
-    measured : ndarray of complex
-        Responses of the encoders, shape (outputs, n).
-    deviation : ndarray
-        Their relative standard deviations, shape (outputs, n).
-    used : ndarray of bool
-        Lines that take part, shape (outputs, n).
-    """
-
-    frequency: Values
-    measured: Complex
-    deviation: Values
-    used: NDArray[np.bool_]
+    frequency: Values  # [Hz], shape (n,)
+    measured: Complex  # responses of the encoders, shape (outputs, n)
+    deviation: Values  # their relative standard deviations, shape (outputs, n)
+    used: NDArray[np.bool_]  # lines that take part, shape (outputs, n)
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted model.
+    """A fitted model."""
 
-    Attributes
-    ----------
-    model : ResponseModel
-        What was fitted.
-    parameters : ndarray
-        Those of the model, then the logarithm of the gain and the dead time [s]; shape (p,).
-    sign : float
-        Sign of the gain.
-    covariance : ndarray
-        Of the parameters, shape (p, p); nan where the fit ended at values that describe no axis.
-    freedom : float
-        Values less parameters.
-    misfit : float
-        Sum of the squared misfits over the noise of the lines.
-    scatter : float
-        Misfit beyond the noise, as a part of the response: the median over lines.
-    weights : ndarray
-        Reciprocal standard deviations that were used, 0 for a line left out, shape (outputs, n).
-    fitted : ndarray of complex
-        Responses of the model at the lines, shape (outputs, n).
-    """
-
-    model: ResponseModel
-    parameters: Values
-    sign: float
-    covariance: Values
-    freedom: float
-    misfit: float
-    scatter: float
-    weights: Values
-    fitted: Complex
+    model: ResponseModel  # what was fitted
+    parameters: Values  # those of the model, then the logarithm of the gain and the dead time [s]; shape (p,)
+    sign: float  # sign of the gain
+    covariance: Values  # of the parameters, shape (p, p); nan where the fit ended at values that describe no axis
+    freedom: float  # values less parameters
+    misfit: float  # sum of the squared misfits over the noise of the lines
+    scatter: float  # misfit beyond the noise, as a part of the response: the median over lines
+    weights: Values  # reciprocal standard deviations that were used, 0 for a line left out, shape (outputs, n)
+    fitted: Complex  # responses of the model at the lines, shape (outputs, n)
 
     @property
     def degrees(self) -> float:
@@ -117,17 +83,7 @@ class Fit:
 
 
 def take_lines(responses: Sequence[FrequencyResponse]) -> Lines:
-    """Put responses of one excitation together.
-
-    Parameters
-    ----------
-    responses : sequence of FrequencyResponse
-        From one recording: lines that not all of them hold are left out.
-
-    Returns
-    -------
-    Lines
-    """
+    """Put responses of one excitation together."""
     frequency = responses[0].frequency
     for response in responses[1:]:
         frequency = frequency[np.isin(frequency, response.frequency)]
@@ -140,28 +96,7 @@ def take_lines(responses: Sequence[FrequencyResponse]) -> Lines:
 
 
 def fit_model(model: ResponseModel, lines: Lines, starts: Sequence[Values], hold: float = 0.0) -> Fit:
-    """Fit a model to responses.
-
-    Parameters
-    ----------
-    model : ResponseModel
-        What is fitted.
-    lines : Lines
-        Responses.
-    starts : sequence of ndarray
-        Values of the model's own parameters to start from; the nearest by magnitude are used.
-    hold : float
-        As in `respond_sampled`.
-
-    Returns
-    -------
-    Fit
-
-    Raises
-    ------
-    DetentError
-        Too few lines are left.
-    """
+    """Fit a model to responses."""
     count = len(model.names) + 2
     if int(lines.used.sum()) < LINES_PER_PARAMETER * count:
         raise DetentError(

@@ -29,44 +29,16 @@ METHOD = "damped oscillation, least squares"
 
 @dataclass(frozen=True, slots=True)
 class Ringing:
-    """A decaying oscillation.
+    """A decaying oscillation."""
 
-    Attributes
-    ----------
-    swings : tuple of float
-        Way between successive turning points.
-    log_decrement : float
-        Logarithm of the ratio of two swings a whole period apart, from the first and last one.
-    period : Estimate
-        Of the damped oscillation [s].
-    damping_ratio : Estimate
-        ``sigma / sqrt(sigma^2 + omega^2)``.
-    """
-
-    swings: tuple[float, ...]
-    log_decrement: float
-    period: Estimate
-    damping_ratio: Estimate
+    swings: tuple[float, ...]  # way between successive turning points
+    log_decrement: float  # logarithm of the ratio of two swings a whole period apart, from the first and last one
+    period: Estimate  # of the damped oscillation [s]
+    damping_ratio: Estimate  # ``sigma / sqrt(sigma^2 + omega^2)``
 
 
 def fit_ringing(t: Values, y: Values, least: float, noise: Values, floor: float = 0.0) -> Ringing | None:
-    """Fit the ringing of a record that begins at its first turning point.
-
-    Parameters
-    ----------
-    t, y : float64 array, shape (n,)
-        Time [s] and position.
-    least : float
-        Smallest swing that is no noise.
-    noise, floor
-        A series of the noise of `y`, and white noise beside it: as in
-        `detent.identify.fit.stationary.known_noise_covariance`.
-
-    Returns
-    -------
-    Ringing or None
-        None with fewer than `FEWEST_SWINGS` swings, or where no damped oscillation fits.
-    """
+    """Fit the ringing of a record that begins at its first turning point."""
     turns = find_turns(y, least)
     swings: Values = np.asarray(np.abs(np.diff(y[turns])), float)
     if len(swings) < FEWEST_SWINGS or swings[-1] >= swings[0]:
@@ -87,8 +59,6 @@ def find_turns(y: Values, least: float) -> NDArray[np.int64]:
 
     A point is one where the record has come back from its extreme by `least`.
 
-    Examples
-    --------
     >>> find_turns(np.array([0.0, 3.0, 1.0, 1.1, 0.9, 2.0, 1.9]), 0.5)
     array([0, 1, 4])
     """

@@ -57,43 +57,23 @@ CLEAR = 6.0
 
 @dataclass(frozen=True, slots=True)
 class StepMetrics:
-    """The answer to one step.
+    """The answer to one step."""
 
-    Attributes
-    ----------
-    begin, duration : float
-        Where the reference leaves its rest, and for how long it moves [s].
-    start, target : float
-        Reference before and after.
-    rise_time : Estimate or None
-        From 10 to 90 % of the way between the rests [s]; None where these levels are not crossed.
-    overshoot : Estimate or None
-        Farthest position beyond the target; None where none stands out of noise.
-    peak_time : Estimate or None
-        Of the farthest position, from `begin` [s].
-    settling_2, settling_5 : float
-        From `begin` until the position stays within 2 or 5 % of the size of the step about its rest [s]; infinite
-        where it does not in this record.
-    rest_error : Estimate
-        Reference less position at rest.
-    ringing : Ringing or None
-        None where there are not enough swings.
-    notes : tuple of str
-        What to know about it.
-    """
-
-    begin: float
-    duration: float
-    start: float
+    begin: float  # and duration: where the reference leaves its rest, and for how long it moves [s]
+    duration: float  # [s]
+    start: float  # and target: reference before and after
     target: float
+    # from 10 to 90 % of the way between the rests [s]; None where these levels are not crossed
     rise_time: Estimate | None
-    overshoot: Estimate | None
-    peak_time: Estimate | None
+    overshoot: Estimate | None  # farthest position beyond the target; None where none stands out of noise
+    peak_time: Estimate | None  # of the farthest position, from `begin` [s]
+    # settling_2, settling_5: from `begin` until the position stays within 2 or 5 % of the size of the step about its
+    # rest [s]; infinite where it does not in this record
     settling_2: float
-    settling_5: float
-    rest_error: Estimate
-    ringing: Ringing | None
-    notes: tuple[str, ...] = ()
+    settling_5: float  # [s]
+    rest_error: Estimate  # reference less position at rest
+    ringing: Ringing | None  # None where there are not enough swings
+    notes: tuple[str, ...] = ()  # what to know about it
 
     @property
     def size(self) -> float:
@@ -110,24 +90,12 @@ class StepMetrics:
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """Answers to the steps of a recording.
+    """Answers to the steps of a recording."""
 
-    Attributes
-    ----------
-    unit : str
-        Unit of positions.
-    steps : tuple of StepMetrics
-        In order of time.
-    reason : str
-        Why there is none; empty where there is one.
-    notes : tuple of str
-        What was passed over.
-    """
-
-    unit: str
-    steps: tuple[StepMetrics, ...] = ()
-    reason: str = ""
-    notes: tuple[str, ...] = ()
+    unit: str  # unit of positions
+    steps: tuple[StepMetrics, ...] = ()  # in order of time
+    reason: str = ""  # why there is none; empty where there is one
+    notes: tuple[str, ...] = ()  # what was passed over
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; a time that is not reached is None."""
@@ -139,22 +107,7 @@ class StepResponse:
 
 
 def measure_steps(log: Log) -> StepResponse:
-    """Metrics of each step of the reference of a recording.
-
-    Parameters
-    ----------
-    log : Log
-        With reference and position.
-
-    Returns
-    -------
-    StepResponse
-
-    Raises
-    ------
-    DetentError
-        A signal is missing, or the two have different units.
-    """
+    """Metrics of each step of the reference of a recording."""
     missing = [role for role in ("reference", "position") if role not in log.signals]
     if missing:
         raise DetentError(
@@ -195,18 +148,7 @@ class Move(NamedTuple):
 
 
 def find_steps(reference: Values) -> list[Move]:
-    """Changes of a reference between rests.
-
-    Parameters
-    ----------
-    reference : float64 array, shape (n,)
-        Position asked for.
-
-    Returns
-    -------
-    list of Move
-        Places are samples; `first` is the last sample at rest, `arrived` the first at the target.
-    """
+    """Changes of a reference between rests."""
     if not np.ptp(reference) > 0:
         return []
     changes = np.abs(np.diff(reference)) > STILL * float(np.ptp(reference))

@@ -44,15 +44,9 @@ class ResponseModel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RigidModel:
-    """One mass with viscous friction: ``1 / (s (s + b))``.
+    """One mass with viscous friction: ``1 / (s (s + b))``."""
 
-    Attributes
-    ----------
-    outputs : int
-        Encoders, which all see the same.
-    """
-
-    outputs: int = 1
+    outputs: int = 1  # encoders, which all see the same
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,15 +60,9 @@ class RigidModel:
 
 @dataclass(frozen=True, slots=True)
 class TwoMassModel:
-    """Two masses seen by the encoder of the motor, or by both.
+    """Two masses seen by the encoder of the motor, or by both."""
 
-    Attributes
-    ----------
-    outputs : int
-        1 for the motor alone, 2 for motor and load.
-    """
-
-    outputs: int = 1
+    outputs: int = 1  # 1 for the motor alone, 2 for motor and load
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -110,13 +98,7 @@ class LoadModel:
 
 
 def constants_of(parameters: Values) -> tuple[float, float, float, float, float, float]:
-    """Masses, stiffness, damping of the coupling, and viscous friction of motor and load, per total mass.
-
-    Parameters
-    ----------
-    parameters : ndarray
-        Of a `TwoMassModel`.
-    """
+    """Masses, stiffness, damping of the coupling, and viscous friction of motor and load, per total mass."""
     ratio, omega = float(np.exp(parameters[0])), float(np.exp(parameters[1]))
     m2 = ratio / (1.0 + ratio)
     return 1.0 - m2, m2, m2 * omega**2, float(parameters[2]), float(parameters[3]), float(parameters[4])
@@ -128,24 +110,7 @@ def laplace(frequency: Values) -> Complex:
 
 
 def respond_sampled(model: ResponseModel, parameters: Values, frequency: Values, hold: float) -> Complex:
-    """Response of a model to an effort that is held between samples.
-
-    Parameters
-    ----------
-    model : ResponseModel
-        What is driven.
-    parameters : ndarray
-        Its parameters, then the logarithm of the gain and the dead time [s].
-    frequency : ndarray
-        [Hz], shape (n,).
-    hold : float
-        Time between two samples of effort and positions [s]; 0 for an effort that is recorded as it acts.
-
-    Returns
-    -------
-    ndarray of complex
-        Shape (outputs, n).
-    """
+    """Response of a model to an effort that is held between samples."""
     *inner, log_gain, delay = parameters.tolist()
     gain, own = np.exp(log_gain), np.asarray(inner)
     s = laplace(frequency)
@@ -169,20 +134,8 @@ class Modes:
 
 
 def modes_of(parameters: Values) -> Modes | None:
-    """Anti-resonance and resonance of two masses.
+    """Anti-resonance and resonance of two masses; None where the damping leaves no resonance.
 
-    Parameters
-    ----------
-    parameters : ndarray
-        Of a `TwoMassModel`.
-
-    Returns
-    -------
-    Modes or None
-        None where the damping leaves no resonance.
-
-    Examples
-    --------
     >>> found = modes_of(np.array([np.log(3.0), np.log(10.0), 0.0, 0.0, 0.0]))
     >>> round(found.omega_zero, 6), round(found.omega_pole, 6)
     (10.0, 20.0)

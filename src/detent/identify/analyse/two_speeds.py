@@ -48,49 +48,24 @@ DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 
 @dataclass(frozen=True, slots=True)
 class SpeedLine:
-    """Effort against speed in one direction.
+    """Effort against speed in one direction."""
 
-    Attributes
-    ----------
-    direction : str
-        ``"positive"`` or ``"negative"``.
-    stretches : tuple of SteadyStretch
-        What it was found from.
-    slope : Estimate or None
-        Effort per speed.
-    coulomb : Estimate or None
-        Effort of the line at speed 0, as a magnitude against the motion.
-    between : float
-        Scatter of the stretches about the line beside their own errors, standard deviation; 0 where there is none.
-    reason : str
-        Why there is no result; empty where there is one.
-    notes : tuple of str
-        What to know about it.
-    """
-
-    direction: str
-    stretches: tuple[SteadyStretch, ...]
-    slope: Estimate | None = None
-    coulomb: Estimate | None = None
+    direction: str  # ``"positive"`` or ``"negative"``
+    stretches: tuple[SteadyStretch, ...]  # what it was found from
+    slope: Estimate | None = None  # effort per speed
+    coulomb: Estimate | None = None  # effort of the line at speed 0, as a magnitude against the motion
+    # scatter of the stretches about the line beside their own errors, standard deviation; 0 where there is none
     between: float = 0.0
-    reason: str = ""
-    notes: tuple[str, ...] = ()
+    reason: str = ""  # why there is no result; empty where there is one
+    notes: tuple[str, ...] = ()  # what to know about it
 
 
 @dataclass(frozen=True, slots=True)
 class TwoSpeeds:
-    """Outcome of the method.
+    """Outcome of the method."""
 
-    Attributes
-    ----------
-    effort : str
-        Role of the signal that drives.
-    positive, negative : SpeedLine
-        One for each direction.
-    """
-
-    effort: str
-    positive: SpeedLine
+    effort: str  # role of the signal that drives
+    positive: SpeedLine  # and negative: one for each direction
     negative: SpeedLine
 
     @property
@@ -112,27 +87,7 @@ class TwoSpeeds:
 
 
 def fit_two_speeds(log: Log, effort: str = "", shortest: float | None = None, tolerance: float = 0.05) -> TwoSpeeds:
-    """Slope and friction of each direction from the steady stretches of a recording.
-
-    Parameters
-    ----------
-    log : Log
-        With position or velocity, and an effort.
-    effort : str
-        Role of the effort; the most direct one by default (force, torque, current, voltage, command).
-    shortest, tolerance : float
-        What counts as steady: as in `detent.identify.fit.steady.find_steady`.
-
-    Returns
-    -------
-    TwoSpeeds
-        Units of the effort, and that per unit of the velocity.
-
-    Raises
-    ------
-    DetentError
-        A signal is missing, or a limit is not positive.
-    """
+    """Slope and friction of each direction from the steady stretches of a recording."""
     role = select_effort(log, effort)
     velocity, speed_unit, step = find_velocity(log)
     drive = log.signals[role]

@@ -55,37 +55,18 @@ CLEARLY_BETTER = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Winding:
-    """Constants of a winding.
+    """Constants of a winding."""
 
-    Attributes
-    ----------
-    resistance, inductance : Estimate or None
-        [Ohm] and [H].
-    back_emf_constant : Estimate or None
-        [V*s/rad] or [V*s/m].
-    offset : Estimate or None
-        Voltage that makes no current [V].
-    torque_constant : Estimate or None
-        [N*m/A] or [N/A].
-    apparent_resistance : Estimate or None
-        ``R + ke v / i`` where speed and current are proportional and only the sum is seen [Ohm].
-    relative_error : float
-        Residual over the current, both standard deviations; nan without a fit.
-    reason : str
-        Why there is no result; empty where there is one.
-    notes : tuple of str
-        What the data cannot tell, and what to know about the result.
-    """
-
-    resistance: Estimate | None = None
+    resistance: Estimate | None = None  # and inductance: [Ohm] and [H]
     inductance: Estimate | None = None
-    back_emf_constant: Estimate | None = None
-    offset: Estimate | None = None
-    torque_constant: Estimate | None = None
+    back_emf_constant: Estimate | None = None  # [V*s/rad] or [V*s/m]
+    offset: Estimate | None = None  # voltage that makes no current [V]
+    torque_constant: Estimate | None = None  # [N*m/A] or [N/A]
+    # ``R + ke v / i`` where speed and current are proportional and only the sum is seen [Ohm]
     apparent_resistance: Estimate | None = None
-    relative_error: float = np.nan
-    reason: str = ""
-    notes: tuple[str, ...] = ()
+    relative_error: float = np.nan  # residual over the current, both standard deviations; nan without a fit
+    reason: str = ""  # why there is no result; empty where there is one
+    notes: tuple[str, ...] = ()  # what the data cannot tell, and what to know about the result
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -99,27 +80,7 @@ class Winding:
 
 
 def fit_winding(log: Log, *, is_locked: bool = False, late: int = 0) -> Winding:
-    """Constants of the winding from a recording.
-
-    Parameters
-    ----------
-    log : Log
-        With voltage and current, and velocity or position unless the rotor is locked; torque or force are used where
-        they are there.
-    is_locked : bool
-        True for a rotor that was held; a recorded motion of exactly 0 says the same.
-    late : int
-        Samples by which the voltage acts later than it is recorded.
-
-    Returns
-    -------
-    Winding
-
-    Raises
-    ------
-    DetentError
-        Voltage or current are missing, or the delay is negative.
-    """
+    """Constants of the winding from a recording."""
     missing = [role for role in ("voltage", "current") if role not in log.signals]
     if missing:
         raise DetentError(

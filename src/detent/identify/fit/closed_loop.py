@@ -29,42 +29,18 @@ SUBSTEPS = 4
 
 @dataclass(frozen=True, slots=True)
 class ClosedLoop:
-    """Errors of the simulation under the loops of the log.
+    """Errors of the simulation under the loops of the log."""
 
-    Attributes
-    ----------
-    rms, largest : float
-        Error of the position [m] or [rad].
-    relative, effort : float
-        Norm of the error over that of the recording, of the position and of the effort.
-    duration : float
-        Simulated time over all logs [s].
-    loops : Loops
-        Of the first log.
-    """
-
-    rms: float
-    largest: float
-    relative: float
+    rms: float  # and largest: error of the position [m] or [rad]
+    largest: float  # [m] or [rad]
+    relative: float  # and effort: norm of the error over that of the recording, of the position and of the effort
     effort: float
-    duration: float
-    loops: Loops
+    duration: float  # simulated time over all logs [s]
+    loops: Loops  # of the first log
 
 
 def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequence[Run]) -> ClosedLoop | None:
-    """Follow the references of the parts that were not seen.
-
-    Parameters
-    ----------
-    constants : Constants
-    seen, unseen : sequence of Run
-        First and last part of each log: loops come from the one, errors from the other.
-
-    Returns
-    -------
-    ClosedLoop or None
-        None where a log shows no such loops.
-    """
+    """Follow the references of the parts that were not seen; None where a log shows no such loops."""
     found = [fit_loops(run) for run in seen]
     if any(loops is None for loops in found):
         return None

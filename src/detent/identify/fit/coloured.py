@@ -9,8 +9,6 @@ those of a Newey-West sum are too short.
 A variance is known no better than by the residuals that count for it. Where the instrument of a constant is large in
 few rows, as a jerk is, few residuals carry its error, and the degrees of freedom of that constant are fewer.
 
-References
-----------
 Lazarus, Lewis, Stock, Watson: HAR inference: recommendations for practice. Journal of Business and Economic Statistics
 36 (2018): number of cosines 0.41 n^(2/3), critical values of Student's distribution.
 Satterthwaite: An approximate distribution of estimates of variance components. Biometrics Bulletin 2 (1946).
@@ -38,16 +36,8 @@ SHARE = 0.3
 def independent_rows(residual: Numbers) -> float:
     """How many independent residuals are worth as much as these, by the correlation of neighbours.
 
-    Parameters
-    ----------
-    residual : float64 array, shape (n,)
-        Rows in their order of time.
-
-    Returns
-    -------
-    float
-        ``n (1 - r) / (1 + r)`` with the correlation `r` of neighbours within 0 and 0.99, corrected for its bias of
-        ``1 / n``.
+    ``n (1 - r) / (1 + r)`` with the correlation `r` of neighbours within 0 and 0.99, corrected for its bias of
+    ``1 / n``.
     """
     n, r = len(residual), neighbour_correlation(residual)
     return n * (1.0 - r) / (1.0 + r)
@@ -65,8 +55,6 @@ def fallen_density(correlation: float, rows: int, cosines: int) -> float:
 
     Its density falls as ``1 / (1 + x^2)`` with ``x = w sqrt(r) / (1 - r)``, `w` the angle per row.
 
-    Examples
-    --------
     >>> round(fallen_density(0.9, 1000, 16), 3), fallen_density(0.0, 1000, 41)
     (0.933, 1.0)
     """
@@ -77,8 +65,6 @@ def fallen_density(correlation: float, rows: int, cosines: int) -> float:
 def count_cosines(rows: int, independent: float) -> int:
     """Cosines, and degrees of freedom: 0.41 n^(2/3), fewer where residuals are strongly coloured, at least 4.
 
-    Examples
-    --------
     >>> count_cosines(1000, 1000), count_cosines(1000, 50), count_cosines(10, 10)
     (41, 15, 4)
     """
@@ -86,42 +72,14 @@ def count_cosines(rows: int, independent: float) -> int:
 
 
 def long_run_variance(scores: Numbers, cosines: int) -> Numbers:
-    """Long-run covariance of rows in their order of time.
-
-    Parameters
-    ----------
-    scores : float64 array, shape (n, k)
-        Rows with a mean of 0.
-    cosines : int
-        Cosines to project on, from 1 to n.
-
-    Returns
-    -------
-    float64 array, shape (k, k)
-        Covariance of the sum of the rows, divided by n.
-    """
+    """Long-run covariance of rows in their order of time."""
     transform: Any = import_module("scipy.fft")  # it states no types
     projected: Numbers = transform.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
     return projected.T @ projected / len(projected)
 
 
 def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Numbers | None = None) -> tuple[Numbers, int]:
-    """Covariance of the constants of a regression with coloured residuals.
-
-    Parameters
-    ----------
-    columns : float64 array, shape (n, k)
-        What multiplies the constants, rows in their order of time.
-    residual : float64 array, shape (n,)
-        Measured less fitted.
-    instruments : float64 array, shape (n, k), optional
-        Of an instrumental-variable fit; the columns themselves by default, which is least squares.
-
-    Returns
-    -------
-    (float64 array, shape (k, k), int)
-        Covariance, and the degrees of freedom behind it.
-    """
+    """Covariance of the constants of a regression with coloured residuals."""
     n, k = columns.shape
     chosen = columns if instruments is None else instruments
     size, length = _sizes(columns), _sizes(chosen)
@@ -143,19 +101,9 @@ def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Number
 def carried_degrees(columns: Numbers, residual: Numbers, instruments: Numbers, cosines: int) -> Numbers:
     """Degrees of freedom behind the variance of each constant.
 
-    Parameters
-    ----------
-    columns, residual, instruments
-        As for `coloured_covariance`.
-    cosines : int
-        Those of the covariance.
-
-    Returns
-    -------
-    float64 array, shape (k,)
-        1 or more, and the cosines at most. A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum
-        h^4`` degrees (Satterthwaite), times ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their
-        squares are correlated by its square.
+    1 or more, and the cosines at most. A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum h^4``
+    degrees (Satterthwaite), times ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their squares are
+    correlated by its square.
     """
     size, length = _sizes(columns), _sizes(instruments)
     tools = instruments / length

@@ -50,30 +50,14 @@ METHODS: dict[Instruments, str] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constants:
-    """Constants of an axis with all that is known about their errors.
+    """Constants of an axis with all that is known about their errors."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        In their order; the delay of the effort comes last.
-    values : float64 array, shape (k,)
-        In SI units.
-    covariance : float64 array, shape (k, k)
-        Of their errors.
-    degrees : float64 array, shape (k,)
-        Degrees of freedom behind the variance of each.
-    method : str
-        How they were found.
-    delay_is_told : bool
-        False where the delay is only what fits best.
-    """
-
-    names: tuple[str, ...]
-    values: Numbers
-    covariance: Numbers
-    degrees: Numbers
-    method: str
-    delay_is_told: bool = True
+    names: tuple[str, ...]  # in their order; the delay of the effort comes last
+    values: Numbers  # in SI units
+    covariance: Numbers  # of their errors
+    degrees: Numbers  # degrees of freedom behind the variance of each
+    method: str  # how they were found
+    delay_is_told: bool = True  # False where the delay is only what fits best
 
     def value(self, name: str) -> float:
         """A constant; 0 where it was not looked for."""
@@ -110,19 +94,7 @@ class Constants:
 
 
 def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
-    """Constants of a fitted model.
-
-    Parameters
-    ----------
-    fit : Fit
-        The chosen model.
-    rivals : sequence of Fit
-        Others that explain the log as well.
-
-    Returns
-    -------
-    Constants
-    """
+    """Constants of a fitted model."""
     names, values, covariance, degrees = _sums_of(fit)
     if rivals:
         covariance = covariance + np.diag(_spread(names, values, rivals))

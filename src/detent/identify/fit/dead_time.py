@@ -41,21 +41,11 @@ _ENOUGH = 0.2
 
 @dataclass(frozen=True, slots=True)
 class DeadTime:
-    """A dead time.
+    """A dead time."""
 
-    Attributes
-    ----------
-    estimate : Estimate
-        [s], with its interval.
-    step : float
-        Time between two samples [s].
-    reason : str
-        Why it is not to be trusted; empty where it is.
-    """
-
-    estimate: Estimate
-    step: float
-    reason: str = ""
+    estimate: Estimate  # [s], with its interval
+    step: float  # time between two samples [s]
+    reason: str = ""  # why it is not to be trusted; empty where it is
 
     @property
     def samples(self) -> float:
@@ -78,29 +68,7 @@ class DeadTime:
 
 
 def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float | None = None) -> DeadTime:
-    """Find the dead time by the shift at which the motion explains the effort best.
-
-    Parameters
-    ----------
-    t : ndarray
-        Time [s], shape (n,), strictly rising, without gaps; uneven stamps are put on an even grid by straight lines.
-    effort, position : ndarray
-        In any units, shape (n,).
-    hold : float, optional
-        Time over which the effort is held [s], half of which is no dead time; that of a sample by default, 0 for an
-        effort that was measured as it acted.
-
-    Returns
-    -------
-    DeadTime
-        The standard error is that of the mean over eight parts of the recording, and a hundredth of a sample that the
-        parabola through the best shifts may be off.
-
-    Raises
-    ------
-    DetentError
-        Arrays differ in length, or the recording is too short.
-    """
+    """Find the dead time by the shift at which the motion explains the effort best."""
     step = _checked_step(t, effort, position)
     even: Values = t[0] + step * np.arange(len(t), dtype=np.float64)
     effort, position = np.interp(even, t, effort), np.interp(even, t, position)
@@ -116,25 +84,7 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
 
 
 def dead_time_of(resonances: Resonances, step: float) -> DeadTime:
-    """Take the dead time from the phase of a frequency response.
-
-    Parameters
-    ----------
-    resonances : Resonances
-        Fit to the response of the motor's encoder, with the hold of the effort.
-    step : float
-        Time between two samples [s].
-
-    Returns
-    -------
-    DeadTime
-        A response without a resonance gives it as well: then that of the rigid axis.
-
-    Raises
-    ------
-    DetentError
-        The fit is to the load alone, where damping of the coupling and dead time cannot be told apart.
-    """
+    """Take the dead time from the phase of a frequency response."""
     if "delay" not in resonances.estimates:
         raise DetentError(
             "identify: came the frequency response of the load alone; allowed: that of the motor; record the encoder "

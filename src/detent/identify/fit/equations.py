@@ -34,32 +34,19 @@ HOPS = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What a position says, window by window, each of shape (m,) unless said otherwise.
+    """What a position says, window by window, each of shape (m,) unless said otherwise."""
 
-    Attributes
-    ----------
-    position, velocity, acceleration : float64 array
-        Means over the window around each row [m, m/s, m/s^2] or in rad.
-    right, left : float64 array
-        Shares of each window in motion to larger and to smaller positions; standstill is half of both.
-    quick, places, effort : float64 array, shape (n,)
-        Velocity, by a short window, position and effort at every sample.
-    rows : int array
-        Samples around which the windows lie.
-    kernel : Kernel
-        Their window.
-    """
-
-    position: Numbers
+    position: Numbers  # and velocity, acceleration: means over the window around each row [m, m/s, m/s^2] or in rad
     velocity: Numbers
     acceleration: Numbers
+    # right, left: shares of each window in motion to larger and to smaller positions; standstill is half of both
     right: Numbers
     left: Numbers
-    quick: Numbers
+    quick: Numbers  # and places, effort: velocity, by a short window, position and effort at every sample
     places: Numbers
     effort: Numbers
-    rows: Rows
-    kernel: Kernel
+    rows: Rows  # samples around which the windows lie
+    kernel: Kernel  # their window
 
 
 def fine_kernel(kernel: Kernel) -> Kernel:
@@ -68,17 +55,7 @@ def fine_kernel(kernel: Kernel) -> Kernel:
 
 
 def make_motion(position: Numbers, effort: Numbers, kernel: Kernel, rows: Rows) -> Motion:
-    """Position, velocity and acceleration by a window.
-
-    Parameters
-    ----------
-    position, effort : float64 array, shape (n,)
-        Evenly sampled.
-    kernel : Kernel
-        The window.
-    rows : int array, shape (m,)
-        Samples around which it lies.
-    """
+    """Position, velocity and acceleration by a window."""
     quick = fine_kernel(kernel).velocities(position)
     still = 0.5 * (quick == 0.0)
     return Motion(
@@ -139,21 +116,7 @@ def terms_of(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def model_columns(m: Motion, names: Sequence[str], bend: float) -> Numbers:
-    """Columns of a model over windows.
-
-    Parameters
-    ----------
-    m : Motion
-    names : sequence of str
-        Terms of `TERMS`, and `LOSS` where a share of the effort is lost.
-    bend : float
-        Stribeck velocity [m/s], or share lost.
-
-    Returns
-    -------
-    float64 array, shape (m, k)
-        One column per term of `terms_of`.
-    """
+    """Columns of a model over windows."""
     columns = np.column_stack([TERMS[name](m, bend) for name in terms_of(names)])
     if LOSS not in names:
         return columns

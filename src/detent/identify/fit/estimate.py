@@ -60,19 +60,7 @@ class Estimate:
 def estimate(  # noqa: PLR0913 - the fields of an estimate
     name: str, value: float, unit: str, error: float, method: str, degrees: float = np.inf
 ) -> Estimate:
-    """Give an estimate its interval, by Student's distribution.
-
-    Parameters
-    ----------
-    name, value, unit, error, method
-        As the fields of `Estimate`.
-    degrees : float
-        Degrees of freedom behind the standard error: independent residuals less constants, not samples.
-
-    Returns
-    -------
-    Estimate
-    """
+    """Give an estimate its interval, by Student's distribution."""
     reach = quantile(degrees) * error
     return Estimate(name, value, unit, error, value - reach, value + reach, method)
 
@@ -85,8 +73,6 @@ def significant(value: float, digits: int = DIGITS) -> float:
 def quantile(degrees: float) -> float:
     """How many standard errors the 95 % interval reaches to each side.
 
-    Examples
-    --------
     >>> round(quantile(float("inf")), 3), round(quantile(10), 3)
     (1.96, 2.228)
     """

@@ -35,43 +35,21 @@ MOST_STARTS = 60
 
 @dataclass(frozen=True, slots=True)
 class Horizon:
-    """Errors of stretches of one length.
+    """Errors of stretches of one length."""
 
-    Attributes
-    ----------
-    duration : float
-        Length of a stretch [s]; a sample, or to the end of the log.
-    name : str
-        What it is called.
-    starts : int
-        Stretches simulated.
-    rms, largest : float
-        Error of the position at the end of a stretch over all stretches; of the free run over its whole length.
-    moved : float
-        Root mean square of the way the axis made in these stretches, which 0 would be wrong by.
-    naive : float
-        Error of going on with the velocity of the start: what no model needs to know.
-    """
-
-    duration: float
-    name: str
-    starts: int
+    duration: float  # length of a stretch [s]; a sample, or to the end of the log
+    name: str  # what it is called
+    starts: int  # stretches simulated
+    # rms, largest: error of the position at the end of a stretch over all stretches; of the free run over its whole
+    # length
     rms: float
     largest: float
-    moved: float
-    naive: float
+    moved: float  # root mean square of the way the axis made in these stretches, which 0 would be wrong by
+    naive: float  # error of going on with the velocity of the start: what no model needs to know
 
 
 class Plant:
-    """An axis with identified constants that can be run along a log.
-
-    Parameters
-    ----------
-    constants : Constants
-        Its constants; friction below 0 counts as none.
-    step : float
-        Time between two samples of the logs [s].
-    """
+    """An axis with identified constants that can be run along a log."""
 
     def __init__(self, constants: Constants, step: float) -> None:
         p = plant_registers(constants)
@@ -83,22 +61,7 @@ class Plant:
         self._step = step
 
     def run(self, effort: Numbers, begin: int, samples: int, position: float, velocity: float) -> Numbers:
-        """Positions at samples under a recorded effort, loops open.
-
-        Parameters
-        ----------
-        effort : float64 array, shape (n,)
-            Of the whole log; what was recorded before `begin` may still be on its way.
-        begin, samples : int
-            First sample, and how many.
-        position, velocity : float
-            Where the axis is then.
-
-        Returns
-        -------
-        float64 array, shape (samples,)
-            The first is `position`.
-        """
+        """Positions at samples under a recorded effort, loops open."""
         r = Cascade()
         switch_on(self._params, r, position - self._hanging)
         r.machine.motor.velocity = r.machine.load.velocity = velocity
@@ -113,18 +76,7 @@ class Plant:
 
 
 def plant_registers(constants: Constants) -> CascadeParams:
-    """Registers of a plant that is driven by the effort itself.
-
-    Parameters
-    ----------
-    constants : Constants
-        Friction below 0 counts as none.
-
-    Returns
-    -------
-    CascadeParams
-        Without loops; its clocks are still to be filled.
-    """
+    """Registers of a plant that is driven by the effort itself."""
     p = CascadeParams()
     p.machine.motor.mass = constants.value("mass")
     offset = 0.5 * (constants.value("coulomb.positive") - constants.value("coulomb.negative"))
@@ -159,21 +111,7 @@ def start_velocities(run: Run) -> Numbers:
 
 
 def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report | None = None) -> tuple[Horizon, ...]:
-    """Errors over a sample, over each of `HORIZONS`, and to the end.
-
-    Parameters
-    ----------
-    constants : Constants
-    runs : sequence of Run
-        Parts of logs that the constants need not have seen.
-    report : callable, optional
-        Is told the share that is done.
-
-    Returns
-    -------
-    tuple of Horizon
-        Those that fit into the runs.
-    """
+    """Errors over a sample, over each of `HORIZONS`, and to the end."""
     found: list[Horizon] = []
     step = runs[0].step
     named = [(1, "one step"), *((round(h / step), f"{h:g} s") for h in HORIZONS)]

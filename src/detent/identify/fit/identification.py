@@ -151,28 +151,7 @@ def identify(
     method: Method = "regression",
     report: Report | None = None,
 ) -> Identification:
-    """Identify an axis from recorded runs.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        Runs of one axis, as `read_log` gives them.
-    effort : str, optional
-        Which signal drives the axis; by default the first of `roles.EFFORTS` that the logs hold.
-    method : str
-        "regression" of the equation of motion; or "output error", which goes on from there by simulation.
-    report : callable, optional
-        Is told what is being done, and the share that is done.
-
-    Returns
-    -------
-    Identification
-
-    Raises
-    ------
-    InputError
-        A log holds no position, nothing that drives the axis, or too few samples.
-    """
+    """Identify an axis from recorded runs."""
     runs = tuple(make_run(log, effort) for log in logs)
     _check_alike(runs)
     refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]

@@ -38,39 +38,21 @@ FEWEST = 10
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """How derivatives and samples are made.
+    """How derivatives and samples are made."""
 
-    Attributes
-    ----------
-    cutoff_hz : float
-        Corner of the low-pass of the position, run forward and backward [Hz].
-    order : int
-        Order of that filter (Butterworth).
-    decimation : int
-        Every so many samples one is kept.
-    border : int
-        Samples left out at the beginning, where filter and differences still settle.
-    """
-
-    cutoff_hz: float = 100.0
-    order: int = 4
-    decimation: int = 10
-    border: int = 49
+    cutoff_hz: float = 100.0  # corner of the low-pass of the position, run forward and backward [Hz]
+    order: int = 4  # order of that filter (Butterworth)
+    decimation: int = 10  # every so many samples one is kept
+    border: int = 49  # samples left out at the beginning, where filter and differences still settle
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Position of a run with its derivatives, each of shape (n,).
+    """Position of a run with its derivatives, each of shape (n,)."""
 
-    Attributes
-    ----------
-    position, velocity, acceleration : float64 array
-        After the low-pass [m, m/s, m/s^2] or [rad, rad/s, rad/s^2].
-    """
-
-    position: Numbers
-    velocity: Numbers
-    acceleration: Numbers
+    position: Numbers  # and velocity, acceleration: after the low-pass [m, m/s, m/s^2] or [rad, rad/s, rad/s^2]
+    velocity: Numbers  # [m, m/s, m/s^2] or [rad, rad/s, rad/s^2]
+    acceleration: Numbers  # [m, m/s, m/s^2] or [rad, rad/s, rad/s^2]
 
 
 Column = Callable[[Motion], Numbers]
@@ -106,59 +88,26 @@ PER_DIRECTION: Mapping[str, Column] = {
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Outcome of a linear fit of the force.
+    """Outcome of a linear fit of the force."""
 
-    Attributes
-    ----------
-    values, standard_errors : dict of float by name
-        Constants in SI units, and their standard errors for independent errors of equal size.
-    correlation : float64 array, shape (k, k)
-        Of the constants, in their order.
-    residual : float64 array, shape (n,)
-        Measured less fitted force of the decimated samples [N].
-    relative_error : float
-        Norm of the residual over that of the force.
-    condition : float
-        Condition number of the regressor with columns of unit length: what the data cannot tell apart makes it large.
-    """
-
+    # values, standard_errors: constants in SI units, and their standard errors for independent errors of equal size
     values: dict[str, float]
     standard_errors: dict[str, float]
-    correlation: Numbers
-    residual: Numbers
-    relative_error: float
+    correlation: Numbers  # of the constants, in their order
+    residual: Numbers  # measured less fitted force of the decimated samples [N]
+    relative_error: float  # norm of the residual over that of the force
+    # condition number of the regressor with columns of unit length: what the data cannot tell apart makes it large
     condition: float
 
 
 def fit_inverse_dynamics(
-    t: Numbers,
+    t: Numbers,  # evenly spaced times [s]
     position: Numbers,
     force: Numbers,
     columns: Mapping[str, Column] = FOUR_CONSTANTS,
     recipe: Recipe | None = None,
 ) -> Regression:
-    """Fit the constants of a rigid axis to one run.
-
-    Parameters
-    ----------
-    t : float64 array, shape (n,)
-        Evenly spaced times [s].
-    position, force : float64 array, shape (n,)
-        Measured position [m], and force of the motor on the axis [N]; [rad] and [N m] of a rotary axis.
-    columns : mapping of str to callable
-        The model: what multiplies each constant.
-    recipe : Recipe, optional
-        Filters; that of the benchmark by default.
-
-    Returns
-    -------
-    Regression
-
-    Raises
-    ------
-    DetentError
-        Times are uneven, arrays differ in length, the run is too short, or the data cannot tell the constants apart.
-    """
+    """Fit the constants of a rigid axis to one run."""
     recipe = recipe or Recipe()
     step = _checked_step(t, position, force, recipe, len(columns))
     motion = differentiate(position, step, recipe)
@@ -168,17 +117,7 @@ def fit_inverse_dynamics(
 
 
 def differentiate(position: Numbers, step: float, recipe: Recipe) -> Motion:
-    """Low-pass the position forward and backward, and take central differences twice.
-
-    Parameters
-    ----------
-    position : float64 array, shape (n,)
-        Evenly sampled [m].
-    step : float
-        Time between two samples [s].
-    recipe : Recipe
-        Its filter.
-    """
+    """Low-pass the position forward and backward, and take central differences twice."""
     signal = _signal()
     b, a = signal.butter(recipe.order, recipe.cutoff_hz * 2 * step)
     smooth = np.asarray(signal.filtfilt(b, a, position, padlen=3 * recipe.order), float)
@@ -192,19 +131,7 @@ def central_differences(values: Numbers, step: float) -> Numbers:
 
 
 def decimate(values: Numbers, factor: int) -> Numbers:
-    """Every `factor`-th sample behind a low-pass without delay; the last sample is kept.
-
-    Parameters
-    ----------
-    values : float64 array, shape (n,)
-        Evenly sampled.
-    factor : int
-        1 keeps every sample unfiltered.
-
-    Returns
-    -------
-    float64 array, shape (ceil(n / factor),)
-    """
+    """Every `factor`-th sample behind a low-pass without delay; the last sample is kept."""
     if factor == 1:
         return values
     signal, order = _signal(), 8

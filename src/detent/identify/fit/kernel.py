@@ -12,8 +12,6 @@ Derivatives are summed over the ways between samples, so that what stands still 
 they would be what rounding leaves, of either sign: a direction. Sums run in one order on every processor, which those
 of BLAS do not.
 
-References
-----------
 Shinbrot: On the analysis of linear and nonlinear systems. Trans. ASME 79 (1957), the method of modulating functions.
 Messenger, Bortz: Weak SINDy: Galerkin-based data-driven model selection. Multiscale Model. Simul. 19 (2021).
 """
@@ -34,21 +32,12 @@ _SQUARED = _SHAPE**2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kernel:
-    """Weights of the samples around a place.
+    """Weights of the samples around a place."""
 
-    Attributes
-    ----------
-    half : int
-        Samples to each side; the weights have ``2 half + 1`` entries.
-    step : float
-        Time between two samples [s].
-    value, first, second, third : float64 array, shape (2 half + 1,)
-        Sums of these times a signal are the weighted mean of the signal [1], of its first [1/s], second [1/s^2] and
-        third derivative [1/s^3].
-    """
-
-    half: int
-    step: float
+    half: int  # samples to each side; the weights have ``2 half + 1`` entries
+    step: float  # time between two samples [s]
+    # value, first, second, third: sums of these times a signal are the weighted mean of the signal [1], of its first
+    # [1/s], second [1/s^2] and third derivative [1/s^3]
     value: Numbers
     first: Numbers
     second: Numbers
@@ -60,12 +49,7 @@ class Kernel:
         return 0.40 / (self.half * self.step)
 
     def held(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
-        """Mean of a signal that stands from each sample to the next, seen `late` samples later, around samples `rows`.
-
-        Returns
-        -------
-        float64 array, shape (len(rows),)
-        """
+        """Mean of a signal held from each sample to the next, seen `late` samples later, around samples `rows`."""
         return _sums(signal, _held_weights(self.half, late), rows)
 
     def held_slope(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
@@ -98,15 +82,7 @@ class Kernel:
 
 
 def make_kernel(half: int, step: float) -> Kernel:
-    """Weights of a window of some samples.
-
-    Parameters
-    ----------
-    half : int
-        Samples to each side, 4 or more.
-    step : float
-        Time between two samples [s].
-    """
+    """Weights of a window of some samples."""
     s = np.arange(-half, half + 1) / half
     area = float(np.sum(_SHAPE(s)))
     slope = half * step

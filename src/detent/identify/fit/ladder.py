@@ -5,8 +5,6 @@ but one stretch and predicts that one, stretch by stretch; a rung is climbed whe
 whole. It is climbed rather too often: a constant that is not needed widens the limits of the others, one that is
 missing makes them wrong.
 
-References
-----------
 Stone: Cross-validatory choice and assessment of statistical predictions. J. Royal Statistical Society B 36 (1974).
 Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81 (1994), whole stretches.
 """
@@ -63,21 +61,11 @@ Report = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Rung:
-    """A model of the friction.
+    """A model of the friction."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    text : str
-        What it says, for people.
-    terms : tuple of str
-        Terms of `equations.TERMS`.
-    """
-
-    name: str
-    text: str
-    terms: tuple[str, ...]
+    name: str  # what it is called
+    text: str  # what it says, for people
+    terms: tuple[str, ...]  # terms of `equations.TERMS`
 
     @property
     def is_bent(self) -> bool:
@@ -102,32 +90,15 @@ RUNGS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Climb:
-    """What the held-out stretches say about one rung.
-
-    Attributes
-    ----------
-    rung : Rung
-    error : float
-        Root mean square of the prediction of stretches not seen, over that of the effort.
-    stretches : float64 array, shape (STRETCHES,)
-        Mean squares, stretch by stretch.
-    gain : float
-        Mean gain over the rung chosen so far, in standard errors; nan for the first.
-    taken : bool
-        True where it was climbed.
-    possible : bool
-        False where its friction falls towards standstill.
-    fit : Fit
-        To all of the log.
-    """
+    """What the held-out stretches say about one rung."""
 
     rung: Rung
-    error: float
-    stretches: Numbers
-    gain: float
-    taken: bool
-    possible: bool
-    fit: Fit
+    error: float  # root mean square of the prediction of stretches not seen, over that of the effort
+    stretches: Numbers  # mean squares, stretch by stretch
+    gain: float  # mean gain over the rung chosen so far, in standard errors; nan for the first
+    taken: bool  # True where it was climbed
+    possible: bool  # False where its friction falls towards standstill
+    fit: Fit  # to all of the log
 
 
 def extended(rung: Rung, extra: Sequence[str]) -> Rung:
@@ -207,22 +178,7 @@ def climb(
     rungs: Sequence[Rung] = RUNGS,
     report: Report | None = None,
 ) -> tuple[Climb, ...]:
-    """Hold every rung to stretches it did not see.
-
-    Parameters
-    ----------
-    parts : sequence of Prepared
-        Runs by one window.
-    rungs : sequence of Rung
-        From the simplest up.
-    report : callable, optional
-        Is told the share that is done.
-
-    Returns
-    -------
-    tuple of Climb
-        One per rung; the last that was taken is the choice.
-    """
+    """Hold every rung to stretches it did not see."""
     climbs: list[Climb] = []
     best: Climb | None = None
     for k, rung in enumerate(rungs):
@@ -268,19 +224,7 @@ Mask = NDArray[np.bool_]
 
 
 def hold_out(parts: Sequence[Prepared], count: int = STRETCHES) -> list[tuple[Mask, Mask]]:
-    """Windows of each stretch, and those that share no sample with it.
-
-    Parameters
-    ----------
-    parts : sequence of Prepared
-    count : int
-        Stretches that each run is cut into, with as many windows in each.
-
-    Returns
-    -------
-    list of (bool array, bool array), shape (m,) each
-        The stretch, and what a fit may see.
-    """
+    """Windows of each stretch, and those that share no sample with it."""
     masks: list[tuple[Mask, Mask]] = []
     for stretch in range(count):
         inside: list[Mask] = []

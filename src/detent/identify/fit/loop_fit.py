@@ -8,8 +8,6 @@ With Kp known this is linear in all others; Kp is searched. A velocity `v` is a 
 samples, and `s` is 0 or 1 where there is an integral: each of these is tried. Loops that explain a part of the log that
 the fit did not see are those of the machine as far as the log can tell; where none do, nothing is said of them.
 
-References
-----------
 Ljung: System Identification, Theory for the User (1999), section 13.5, direct identification of the regulator.
 """
 
@@ -48,48 +46,24 @@ GAINS = (0.5, 2000.0)
 
 @dataclass(frozen=True, slots=True)
 class Loops:
-    """Loops as a log tells them; efforts in the unit of the log.
+    """Loops as a log tells them; efforts in the unit of the log."""
 
-    Attributes
-    ----------
-    position : float
-        Gain of the position loop [1/s].
-    velocity, integral : float
-        Gains of the velocity loop: effort per velocity, and per position.
-    span : int
-        Samples that the velocity is a difference over.
-    feed_velocity : float
-        Share of the reference's velocity in the demand; without an integral it holds viscous feed-forward too.
-    feed_acceleration, feed_viscous, feed_coulomb : float
-        Effort per acceleration and per velocity of the reference, and for its direction.
-    error : float
-        Effort not explained over the effort, in the part that was not fitted.
-    """
-
-    position: float
-    velocity: float
+    position: float  # gain of the position loop [1/s]
+    velocity: float  # and integral: gains of the velocity loop: effort per velocity, and per position
     integral: float
-    span: int
+    span: int  # samples that the velocity is a difference over
+    # share of the reference's velocity in the demand; without an integral it holds viscous feed-forward too
     feed_velocity: float
+    # feed_acceleration, feed_viscous, feed_coulomb: effort per acceleration and per velocity of the reference, and for
+    # its direction
     feed_acceleration: float
     feed_viscous: float
     feed_coulomb: float
-    error: float
+    error: float  # effort not explained over the effort, in the part that was not fitted
 
 
 def fit_loops(run: Run) -> Loops | None:
-    """Find the loops that drove an axis.
-
-    Parameters
-    ----------
-    run : Run
-        With a reference.
-
-    Returns
-    -------
-    Loops or None
-        None without a reference, and where no such loops explain the effort.
-    """
+    """Find the loops that drove an axis; None without a reference, and where no such loops explain the effort."""
     if run.reference is None or len(run.position) < 10 * max(SPANS):
         return None
     found = [loops for trial in _trials(run, run.reference) if (loops := trial.solve()) is not None]

@@ -7,8 +7,6 @@ be, but stretches are nearly independent: the covariance is that of their scores
 "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986)), with Student's distribution of as
 many degrees as there are stretches beyond the constants.
 
-References
-----------
 Ljung: System Identification, 2nd ed. (1999), section 7.2 (output-error structure).
 Bock: Recent advances in parameter identification for ordinary differential equations (1983), multiple shooting.
 """
@@ -68,38 +66,17 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutputErrorFit:
-    """Outcome of a fit by simulation.
+    """Outcome of a fit by simulation."""
 
-    Attributes
-    ----------
-    constants : Constants
-        With intervals.
-    error : float
-        Root mean square of simulated less measured position over all stretches [m] or [rad].
-    before : float
-        The same with the constants that it began with.
-    stretches : int
-        Stretches simulated.
-    simulations : int
-        How often all of them were.
-    """
-
-    constants: Constants
-    error: float
-    before: float
-    stretches: int
-    simulations: int
+    constants: Constants  # with intervals
+    error: float  # root mean square of simulated less measured position over all stretches [m] or [rad]
+    before: float  # the same with the constants that it began with
+    stretches: int  # stretches simulated
+    simulations: int  # how often all of them were
 
 
 def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretch]:
-    """Stretches of a duration, without samples that mean nothing.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    duration : float
-        [s]; a run that is shorter is one stretch.
-    """
+    """Stretches of a duration, without samples that mean nothing."""
     found: list[Stretch] = []
     for run in runs:
         velocity = start_velocities(run)
@@ -120,27 +97,7 @@ def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretc
 def fit_output_error(
     runs: Sequence[Run], start: Constants, duration: float = STRETCH, report: Report | None = None
 ) -> OutputErrorFit:
-    """Fit constants by simulation.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    start : Constants
-        Where the search begins; its delay is kept.
-    duration : float
-        Length of a stretch [s].
-    report : callable, optional
-        Is told the share that is done, of the most rounds that both passes may take.
-
-    Returns
-    -------
-    OutputErrorFit
-
-    Raises
-    ------
-    DetentError
-        The runs hold too few stretches for the constants.
-    """
+    """Fit constants by simulation."""
     names = tuple(name for name in start.names if name != "delay")
     stretches = cut_stretches(runs, duration)
     if len(stretches) < 4 or sum(s.samples for s in stretches) < 20 * len(names):

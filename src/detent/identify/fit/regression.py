@@ -9,8 +9,6 @@ are instruments, ``theta = (Z' X)^-1 Z' y``, and the bias is gone. Where there i
 by wider windows take its place: of the white noise in the second derivative by narrow windows, those 2.5 times as wide
 hold 2.6 %.
 
-References
-----------
 Soderstrom, Stoica: Instrumental variable methods for system identification (1983).
 Janot, Vandanjon, Gautier: A generic instrumental variable approach for industrial robot identification. IEEE Trans.
 Control Systems Technology 22 (2014).
@@ -50,63 +48,32 @@ UNKNOWN = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """A run with its windows, of which the columns of any model are made.
-
-    Attributes
-    ----------
-    run : Run
-    motion : Motion
-        Of the measured position.
-    ideal : Motion
-        What instruments are made of: the motion of the reference, as late as the axis follows it; that of the position
-        by wider windows; or `motion` itself, which is least squares.
-    instruments : str
-        Which of these: "reference", "position" or "none".
-    """
+    """A run with its windows, of which the columns of any model are made."""
 
     run: Run
-    motion: Motion
+    motion: Motion  # of the measured position
+    # what instruments are made of: the motion of the reference, as late as the axis follows it; that of the position by
+    # wider windows; or `motion` itself, which is least squares
     ideal: Motion
-    instruments: Instruments
+    instruments: Instruments  # which of these: "reference", "position" or "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Outcome of a regression.
+    """Outcome of a regression."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Terms of the model that have a column; then ``delay``, that of the effort [s]; then ``stribeck`` or ``loss``
-        where the model has one.
-    values : float64 array, shape (k,)
-        Their constants.
-    covariance : float64 array, shape (k, k)
-        Of these.
-    degrees : float64 array, shape (k,)
-        Degrees of freedom behind the variance of each.
-    residual, effort : float64 array, shape (m,)
-        Measured less fitted effort, and the effort, window by window.
-    model : tuple of str
-        What the model was asked for.
-    half : int
-        Samples of the window to each side.
-    condition : float
-        Condition number of the columns at unit length.
-    instruments : str
-        What they are made of: "reference", "position", or "none" for least squares.
-    """
-
+    # terms of the model that have a column; then ``delay``, that of the effort [s]; then ``stribeck`` or ``loss`` where
+    # the model has one
     names: tuple[str, ...]
-    values: Numbers
-    covariance: Numbers
-    degrees: Numbers
-    residual: Numbers
+    values: Numbers  # their constants
+    covariance: Numbers  # of these
+    degrees: Numbers  # degrees of freedom behind the variance of each
+    residual: Numbers  # and effort: measured less fitted effort, and the effort, window by window
     effort: Numbers
-    model: tuple[str, ...]
-    half: int
-    condition: float
-    instruments: Instruments
+    model: tuple[str, ...]  # what the model was asked for
+    half: int  # samples of the window to each side
+    condition: float  # condition number of the columns at unit length
+    instruments: Instruments  # what they are made of: "reference", "position", or "none" for least squares
 
     @property
     def delay(self) -> float:
@@ -129,16 +96,7 @@ class Fit:
 
 
 def prepare(run: Run, kernel: Kernel, instruments: Instruments) -> Prepared:
-    """Make the windows of a run.
-
-    Parameters
-    ----------
-    run : Run
-    kernel : Kernel
-        The window.
-    instruments : str
-        As of `Prepared`; "reference" for a run that has one.
-    """
+    """Make the windows of a run."""
     rows, n = usable_rows(run, kernel), len(run.position)
     if instruments == "position":
         wide = make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
@@ -180,27 +138,11 @@ def make_effort(parts: Sequence[Prepared], delay: float) -> Numbers:
 def fit_equations(
     parts: Sequence[Prepared],
     names: Sequence[str],
-    bend: float = 1.0,
+    bend: float = 1.0,  # Stribeck velocity [m/s] or share lost, where the model has one
     *,
-    delay: float | None = None,
+    delay: float | None = None,  # known delay of the effort [s]; found by default
 ) -> Fit:
-    """Fit a model to runs.
-
-    Parameters
-    ----------
-    parts : sequence of Prepared
-        Runs by windows of the same duration, with the same instruments.
-    names : sequence of str
-        Terms of `equations.TERMS`, the mass first, and `equations.LOSS`.
-    bend : float
-        Stribeck velocity [m/s] or share lost, where the model has one.
-    delay : float, optional
-        Known delay of the effort [s]; found by default.
-
-    Returns
-    -------
-    Fit
-    """
+    """Fit a model to runs."""
     columns = make_columns(parts, names, bend)
     ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
     late, step = delay or 0.0, parts[0].run.step
@@ -288,20 +230,7 @@ def _bend_slope(
 
 
 def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
-    """By how much the bend misses what the instruments say of it, to first order.
-
-    Parameters
-    ----------
-    parts : sequence of Prepared
-        The runs of the fit.
-    fit : Fit
-        By instruments, of a model with a bend.
-
-    Returns
-    -------
-    float
-        To be added to `fit.bend`.
-    """
+    """By how much the bend misses what the instruments say of it, to first order."""
     names, theta, bend = fit.model, fit.linear, fit.bend
     columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
     x, _, z = _with_bend(parts, names, theta, bend, columns, fit.residual, tools)
@@ -315,17 +244,7 @@ def column_sizes(columns: Numbers) -> Numbers:
 
 
 def solve(instruments: Numbers, columns: Numbers, effort: Numbers) -> Numbers:
-    """Constants ``(Z' X)^-1 Z' y``, worked out with columns of unit length; least squares where Z is X.
-
-    Parameters
-    ----------
-    instruments, columns : float64 array, shape (m, k)
-    effort : float64 array, shape (m,)
-
-    Returns
-    -------
-    float64 array, shape (k,)
-    """
+    """Constants ``(Z' X)^-1 Z' y``, worked out with columns of unit length; least squares where Z is X."""
     size, length = column_sizes(columns), column_sizes(instruments)
     tools = instruments / length
     matrix, moments = products(tools, columns / size), products(tools, effort[:, None])[:, 0]

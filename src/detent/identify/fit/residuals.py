@@ -10,30 +10,15 @@ from detent.identify.fit.regression import Fit
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Residuals of a regression, window by window.
+    """Residuals of a regression, window by window."""
 
-    Attributes
-    ----------
-    rms : float
-        Root mean square, in the unit of the effort.
-    relative : float
-        The same over the root mean square of the effort.
-    largest : float
-        Largest magnitude.
-    neighbours : float
-        Correlation of neighbours: 0 for independent ones; windows overlap, which alone makes it about 0.4.
-    independent : float
-        Independent residuals that say as much.
-    count : int
-        Windows.
-    """
-
-    rms: float
-    relative: float
-    largest: float
+    rms: float  # root mean square, in the unit of the effort
+    relative: float  # the same over the root mean square of the effort
+    largest: float  # largest magnitude
+    # correlation of neighbours: 0 for independent ones; windows overlap, which alone makes it about 0.4
     neighbours: float
-    independent: float
-    count: int
+    independent: float  # independent residuals that say as much
+    count: int  # windows
 
 
 def residuals_of(fit: Fit) -> Residuals:

@@ -24,44 +24,20 @@ _MASS = {"N": "kg", "N*m": "kg*m^2"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """One run on an even grid.
+    """One run on an even grid."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the log.
-    step : float
-        Time between two samples [s].
-    position : float64 array, shape (n,)
-        As measured [m], [rad] or [count].
-    effort : float64 array, shape (n,)
-        What drives the axis, from each sample to the next.
-    usable : bool array, shape (n,)
-        Samples that mean something.
-    effort_name, effort_unit : str
-        What it is.
-    position_unit : str
-        Unit of the position.
-    reference, load_position : float64 array or None
-        Position asked for; position of a second encoder.
-    resolution : float
-        Way of a count of the encoder; 0 where none shows.
-    noise : float
-        Standard deviation of the measured position, counts included.
-    """
-
-    name: str
-    step: float
-    position: Numbers
-    effort: Numbers
-    usable: NDArray[np.bool_]
-    effort_name: str = "force"
+    name: str  # name of the log
+    step: float  # time between two samples [s]
+    position: Numbers  # as measured [m], [rad] or [count]
+    effort: Numbers  # what drives the axis, from each sample to the next
+    usable: NDArray[np.bool_]  # samples that mean something
+    effort_name: str = "force"  # and effort_unit: what it is
     effort_unit: str = "N"
     position_unit: str = "m"
-    reference: Numbers | None = None
+    reference: Numbers | None = None  # and load_position: position asked for; position of a second encoder
     load_position: Numbers | None = None
-    resolution: float = 0.0
-    noise: float = 0.0
+    resolution: float = 0.0  # way of a count of the encoder; 0 where none shows
+    noise: float = 0.0  # standard deviation of the measured position, counts included
 
     @property
     def t(self) -> Numbers:
@@ -107,24 +83,7 @@ def _unit(name: str, effort: str, way: str) -> str:
 
 
 def make_run(log: Log, effort: str | None = None) -> Run:
-    """Put a log on an even grid and choose what drives its axis.
-
-    Parameters
-    ----------
-    log : Log
-        As `read_log` gives it.
-    effort : str, optional
-        One of `EFFORTS`; by default the first that the log holds.
-
-    Returns
-    -------
-    Run
-
-    Raises
-    ------
-    InputError
-        No position, nothing that drives the axis, or too few samples.
-    """
+    """Put a log on an even grid and choose what drives its axis."""
     name = _choose_effort(log, effort)
     if "position" not in log.signals:
         raise InputError.of_file(

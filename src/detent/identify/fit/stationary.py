@@ -27,26 +27,7 @@ FADED = 200
 def known_noise_covariance(
     columns: Values, residual: Values, noise: Values, instruments: Values | None = None, floor: float = 0.0
 ) -> tuple[Values, int]:
-    """Covariance of the constants of a regression, at least that of a known noise.
-
-    Parameters
-    ----------
-    columns : float64 array, shape (n, k)
-        What multiplies the constants, rows in their order of time.
-    residual : float64 array, shape (n,)
-        Measured less fitted.
-    noise : float64 array, shape (m,)
-        A series of the noise, evenly sampled as the rows; the residual itself where it is long.
-    instruments : float64 array, shape (n, k), optional
-        Of an instrumental-variable fit; the columns themselves by default.
-    floor : float
-        Standard deviation of white noise beside it, such as that of rounding to counts.
-
-    Returns
-    -------
-    (float64 array, shape (k, k), int)
-        Covariance, and the degrees of freedom behind it.
-    """
+    """Covariance of the constants of a regression, at least that of a known noise."""
     chosen = columns if instruments is None else instruments
     found, degrees = coloured_covariance(columns, residual, instruments)
     inverse: Values = np.asarray(np.linalg.pinv(chosen.T @ columns), float)

@@ -32,40 +32,21 @@ STANDS_OUT = 3.0
 
 @dataclass(frozen=True, slots=True)
 class SteadyStretch:
-    """A part of a recording at one speed.
+    """A part of a recording at one speed."""
 
-    Attributes
-    ----------
-    first, stop : int
-        First sample, and the one behind the last.
-    begin, seconds : float
-        Where it lies in time and how long it is [s].
-    speed, effort : float
-        Means, signed, in SI units.
-    effort_error : float
-        Standard error of the mean effort at this speed: what noise of the speed does to it is part of it.
-    degrees : float
-        Degrees of freedom behind it.
-    """
-
-    first: int
+    first: int  # and stop: first sample, and the one behind the last
     stop: int
-    begin: float
-    seconds: float
-    speed: float
+    begin: float  # and seconds: where it lies in time and how long it is [s]
+    seconds: float  # [s]
+    speed: float  # and effort: means, signed, in SI units
     effort: float
+    # standard error of the mean effort at this speed: what noise of the speed does to it is part of it
     effort_error: float
-    degrees: float
+    degrees: float  # degrees of freedom behind it
 
 
 def select_effort(log: Log, role: str = "") -> str:
-    """Role of the signal that drives the axis: as asked for, or the most direct one that the log has.
-
-    Raises
-    ------
-    DetentError
-        The log has no such signal, or none that drives.
-    """
+    """Role of the signal that drives the axis: as asked for, or the most direct one that the log has."""
     present = [name for name in EFFORTS if name in log.signals]
     if role and role not in present:
         raise DetentError(
@@ -81,13 +62,7 @@ def select_effort(log: Log, role: str = "") -> str:
 
 
 def find_velocity(log: Log) -> tuple[Values, str, float]:
-    """Velocity as measured, or by central differences of the position; its unit; the grain of that position, or 0.
-
-    Raises
-    ------
-    DetentError
-        The log has neither.
-    """
+    """Velocity as measured, or by central differences of the position; its unit; the grain of that position, or 0."""
     if "velocity" in log.signals:
         return log.signals["velocity"], log.units["velocity"], 0.0
     if "position" not in log.signals:
@@ -104,8 +79,6 @@ def find_velocity(log: Log) -> tuple[Values, str, float]:
 def unit_per_speed(effort: str, speed: str) -> str:
     """Unit of an effort per speed.
 
-    Examples
-    --------
     >>> unit_per_speed("V", "rad/s"), unit_per_speed("N", "m/s"), unit_per_speed("", "m/s")
     ('V*s/rad', 'N*s/m', 's/m')
     """
@@ -122,27 +95,6 @@ def find_steady(
     tolerance; blocks at its ends that stand out are left out, and one whose halves differ is no stretch. What is left
     is searched again with blocks twice as long, in which the grain of an encoder counts less; neighbours that are
     steady as one become one.
-
-    Parameters
-    ----------
-    t, velocity : float64 array, shape (n,)
-        Time [s], rising, and velocity; gaps in the time end a stretch.
-    shortest : float, optional
-        Shortest stretch [s]; by default `SHARE` of the recording, and `FEWEST_ROWS` rows.
-    tolerance : float
-        Largest difference of two blocks of a stretch, as a part of its speed.
-    step : float
-        Grain of the position behind the velocity: a block moves over so many that one of them is within the tolerance.
-
-    Returns
-    -------
-    list of slice
-        Samples of each stretch, in order of time.
-
-    Raises
-    ------
-    DetentError
-        A limit is not positive.
     """
     for name, limit in (("shortest", shortest), ("tolerance", tolerance)):
         if limit is not None and not limit > 0:
@@ -165,18 +117,7 @@ def find_steady(
 
 
 def measure_stretch(t: Values, velocity: Values, effort: Values, part: slice, slope: float) -> SteadyStretch:
-    """Mean speed and effort of a stretch, and the error of the effort at that speed.
-
-    Parameters
-    ----------
-    t, velocity, effort : float64 array, shape (n,)
-        Time [s], velocity, and what drives the axis.
-    part : slice
-        Samples of the stretch.
-    slope : float
-        By how much the effort rises with the speed: the two vary together, and the error is that of
-        ``effort - slope * velocity``.
-    """
+    """Mean speed and effort of a stretch, and the error of the effort at that speed."""
     speed, drive = float(velocity[part].mean()), float(effort[part].mean())
     error, degrees = mean_error(effort[part] - slope * velocity[part])
     seconds = float(t[part.stop - 1] - t[part.start])

@@ -199,13 +199,7 @@ def _read_logs(
 
 
 def read_axis_text(path: str | Path) -> str:
-    """Text of an axis file.
-
-    Raises
-    ------
-    InputError
-        It cannot be read, or holds errors.
-    """
+    """Text of an axis file."""
     from detent.methods.load import read_axis
 
     read_axis(path)  # tells everything that is wrong with it
@@ -214,13 +208,7 @@ def read_axis_text(path: str | Path) -> str:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a file.
-
-    Raises
-    ------
-    DetentError
-        It cannot be written.
-    """
+    """Write a file."""
     path = Path(path)
     try:
         with path.open("w", encoding="utf-8", newline="") as file:

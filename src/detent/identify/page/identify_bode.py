@@ -12,71 +12,32 @@ from detent.page.parts import Numbers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One curve of a plot over the frequency.
+    """One curve of a plot over the frequency."""
 
-    Attributes
-    ----------
-    label : str
-        As in the legend; empty for none.
-    colour : str
-        Name of a colour of template/report.css.
-    x, y : ndarray
-        Frequency [Hz] and value, NaN for a gap, shape (n,).
-    dash : str
-        Of the line, as SVG writes it; empty for a solid one.
-    """
-
-    label: str
-    colour: str
-    x: Numbers
+    label: str  # as in the legend; empty for none
+    colour: str  # name of a colour of template/report.css
+    x: Numbers  # and y: frequency [Hz] and value, NaN for a gap, shape (n,)
     y: Numbers
-    dash: str = ""
+    dash: str = ""  # of the line, as SVG writes it; empty for a solid one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plot:
-    """A plot over the logarithm of the frequency.
+    """A plot over the logarithm of the frequency."""
 
-    Attributes
-    ----------
-    label : str
-        Of the vertical axis.
-    lines : sequence of Line
-        The first is drawn first.
-    logarithmic : bool
-        The values are, too.
-    span : (float, float) or None
-        Of the values; by the first line unless given.
-    height : int
-        [px]
-    levels : sequence of float
-        Marked values.
-    """
-
-    label: str
-    lines: Sequence[Line]
-    logarithmic: bool = False
-    span: tuple[float, float] | None = None
-    height: int = 200
-    levels: Sequence[float] = ()
+    label: str  # of the vertical axis
+    lines: Sequence[Line]  # the first is drawn first
+    logarithmic: bool = False  # the values are, too
+    span: tuple[float, float] | None = None  # of the values; by the first line unless given
+    height: int = 200  # [px]
+    levels: Sequence[float] = ()  # marked values
 
 
 LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
 
 
 def frequency_plots(plots: Sequence[Plot]) -> str:
-    """Draw plots above one another over the same frequencies, the axis logarithmic.
-
-    Parameters
-    ----------
-    plots : sequence of Plot
-        From top to bottom; the lines of the first say which frequencies.
-
-    Returns
-    -------
-    str
-        HTML, as wide as there is room.
-    """
+    """Draw plots above one another over the same frequencies, the axis logarithmic."""
     low, high = (float(f(plots[0].lines[0].x)) for f in (np.min, np.max))
     named = [line for line in plots[0].lines if line.label]
     legend = " ".join(

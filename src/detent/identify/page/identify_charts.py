@@ -41,18 +41,7 @@ SINCE = "time since the recording began"
 
 
 def all_charts(data: IdentifyReportData) -> list[Chart]:
-    """Every chart of the page.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
+    """Every chart of the page."""
     charts = recorded_charts(data.found.runs[data.shown])
     if data.held:
         charts += held_charts(data.held[data.shown], ways_of(data))
@@ -73,18 +62,7 @@ def ways_of(data: IdentifyReportData) -> Ways:
 
 
 def recorded_charts(run: Run) -> list[Chart]:
-    """Draw what was recorded: position with its reference, and effort; samples that are not used are marked.
-
-    Parameters
-    ----------
-    run : Run
-        One log.
-
-    Returns
-    -------
-    list of dict
-        Two charts above one another.
-    """
+    """Draw what was recorded: position with its reference, and effort; samples that are not used are marked."""
     place, scale = Ways(run.position_unit).place, effort_scale(run.effort_unit, _peak(run.effort))
     curves = [_curve("position", "speed", run.position, place)]
     if run.reference is not None:
@@ -100,20 +78,7 @@ def recorded_charts(run: Run) -> list[Chart]:
 
 
 def held_charts(held: HeldOut, ways: Ways) -> list[Chart]:
-    """Draw the held-out part: recorded and simulated position, and both differences.
-
-    Parameters
-    ----------
-    held : HeldOut
-        One log.
-    ways : Ways
-        How positions are written.
-
-    Returns
-    -------
-    list of dict
-        Three charts above one another.
-    """
+    """Draw the held-out part: recorded and simulated position, and both differences."""
     place, again = ways.place, f"simulated, from the recording again every {held.restart:.3g} s"
     curves = [
         _curve(again, "speed", held.restarted, place, width=2.5),
@@ -143,20 +108,7 @@ def _off_panel(name: str, label: str, colour: str, off: Numbers, ways: Ways) -> 
 
 
 def effort_charts(windows: Windows, run: Run) -> list[Chart]:
-    """Draw what drove the axis, measured and by the model, and what is left.
-
-    Parameters
-    ----------
-    windows : Windows
-        Of one log.
-    run : Run
-        The log.
-
-    Returns
-    -------
-    list of dict
-        Two charts above one another.
-    """
+    """Draw what drove the axis, measured and by the model, and what is left."""
     if not len(windows.t):
         return []
     gaps = np.flatnonzero(np.diff(windows.place) > 1) + 1
@@ -177,20 +129,7 @@ def effort_charts(windows: Windows, run: Run) -> list[Chart]:
 
 
 def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:
-    """Count residuals by their size.
-
-    Parameters
-    ----------
-    windows : sequence of Windows
-        One per log.
-    unit : str
-        Of the effort.
-
-    Returns
-    -------
-    dict
-        One chart.
-    """
+    """Count residuals by their size."""
     residual = np.concatenate([one.residual for one in windows])
     # A few far ones must not squeeze all others into one bar; they stand at its end.
     reach = 4.0 * float(np.sqrt(np.mean(residual**2))) or 1.0
@@ -202,18 +141,7 @@ def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:
 
 
 def memory_chart(windows: Sequence[Windows]) -> Chart:
-    """Draw how much a residual resembles those before it, with the bounds of residuals that do not.
-
-    Parameters
-    ----------
-    windows : sequence of Windows
-        One per log.
-
-    Returns
-    -------
-    dict
-        One chart.
-    """
+    """Draw how much a residual resembles those before it, with the bounds of residuals that do not."""
     correlation, pairs = autocorrelation(windows)
     one = windows[0]
     lag = np.arange(len(correlation)) * one.hop * 1e3
@@ -237,20 +165,7 @@ def memory_chart(windows: Sequence[Windows]) -> Chart:
 
 
 def friction_chart(data: IdentifyReportData, constants: Constants) -> Chart:
-    """Draw friction over the velocity: windows, the model's curve and its limits.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        With windows.
-    constants : Constants
-        Of the model.
-
-    Returns
-    -------
-    dict
-        One chart.
-    """
+    """Draw friction over the velocity: windows, the model's curve and its limits."""
     velocity = np.concatenate([one.velocity for one in data.windows])
     residual = np.concatenate([one.residual for one in data.windows])
     every = max(1, -(-len(velocity) // DOTS))

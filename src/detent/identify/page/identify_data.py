@@ -42,28 +42,14 @@ BROADEST = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOut:
-    """A log's last part beside its simulation with constants from the first, arrays of shape (n,).
+    """A log's last part beside its simulation with constants from the first, arrays of shape (n,)."""
 
-    Attributes
-    ----------
-    log : int
-        Which log.
-    t : ndarray
-        Time since the log's begin [s].
-    measured : ndarray
-        Position of the log.
-    restarted, free : ndarray
-        Simulated position: from the recording again after each `restart`, and in one piece.
-    restart : float
-        Time between two restarts [s].
-    """
-
-    log: int
-    t: Numbers
-    measured: Numbers
-    restarted: Numbers
+    log: int  # which log
+    t: Numbers  # time since the log's begin [s]
+    measured: Numbers  # position of the log
+    restarted: Numbers  # and free: simulated position: from the recording again after each `restart`, and in one piece
     free: Numbers
-    restart: float
+    restart: float  # time between two restarts [s]
 
     @property
     def rms_restarted(self) -> float:
@@ -78,61 +64,29 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Rows of the regression of one log, arrays of shape (m,).
+    """Rows of the regression of one log, arrays of shape (m,)."""
 
-    Attributes
-    ----------
-    t : ndarray
-        Middle of each window since the log's begin [s].
-    effort, fitted, residual : ndarray
-        Measured, by the model, and the difference.
-    velocity : ndarray
-        Mean velocity.
-    place : ndarray of int
-        Number of each window on an even grid; where it jumps, windows in between were not usable.
-    hop, width : float
-        Distance of two neighbouring windows, and their width [s].
-    """
-
-    t: Numbers
-    effort: Numbers
+    t: Numbers  # middle of each window since the log's begin [s]
+    effort: Numbers  # and fitted, residual: measured, by the model, and the difference
     fitted: Numbers
     residual: Numbers
-    velocity: Numbers
-    place: Numbers
-    hop: float
-    width: float
+    velocity: Numbers  # mean velocity
+    place: Numbers  # number of each window on an even grid; where it jumps, windows in between were not usable
+    hop: float  # and width: distance of two neighbouring windows, and their width [s]
+    width: float  # [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifyReportData:
-    """Everything `identify_page` shows.
+    """Everything `identify_page` shows."""
 
-    Attributes
-    ----------
-    found : Identification
-        What came out.
-    title : str
-        What was identified.
-    held : tuple of HeldOut
-        One per log; empty where nothing could be simulated.
-    windows : tuple of Windows
-        One per log; empty where nothing was fitted.
-    shown : int
-        Which log is drawn.
-    response : FrequencyResponse or None
-        None where no log holds an excitation that tells one.
-    resonances : Resonances or None
-        What was fitted to the response.
-    """
-
-    found: Identification
-    title: str
-    held: tuple[HeldOut, ...] = ()
-    windows: tuple[Windows, ...] = ()
-    shown: int = 0
-    response: FrequencyResponse | None = None
-    resonances: Resonances | None = None
+    found: Identification  # what came out
+    title: str  # what was identified
+    held: tuple[HeldOut, ...] = ()  # one per log; empty where nothing could be simulated
+    windows: tuple[Windows, ...] = ()  # one per log; empty where nothing was fitted
+    shown: int = 0  # which log is drawn
+    response: FrequencyResponse | None = None  # None where no log holds an excitation that tells one
+    resonances: Resonances | None = None  # what was fitted to the response
 
 
 def identify_report_data(
@@ -141,23 +95,7 @@ def identify_report_data(
     response: FrequencyResponse | None = None,
     resonances: Resonances | None = None,
 ) -> IdentifyReportData:
-    """Work out what the report shows.
-
-    Parameters
-    ----------
-    found : Identification
-        What came out.
-    title : str, optional
-        What was identified; the logs' names by default.
-    response : FrequencyResponse, optional
-        By default that of the drawn log, where its excitation tells one.
-    resonances : Resonances, optional
-        What was fitted to the response.
-
-    Returns
-    -------
-    IdentifyReportData
-    """
+    """Work out what the report shows."""
     held = hold_out(found)
     shown = max(range(len(held)), key=lambda k: held[k].rms_restarted) if held else 0
     return IdentifyReportData(
@@ -184,18 +122,7 @@ def _names(found: Identification) -> str:
 
 
 def hold_out(found: Identification) -> tuple[HeldOut, ...]:
-    """Simulate the last part of each log with constants from the first parts, as the table of horizons does.
-
-    Parameters
-    ----------
-    found : Identification
-        What came out.
-
-    Returns
-    -------
-    tuple of HeldOut
-        One per log; none without a simulation.
-    """
+    """Simulate the last part of each log with constants from the first parts, as the table of horizons does."""
     constants = found.seen
     if constants is None or not found.horizons:
         return ()
@@ -228,18 +155,7 @@ def _restart_of(seconds: float) -> float:
 
 
 def windows_of(found: Identification) -> tuple[Windows, ...]:
-    """Rows of the regression, log by log.
-
-    Parameters
-    ----------
-    found : Identification
-        What came out.
-
-    Returns
-    -------
-    tuple of Windows
-        None without a fit.
-    """
+    """Rows of the regression, log by log; None without a fit."""
     fit = found.fit
     if fit is None:
         return ()
@@ -268,18 +184,7 @@ def _windows(fit: Fit, run: Run, motion: Motion, part: slice) -> Windows:
 
 
 def autocorrelation(windows: Sequence[Windows]) -> tuple[Numbers, Numbers]:
-    """Correlation of residuals with those some windows earlier; gaps do not count as neighbours.
-
-    Parameters
-    ----------
-    windows : sequence of Windows
-        One per log.
-
-    Returns
-    -------
-    (ndarray, ndarray), shape (k + 1,) each
-        Correlations from lag 0 on, and how many pairs are behind each.
-    """
+    """Correlation of residuals with those some windows earlier; gaps do not count as neighbours."""
     most = min(LAGS, max(int(one.place[-1]) for one in windows if len(one.place)))
     products, pairs = np.zeros(most + 1), np.zeros(most + 1)
     for one in windows:

@@ -26,40 +26,14 @@ UNSCALED = ("delay", "stribeck", "loss")
 
 
 def reach_of(estimates: Sequence[Estimate]) -> float:
-    """End of the scale on which all intervals are drawn: as wide as the widest needs, delays and the like left out.
-
-    Parameters
-    ----------
-    estimates : sequence of Estimate
-        Those that are trusted, if any is.
-
-    Returns
-    -------
-    float
-        Over the value.
-    """
+    """End of the scale on which all intervals are drawn: as wide as the widest needs, delays and the like left out."""
     halves = [relative_half(one) for one in estimates if one.name not in UNSCALED]
     widest = max(halves, default=REACHES[-1])
     return next((reach for reach in REACHES if reach >= widest), REACHES[-1])
 
 
 def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> str:
-    """Draw an interval about its value, on a scale that all constants of a table share.
-
-    Parameters
-    ----------
-    found : Estimate
-        A constant.
-    reach : float
-        End of the scale, over the value.
-    trusted : bool
-        Whether it is.
-
-    Returns
-    -------
-    str
-        HTML; an interval that leaves the scale ends in arrows.
-    """
+    """Draw an interval about its value, on a scale that all constants of a table share."""
     if not is_known(found):
         return '<span style="color:var(--bad)">from nothing to anything</span>'
     half = relative_half(found) / reach
@@ -89,22 +63,7 @@ def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> str:
 
 
 def long_bar(share: float, text: str, *, chosen: bool) -> str:
-    """Draw a bar with its figure.
-
-    Parameters
-    ----------
-    share : float
-        Of the longest, 0 to 1.
-    text : str
-        The figure.
-    chosen : bool
-        Stands out.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Draw a bar with its figure."""
     colour = "var(--good)" if chosen else "var(--muted)"
     width = max(round(LONGEST * min(max(share, 0.0), 1.0)), 1)
     bar = f'<span class="bar" style="width:{width}px;background:{colour}"></span>'
@@ -112,22 +71,7 @@ def long_bar(share: float, text: str, *, chosen: bool) -> str:
 
 
 def heat_map(names: Sequence[str], correlation: Numbers, *, limit: float) -> str:
-    """Write a correlation table whose cells are the darker the closer they come to 1 or -1.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of rows and columns.
-    correlation : ndarray, shape (k, k)
-        From -1 to 1.
-    limit : float
-        From where on a cell is framed.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Write a correlation table whose cells are the darker the closer they come to 1 or -1."""
     heads = [("", False), *((str(k), True) for k in range(1, len(names) + 1))]
     rows = [
         [f"{k + 1} {escape(name)}", *(_heat_cell(float(r), limit, own=k == j) for j, r in enumerate(correlation[k]))]
@@ -139,8 +83,6 @@ def heat_map(names: Sequence[str], correlation: Numbers, *, limit: float) -> str
 def signed(value: float) -> str:
     """Write a correlation with its sign.
 
-    Examples
-    --------
     >>> signed(0.917), signed(-0.001)
     ('+0.92', '0.00')
     """

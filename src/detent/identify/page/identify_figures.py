@@ -22,18 +22,7 @@ MOST_PAIRS = 4
 
 
 def model_sections(data: IdentifyReportData) -> list[str]:
-    """Sections about the model: its tests, what it makes of the effort, which one it is, what it cannot tell apart.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        What to show.
-
-    Returns
-    -------
-    list of str
-        HTML, from top to bottom; empty where there is nothing to show.
-    """
+    """Sections about the model: its tests, what it makes of the effort, which one it is, what it cannot tell apart."""
     return [_held(data), _horizons(data), _effort(data), _friction(data), _ladder(data), _correlation(data)]
 
 

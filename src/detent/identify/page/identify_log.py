@@ -18,18 +18,7 @@ _COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "sof
 
 
 def log_sections(data: IdentifyReportData) -> tuple[str, str]:
-    """Sections about the recordings, and about what to record instead.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        What to show.
-
-    Returns
-    -------
-    (str, str)
-        HTML; the second is empty where nothing was refused.
-    """
+    """Sections about the recordings, and about what to record instead."""
     log = section("What was found in the log", _recorded(data), _findings(data), _logs(data), _guesses(data))
     return log, section("What to record instead", _refusals(data))
 

@@ -8,22 +8,7 @@ from detent.page.parts import Numbers
 
 
 def friction_at(constants: Constants, values: Numbers, velocity: Numbers) -> Numbers:
-    """Friction of the model, signed as the velocity, with any values of its constants.
-
-    Parameters
-    ----------
-    constants : Constants
-        Of the model.
-    values : ndarray
-        In their place, shape (k,).
-    velocity : ndarray
-        Where, shape (n,).
-
-    Returns
-    -------
-    ndarray
-        Effort that keeps the axis at these velocities, shape (n,).
-    """
+    """Friction of the model, signed as the velocity, with any values of its constants."""
     known = dict(zip(constants.names, values.tolist(), strict=True))
     total = np.zeros(len(velocity))
     for way, sign in (("positive", 1.0), ("negative", -1.0)):
@@ -38,20 +23,7 @@ def friction_at(constants: Constants, values: Numbers, velocity: Numbers) -> Num
 
 
 def friction_limits(constants: Constants, velocity: Numbers) -> Numbers:
-    """Half of the 95 % interval of the friction at some velocities, from the covariance of all its constants.
-
-    Parameters
-    ----------
-    constants : Constants
-        Of the model.
-    velocity : ndarray
-        Where, shape (n,).
-
-    Returns
-    -------
-    ndarray
-        Shape (n,).
-    """
+    """Half of the 95 % interval of the friction at some velocities, from the covariance of all its constants."""
     slopes: list[Numbers] = []
     for k, error in enumerate(constants.errors):
         step = np.zeros(len(constants.names))
@@ -65,20 +37,7 @@ def friction_limits(constants: Constants, velocity: Numbers) -> Numbers:
 
 
 def respond(constants: Constants, frequency: Numbers) -> Numbers | None:
-    """Response of position to effort by mass, viscous friction and delay alone, complex, shape (n,).
-
-    Parameters
-    ----------
-    constants : Constants
-        Of the model.
-    frequency : ndarray
-        Where [Hz], shape (n,).
-
-    Returns
-    -------
-    ndarray or None
-        None without a mass above 0.
-    """
+    """Response of position to effort by mass, viscous friction and delay alone, complex, shape (n,)."""
     mass = constants.value("mass")
     if mass <= 0.0:
         return None

@@ -31,17 +31,7 @@ LOOKS: dict[Verdict, Literal["good", "warn", "bad"]] = {"trusted": "good", "part
 
 
 def identify_page(data: IdentifyReportData) -> Page:
-    """Put the page together.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-    """
+    """Put the page together."""
     log, record = log_sections(data)
     return {
         "title": f"{data.title}: {data.found.verdict}",

@@ -18,26 +18,7 @@ def write_identify_report(
     response: FrequencyResponse | None = None,
     resonances: Resonances | None = None,
 ) -> None:
-    """Write the report of an identification as one self-contained HTML file.
-
-    Parameters
-    ----------
-    found : Identification
-        What came out, trusted or not.
-    path : str or Path
-        Target; replaced if it exists.
-    title : str, optional
-        What was identified; the names of the logs by default.
-    response : FrequencyResponse, optional
-        What the Bode plot shows; by default the response of the log, where its excitation tells one.
-    resonances : Resonances, optional
-        What was fitted to the response.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Write the report of an identification as one self-contained HTML file."""
     write_page(path, identify_page(identify_report_data(found, title, response, resonances)))
 
 
@@ -48,16 +29,5 @@ def render_identify_report(
     response: FrequencyResponse | None = None,
     resonances: Resonances | None = None,
 ) -> str:
-    """Make the page as text.
-
-    Parameters
-    ----------
-    found, title, response, resonances
-        As of `write_identify_report`.
-
-    Returns
-    -------
-    str
-        A whole HTML document.
-    """
+    """Make the page as text."""
     return render_page(identify_page(identify_report_data(found, title, response, resonances)))

@@ -31,18 +31,7 @@ _NAMES = {
 
 
 def response_section(data: IdentifyReportData) -> str:
-    """Bode plot with coherence, or a sentence why there is none.
-
-    Parameters
-    ----------
-    data : IdentifyReportData
-        What to show.
-
-    Returns
-    -------
-    str
-        HTML; empty for a refused identification without a response.
-    """
+    """Bode plot with coherence, or a sentence why there is none."""
     title = "Frequency response"
     if data.response is None:
         if data.found.verdict == "refused":

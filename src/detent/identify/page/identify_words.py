@@ -44,19 +44,6 @@ _SMALL_EFFORTS = {"N": "mN", "N*m": "mN*m", "A": "mA", "V": "mV"}
 def constant_name(name: str, unit: str = "") -> str:
     """Name of a constant for people.
 
-    Parameters
-    ----------
-    name : str
-        As in an identification.
-    unit : str
-        Its unit, by which a moment of inertia is told from a mass.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> constant_name("viscous.positive"), constant_name("mass", "kg*m^2")
     ('viscous friction in positive direction', 'moment of inertia')
     """
@@ -82,8 +69,6 @@ def sentence(text: str) -> str:
 def unit_text(unit: str) -> str:
     """Write a unit as it is printed.
 
-    Examples
-    --------
     >>> unit_text("N*s/m").replace(GAP, " "), unit_text("kg*m^2").replace(GAP, " "), unit_text("1")
     ('N s/m', 'kg m²', '')
     """
@@ -92,21 +77,11 @@ def unit_text(unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A number with its limits, written out.
+    """A number with its limits, written out."""
 
-    Attributes
-    ----------
-    value : str
-        With as many digits as its limits leave.
-    half : str
-        Half of the interval, in two digits.
-    unit : str
-        As it is printed.
-    """
-
-    value: str
-    half: str
-    unit: str
+    value: str  # with as many digits as its limits leave
+    half: str  # half of the interval, in two digits
+    unit: str  # as it is printed
 
     def __str__(self) -> str:
         """Give value, limits and unit."""
@@ -169,15 +144,9 @@ def _raised(power: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Ways:
-    """How positions of a log are written.
+    """How positions of a log are written."""
 
-    Attributes
-    ----------
-    unit : str
-        Of the log's positions: "m", "rad", or anything else as it is.
-    """
-
-    unit: str
+    unit: str  # of the log's positions: "m", "rad", or anything else as it is
 
     @property
     def _units(self) -> Units | None:
@@ -205,8 +174,6 @@ class Ways:
 def effort_scale(unit: str, peak: float) -> Scale:
     """Unit in which efforts are drawn, by the largest of them.
 
-    Examples
-    --------
     >>> effort_scale("N*m", 0.02).factor, effort_scale("N", 80.0).factor
     (1000.0, 1.0)
     """
@@ -218,8 +185,6 @@ def effort_scale(unit: str, peak: float) -> Scale:
 def digits_for(peak: float) -> int:
     """Digits after the point that a chart keeps of numbers up to a peak: four significant ones of the largest.
 
-    Examples
-    --------
     >>> digits_for(150.0), digits_for(0.02)
     (2, 6)
     """

@@ -46,33 +46,7 @@ FORCE_SHARE = 0.9
 
 
 def axis_toml(found: Identification, base: str | None = None, file: str = "axis file", reading: str = "") -> str:
-    """Write an axis file.
-
-    Parameters
-    ----------
-    found : Identification
-        What was found; its mass is trusted where there is no `base`.
-    base : str, optional
-        Text of an axis file of the cascade method: only what was identified and is trusted is changed in it.
-    file : str
-        Name of that file, for errors.
-    reading : str
-        Options that the logs were read with, as the command line has them: part of the command that replays the log.
-
-    Returns
-    -------
-    str
-        An axis file that loads.
-
-    Raises
-    ------
-    AxisError
-        Nothing of it is trusted, or not the mass.
-    InputError
-        The base is no axis file, or would be none with the new numbers.
-    DetentError
-        The base is of another method or kind of motion, or has no such effort; positions are counts.
-    """
+    """Write an axis file."""
     if found.verdict == "refused":
         raise AxisError("no axis file: nothing that was identified is trusted; record what the refusals name")
     if base is None:
@@ -85,15 +59,7 @@ def axis_toml(found: Identification, base: str | None = None, file: str = "axis 
 
 
 def cascade_spec(text: str, file: str) -> CascadeSpec:
-    """Read the text of an axis file of the cascade method.
-
-    Raises
-    ------
-    InputError
-        It is none.
-    DetentError
-        It is of another method.
-    """
+    """Read the text of an axis file of the cascade method."""
     spec = axis_of(parse_source(file, text)).spec
     if not isinstance(spec, CascadeSpec):
         raise DetentError(
@@ -108,45 +74,22 @@ def cascade_spec(text: str, file: str) -> CascadeSpec:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Loops of an axis.
+    """Loops of an axis."""
 
-    Attributes
-    ----------
-    span : int
-        Samples that the velocity is a difference over.
-    dead_time : float
-        Of the velocity loop [s].
-    bandwidth : float
-        Of the velocity loop [rad/s].
-    position : float
-        Gain of the position loop [1/s].
-    velocity, integral : float
-        Gains of the velocity loop, effort per velocity and per position.
-    """
-
-    span: int
-    dead_time: float
-    bandwidth: float
-    position: float
-    velocity: float
+    span: int  # samples that the velocity is a difference over
+    dead_time: float  # of the velocity loop [s]
+    bandwidth: float  # of the velocity loop [rad/s]
+    position: float  # gain of the position loop [1/s]
+    velocity: float  # and integral: gains of the velocity loop, effort per velocity and per position
     integral: float
 
 
 def choose_gains(mass: float, seen: Seen, delay: int) -> Gains:
-    """Gains of a rigid axis of which a log tells mass, delay and encoder.
+    """Gains of a rigid axis of which a log tells mass, delay [samples] and encoder.
 
     The velocity is a difference over as many samples as make one count `STEADY` of the top speed. The velocity loop's
     bandwidth is `CLEAR` over its dead time, `FASTEST` at most, and less where one count would move the command by more
     than `JUMP`; the position loop has a quarter of it, the integral an eighth.
-
-    Parameters
-    ----------
-    mass : float
-        All that moves, in units of the effort.
-    seen : Seen
-        What the logs show of the limits.
-    delay : int
-        Delay of the effort [samples].
     """
     period, count = seen.period, seen.resolution
     longest = max(1, min(MOST_SAMPLES, math.floor(LONGEST / period)))

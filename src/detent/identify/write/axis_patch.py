@@ -13,23 +13,6 @@ def patch(text: str, numbers: Iterable[Number], file: str) -> str:
     A number that the file states is replaced where it stands, and what is said of it goes into a comment: behind it, or
     into a line of its own above where there is a comment already. A number that it does not state is added to its
     table.
-
-    Parameters
-    ----------
-    text : str
-        The file, free of errors.
-    numbers : iterable of Number
-    file : str
-        Its name, for errors.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    InputError
-        A key cannot be added: its table is written in one line.
     """
     newline = "\r\n" if "\r\n" in text else "\n"
     lines = text.split(newline)

@@ -35,29 +35,15 @@ RAMP = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Where moves may go, and how fast, in m or rad.
+    """Where moves may go, and how fast, in m or rad."""
 
-    Attributes
-    ----------
-    lowest, highest : float
-        Positions.
-    speed, acceleration : float
-        Largest magnitudes.
-    start : float
-        Where the axis stands.
-    is_rotary : bool
-        True for angles.
-    source : str
-        What told them.
-    """
-
-    lowest: float
+    lowest: float  # and highest: positions
     highest: float
-    speed: float
+    speed: float  # and acceleration: largest magnitudes
     acceleration: float
-    start: float
-    is_rotary: bool
-    source: str
+    start: float  # where the axis stands
+    is_rotary: bool  # True for angles
+    source: str  # what told them
 
     @property
     def middle(self) -> float:
@@ -80,13 +66,7 @@ def bounds_of_axis(spec: CascadeSpec) -> Bounds:
 
 
 def bounds_of_logs(found: Identification) -> Bounds:
-    """What the axis did in its logs.
-
-    Raises
-    ------
-    DetentError
-        It did not move, or its positions are counts.
-    """
+    """What the axis did in its logs."""
     seen = see(found.runs)
     if not (seen.way > 20.0 * seen.resolution and seen.speed > 0.0):
         raise DetentError(
@@ -100,24 +80,12 @@ def bounds_of_logs(found: Identification) -> Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Moves for one thing that is to be seen.
+    """Moves for one thing that is to be seen."""
 
-    Attributes
-    ----------
-    text : str
-        What they are for.
-    shares : tuple of float
-        Speeds, as shares of the top speed.
-    steady : float
-        Time at that speed in each move [s]; 0 for the shortest way that reaches it.
-    dwell : float
-        Rest after each move [s].
-    """
-
-    text: str
-    shares: tuple[float, ...]
-    steady: float
-    dwell: float = 0.0
+    text: str  # what they are for
+    shares: tuple[float, ...]  # speeds, as shares of the top speed
+    steady: float  # time at that speed in each move [s]; 0 for the shortest way that reaches it
+    dwell: float = 0.0  # rest after each move [s]
 
 
 SPEEDS = Part(
@@ -145,8 +113,6 @@ def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
     A log of which nothing is trusted is of no use, so that the next one must show everything but static friction; else
     the moves only add what is missing.
 
-    Examples
-    --------
     >>> [part.text for part in missing_parts([Refusal("little acceleration", "", "", ("mass",))])]
     ['short ramps, one after the other: the mass']
     """
@@ -160,25 +126,7 @@ def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
 
 
 def excitation_job(found: Identification, axis: CascadeSpec | None = None) -> str:
-    """Write a list of moves that a recording needs for what is missing.
-
-    Parameters
-    ----------
-    found : Identification
-        Its refusals say what is missing; without any the moves show everything.
-    axis : CascadeSpec, optional
-        Axis whose limits the moves keep; by default they keep to what the logs show.
-
-    Returns
-    -------
-    str
-        A job as `detent run --job` reads it.
-
-    Raises
-    ------
-    DetentError
-        The limits are not known: no axis, and a log without motion or in counts.
-    """
+    """Write a list of moves that a recording needs for what is missing."""
     bounds = bounds_of_logs(found) if axis is None else bounds_of_axis(axis)
     saturated = any(refusal.subject == "saturated" for refusal in found.refusals)
     moves = _Moves(bounds, SLOWER * bounds.speed if saturated else bounds.speed)

@@ -21,20 +21,11 @@ FEWEST_PERIODS = 3
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What an excitation may not exceed, in units of the excitation.
+    """What an excitation may not exceed, in units of the excitation."""
 
-    Attributes
-    ----------
-    size : float
-        Largest magnitude.
-    rate : float
-        Largest magnitude of its rate [1/s], such as the velocity of a reference.
-    bend : float
-        Largest magnitude of its second derivative [1/s^2], such as the acceleration of a reference.
-    """
-
-    size: float
-    rate: float = math.inf
+    size: float  # largest magnitude
+    rate: float = math.inf  # largest magnitude of its rate [1/s], such as the velocity of a reference
+    # largest magnitude of its second derivative [1/s^2], such as the acceleration of a reference
     bend: float = math.inf
 
     def __post_init__(self) -> None:
@@ -50,33 +41,19 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """An excitation, ready to be played.
+    """An excitation, ready to be played."""
 
-    Attributes
-    ----------
-    t : ndarray
-        Time [s], from 0, shape (n,).
-    values : ndarray
-        Shape (n,).
-    frequency : ndarray
-        Excited lines [Hz], shape (lines,).
-    period : float
-        Time after which it comes back [s].
-    text : str
-        What it is, for a person.
-    """
-
-    t: Values
-    values: Values
-    frequency: Values
-    period: float
-    text: str
+    t: Values  # time [s], from 0, shape (n,)
+    values: Values  # shape (n,)
+    frequency: Values  # excited lines [Hz], shape (lines,)
+    period: float  # time after which it comes back [s]
+    text: str  # what it is, for a person
 
 
 def make_multisine(  # noqa: PLR0913 - what a multisine has
     band: tuple[float, float],
-    period: float,
-    step: float,
+    period: float,  # period [s]; its reciprocal is the distance of two lines
+    step: float,  # time between two samples [s]
     limits: Limits,
     *,
     periods: int = 10,
@@ -85,36 +62,6 @@ def make_multisine(  # noqa: PLR0913 - what a multisine has
 ) -> Excitation:
     """Make a multisine with lines of equal amplitude.
 
-    Parameters
-    ----------
-    band : (float, float)
-        Lowest and highest line [Hz], both on or inside these; above 0, below half the sample rate.
-    period : float
-        Period [s]; its reciprocal is the distance of two lines. It is put on a whole number of samples.
-    step : float
-        Time between two samples [s].
-    limits : Limits
-        One of them is reached.
-    periods : int
-        Periods to play, 3 or more.
-    seed : int, optional
-        Seed of random phases; without, the phases are those of Schroeder, which make the lowest peaks (M. R. Schroeder,
-        IEEE Transactions on Information Theory 16 (1970) 85).
-    odd : bool
-        Excite odd lines only: what an even nonlinearity answers then lies between them.
-
-    Returns
-    -------
-    Excitation
-        It begins where its value is nearest to 0.
-
-    Raises
-    ------
-    DetentError
-        The band holds no line, or reaches half the sample rate.
-
-    Examples
-    --------
     >>> made = make_multisine((1.0, 20.0), 2.0, 1e-3, Limits(0.5), periods=3)
     >>> len(made.t), len(made.frequency), round(float(abs(made.values).max()), 6)
     (6000, 39, 0.5)
@@ -172,23 +119,6 @@ def make_chirp(
 
     Its amplitude falls where rate or second derivative would exceed their limits; so a reference may be wide at low
     frequencies and small at high ones.
-
-    Parameters
-    ----------
-    band : (float, float)
-        First and last frequency [Hz], both above 0 and below half the sample rate.
-    period, step, limits, periods
-        As for `make_multisine`.
-
-    Returns
-    -------
-    Excitation
-        Its lines are those of the period within the band.
-
-    Raises
-    ------
-    DetentError
-        The band is empty or reaches half the sample rate.
     """
     _check_band(band, step, periods)
     rows = round(period / step)
@@ -212,17 +142,7 @@ def make_chirp(
 
 
 def write_excitation(path: Path, excitation: Excitation, heading: str) -> None:
-    """Write an excitation as comma-separated values: time and value, one line per sample.
-
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    excitation : Excitation
-        What is written.
-    heading : str
-        Name and unit of the values, such as ``voltage [V]`` or ``reference [m]``; `read_log` reads the file back.
-    """
+    """Write an excitation as comma-separated values: time and value, one line per sample."""
     lines = [f"# {excitation.text}", f"t [s],{heading}"]
     lines += [
         f"{t:.9g},{value:.9g}" for t, value in zip(excitation.t.tolist(), excitation.values.tolist(), strict=True)

@@ -32,27 +32,13 @@ _WAYS = ("positive", "negative")
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number of an axis file.
+    """A number of an axis file."""
 
-    Attributes
-    ----------
-    key : str
-        Dotted key.
-    value : float
-        In `unit`; a pure number where that is empty.
-    unit : str
-        SI unit.
-    note : str
-        Its interval and where it comes from.
-    trusted : bool
-        False where the identification refused it.
-    """
-
-    key: str
-    value: float
-    unit: str
-    note: str
-    trusted: bool = True
+    key: str  # dotted key
+    value: float  # in `unit`; a pure number where that is empty
+    unit: str  # SI unit
+    note: str  # its interval and where it comes from
+    trusted: bool = True  # False where the identification refused it
 
     @property
     def text(self) -> str:
@@ -62,18 +48,10 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How the effort of a log becomes the force of an axis file.
+    """How the effort of a log becomes the force of an axis file."""
 
-    Attributes
-    ----------
-    factor : float
-        Force per effort.
-    drag : float
-        Force per velocity that back-EMF takes, and that the log shows as viscous friction [N s/m].
-    """
-
-    factor: float = 1.0
-    drag: float = 0.0
+    factor: float = 1.0  # force per effort
+    drag: float = 0.0  # force per velocity that back-EMF takes, and that the log shows as viscous friction [N s/m]
 
     def force(self, found: Estimate) -> Estimate:
         """An estimate in the units of the axis file, times aside."""
@@ -92,13 +70,7 @@ class Scale:
 
 
 def scale_of(spec: CascadeSpec, run: Run) -> Scale:
-    """How the effort of a run becomes the force of an axis.
-
-    Raises
-    ------
-    DetentError
-        The axis has no such effort, or is of another kind of motion.
-    """
+    """How the effort of a run becomes the force of an axis."""
     motion = "rotary" if run.is_rotary else "linear"
     if spec.axis.motion != motion:
         raise DetentError(
@@ -179,19 +151,7 @@ class Contrast:
 
 
 def contrasts(found: Identification, spec: CascadeSpec) -> list[Contrast]:
-    """Constants that a file states outside of what was identified and is trusted.
-
-    Parameters
-    ----------
-    found : Identification
-    spec : CascadeSpec
-        The axis by its file.
-
-    Raises
-    ------
-    DetentError
-        The axis has no effort like that of the log.
-    """
+    """Constants that a file states outside of what was identified and is trusted."""
     scale, stated = scale_of(spec, found.runs[0]), stated_constants(spec)
     known = [in_file_units(scale.force(e), spec.axis.motion) for e in found.trusted if e.name in stated]
     return [Contrast(e.name, stated[e.name], e) for e in known if not e.holds(stated[e.name])]
@@ -204,15 +164,7 @@ def in_file_units(found: Estimate, motion: str) -> Estimate:
 
 
 class FileNumbers:
-    """Identified constants as numbers of an axis file.
-
-    Parameters
-    ----------
-    found : Identification
-        With constants.
-    base : CascadeSpec, optional
-        Axis whose file the numbers are for; by default one with nothing beside them, whose force is the effort.
-    """
+    """Identified constants as numbers of an axis file."""
 
     def __init__(self, found: Identification, base: CascadeSpec | None = None) -> None:
         run = found.runs[0]

@@ -19,35 +19,17 @@ NEARLY_ALL = 0.999
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """Extremes of some runs of one axis, in m or rad, and the unit of the effort.
+    """Extremes of some runs of one axis, in m or rad, and the unit of the effort."""
 
-    Attributes
-    ----------
-    lowest, highest : float
-        Positions.
-    speed, acceleration : float
-        Largest magnitudes [m/s, m/s^2].
-    effort : float
-        Largest magnitude.
-    start : float
-        Position of the first run at its begin.
-    period : float
-        Time between two samples [s], the longest of the runs.
-    resolution : float
-        Way of a count of the encoder, the coarsest of the runs; 0 where none shows.
-    is_rotary : bool
-        True where the position is an angle.
-    """
-
-    lowest: float
+    lowest: float  # and highest: positions
     highest: float
-    speed: float
-    acceleration: float
-    effort: float
-    start: float
-    period: float
-    resolution: float
-    is_rotary: bool
+    speed: float  # and acceleration: largest magnitudes [m/s, m/s^2]
+    acceleration: float  # [m/s, m/s^2]
+    effort: float  # largest magnitude
+    start: float  # position of the first run at its begin
+    period: float  # time between two samples [s], the longest of the runs
+    resolution: float  # way of a count of the encoder, the coarsest of the runs; 0 where none shows
+    is_rotary: bool  # True where the position is an angle
 
     @property
     def way(self) -> float:
@@ -56,22 +38,7 @@ class Seen:
 
 
 def see(runs: Sequence[Run]) -> Seen:
-    """Extremes of runs.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of one axis.
-
-    Returns
-    -------
-    Seen
-
-    Raises
-    ------
-    DetentError
-        A position is in counts, or the runs are not of one kind of motion.
-    """
+    """Extremes of runs."""
     units = {run.position_unit for run in runs}
     if len(units) > 1 or not units <= {"m", "rad"}:
         came = " and ".join(sorted(units))
@@ -106,8 +73,6 @@ def _speed_and_acceleration(run: Run) -> tuple[float, float]:
 def outwards(value: float, *, up: bool, size: float) -> float:
     """Round a value to two digits of a size, away from what it bounds.
 
-    Examples
-    --------
     >>> outwards(0.2034, up=True, size=0.4), outwards(-0.2034, up=False, size=0.4)
     (0.21, -0.21)
     """

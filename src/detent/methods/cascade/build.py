@@ -18,18 +18,7 @@ LONGEST_TICK = 1e-4
 
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
-    """Parameters of the cascade axis.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    CascadeParams
-        Complete, its clocks included; those of a rotary axis in rad, N*m and kg*m^2.
-    """
+    """Parameters of the cascade axis."""
     p = CascadeParams()
     _fill_machine(p.machine, spec)
     _fill_source(p, spec)
@@ -49,15 +38,7 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
 
 
 def sample_ticks(sample_period: float, rate: float) -> int:
-    """Ticks in a sample.
-
-    Parameters
-    ----------
-    sample_period : float
-        [s].
-    rate : float
-        Fastest rate of the plant [1/s].
-    """
+    """Ticks in a sample."""
     return max(1, math.ceil(sample_period * max(rate / LARGEST_ANGLE, 1 / LONGEST_TICK) * (1 - 1e-9)))
 
 

@@ -27,23 +27,7 @@ WINDOW_SHARE = 0.02
 def error_panel(
     name: str, label: str, curve: tuple[str, str, Numbers], units: Units, levels: tuple[tuple[float, str], ...] = ()
 ) -> Panel:
-    """Draw an error [m] in a unit that suits it, with levels on both sides that are of its size.
-
-    Parameters
-    ----------
-    name, label : str
-        Of the plot area.
-    curve : (str, str, ndarray)
-        Legend, colour and error [m].
-    units : Units
-        Of the axis.
-    levels : tuple of (float, str)
-        Magnitudes that matter [m], and their names.
-
-    Returns
-    -------
-    Panel
-    """
+    """Draw an error [m] in a unit that suits it, with levels on both sides that are of its size."""
     text, colour, values = curve
     peak = float(np.nanmax(np.abs(values), initial=0.0))
     scale = units.small(peak)
@@ -86,18 +70,7 @@ def pair_panel(name: str, label: str, scale: Scale, curves: tuple[tuple[str, Num
 
 
 def job_charts(data: CascadeReportData) -> list[Chart]:
-    """Draw the whole job: position, following error, command.
-
-    Parameters
-    ----------
-    data : CascadeReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        Three charts above one another, time in s; none without a path.
-    """
+    """Draw the whole job: position, following error, command."""
     path = data.path
     if path is None:
         return []
@@ -112,18 +85,7 @@ def job_charts(data: CascadeReportData) -> list[Chart]:
 
 
 def detail_charts(data: CascadeReportData) -> list[Chart]:
-    """Draw one move: position, velocity, following error, command; then how the load comes to rest.
-
-    Parameters
-    ----------
-    data : CascadeReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        Time in ms; none without a detail.
-    """
+    """Draw one move: position, velocity, following error, command; then how the load comes to rest."""
     detail = data.detail
     if detail is None:
         return []
@@ -182,18 +144,7 @@ LOOKS = (("left", (5, 4)), ("left", None), ("speed", (5, 4)), ("speed", None))
 
 
 def profile_charts(found: ProfileComparison) -> list[Chart]:
-    """Draw the speed of both references, the following error of the four cases, and the twist after the end.
-
-    Parameters
-    ----------
-    found : ProfileComparison
-        The comparison.
-
-    Returns
-    -------
-    list of dict
-        Time in ms; without the twist for a rigid axis.
-    """
+    """Draw the speed of both references, the following error of the four cases, and the twist after the end."""
     units = Units(rotary=found.rotary)
     t = found.cases[-1].t
     timeline = Timeline(name="profiles", t=t, label="time since the move began")
@@ -264,20 +215,7 @@ def shown_signals(run: ReplayRun) -> list[Compared]:
 
 
 def replay_charts(run: ReplayRun, units: Units) -> list[Chart]:
-    """Draw recording and simulation above one another, and the difference of the positions; whole and magnified.
-
-    Parameters
-    ----------
-    run : ReplayRun
-        What came out.
-    units : Units
-        Of the axis.
-
-    Returns
-    -------
-    list of dict
-        Time in s; the magnified ones are called "near-...".
-    """
+    """Draw recording and simulation above one another, and the difference of the positions; whole and magnified."""
     if not run.compared:
         return []
     t = run.job.t - run.job.t[0]
@@ -290,18 +228,7 @@ def replay_charts(run: ReplayRun, units: Units) -> list[Chart]:
 
 
 def magnified(run: ReplayRun) -> tuple[float, float]:
-    """Stretch around the largest difference of the positions [s].
-
-    Parameters
-    ----------
-    run : ReplayRun
-        With at least one signal.
-
-    Returns
-    -------
-    (float, float)
-        Since the first sample.
-    """
+    """Stretch around the largest difference of the positions [s]."""
     t = run.job.t - run.job.t[0]
     half = 0.5 * max(ZOOM_LEAST, ZOOM_SHARE * float(t[-1]))
     at = float(t[int(np.argmax(np.abs(run.compared[0].difference)))])

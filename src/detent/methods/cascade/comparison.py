@@ -120,20 +120,7 @@ class ProfileComparison:
 
 
 def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> ProfileComparison:
-    """Make one move in four ways on the axis of `spec`.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis; its ``[disturbance]`` is left out, and its feed-forward is either none or all of it.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    ProfileComparison
-        Of a move over the middle half of the travel.
-    """
+    """Make one move in four ways on the axis of `spec`."""
     limits = motion_limits(spec)
     jerk = limits.jerk if math.isfinite(limits.jerk) else smooth_jerk(spec)
     found: list[ProfileCase] = []

@@ -27,18 +27,7 @@ def comparison_charts(found: ProfileComparison | None) -> list[Chart]:
 
 
 def comparison_section(found: ProfileComparison | None) -> str:
-    """Figures of the comparison under their title.
-
-    Parameters
-    ----------
-    found : ProfileComparison, optional
-        What to show.
-
-    Returns
-    -------
-    str
-        HTML; empty if there is none.
-    """
+    """Figures of the comparison under their title."""
     if not found:
         return ""
     return section("What profile and feed-forward are worth on this axis", _curves(found), _figures(found))
@@ -101,20 +90,7 @@ def _figures(found: ProfileComparison) -> str:
 
 
 def plot_profiles(found: ProfileComparison, path: str | Path) -> None:
-    """Draw following error and twist of the four cases.
-
-    Parameters
-    ----------
-    found : ProfileComparison
-        Curves and figures.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Draw following error and twist of the four cases."""
     path = check_figure_path(path)
     units, rigid = Units(rotary=found.rotary), math.isnan(found.frequency)
     with new_figure(path, 9.5, 6.6 if rigid else 9.8) as drawn:
@@ -175,22 +151,7 @@ def _draw_twist(area: Axes, found: ProfileComparison, units: Units) -> None:
 
 
 def profiles_table(found: ProfileComparison) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    """The comparison as a table for the terminal.
-
-    Parameters
-    ----------
-    found : ProfileComparison
-        What was found.
-
-    Returns
-    -------
-    title : str
-        What the table shows.
-    heads : tuple of str
-        Of its columns.
-    rows : list of tuple of str
-        Cells.
-    """
+    """The comparison as a table for the terminal."""
     units = Units(rotary=found.rotary)
     heads = ("profile", "takes", "largest following error", "settles after", "twist after that", "peak command")
     rows = [

@@ -28,13 +28,7 @@ def dead_time(spec: CascadeSpec) -> float:
 
 
 class Machine:
-    """The machine behind a specification, with the model of its loops.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    """
+    """The machine behind a specification, with the model of its loops."""
 
     def __init__(self, spec: CascadeSpec) -> None:
         self.spec = spec

@@ -13,15 +13,7 @@ LONGEST_SATURATION = 1.0
 
 
 class Guard:
-    """What a drive looks after at every sample; the cause is that of the first sample in which something is wrong.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    period : float
-        Time between two samples [s].
-    """
+    """What a drive looks after at every sample; the cause is that of the first sample in which something is wrong."""
 
     def __init__(self, spec: CascadeSpec, period: float) -> None:
         self._spec = spec
@@ -72,17 +64,7 @@ class Guard:
 
 
 class Arrival:
-    """Ends a stretch when the axis is in position, or when the guard does.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    period : float
-        Time between two samples [s].
-    guard : Guard
-        Of the run.
-    """
+    """Ends a stretch when the axis is in position, or when the guard does."""
 
     def __init__(self, spec: CascadeSpec, period: float, guard: Guard) -> None:
         self._window, self._guard = spec.method.in_position, guard

@@ -42,8 +42,6 @@ class RotaryCascade(Cascade):
 def rotary_unit(unit: str) -> str:
     """Unit of an axis that turns, for that of one that moves straight.
 
-    Examples
-    --------
     >>> [rotary_unit(unit) for unit in ("m/s", "V, N", "V.s2/m", "tick")]
     ['rad/s', 'V, N.m', 'V.s2/rad', 'tick']
     """
@@ -58,18 +56,10 @@ def cascade_registers(spec: CascadeSpec) -> type[Registers]:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """What ends a stretch.
+    """What ends a stretch."""
 
-    Attributes
-    ----------
-    samples : int
-        Samples passed, the one in which it was seen counted.
-    cause : str
-        Why the drive switches off; empty where nothing is wrong.
-    """
-
-    samples: int
-    cause: str = ""
+    samples: int  # samples passed, the one in which it was seen counted
+    cause: str = ""  # why the drive switches off; empty where nothing is wrong
 
 
 Judge = Callable[[Rows], Stop | None]
@@ -78,21 +68,11 @@ Judge = Callable[[Rows], Stop | None]
 
 @dataclass(slots=True)
 class Peaks:
-    """Largest magnitudes since they were cleared.
+    """Largest magnitudes since they were cleared."""
 
-    Attributes
-    ----------
-    following : float
-        Following error of the position loop [m].
-    command : float
-        Command, in its own unit.
-    limited : int
-        Samples with the command at its limit.
-    """
-
-    following: float = 0.0
-    command: float = 0.0
-    limited: int = 0
+    following: float = 0.0  # following error of the position loop [m]
+    command: float = 0.0  # command, in its own unit
+    limited: int = 0  # samples with the command at its limit
 
     def take(self, rows: Rows) -> None:
         """Take the rows of a stretch."""
@@ -102,17 +82,7 @@ class Peaks:
 
 
 class CascadeHost:
-    """A cascade axis at power-on, its loops closed, and the reference where it stands.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    position : float, optional
-        Where it stands [m]; by default where the file says.
-    """
+    """A cascade axis at power-on, its loops closed, and the reference where it stands."""
 
     def __init__(self, spec: CascadeSpec, recorder: AnyRecorder | None = None, position: float | None = None) -> None:
         self.spec, self.peaks = spec, Peaks()
@@ -170,18 +140,7 @@ class CascadeHost:
         return advance(p, r, ticks, *recording, *self._feed)
 
     def rehearse(self, samples: int) -> Rows:
-        """What the next samples would bring; the axis stays where it is.
-
-        Parameters
-        ----------
-        samples : int
-            How many.
-
-        Returns
-        -------
-        structured ndarray
-            Columns of `WATCHED`, shape (samples,).
-        """
+        """What the next samples would bring; the axis stays where it is."""
         copy: Any = self.state.copy()
         first = copy.tick // self.sample_ticks + 1
         memory = np.zeros((samples + 1, len(_PICKS)), np.uint8)
@@ -189,20 +148,7 @@ class CascadeHost:
         return memory[np.arange(first, first + samples) % len(memory)].view(_ROW)[:, 0]
 
     def pass_samples(self, samples: int, judge: Judge) -> Stop | None:
-        """Let samples pass, at most until the judge ends the stretch.
-
-        Parameters
-        ----------
-        samples : int
-            How many at most.
-        judge : callable
-            Looks through them.
-
-        Returns
-        -------
-        Stop, optional
-            What ended it early, with the samples passed.
-        """
+        """Let samples pass, at most until the judge ends the stretch."""
         done = 0
         while done < samples:
             rows = self.rehearse(min(samples - done, CHUNK))
@@ -231,20 +177,6 @@ _ROW: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in _LEAVES])
 def run_lengths(on: NDArray[np.bool_], before: int) -> NDArray[np.int64]:
     """For each sample, through how many up to it something has held.
 
-    Parameters
-    ----------
-    on : ndarray of bool
-        Whether it holds, shape (n,).
-    before : int
-        Through how many it held just before.
-
-    Returns
-    -------
-    ndarray of int
-        0 where it does not hold, shape (n,).
-
-    Examples
-    --------
     >>> import numpy as np
     >>> run_lengths(np.array([True, True, False, True]), 5).tolist()
     [6, 7, 0, 1]

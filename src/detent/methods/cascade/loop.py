@@ -42,34 +42,16 @@ MARGIN_STEP = 1.2
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """Motor, coupling and load as linear equations x' = A x + b u.
+    """Motor, coupling and load as linear equations x' = A x + b u."""
 
-    Attributes
-    ----------
-    a : ndarray
-        Shape (n, n), n = 2 to 5.
-    b : ndarray
-        Shape (n,); the input is what the amplifier puts out, a voltage [V] or a force [N].
-    motor, load : int
-        Places of both positions in x; the same where the coupling is rigid.
-    """
-
-    a: Numbers
-    b: Numbers
-    motor: int
+    a: Numbers  # shape (n, n), n = 2 to 5
+    b: Numbers  # shape (n,); the input is what the amplifier puts out, a voltage [V] or a force [N]
+    motor: int  # and load: places of both positions in x; the same where the coupling is rigid
     load: int
 
 
 def plant_of(spec: CascadeSpec, drags: tuple[float, float]) -> Plant:
-    """Linear equations of the plant.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    drags : (float, float)
-        Slope of the friction over speed of motor and load [N*s/m].
-    """
+    """Linear equations of the plant."""
     winding = spec.drive.input == "voltage" and spec.motor is not None and spec.motor.inductance > 0
     first, coupled = int(winding), spec.mechanics.coupling is not None
     size = first + (4 if coupled else 2)
@@ -122,28 +104,14 @@ def steepest(table: FrictionTable) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """Where an open loop crosses a gain of 1.
+    """Where an open loop crosses a gain of 1."""
 
-    Attributes
-    ----------
-    crossover : float
-        Frequency at which the gain first falls below 1 [Hz]; 0 where it never does.
-    phase : float
-        Smallest phase margin over all crossings [rad].
-    """
-
-    crossover: float
-    phase: float
+    crossover: float  # frequency at which the gain first falls below 1 [Hz]; 0 where it never does
+    phase: float  # smallest phase margin over all crossings [rad]
 
 
 class LinearLoop:
-    """The closed loop.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    """
+    """The closed loop."""
 
     def __init__(self, spec: CascadeSpec) -> None:
         self.spec = spec
@@ -185,18 +153,7 @@ class LinearLoop:
     # ----------------------------------------------------------------------------------------------- modes
 
     def transition(self, more: float = 1.0) -> Numbers:
-        """State from sample to sample, the reference at 0.
-
-        Parameters
-        ----------
-        more : float
-            Factor of the whole loop's gain.
-
-        Returns
-        -------
-        ndarray
-            Shape (n, n); the state is that of the plant, what encoders and amplifier remember, filters and integral.
-        """
+        """State from sample to sample, the reference at 0."""
         rows = _Rows(len(self.plant.b), self._memories())
         position = rows.late("position", rows.plant(self.position_place), self.position_sensor.delay)
         read = self.velocity_sensor

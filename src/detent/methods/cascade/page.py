@@ -29,18 +29,7 @@ MOST_MOVES = 500
 
 
 def make_cascade_page(data: CascadeReportData) -> Page:
-    """What the page is made of.
-
-    Parameters
-    ----------
-    data : CascadeReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
+    """What the page is made of."""
     drawn = all_charts(data)
     return {
         "title": f"{data.run.job.name} on {data.axis_name}: {'done' if data.run.done else 'not done'}",
@@ -54,18 +43,7 @@ def make_cascade_page(data: CascadeReportData) -> Page:
 
 
 def all_charts(data: CascadeReportData) -> list[Chart]:
-    """Every chart of the page.
-
-    Parameters
-    ----------
-    data : CascadeReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
+    """Every chart of the page."""
     return [*job_charts(data), *detail_charts(data), *comparison_charts(data.comparison)]
 
 

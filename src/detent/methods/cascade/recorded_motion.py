@@ -28,18 +28,6 @@ def recorded_profile(t: Numbers, reference: Numbers, period: float) -> Profile:
 
     They are those of a spline, which rings by a hair where the reference stands: a feed-forward against Coulomb
     friction would jump to and fro. Where the recording stands for `STILL` samples on both sides they are 0.
-
-    Parameters
-    ----------
-    t, reference : ndarray
-        Time [s] and position asked for [m], shape (n,).
-    period : float
-        Of the samples [s].
-
-    Returns
-    -------
-    Profile
-        From ``t[0]`` on.
     """
     found = profile_of_recording(t, reference, period)
     moves = np.convolve(np.diff(reference) != 0.0, np.ones(2 * STILL), mode="full")[STILL - 1 :][: len(reference)]
@@ -53,19 +41,7 @@ def recorded_profile(t: Numbers, reference: Numbers, period: float) -> Profile:
 
 
 def starting_velocity(t: Numbers, position: Numbers) -> float:
-    """Velocity at the begin of a recording.
-
-    Parameters
-    ----------
-    t, position : ndarray
-        Time [s] and position [m], shape (n,).
-
-    Returns
-    -------
-    float
-        Slope of the cubic through the first positions at the first of them [m/s], exact for a start with a limited
-        jerk; 0 where it is less than five standard errors, or a tenth of the speed reached: then the axis sets off.
-    """
+    """Velocity at the begin of a recording [m/s]."""
     begin = float(t[0])
     count = max(START_SAMPLES, int(np.searchsorted(t, begin + START_SPAN, side="right")))
     if len(t) <= count:
@@ -78,18 +54,7 @@ def starting_velocity(t: Numbers, position: Numbers) -> float:
 
 
 def smooth_velocity(t: Numbers, position: Numbers) -> Numbers:
-    """Velocity of recorded positions: low-passed forwards and backwards, then central differences.
-
-    Parameters
-    ----------
-    t, position : ndarray
-        Time [s], even or nearly so, and position [m], shape (n,), n >= 3.
-
-    Returns
-    -------
-    ndarray
-        [m/s], shape (n,). A Butterworth filter of fourth order at `CUTOFF`, none in a recording of a few samples.
-    """
+    """Velocity of recorded positions: low-passed forwards and backwards, then central differences [m/s]."""
     signal: Any = import_module("scipy.signal")  # it states no types
     rate = (len(t) - 1) / float(t[-1] - t[0])
     numerator, denominator = signal.butter(4, min(CUTOFF, 0.2 * rate) / (0.5 * rate))

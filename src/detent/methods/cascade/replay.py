@@ -3,8 +3,6 @@
 The simulated axis begins where the recorded one stood and as fast as it moved. It is compared with the recording at the
 recording's own instants: what its encoders read there, and what its law commanded.
 
-References
-----------
 Janot, Gautier, Brunot: Data Set and Reference Models of EMPS. Nonlinear System Identification Benchmarks 2019 (relative
 errors of a simulation: the norm of the difference over the norm of the measurement).
 """
@@ -136,27 +134,6 @@ def run_cascade_replay(
 
     The loops follow the recorded reference; without one the amplifier gets the recorded effort. The drive does not go
     off: what it would have gone off for is a warning.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    job : ReplayJob
-        The recording.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    ReplayRun
-        Figures and curves of what was recorded and simulated.
-
-    Raises
-    ------
-    DetentError
-        The recording drives the axis by a signal that it cannot take, or is too long.
     """
     host = _start(spec, job, recorder)
     result = ReplayRun(job, period=host.period)
@@ -201,18 +178,7 @@ def _watch(host: CascadeHost, samples: int, progress: Progress | None) -> Rows:
 
 
 def per_command(spec: CascadeSpec) -> dict[str, float]:
-    """Each effort that a recording can hold, per volt of this axis's command.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-
-    Returns
-    -------
-    dict of str to float
-        Efforts that follow from the command alone, by the roles of a log.
-    """
+    """Each effort that a recording can hold, per volt of this axis's command."""
     found = {"command": 1.0}
     if spec.drive.input == "voltage":
         return found | {"voltage": spec.drive.voltage_gain}
@@ -266,21 +232,7 @@ def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) 
 
 
 def at_stamps(t: Numbers, at: Numbers, values: Numbers) -> Numbers:
-    """Simulated values at the stamps of a recording.
-
-    Parameters
-    ----------
-    t : ndarray
-        Stamps [s], shape (n,). The last may lie a part of a period behind the last sample of the loops, which is as
-        far as a reference is known: there the last slope goes on.
-    at, values : ndarray
-        Time [s] and value of each sample of the loops, shape (m,).
-
-    Returns
-    -------
-    ndarray
-        Shape (n,).
-    """
+    """Simulated values at the stamps of a recording."""
     found = np.interp(t, at, values)
     if len(at) < 2:
         return found

@@ -79,34 +79,11 @@ class ReplayJob:
 def make_replay_job(
     spec: CascadeSpec,
     name: str,
-    t: Numbers,
+    t: Numbers,  # time [s], shape (n,)
     signals: Mapping[str, tuple[Numbers, str]],
     notes: Sequence[str] = (),
 ) -> ReplayJob:
-    """The recording of an axis, as its job.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    name : str
-        Name of the log.
-    t : ndarray
-        Time [s], shape (n,).
-    signals : mapping of str to (ndarray, str)
-        From the role of a signal, such as "position", to its values, shape (n,), and their SI unit.
-    notes : sequence of str
-        What was found wrong with the log, and what was guessed.
-
-    Returns
-    -------
-    ReplayJob
-
-    Raises
-    ------
-    DetentError
-        The log has no position, is of an axis of another kind of motion, in counts, or cannot be replayed.
-    """
+    """The recording of an axis, as its job."""
     if "position" not in signals:
         came = ", ".join(signals) or "no signal"
         raise DetentError(

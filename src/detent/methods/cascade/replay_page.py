@@ -25,18 +25,7 @@ from detent.page.words import GAP, bar_cell, count, duration, number, table
 
 
 def make_replay_page(data: ReplayReportData) -> Page:
-    """What the page is made of.
-
-    Parameters
-    ----------
-    data : ReplayReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
+    """What the page is made of."""
     drawn = replay_charts(data.run, data.units)
     return {
         "title": f"{data.run.job.name} replayed on {data.axis_name}",

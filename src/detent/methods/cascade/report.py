@@ -42,20 +42,7 @@ def units_of(spec: CascadeSpec) -> Units:
 
 
 def cascade_summary_rows(spec: CascadeSpec, run: CascadeRun) -> list[tuple[str, str]]:
-    """Name and text of each figure of a run of moves; what a run did not come to is left out.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    run : CascadeRun
-        Done or not.
-
-    Returns
-    -------
-    list of (str, str)
-        Such as ("moves", "24 of 24 in position").
-    """
+    """Name and text of each figure of a run of moves; what a run did not come to is left out."""
     units = units_of(spec)
     arrived = sum(move.in_position for move in run.moves)
     rows = [("moves", f"{count(arrived)} of {count(run.job.count)} in position")]
@@ -104,25 +91,7 @@ def cascade_report(
     comparison: ProfileComparison | None = None,
     settings: dict[str, str] | None = None,
 ) -> CascadeReportData:
-    """Everything the report of a run of moves shows.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    run : CascadeRun
-        Its outcome.
-    trace : Trace, optional
-        What was recorded; figures over time are left out where it lacks their signals.
-    comparison : ProfileComparison, optional
-        A move with other profiles.
-    settings : dict of str to str, optional
-        Small print: file, seed.
-
-    Returns
-    -------
-    CascadeReportData
-    """
+    """Everything the report of a run of moves shows."""
     usable = trace if trace is not None and len(trace) > 1 and all(n in trace for n in NEEDED.values()) else None
     return CascadeReportData(
         axis_name=spec.axis.name,
@@ -196,20 +165,7 @@ def _rest(run: CascadeRun, move: CascadeMove, path: CascadePath) -> tuple[float,
 
 
 def replay_summary_rows(spec: CascadeSpec, run: ReplayRun) -> list[tuple[str, str]]:
-    """Name and text of each figure of a replay.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    run : ReplayRun
-        Done or not.
-
-    Returns
-    -------
-    list of (str, str)
-        Such as ("position", "rms 2.3 µm, largest 42 µm, relative 0.0016 %").
-    """
+    """Name and text of each figure of a replay."""
     units = units_of(spec)
     source = f"driven by the recorded {run.open_loop}" if run.open_loop else "along the recorded reference"
     rows = [("recording", f"{duration(run.job.seconds)}, {count(len(run.job.t))} samples, {source}")]
@@ -239,21 +195,7 @@ def figure(one: Compared, value: float, units: Units) -> str:
 
 
 def replay_report(spec: CascadeSpec, run: ReplayRun, *, settings: dict[str, str] | None = None) -> ReplayReportData:
-    """Everything the report of a replay shows.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    run : ReplayRun
-        Its outcome.
-    settings : dict of str to str, optional
-        Small print: file.
-
-    Returns
-    -------
-    ReplayReportData
-    """
+    """Everything the report of a replay shows."""
     notes = [Note("warning", text) for text in run.warnings] + [Note("note", text) for text in run.job.notes]
     return ReplayReportData(
         axis_name=spec.axis.name, units=units_of(spec), run=run, notes=notes, settings=settings or {}

@@ -164,29 +164,6 @@ def run_cascade_moves(
     """Make a list of moves on the axis of `spec`, from power-on.
 
     A move begins when the one before has been in position and its dwell is over.
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    job : MoveJob
-        The moves; those of a rotary axis in rad.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    CascadeRun
-        What the axis did; a fault, or a move that was not in position, is in `failure`, not raised.
-
-    Raises
-    ------
-    InputError
-        A move cannot be commanded to this axis.
-    DetentError
-        A move is too slow for a profile of its samples.
     """
     targets = check_cascade_job(spec, job)
     host = CascadeHost(spec, recorder)
@@ -320,25 +297,7 @@ def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
 
 
 def check_cascade_job(spec: CascadeSpec, job: MoveJob) -> list[float]:
-    """Where each move of a job goes [m].
-
-    Parameters
-    ----------
-    spec : CascadeSpec
-        The axis.
-    job : MoveJob
-        The moves.
-
-    Returns
-    -------
-    list of float
-        Targets, in order.
-
-    Raises
-    ------
-    InputError
-        Targets beyond the travel, speeds beyond the limit, sample periods: all of them, with their lines.
-    """
+    """Where each move of a job goes [m]."""
     problems: list[FileProblem] = []
     targets: list[float] = []
     place = spec.mechanics.start_position

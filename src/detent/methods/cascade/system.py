@@ -161,23 +161,7 @@ def smoothing(time_constant: float, period: float) -> float:
 
 
 def fill_clocks(p: CascadeParams, tick: float, sample_ticks: int) -> None:
-    """Set the base tick and the period of the loops, and check what depends on them.
-
-    Parameters
-    ----------
-    p : CascadeParams
-        Written: every period. Its other constants are there already.
-    tick : float
-        Base tick [s].
-    sample_ticks : int
-        Ticks between two samples, 1 or more.
-
-    Raises
-    ------
-    ValueError
-        The tick is too long for the plant, a delay too long for its memory, a span is 0, or a rigid coupling has
-        backlash.
-    """
+    """Set the base tick and the period of the loops, and check what depends on them."""
     _check_memory(p)
     if sample_ticks < 1 or tick <= 0.0:
         raise ValueError(f"tick {tick:g} s and {sample_ticks} ticks per sample, must be above 0 and 1 or more")

@@ -12,31 +12,17 @@ MICRO = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """A unit of a plot area.
+    """A unit of a plot area."""
 
-    Attributes
-    ----------
-    factor : float
-        From SI units.
-    name : str
-        Of the unit.
-    """
-
-    factor: float
-    name: str
+    factor: float  # from SI units
+    name: str  # of the unit
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Units of an axis.
+    """Units of an axis."""
 
-    Attributes
-    ----------
-    rotary : bool
-        It turns.
-    """
-
-    rotary: bool
+    rotary: bool  # it turns
 
     @property
     def place(self) -> Scale:
@@ -57,8 +43,6 @@ class Units:
     def error(self, value: float) -> str:
         """Write an error with its unit.
 
-        Examples
-        --------
         >>> Units(rotary=False).error(5.69e-6).replace(GAP, " "), Units(rotary=True).error(0.1).replace(GAP, " ")
         ('5.7 µm', '5.73 deg')
         """
@@ -80,8 +64,6 @@ class Units:
 def percent(share: float) -> str:
     """Write a share in percent, with three digits.
 
-    Examples
-    --------
     >>> percent(1.556e-5).replace(GAP, " "), percent(0.0574).replace(GAP, " ")
     ('0.0016 %', '5.74 %')
     """

@@ -14,17 +14,7 @@ SUBSTEP_SHARE = 0.25
 
 
 def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
-    """Parameters of the filtered servo.
-
-    Parameters
-    ----------
-    spec : FilteredServoSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    FilteredServoParams
-    """
+    """Parameters of the filtered servo."""
     p = FilteredServoParams()
     method, drive = spec.method, spec.drive
     p.generator.ticks_per_second = 1 / TICK

@@ -261,22 +261,7 @@ def _word_charts(found: FeedbackComparison) -> list[Chart]:
 def compare_feedback(
     spec: FilteredServoSpec, *, rate: float = RATE, progress: Progress | None = None
 ) -> FeedbackComparison:
-    """Drive the axis at constant rate and stop it, with each way of feeding the counted speed back.
-
-    Parameters
-    ----------
-    spec : FilteredServoSpec
-        The axis; its ``[disturbance]`` is left out.
-    rate : float
-        Command pulses per second; lowered to `limits.speed` where that is less.
-    progress : callable, optional
-        Told the share done.
-
-    Raises
-    ------
-    DetentError
-        The rate is not above 0.
-    """
+    """Drive the axis at constant rate and stop it, with each way of feeding the counted speed back."""
     require_positive("compare_feedback: rate", rate, "pulses/s", "the rate of the command pulses")
     rate = min(rate, spec.limits.speed / spec.pulse)
     variants = list(feedback_variants(spec))

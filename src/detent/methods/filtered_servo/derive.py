@@ -25,13 +25,7 @@ SETTLING_WINDOWS = 200
 
 
 class Machine:
-    """The machine behind a specification, with the model of its loop.
-
-    Parameters
-    ----------
-    spec : FilteredServoSpec
-        The axis.
-    """
+    """The machine behind a specification, with the model of its loop."""
 
     def __init__(self, spec: FilteredServoSpec) -> None:
         self.spec = spec

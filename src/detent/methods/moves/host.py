@@ -81,14 +81,7 @@ class Host(Protocol):
 
 
 def check_job(host: Host, job: MoveJob) -> list[Destination]:
-    """Destinations of a whole job, before anything moves.
-
-    Raises
-    ------
-    InputError
-        Targets outside the travel, off the positioning points, or too far for the axis; speeds and sample periods that
-        it cannot take. All of them, with their lines.
-    """
+    """Destinations of a whole job, before anything moves."""
     problems: list[FileProblem] = []
     found: list[Destination] = []
     position = host.home

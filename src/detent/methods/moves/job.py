@@ -89,13 +89,7 @@ class Move:
 
 
 def check_dwell(number: int, dwell: float) -> None:
-    """Refuse a time that nothing can stand [s], in move `number`.
-
-    Raises
-    ------
-    DetentError
-        It is negative, or not finite.
-    """
+    """Refuse a time that nothing can stand [s], in move `number`."""
     if not 0 <= dwell < math.inf:
         raise bad_move(number, f"a dwell of {dwell} s", "0 s or more")
 
@@ -132,27 +126,6 @@ class MoveJob:
 def expand_moves(file: str, rows: Sequence[tuple[AnyMove, int]], repeat: int = 1) -> tuple[AnyMove, ...]:
     """Write out the repeats of a list, and number the moves.
 
-    Parameters
-    ----------
-    file : str
-        The file as the user named it, for messages.
-    rows : sequence of (move, int)
-        Each row once, with how often it is done in succession, 1 or more; the number of these moves is ignored.
-    repeat : int
-        How often the whole list is done, 1 or more.
-
-    Returns
-    -------
-    tuple of moves
-        Numbered from 1.
-
-    Raises
-    ------
-    InputError
-        More than `MOST_MOVES` moves.
-
-    Examples
-    --------
     >>> step = Move(number=1, row=3, by=0.001)
     >>> [(move.number, move.row, move.by) for move in expand_moves("steps.toml", [(step, 3)])]
     [(1, 3, 0.001), (2, 3, 0.001), (3, 3, 0.001)]
@@ -182,32 +155,6 @@ def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, ha
     feed, a carriage return or a form feed stands at its column from the left again: the carriage goes back. A combining
     accent is struck together with the letter before it. A SUB that ends a CP/M text is ignored.
 
-    Parameters
-    ----------
-    text : str
-        The whole text.
-    name : str
-        The file as the user named it.
-    pitch : float
-        Distance of two columns [m], above 0.
-    left_margin : float
-        Position of the first column [m].
-    hammer_time : float
-        Time the carriage stands at each character [s].
-
-    Returns
-    -------
-    MoveJob
-        Of kind "text", with at least one move; the label of a move is its character.
-
-    Raises
-    ------
-    InputError
-        The text holds other control characters or what cannot be printed (every place is named, up to
-        `MOST_PROBLEMS`), prints nothing, or prints more than `MOST_MOVES` characters.
-
-    Examples
-    --------
     >>> job = text_job("ab c\nd", name="short.txt", pitch=0.00254, hammer_time=0.008)
     >>> [(move.label, move.target, move.row) for move in job.moves]
     [('a', 0.0, 1), ('b', 0.00254, 1), ('c', 0.00762, 1), ('d', 0.0, 2)]

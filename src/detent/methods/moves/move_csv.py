@@ -15,25 +15,6 @@ def parse_move_csv(file: str, text: str, units: Mapping[str, str] = UNITS) -> Mo
 
     The header names the columns, in any order: ``target [mm]`` or ``by [mm]`` or both, and where wanted ``dwell [ms]``,
     ``repeat``, ``speed [mm/s]``, ``sample_period [ms]``. How lines are written is said in `detent.files.job_csv`.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    units : mapping of str to str
-        Unit of each column: `UNITS`, or `ROTARY_UNITS`.
-
-    Returns
-    -------
-    MoveJob
-        With at least one move.
-
-    Raises
-    ------
-    InputError
-        All that is wrong, each with line and column.
     """
     rows = JobRows[Move](file)
     table = JobTable(file, text, rows.problems)

@@ -17,36 +17,12 @@ _WHAT_A_JOB_IS = "a list of moves (.csv or .toml) or a text (.txt)"
 def load_moves(
     path: str | PathLike[str],
     *,
-    pitch: float | None = None,
-    left_margin: float = 0.0,
-    hammer_time: float = 0.0,
+    pitch: float | None = None,  # distance of two characters [m], above 0; None for an axis that prints no text
+    left_margin: float = 0.0,  # position of a text's first column [m]
+    hammer_time: float = 0.0,  # time the axis stands at each character of a text [s]
     rotary: bool = False,
 ) -> MoveJob:
-    """Read the job of a servo axis; the ending of the name says what it is.
-
-    Parameters
-    ----------
-    path : str or path
-        A list of moves (``.csv``, ``.toml``; UTF-8), or a text (``.txt``; UTF-8, or Latin-1 where it is not UTF-8).
-    pitch : float or None
-        Distance of two characters [m], above 0; None for an axis that prints no text.
-    left_margin : float
-        Position of a text's first column [m].
-    hammer_time : float
-        Time the axis stands at each character of a text [s].
-    rotary : bool
-        The axis turns: places and ways are angles, the job has them in rad.
-
-    Returns
-    -------
-    MoveJob
-        With at least one move. Whether the axis can do it is not checked here.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or something in it is wrong: all of it is told, with line and column.
-    """
+    """Read the job of a servo axis; the ending of the name says what it is."""
     file = Path(path)
     data = read_data(file, _KINDS, _WHAT_A_JOB_IS)
     ending, units = file.suffix.lower(), ROTARY_UNITS if rotary else UNITS

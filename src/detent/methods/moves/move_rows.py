@@ -19,13 +19,7 @@ ONE_WAY = "exactly one of target (a place) and by (a way from the place before)"
 
 
 def read_quantity(key: str, text: str, units: Mapping[str, str] = UNITS) -> float:
-    """Read a number with its unit as the value of a key, in SI units.
-
-    Raises
-    ------
-    RefusedValueError
-        It is no such quantity, or outside what the key allows.
-    """
+    """Read a number with its unit as the value of a key, in SI units."""
     try:
         value = parse_quantity(text, units[key])
     except QuantityError as error:
@@ -34,13 +28,7 @@ def read_quantity(key: str, text: str, units: Mapping[str, str] = UNITS) -> floa
 
 
 def check_quantity(key: str, value: float, units: Mapping[str, str] = UNITS) -> float:
-    """Check the value of a key, in SI units.
-
-    Raises
-    ------
-    RefusedValueError
-        It is outside what the key allows.
-    """
+    """Check the value of a key, in SI units."""
     if key == "dwell":
         return check_dwell(value)
     if key in {"speed", "sample_period"} and value <= 0:
@@ -64,11 +52,5 @@ def add_move(rows: JobRows[Move], line: int, values: Mapping[str, float]) -> Non
 
 
 def to_job(rows: JobRows[Move], repeat: int = 1) -> MoveJob:
-    """Make the rows a job that does the list `repeat` times.
-
-    Raises
-    ------
-    InputError
-        There are problems, no moves, or too many.
-    """
+    """Make the rows a job that does the list `repeat` times."""
     return MoveJob(PurePath(rows.file).name, "moves", rows.written_out(repeat))

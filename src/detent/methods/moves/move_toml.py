@@ -15,25 +15,6 @@ def parse_move_toml(file: str, text: str, units: Mapping[str, str] = UNITS) -> M
 
     Each ``[[move]]`` has ``target`` or ``by``, and where wanted ``dwell``, ``repeat``, ``speed`` and ``sample_period``.
     A ``repeat`` before the first of them does the whole list so many times.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    units : mapping of str to str
-        Unit of each key: `UNITS`, or `ROTARY_UNITS`.
-
-    Returns
-    -------
-    MoveJob
-        With at least one move.
-
-    Raises
-    ------
-    InputError
-        All that is wrong, each with line and column.
     """
     rows = JobRows[Move](file)
     tables = JobTables(file, text, ("move",), rows.problems)

@@ -123,27 +123,7 @@ class MoveRun:
 
 
 def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> MoveRun:
-    """Make a list of moves on an axis, from power-on.
-
-    Parameters
-    ----------
-    host : Host
-        The host of the axis, at power-on.
-    job : MoveJob
-        The moves.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    MoveRun
-        What the axis did; a fault, or a move that ended elsewhere, is in `failure`, not raised.
-
-    Raises
-    ------
-    InputError
-        A move cannot be commanded to this axis.
-    """
+    """Make a list of moves on an axis, from power-on."""
     result = MoveRun(job, tolerance=host.tolerance, grid=host.grid)
     destinations = check_job(host, job)
     try:

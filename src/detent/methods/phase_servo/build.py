@@ -16,17 +16,7 @@ SUBSTEP = 1e-5
 
 
 def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
-    """Parameters of the phase servo.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    PhaseServoParams
-    """
+    """Parameters of the phase servo."""
     p = PhaseServoParams()
     p.clocks.integrate_mask = (1 << spec.clock.integrate_tap) - 1
     p.clocks.sample_mask = (1 << spec.clock.sample_tap) - 1

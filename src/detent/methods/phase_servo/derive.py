@@ -18,13 +18,7 @@ STIFFEST = 1e3
 
 
 class Machine:
-    """The machine behind a specification, in the units of its logic.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        The axis.
-    """
+    """The machine behind a specification, in the units of its logic."""
 
     def __init__(self, spec: PhaseServoSpec) -> None:
         motor, mechanics, friction = spec.motor, spec.mechanics, spec.mechanics.friction

@@ -14,24 +14,13 @@ JITTER_PEAK = 3
 
 @dataclass(frozen=True, slots=True)
 class EdgeSeparation:
-    """Displacements of an edge in turns of the carrier, and what would still do.
+    """Displacements of an edge in turns of the carrier, and what would still do."""
 
-    Attributes
-    ----------
-    displaced : float
-        By the comparator's offset where the secondary is weakest; 0.5 where it does not reach the offset at all.
-    limit : float
-        Largest displacement allowed.
-    largest_offset : float
-        Largest offset within it, as a fraction of the amplitude.
-    largest_jitter : float
-        Largest rms jitter that the offset leaves room for [s].
-    """
-
+    # by the comparator's offset where the secondary is weakest; 0.5 where it does not reach the offset at all
     displaced: float
-    limit: float
-    largest_offset: float
-    largest_jitter: float
+    limit: float  # largest displacement allowed
+    largest_offset: float  # largest offset within it, as a fraction of the amplitude
+    largest_jitter: float  # largest rms jitter that the offset leaves room for [s]
 
 
 def edge_separation(spec: PhaseServoSpec) -> EdgeSeparation:

@@ -223,15 +223,7 @@ def _events(found: HoldComparison) -> list[Event]:
 
 
 def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> HoldComparison:
-    """Record how the axis stands at its target, still and pushed, with and without dead band and integrator.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        The axis; its ``[disturbance]`` is left out. Each variant but the first stops, whatever `stop_always_off` says.
-    progress : callable, optional
-        Told the share done.
-    """
+    """Record how the axis stands at its target, still and pushed, with and without dead band and integrator."""
     cases = len(STILL) + len(LOADED)
     stopping = change_method(spec, stop_always_off=False)
 

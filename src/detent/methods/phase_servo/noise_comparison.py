@@ -161,22 +161,7 @@ def _rest_charts(found: NoiseComparison) -> list[Chart]:
 
 
 def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress | None = None) -> NoiseComparison:
-    """Find where the axis stops after spurious pulses, and where it would stop by counted pulses.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        The axis; its ``[disturbance]`` is left out.
-    pitches : int
-        Length of the move.
-    progress : callable, optional
-        Told the share done.
-
-    Raises
-    ------
-    DetentError
-        The move is shorter than a pitch, or longer than the distance word can say.
-    """
+    """Find where the axis stops after spurious pulses, and where it would stop by counted pulses."""
     most = MOST_STEPS // spec.detector.counts
     if not 1 <= pitches <= most:
         raise DetentError(
@@ -207,8 +192,6 @@ def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress 
 def pulse_counts(margin: int) -> tuple[int, ...]:
     """Numbers of pulses to try: those of the specification, and one below and one above the axis's own `margin`.
 
-    Examples
-    --------
     >>> pulse_counts(24)
     (0, 1, 2, 5, 8, 12, 16, 20, 30)
     >>> pulse_counts(5)
@@ -219,26 +202,7 @@ def pulse_counts(margin: int) -> tuple[int, ...]:
 
 
 def rest_point(spec: PhaseServoSpec, pitches: int, count: int, sign: str, begin: float) -> float:
-    """Where a move ends that `count` spurious pulses disturb.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        The axis.
-    pitches : int
-        The move, positive to the right.
-    count : int
-        Spurious pulses, 0..64.
-    sign : "+" or "-"
-        Their sign.
-    begin : float
-        When the first comes [s]; the strobe comes at 0.25 ms.
-
-    Returns
-    -------
-    float
-        Rest point less target [steps].
-    """
+    """Where a move ends that `count` spurious pulses disturb [steps]."""
     disturbance = UNDISTURBED
     if count:
         # Values in SI already: nothing is to be read from text.

@@ -31,19 +31,7 @@ def change_method(spec: PhaseServoSpec, **values: object) -> PhaseServoSpec:
 
 
 class PhaseBench:
-    """An axis that stands at a positioning point, locked and ready, before a move by whole pitches.
-
-    Parameters
-    ----------
-    spec : PhaseServoSpec
-        The axis.
-    pitches : int
-        The move, positive to the right; not 0.
-    disturbance : DisturbanceTable
-        All that disturbs the run; what the file says is left out.
-    recorder : Recorder, optional
-        Records registers on the way.
-    """
+    """An axis that stands at a positioning point, locked and ready, before a move by whole pitches."""
 
     def __init__(
         self,
@@ -73,14 +61,7 @@ class PhaseBench:
             self.machine.state.sequencer.event = 0
 
     def move(self) -> float:
-        """Make the move up to the beginning of position mode.
-
-        Returns
-        -------
-        float
-            When position mode was entered [s]; NaN for an axis that does not get there in three times the time that
-            its velocity table gives it, and half a second.
-        """
+        """Make the move up to the beginning of position mode; gives its time [s], NaN where it is not reached."""
         self.run_until(START)
         s = self.machine.state.sequencer
         s.command, s.backward, s.strobe = abs(self.pitches) * self.spec.detector.counts, self.pitches < 0, 1

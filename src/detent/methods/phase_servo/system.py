@@ -260,13 +260,7 @@ def be_ready(p: PhaseServoParams, r: PhaseServo) -> None:
 
 @step
 def run_converters(p: ConverterParams, r: Converters, d: DetectorParams, start: int, rate: int, periods: int) -> int:
-    """Converters alone, the phase of the secondary at `start` and growing by `rate` per period [2^-32 turn].
-
-    Returns
-    -------
-    int
-        Pulses, forward less backward.
-    """
+    """Converters alone, the phase of the secondary at `start` and growing by `rate` per period [2^-32 turn]."""
     local = local_copy(r)
     net = 0
     phase = start

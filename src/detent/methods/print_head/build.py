@@ -27,18 +27,7 @@ SUBSTEP_SHARE = 0.25
 
 
 def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
-    """Parameters of the print-head axis.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    PrintHeadParams
-        Parameters of the true machine (with its disturbances) and of the axis computer (which does not know of them).
-    """
+    """Parameters of the print-head axis."""
     p = PrintHeadParams()
     p.fidelity = SWITCH_LEVEL if spec.axis.fidelity == "switch-level" else AVERAGED
     p.supply = spec.disturbance.supply

@@ -35,18 +35,7 @@ def _transition(t: Numbers, on: Numbers) -> Band:
 
 
 def profile_charts(profile: SpeedProfile) -> list[Chart]:
-    """Draw one line: speed above, drive below, over the same time.
-
-    Parameters
-    ----------
-    profile : SpeedProfile
-        One line from start to stop.
-
-    Returns
-    -------
-    list of dict
-        Two charts: speed [in/s], drive [count]; time in ms.
-    """
+    """Draw one line: speed above, drive below, over the same time."""
     bands = [_transition(profile.t, profile.transition)]
     if profile.print_span:
         bands.insert(0, Band(label="printing", colour="good", spans=[profile.print_span]))
@@ -63,18 +52,7 @@ def profile_charts(profile: SpeedProfile) -> list[Chart]:
 
 
 def turn_charts(turn: TurnAround) -> list[Chart]:
-    """Draw a turn-around: motor current above, speed below, over the same time.
-
-    Parameters
-    ----------
-    turn : TurnAround
-        From the stop of one line to the steady speed of the next.
-
-    Returns
-    -------
-    list of dict
-        Two charts: current [A], speed [in/s]; time in ms.
-    """
+    """Draw a turn-around: motor current above, speed below, over the same time."""
     bands = [_transition(turn.t, turn.transition)]
     timeline = Timeline(name="turn", t=turn.t, label="time since the stop began", bands=bands, events=turn.events)
     current = Curve(label="motor current", colour="current", y=turn.current, digits=4)
@@ -86,18 +64,7 @@ def turn_charts(turn: TurnAround) -> list[Chart]:
 
 
 def path_chart(path: HeadPath) -> Chart:
-    """Draw the head's position over the first half minute of the job, with the stretches in which it prints.
-
-    Parameters
-    ----------
-    path : HeadPath
-        The whole job, of which no more than `PATH_SECONDS` are drawn.
-
-    Returns
-    -------
-    dict
-        One chart: position [in from the left frame] over time [s].
-    """
+    """Draw the head's position over the first half minute of the job, with the stretches in which it prints."""
     end = int(np.searchsorted(path.t, float(path.t[0]) + PATH_SECONDS, side="right"))
     changes = np.flatnonzero(np.diff(np.asarray(path.printing[:end], dtype=np.int8)))
     # Both sides of each change, so that a line's first and last character stand where they belong.
@@ -123,20 +90,7 @@ def path_chart(path: HeadPath) -> Chart:
 
 
 def column_chart(errors: ColumnErrors, limit: float) -> Chart:
-    """Count how far from their place the columns landed, per direction of printing.
-
-    Parameters
-    ----------
-    errors : ColumnErrors
-        At least one column.
-    limit : float
-        Largest good column error [m].
-
-    Returns
-    -------
-    dict
-        One chart: columns per bin over micrometres to the right of the place.
-    """
+    """Count how far from their place the columns landed, per direction of printing."""
     heaps = [
         Heap(label=f"printed to the {name}", colour=name, at=errors.offsets * 1e6, counts=counts)
         for name, counts in (("right", errors.right), ("left", errors.left))
@@ -146,18 +100,7 @@ def column_chart(errors: ColumnErrors, limit: float) -> Chart:
 
 
 def identified_chart(line: IdentifiedLine) -> Chart:
-    """Draw the drive value against speed in one direction: measured points, the line through them, the truth.
-
-    Parameters
-    ----------
-    line : IdentifiedLine
-        One direction.
-
-    Returns
-    -------
-    dict
-        One chart: drive [count] over speed [in/s].
-    """
+    """Draw the drive value against speed in one direction: measured points, the line through them, the truth."""
     speeds = np.unique(np.concatenate(([0.0, 240.0], [point[0] for point in line.points])))
     curves: list[Curve] = []
     if line.default_slope is not None and line.default_friction is not None:

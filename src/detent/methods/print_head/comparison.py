@@ -49,42 +49,23 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveConstants:
-    """Constants the axis computer works with.
+    """Constants the axis computer works with."""
 
-    Attributes
-    ----------
-    slope_right, slope_left : int
-        Slope K [1/256 count per speed value].
-    friction_right, friction_left : int
-        Friction-equivalent drive Vf [count].
-    """
-
-    slope_right: int
-    slope_left: int
-    friction_right: int
-    friction_left: int
+    slope_right: int  # and slope_left: slope K [1/256 count per speed value]
+    slope_left: int  # [1/256 count per speed value]
+    friction_right: int  # and friction_left: friction-equivalent drive Vf [count]
+    friction_left: int  # [count]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveStart:
-    """A start to the right at top speed, with the trim running.
+    """A start to the right at top speed, with the trim running."""
 
-    Attributes
-    ----------
-    t, velocity : ndarray
-        Time since the move began [s] and carriage speed [m/s].
-    steady_from : float
-        When the acceleration ramp ended [s].
-    mean_error : float
-        Speed error over the first 0.30 s of steady motion, as a fraction of the commanded speed.
-    time_to_band : float
-        From the end of the ramp until the speed first is within 1 % of the commanded one [s]; infinite if it never is.
-    """
-
-    t: Numbers
+    t: Numbers  # and velocity: time since the move began [s] and carriage speed [m/s]
     velocity: Numbers
-    steady_from: float
-    mean_error: float
+    steady_from: float  # when the acceleration ramp ended [s]
+    mean_error: float  # speed error over the first 0.30 s of steady motion, as a fraction of the commanded speed
+    # from the end of the ramp until the speed first is within 1 % of the commanded one [s]; infinite if it never is
     time_to_band: float
 
 
@@ -138,22 +119,7 @@ class DriveComparison:
 
 
 def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> DriveComparison:
-    """Compare the power-on default, the nominal table and the identified drive on the machine of `spec`.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        The axis; its ``[disturbance]`` is what the nameplate does not know.
-    speeds : tuple of float
-        Speeds to compare at [m/s]; those above the limit of the axis are left out.
-
-    Raises
-    ------
-    DetentError
-        No speed is left, or one belongs to the low-speed class, which has no open-loop steady phase to compare.
-    AxisError
-        The identification failed.
-    """
+    """Compare the power-on default, the nominal table and the identified drive on the machine of `spec`."""
     chosen = tuple(v for v in speeds if v <= spec.limits.speed * (1 + 1e-9))
     low = [v for v in chosen if speed_value(v) < HIGH_SPEED]
     if low or not chosen:
@@ -205,13 +171,7 @@ def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
 
 
 def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
-    """Run CALCULATE PARAMETERS on the machine of `spec` and read what it found.
-
-    Raises
-    ------
-    AxisError
-        The axis answered with an error, or not at all.
-    """
+    """Run CALCULATE PARAMETERS on the machine of `spec` and read what it found."""
     p, r = build_print_head(spec), PrintHead()
     switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
     _put_byte(p, r, CODE_CALCULATE)
@@ -229,13 +189,7 @@ def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
 
 
 class MeasuringBench:
-    """The machine of a specification on a line of 218 in, where the steady speed of any drive can be measured.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        The axis; an obstacle and a push in it are left out.
-    """
+    """The machine of a specification on a line of 218 in, where the steady speed of any drive can be measured."""
 
     def __init__(self, spec: PrintHeadSpec) -> None:
         limits = spec.limits.model_copy(update={"travel": BENCH_EMITTERS * EMITTER})

@@ -26,13 +26,7 @@ FRAME_RESERVE = 12
 
 
 class Machine:
-    """The true machine behind a specification, in the units its axis computer thinks in.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        The axis.
-    """
+    """The true machine behind a specification, in the units its axis computer thinks in."""
 
     def __init__(self, spec: PrintHeadSpec) -> None:
         drift = spec.disturbance

@@ -23,20 +23,6 @@ from detent.methods.print_head.printed_page import AcceptedCode, ByteAccount, Jo
 def parse_diablo(data: bytes, name: str = "job") -> PrintJob:
     """Read a Diablo 630 stream.
 
-    Parameters
-    ----------
-    data : bytes
-        The whole stream. A SUB byte (1A hex) ends it, as in the text files of CP/M.
-    name : str
-        Name for messages and reports.
-
-    Returns
-    -------
-    PrintJob
-        Without lines if nothing was printed. Never raises: what is unknown is noted.
-
-    Examples
-    --------
     >>> job = parse_diablo(bytes([0x1B, 0x1F, 11]) + b"ab", "elite")
     >>> [(c.char, c.column) for c in job.lines[0].characters]
     [('a', 0), ('b', 10)]

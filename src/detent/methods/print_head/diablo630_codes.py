@@ -22,24 +22,12 @@ class Handling(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ControlCode:
-    """One control code.
+    """One control code."""
 
-    Attributes
-    ----------
-    name : str
-        As the manuals write it: "ESC US n".
-    meaning : str
-        What the printer does; for a code that is not supported, also what happens instead.
-    handling : Handling
-        Whether it is carried out, accepted or noted.
-    parameters : int
-        Bytes that follow the code and belong to it.
-    """
-
-    name: str
-    meaning: str
-    handling: Handling = Handling.CARRIED_OUT
-    parameters: int = 0
+    name: str  # as the manuals write it: "ESC US n"
+    meaning: str  # what the printer does; for a code that is not supported, also what happens instead
+    handling: Handling = Handling.CARRIED_OUT  # whether it is carried out, accepted or noted
+    parameters: int = 0  # bytes that follow the code and belong to it
 
 
 ESC: Final = 0x1B

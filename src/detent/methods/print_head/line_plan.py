@@ -39,29 +39,14 @@ _ZERO_SPEED_TIMEOUT = 5e-3  # [s] the axis waits before it calls the head at res
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """What a line has to fit into.
+    """What a line has to fit into."""
 
-    Attributes
-    ----------
-    width_emitters : int
-        Way between the two frames [emitter = 1/300 in].
-    column0_emitters : float
-        Carriage position at column 0 of the paper [emitter].
-    emitters_per_column : float
-        2.5 for columns of 1/120 in.
-    max_speed : int
-        Highest speed value to use, 18..240 [1/6 in/s].
-    reserve : int
-        Way that stays free at each frame [emitter].
-    stop_tolerance : int
-        How far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45).
-    """
-
-    width_emitters: int
-    column0_emitters: float
-    emitters_per_column: float = 2.5
-    max_speed: int = MAX_SPEED
-    reserve: int = 12
+    width_emitters: int  # way between the two frames [emitter = 1/300 in]
+    column0_emitters: float  # carriage position at column 0 of the paper [emitter]
+    emitters_per_column: float = 2.5  # 2.5 for columns of 1/120 in
+    max_speed: int = MAX_SPEED  # highest speed value to use, 18..240 [1/6 in/s]
+    reserve: int = 12  # way that stays free at each frame [emitter]
+    # how far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)
     stop_tolerance: int = 8
 
     def __post_init__(self) -> None:
@@ -77,43 +62,20 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class LinePlan:
-    """How one line is printed.
+    """How one line is printed."""
 
-    Attributes
-    ----------
-    line : PrintLine
-        What is printed.
-    direction : int
-        +1 to the right, -1 to the left.
-    speed : int
-        Speed value s to preselect [1/6 in/s].
-    run_to : int or None
-        Where to RUN before this line [emitter]; None where the head already stands far enough back. A CONTROLLED
-        RUN keeps to the highest speed of the geometry, as the estimate does.
-    start : int
-        Where the head is expected at rest, or turning, before the line [emitter].
-    print_from : int
-        First place of PRINT [1/256 emitter], the beginning of the ink in the direction of printing.
-    print_to : int
-        Last place of PRINT [emitter], at or beyond the end of the ink.
-    stop : int
-        Where the head is expected to come to rest, or to turn [emitter].
-    turn_around : bool
-        The axis can turn around from the line before, without a stop.
-    seconds : float
-        Estimated time from rest to rest, with the RUN before it [s].
-    """
-
-    line: PrintLine
-    direction: int
-    speed: int
+    line: PrintLine  # what is printed
+    direction: int  # +1 to the right, -1 to the left
+    speed: int  # speed value s to preselect [1/6 in/s]
+    # where to RUN before this line [emitter]; None where the head already stands far enough back. A CONTROLLED RUN
+    # keeps to the highest speed of the geometry, as the estimate does
     run_to: int | None
-    start: int
-    print_from: int
-    print_to: int
-    stop: int
-    turn_around: bool
-    seconds: float
+    start: int  # where the head is expected at rest, or turning, before the line [emitter]
+    print_from: int  # first place of PRINT [1/256 emitter], the beginning of the ink in the direction of printing
+    print_to: int  # last place of PRINT [emitter], at or beyond the end of the ink
+    stop: int  # where the head is expected to come to rest, or to turn [emitter]
+    turn_around: bool  # the axis can turn around from the line before, without a stop
+    seconds: float  # estimated time from rest to rest, with the RUN before it [s]
 
 
 def stop_distance(s: int) -> float:
@@ -164,29 +126,6 @@ def plan_lines(
 
     Each line runs at the highest speed that fits between the frames in its direction. The directions are chosen
     together, by dynamic programming over the job.
-
-    Parameters
-    ----------
-    lines : sequence of PrintLine
-        The lines in the order of printing.
-    geometry : Geometry
-        What they have to fit into.
-    head : int or None
-        Where the head stands [emitter]; None for the right frame, where calibration leaves it (spec 3.2, 3.3).
-    bidirectional : bool
-        False prints every line to the right.
-    job_name : str
-        Name of the job for messages.
-
-    Returns
-    -------
-    tuple of LinePlan
-        One per line, in the same order.
-
-    Raises
-    ------
-    InputError
-        Lines that fit at no speed, each with its width and what would fit.
     """
     directions = (1, -1) if bidirectional else (1,)
     choices = [_passes(line, geometry, directions) for line in lines]

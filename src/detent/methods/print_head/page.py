@@ -42,18 +42,7 @@ MOST_LINES = 500
 
 
 def make_print_page(data: ReportData) -> Page:
-    """What the page is made of.
-
-    Parameters
-    ----------
-    data : ReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
+    """What the page is made of."""
     paper = printed_pages(data.marks, data.column_limit) if len(data.marks) else None
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'printed' if data.printed else 'not printed'}",

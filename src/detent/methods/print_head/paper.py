@@ -19,25 +19,14 @@ PAGE = 66 * LINE
 
 @dataclass(slots=True)
 class Paper:
-    """Where the paper stands, and where its pages begin.
+    """Where the paper stands, and where its pages begin."""
 
-    Attributes
-    ----------
-    place : int
-        Print line below the top of the first page [1/96 in], never negative.
-    page_length : int
-        Length of the pages to come [1/96 in].
-    tops : list of int
-        Where each page reached so far begins [1/96 in], rising.
-    top_margin, bottom_margin : int or None
-        First and last printable place of a page, from its top [1/96 in]; None while not set.
-    """
-
-    place: int = 0
-    page_length: int = PAGE
-    tops: list[int] = field(default_factory=lambda: [0])
+    place: int = 0  # print line below the top of the first page [1/96 in], never negative
+    page_length: int = PAGE  # length of the pages to come [1/96 in]
+    tops: list[int] = field(default_factory=lambda: [0])  # where each page reached so far begins [1/96 in], rising
+    # top_margin, bottom_margin: first and last printable place of a page, from its top [1/96 in]; None while not set
     top_margin: int | None = None
-    bottom_margin: int | None = None
+    bottom_margin: int | None = None  # [1/96 in]
 
     @property
     def page(self) -> int:
@@ -55,13 +44,7 @@ class Paper:
         return self.place - self.tops[self.page - 1]
 
     def feed(self, distance: int) -> bool:
-        """Advance the paper by `distance` [1/96 in]; negative pulls it back.
-
-        Returns
-        -------
-        bool
-            False if the paper could not be pulled back that far and stands at the top of the job.
-        """
+        """Advance the paper by `distance` [1/96 in]; negative pulls it back."""
         self.place += distance
         if self.place < 0:
             self.place = 0

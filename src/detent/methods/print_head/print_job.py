@@ -51,24 +51,7 @@ _WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
 
 
 def load_job(path: str | PathLike[str]) -> PrintJob:
-    """Read a print job.
-
-    Parameters
-    ----------
-    path : str or path
-        A text file (UTF-8, or Latin-1 where it is not UTF-8) or a Diablo 630 stream. Escape sequences or other
-        control bytes make it a stream.
-
-    Returns
-    -------
-    PrintJob
-        At least one line.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, prints nothing, or is neither text nor a stream.
-    """
+    """Read a print job."""
     file = Path(path)
     try:
         data = file.read_bytes()
@@ -118,22 +101,6 @@ def parse_text(text: str, name: str = "job", *, encoding: str = "utf-8") -> Prin
     Tab stops stand every eight characters, a form feed begins a page, a carriage return without line feed goes
     back to overstrike the line, a combining accent is struck over the letter before it.
 
-    Parameters
-    ----------
-    text : str
-        The whole text.
-    name : str
-        Name for messages and reports.
-    encoding : str
-        How the text stands in its file; offsets of notes count its bytes.
-
-    Returns
-    -------
-    PrintJob
-        Without lines if nothing was printed. Never raises: what cannot be printed is noted.
-
-    Examples
-    --------
     >>> job = parse_text("ab\n\n\tc")
     >>> [(line.baseline, line.first_column, line.text) for line in job.lines]
     [(0, 0, 'ab'), (16, 96, 'c')]

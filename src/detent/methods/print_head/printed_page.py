@@ -19,30 +19,14 @@ NARROWEST_PITCH = 6
 
 @dataclass(frozen=True, slots=True)
 class PrintedCharacter:
-    """One glyph at one place, struck once or more.
+    """One glyph at one place, struck once or more."""
 
-    Attributes
-    ----------
-    char : str
-        The glyph.
-    column : int
-        Left edge [1/120 in] from column 0 of the paper, never negative.
-    width_columns : int
-        Carriage spacing (HMI) in force when it was struck [1/120 in]; 0 where the carriage was held.
-    strike : int
-        How often the hammer hit this glyph at this place: 2 is bold by overstrike.
-    red : bool
-        Struck with the secondary ribbon colour.
-    underline : bool
-        An underscore is struck at the same place.
-    """
-
-    char: str
-    column: int
-    width_columns: int
-    strike: int = 1
-    red: bool = False
-    underline: bool = False
+    char: str  # the glyph
+    column: int  # left edge [1/120 in] from column 0 of the paper, never negative
+    width_columns: int  # carriage spacing (HMI) in force when it was struck [1/120 in]; 0 where the carriage was held
+    strike: int = 1  # how often the hammer hit this glyph at this place: 2 is bold by overstrike
+    red: bool = False  # struck with the secondary ribbon colour
+    underline: bool = False  # an underscore is struck at the same place
 
     @property
     def ink_columns(self) -> int:
@@ -58,24 +42,12 @@ class PrintedCharacter:
 
 @dataclass(frozen=True, slots=True)
 class PrintLine:
-    """All ink on one base line.
+    """All ink on one base line."""
 
-    Attributes
-    ----------
-    number : int
-        1 for the first line with ink, counted downwards over all pages.
-    baseline : int
-        Distance from the top of the first page [1/48 in], on continuous paper.
-    characters : tuple of PrintedCharacter
-        At least one, sorted by column.
-    page : int
-        1 for the first page.
-    """
-
-    number: int
-    baseline: int
-    characters: tuple[PrintedCharacter, ...]
-    page: int = 1
+    number: int  # 1 for the first line with ink, counted downwards over all pages
+    baseline: int  # distance from the top of the first page [1/48 in], on continuous paper
+    characters: tuple[PrintedCharacter, ...]  # at least one, sorted by column
+    page: int = 1  # 1 for the first page
 
     @property
     def first_column(self) -> int:
@@ -106,21 +78,11 @@ class PrintLine:
 
 @dataclass(frozen=True, slots=True)
 class JobNote:
-    """Something in the job that could not be carried out as it stands.
+    """Something in the job that could not be carried out as it stands."""
 
-    Attributes
-    ----------
-    offset : int
-        Where in the file it stands [byte], 0 is the first.
-    code : str
-        The control code as the manuals write it, such as "ESC P".
-    text : str
-        What was met, and what was done instead.
-    """
-
-    offset: int
-    code: str
-    text: str
+    offset: int  # where in the file it stands [byte], 0 is the first
+    code: str  # the control code as the manuals write it, such as "ESC P"
+    text: str  # what was met, and what was done instead
 
     def __str__(self) -> str:
         """As a person reads it."""
@@ -138,24 +100,12 @@ class AcceptedCode:
 
 @dataclass(frozen=True, slots=True)
 class ByteAccount:
-    """Where every byte of the file went; the four add up to the length of the file.
+    """Where every byte of the file went; the four add up to the length of the file."""
 
-    Attributes
-    ----------
-    printed : int
-        Bytes that left ink.
-    interpreted : int
-        Bytes of blanks and of control codes that were carried out.
-    accepted : int
-        Bytes of codes without effect on ink or motion.
-    noted : int
-        Bytes covered by a `JobNote`.
-    """
-
-    printed: int = 0
-    interpreted: int = 0
-    accepted: int = 0
-    noted: int = 0
+    printed: int = 0  # bytes that left ink
+    interpreted: int = 0  # bytes of blanks and of control codes that were carried out
+    accepted: int = 0  # bytes of codes without effect on ink or motion
+    noted: int = 0  # bytes covered by a `JobNote`
 
     @property
     def total(self) -> int:
@@ -165,36 +115,16 @@ class ByteAccount:
 
 @dataclass(frozen=True, slots=True)
 class PrintJob:
-    """A print job read whole.
+    """A print job read whole."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the file, for messages and reports.
-    kind : str
-        "text" or "diablo630".
-    lines : tuple of PrintLine
-        Only lines with ink, from the top down.
-    pages : int
-        Pages up to the last ink; 0 for a job without ink.
-    notes : tuple of JobNote
-        What could not be carried out, in the order of the file.
-    accepted : tuple of AcceptedCode
-        Codes without effect on ink or motion.
-    length_bytes : int
-        Length of the file [byte].
-    account : ByteAccount
-        Where the bytes went.
-    """
-
-    name: str
-    kind: str
-    lines: tuple[PrintLine, ...]
-    pages: int
-    notes: tuple[JobNote, ...]
-    accepted: tuple[AcceptedCode, ...]
-    length_bytes: int
-    account: ByteAccount
+    name: str  # name of the file, for messages and reports
+    kind: str  # "text" or "diablo630"
+    lines: tuple[PrintLine, ...]  # only lines with ink, from the top down
+    pages: int  # pages up to the last ink; 0 for a job without ink
+    notes: tuple[JobNote, ...]  # what could not be carried out, in the order of the file
+    accepted: tuple[AcceptedCode, ...]  # codes without effect on ink or motion
+    length_bytes: int  # length of the file [byte]
+    account: ByteAccount  # where the bytes went
 
     @property
     def characters(self) -> int:

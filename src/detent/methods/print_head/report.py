@@ -63,19 +63,7 @@ NEEDED = (
 def print_report(
     spec: PrintHeadSpec, run: PrintRun, trace: Trace | None, *, settings: dict[str, str] | None = None
 ) -> ReportData:
-    """Everything the report of a print run shows.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        The axis.
-    run : PrintRun
-        Its outcome.
-    trace : Trace, optional
-        What was recorded; figures over time are left out where it lacks their signals.
-    settings : dict, optional
-        Small print: file, seed, fidelity.
-    """
+    """Everything the report of a print run shows."""
     drawable = trace is not None and len(trace) > 1 and all(name in trace for name in NEEDED)
     return ReportData(
         axis_name=spec.axis.name,

@@ -181,29 +181,7 @@ MOST_STRIKES = 20_000
 def print_job(
     spec: PrintHeadSpec, job: PrintJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
 ) -> PrintRun:
-    """Print a job on the axis of `spec`, from power-on.
-
-    Parameters
-    ----------
-    spec : PrintHeadSpec
-        The axis.
-    job : PrintJob
-        What to print.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    PrintRun
-        What the axis did; an obstruction or a refusal of the axis is in `failure`, not raised.
-
-    Raises
-    ------
-    InputError
-        A line does not fit between the frames at any speed.
-    """
+    """Print a job on the axis of `spec`, from power-on."""
     runner = _Runner(spec, job, recorder, progress or (lambda _share, _text: None))
     try:
         runner.prepare()

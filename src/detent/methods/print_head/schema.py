@@ -39,20 +39,8 @@ MAX_SPEED = 40 * INCH
 
 
 def speed_value(velocity: float) -> int:
-    """Speed value of the axis computer for a velocity: whole steps of 1/6 in/s, rounded down.
+    """Speed value of the axis computer for a velocity: whole steps of 1/6 in/s, rounded down [1/6 in/s].
 
-    Parameters
-    ----------
-    velocity : float
-        Velocity [m/s], not negative.
-
-    Returns
-    -------
-    int
-        Speed value [1/6 in/s] (2.1); the method accepts 18..240. Rounded down: a limit must not be passed.
-
-    Examples
-    --------
     >>> speed_value(1.016)
     240
     >>> speed_value(1.0)

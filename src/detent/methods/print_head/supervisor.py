@@ -22,27 +22,13 @@ MOST_TRIES = 1000
 
 @dataclass(frozen=True)
 class Command:
-    """One command as its bytes.
+    """One command as its bytes."""
 
-    Attributes
-    ----------
-    data : bytes
-        First byte and data bytes.
-    motion : bool
-        True if it moves the head to a position; only one such command may wait.
-    text : str
-        For messages.
-    tag : int
-        The caller's own number, returned with the answer.
-    returns_data : bool
-        True if the answer is a data byte instead of SB1.
-    """
-
-    data: bytes
-    motion: bool
-    text: str
-    tag: int = -1
-    returns_data: bool = False
+    data: bytes  # first byte and data bytes
+    motion: bool  # True if it moves the head to a position; only one such command may wait
+    text: str  # for messages
+    tag: int = -1  # the caller's own number, returned with the answer
+    returns_data: bool = False  # True if the answer is a data byte instead of SB1
 
 
 @dataclass(frozen=True)
@@ -86,27 +72,14 @@ def position_low() -> Command:
 
 @dataclass
 class Supervisor:
-    """Sends commands and collects answers.
+    """Sends commands and collects answers."""
 
-    Attributes
-    ----------
-    head : HeadComputer
-        Registers of the axis computer; only its two latches are touched.
-    pass_time : callable
-        ``pass_time(seconds) -> None`` lets at most that much time pass and returns earlier when a status byte waits.
-    on_answer : callable
-        Called with every `Answer` the moment it is read.
-    ack_last : bool
-        The axis acknowledges the last byte of a command too.
-    patience : float
-        Longest time a byte may take [s]; an axis that is silent for longer has failed.
-    """
-
-    head: HeadComputer
+    head: HeadComputer  # registers of the axis computer; only its two latches are touched
+    # ``pass_time(seconds) -> None`` lets at most that much time pass and returns earlier when a status byte waits
     pass_time: Callable[[float], None]
-    on_answer: Callable[[Answer], None]
-    ack_last: bool = False
-    patience: float = 60.0
+    on_answer: Callable[[Answer], None]  # called with every `Answer` the moment it is read
+    ack_last: bool = False  # the axis acknowledges the last byte of a command too
+    patience: float = 60.0  # longest time a byte may take [s]; an axis that is silent for longer has failed
     outstanding: deque[Command] = field(default_factory=deque[Command])
 
     def send(self, command: Command) -> None:

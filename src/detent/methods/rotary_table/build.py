@@ -19,17 +19,7 @@ DIRECTIONS = {"shortest": SHORTEST, "positive": POSITIVE, "negative": NEGATIVE, 
 
 
 def build_rotary_table(spec: RotaryTableSpec) -> RotaryTableParams:
-    """Parameters of the rotary table.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        As `load_spec` returns it.
-
-    Returns
-    -------
-    RotaryTableParams
-    """
+    """Parameters of the rotary table."""
     p = RotaryTableParams()
     method = spec.method
     p.clocks.strobe_ticks, p.clocks.delay_ticks = ticks(method.strobe_period), ticks(method.interrupt_delay)

@@ -33,51 +33,18 @@ DEG = 180.0 / math.pi
 
 
 def line_end(data: TableReportData) -> float:
-    """Time up to which the time line is drawn [s]: no farther than what was recorded.
-
-    Parameters
-    ----------
-    data : TableReportData
-        What to show.
-
-    Returns
-    -------
-    float
-        Since the start of the sequence.
-    """
+    """Time up to which the time line is drawn [s]: no farther than what was recorded."""
     recorded = float(data.path.t[-1]) if data.path else math.inf
     return min(data.figures.seconds, recorded, LINE_SECONDS)
 
 
 def left_out_signals(data: TableReportData) -> int:
-    """Signals that the time line has no room for.
-
-    Parameters
-    ----------
-    data : TableReportData
-        What to show.
-
-    Returns
-    -------
-    int
-        How many of inputs and outputs.
-    """
+    """Signals that the time line has no room for."""
     return max(len(data.outputs) + len(data.inputs) - MOST_SIGNALS, 0)
 
 
 def line_charts(data: TableReportData) -> list[Chart]:
-    """Draw what the sequence did when: its steps and signals as bars, angle and speed of the table below.
-
-    Parameters
-    ----------
-    data : TableReportData
-        With at least one step.
-
-    Returns
-    -------
-    list of dict
-        One chart of lanes, and three of curves if there is a path; time in s.
-    """
+    """Draw what the sequence did when: its steps and signals as bars, angle and speed of the table below."""
     end = line_end(data)
     lanes = [*_step_lanes(data.steps), *_signal_lanes(data)]
     label = "time since the sequence began [s]"
@@ -137,18 +104,7 @@ def _path_charts(path: TablePath, end: float, label: str) -> list[Chart]:
 
 
 def turn_charts(detail: TurnDetail) -> list[Chart]:
-    """Draw the angles that the positioner reckons with in one step.
-
-    Parameters
-    ----------
-    detail : TurnDetail
-        The step.
-
-    Returns
-    -------
-    list of dict
-        Four charts above one another; time in s.
-    """
+    """Draw the angles that the positioner reckons with in one step."""
     added = Band(label="", colour="good", spans=spans_of(detail.t, detail.present != detail.detected))
     timeline = Timeline(name="turn", t=detail.t, label=_since(detail), unit="s", bands=[added], events=detail.events)
     return time_charts(timeline, [

@@ -64,33 +64,16 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """One way over the end of the turn.
+    """One way over the end of the turn."""
 
-    Attributes
-    ----------
-    name : str
-        "conventional" or "endless".
-    time : float
-        When the end of the turn was crossed first, since the start [s]; NaN if it was not.
-    deviation_before, deviation_after : float
-        Deviation dR at the interrupts before and after that [rad].
-    travel : float
-        Way at the end [rad].
-    speed : float
-        Speed at the end [rad/s].
-    t : ndarray, shape (n,)
-        Time since the start [s].
-    angle, deviation, s4 : ndarray, shape (n,)
-        Way of the table [rad], deviation [rad], speed signal as speed of the table [rad/s].
-    """
-
-    name: str
-    time: float
-    deviation_before: float
-    deviation_after: float
-    travel: float
-    speed: float
-    t: Numbers
+    name: str  # "conventional" or "endless"
+    time: float  # when the end of the turn was crossed first, since the start [s]; NaN if it was not
+    deviation_before: float  # and deviation_after: deviation dR at the interrupts before and after that [rad]
+    deviation_after: float  # [rad]
+    travel: float  # way at the end [rad]
+    speed: float  # speed at the end [rad/s]
+    t: Numbers  # time since the start [s]
+    # angle, deviation, s4: way of the table [rad], deviation [rad], speed signal as speed of the table [rad/s]
     angle: Numbers
     deviation: Numbers
     s4: Numbers
@@ -98,42 +81,22 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Feed:
-    """Manual feed at one speed.
+    """Manual feed at one speed."""
 
-    Attributes
-    ----------
-    speed : float
-        Of the dial [rad/s].
-    closed, opened : float
-        Mean speed with and without position control, as a relative error.
-    """
-
-    speed: float
-    closed: float
+    speed: float  # of the dial [rad/s]
+    closed: float  # and opened: mean speed with and without position control, as a relative error
     opened: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """A jog that starts just after the boundary, with one form of the extension.
+    """A jog that starts just after the boundary, with one form of the extension."""
 
-    Attributes
-    ----------
-    angle : float
-        Where it starts [rad].
-    form : str
-        A key of `FORMS`.
-    travel, asked : float
-        Way of the table, and of the command, after the same time [rad].
-    thrown_back : bool
-        The table has lost half a turn or more.
-    """
-
-    angle: float
-    form: str
-    travel: float
-    asked: float
-    thrown_back: bool
+    angle: float  # where it starts [rad]
+    form: str  # a key of `FORMS`
+    travel: float  # and asked: way of the table, and of the command, after the same time [rad]
+    asked: float  # [rad]
+    thrown_back: bool  # the table has lost half a turn or more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,24 +141,7 @@ def _finite(value: Any) -> Any:
 
 
 def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) -> AngleComparison:
-    """Take the axis over the end of its turn, feed it by hand, and start it near the boundary, in every form.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis; its ``[disturbance]`` is left out.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    AngleComparison
-
-    Raises
-    ------
-    DetentError
-        The table takes longer than `LONGEST_TURN` to go round.
-    """
+    """Take the axis over the end of its turn, feed it by hand, and start it near the boundary, in every form."""
     speed = crossing_speed(spec)
     if speed < FULL_TURN / LONGEST_TURN:
         least = format_quantity(FULL_TURN / LONGEST_TURN, "rad/s")

@@ -39,18 +39,7 @@ LOOKS: tuple[tuple[str, str, float], ...] = (("conventional", "left", 1.5), ("en
 
 
 def comparison_charts(found: AngleComparison | None) -> list[Chart]:
-    """Draw the crossing of the end of the turn, conventional and endless.
-
-    Parameters
-    ----------
-    found : AngleComparison, optional
-        What to draw; nothing if None.
-
-    Returns
-    -------
-    list of dict
-        Three charts above one another, time in s.
-    """
+    """Draw the crossing of the end of the turn, conventional and endless."""
     if not found:
         return []
     t = found.crossings[0].t
@@ -74,18 +63,7 @@ def _curves(t: Numbers, cases: list[tuple[Numbers, Numbers]]) -> list[Curve]:
 
 
 def crossing_events(found: AngleComparison) -> list[Event]:
-    """Moments at which the end of the turn is crossed.
-
-    Parameters
-    ----------
-    found : AngleComparison
-        The comparison.
-
-    Returns
-    -------
-    list of Event
-        In order of time; without a case that never came so far.
-    """
+    """Moments at which the end of the turn is crossed."""
     texts: dict[float, list[str]] = {}
     for case in found.crossings:
         if not math.isnan(case.time):
@@ -101,18 +79,7 @@ def _crossing_text(case: Crossing) -> str:
 
 
 def comparison_section(found: AngleComparison | None) -> str:
-    """Figures of the comparison under their title.
-
-    Parameters
-    ----------
-    found : AngleComparison, optional
-        What to show.
-
-    Returns
-    -------
-    str
-        HTML; empty if there is none.
-    """
+    """Figures of the comparison under their title."""
     if not found:
         return ""
     return section(
@@ -183,20 +150,7 @@ def _start_cell(start: Start) -> str:
 
 
 def plot_angle(found: AngleComparison, path: str | Path) -> None:
-    """Draw the table across the end of its turn, the accuracy of manual feed, and the starts that throw it back.
-
-    Parameters
-    ----------
-    found : AngleComparison
-        Curves and figures.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Draw the table across the end of its turn, the accuracy of manual feed, and the starts that throw it back."""
     path = check_figure_path(path)
     with new_figure(path, 10.0, 9.6) as figure:
         areas = figure.subplot_mosaic(
@@ -275,22 +229,7 @@ def _draw_starts(area: Axes, found: AngleComparison) -> None:
 
 
 def angle_table(found: AngleComparison) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    """The comparison as a table for the terminal.
-
-    Parameters
-    ----------
-    found : AngleComparison
-        What was found.
-
-    Returns
-    -------
-    title : str
-        What the table shows.
-    heads : tuple of str
-        Of its columns.
-    rows : list of tuple of str
-        Cells.
-    """
+    """The comparison as a table for the terminal."""
     conventional, endless = found.crossings
     rows = [
         ("deviation across the end of the turn", _change(endless), _change(conventional)),

@@ -24,13 +24,7 @@ POINTS = 256
 
 
 class Machine:
-    """The machine behind a specification.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    """
+    """The machine behind a specification."""
 
     def __init__(self, spec: RotaryTableSpec) -> None:
         self.spec = spec

@@ -38,24 +38,11 @@ def rotary_table_machine(
 
 
 class TableHost:
-    """Lines of a rotary table, and the passing of time.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-
-    Attributes
-    ----------
-    machine : Machine
-        The simulated axis.
-    """
+    """Lines of a rotary table, and the passing of time."""
 
     def __init__(self, spec: RotaryTableSpec, recorder: AnyRecorder | None = None) -> None:
         self.spec = spec
-        self.machine = rotary_table_machine(spec, recorder)
+        self.machine = rotary_table_machine(spec, recorder)  # the simulated axis
         # ctypes gives every register its type at run time only.
         self._lines: Any = self.machine.state.positioner
         self._refused_before = 0
@@ -158,21 +145,7 @@ def dial_speed(spec: RotaryTableSpec, speed: float | None) -> float:
 
 
 def check_sequence(spec: RotaryTableSpec, job: SequenceJob) -> None:
-    """Refuse a sequence that the axis cannot do, before anything moves.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    job : SequenceJob
-        The sequence.
-
-    Raises
-    ------
-    InputError
-        Steps that do not go together (`find_faults`), position numbers without an entry, speeds of a jog above
-        ``limits.speed`` or below a step of the dial, jogs too short to be seen; all of them, with their lines.
-    """
+    """Refuse a sequence that the axis cannot do, before anything moves."""
     if not job.steps:
         raise InputError.of_file(job.name, "no steps", "a sequence of at least one step", "add a step")
     faults = find_faults(job.steps, job.inputs)
@@ -222,8 +195,6 @@ def _jog_faults(spec: RotaryTableSpec, index: int, jog: Jog) -> list[StepFault]:
 def describe_numbers(numbers: list[int]) -> str:
     """Position numbers for people, in order.
 
-    Examples
-    --------
     >>> describe_numbers([0, 1, 2, 3, 7, 8])
     'the position numbers of the axis: 0 to 3, 7, 8'
     """

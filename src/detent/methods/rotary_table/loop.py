@@ -21,25 +21,13 @@ STEPS = 6_000
 
 @dataclass(frozen=True, slots=True)
 class HeldLoop:
-    """The loop.
+    """The loop."""
 
-    Attributes
-    ----------
-    gain : float
-        Kp [1/s].
-    share : float
-        g, the share of its reference that the speed reaches.
-    time_constant : float
-        Of the velocity loop, tau [s].
-    period, delay : float
-        Of the strobe, and from it to the interrupt, which is shorter [s].
-    """
-
-    gain: float
-    share: float
-    time_constant: float
-    period: float
-    delay: float
+    gain: float  # Kp [1/s]
+    share: float  # g, the share of its reference that the speed reaches
+    time_constant: float  # of the velocity loop, tau [s]
+    period: float  # and delay: of the strobe, and from it to the interrupt, which is shorter [s]
+    delay: float  # [s]
 
     def _coefficients(self, time: float) -> tuple[float, float, float, float]:
         """What a stretch of time makes of speed and signal: (x from w, x from u, w from w, w from u)."""
@@ -92,15 +80,7 @@ class HeldLoop:
         By the symmetry of the loop the same figures tell by how much more than in the steady state the table lags
         after an acceleration.
 
-        Parameters
-        ----------
-        ramp : float
-            How long that takes [s]; more than the loop remembers makes no difference.
-
-        Returns
-        -------
-        (float, float)
-            Way by which the table passes its target [rad], 0 or more; largest acceleration on the way [rad/s^2].
+        Way by which the table passes its target [rad], 0 or more; largest acceleration on the way [rad/s^2].
         """
         slowest = LONGEST * (self.time_constant + 1.0 / (self.gain * self.share))
         ramp = min(ramp, slowest)

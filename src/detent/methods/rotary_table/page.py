@@ -31,18 +31,7 @@ COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
 
 
 def make_table_page(data: TableReportData) -> Page:
-    """What the page is made of.
-
-    Parameters
-    ----------
-    data : TableReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
+    """What the page is made of."""
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
         "body": [
@@ -55,18 +44,7 @@ def make_table_page(data: TableReportData) -> Page:
 
 
 def all_charts(data: TableReportData) -> list[Chart]:
-    """Every chart of the page.
-
-    Parameters
-    ----------
-    data : TableReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
+    """Every chart of the page."""
     drawn = line_charts(data) if data.steps else []
     if data.detail:
         drawn += turn_charts(data.detail)

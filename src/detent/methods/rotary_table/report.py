@@ -57,25 +57,7 @@ def sequence_report(
     comparison: AngleComparison | None = None,
     settings: dict[str, str] | None = None,
 ) -> TableReportData:
-    """Everything the report of a sequence shows.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    run : SequenceRun
-        Its outcome.
-    trace : Trace, optional
-        What was recorded; figures over time are left out where it lacks their signals.
-    comparison : AngleComparison, optional
-        The method beside its alternatives.
-    settings : dict of str to str, optional
-        Small print: file, seed.
-
-    Returns
-    -------
-    TableReportData
-    """
+    """Everything the report of a sequence shows."""
     return TableReportData(
         axis_name=spec.axis.name,
         job_name=run.job.name,

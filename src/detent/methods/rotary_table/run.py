@@ -164,28 +164,6 @@ def run_sequence(
 
     The sequence, and the time of its inputs, begins when the axis holds its table. Each step ends before the next
     begins: a positioning when the table is in position, a jog when it has come to rest and the loop has settled.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    job : SequenceJob
-        The steps and the inputs.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    SequenceRun
-        What the table did. A step that does not end within the time its way can take, a table that runs away, a signal
-        that does not come any more: such a run ends, and its `failure` says why.
-
-    Raises
-    ------
-    InputError
-        The axis cannot do the sequence, see `host.check_sequence`.
     """
     check_sequence(spec, job)
     result = SequenceRun(job, count=spec.count, in_position=spec.method.in_position * spec.count)
@@ -328,15 +306,7 @@ _KINDS: dict[type, str] = {Go: "go", Jog: "jog", Wait: "wait", Output: "output"}
 
 
 def describe_step(spec: RotaryTableSpec, step: Action) -> str:
-    """What a step asks for, for people.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    step : Go, Jog, Wait or Output
-        The step.
-    """
+    """What a step asks for, for people."""
     if isinstance(step, Go):
         entry = spec.position[str(step.number)]
         # Only the turn counter knows other ways.

@@ -20,29 +20,14 @@ CHECKED = 2500
 
 
 class SequenceController:
-    """Steps, inputs and outputs.
-
-    Parameters
-    ----------
-    host : TableHost
-        Lines of the table, which is held.
-    inputs : dict
-        Stretches in which the input signals are on [s from now].
-    watch : callable
-        Called again and again while time passes.
-
-    Attributes
-    ----------
-    inputs, outputs : list of Change
-        Input signals as they came, and output signals as they were switched.
-    warnings : dict of str
-        What went otherwise than a reader of the job expects; each text once, as a key.
-    """
+    """Steps, inputs and outputs."""
 
     def __init__(self, host: TableHost, inputs: dict[str, Stretches], watch: Watch) -> None:
         self.host = host
+        # inputs, outputs: input signals as they came, and output signals as they were switched
         self.inputs: list[Change] = []
         self.outputs: list[Change] = []
+        # what went otherwise than a reader of the job expects; each text once, as a key
         self.warnings: dict[str, None] = {}
         self._edges = input_edges(inputs, host.tick)
         self._taken = 0  # edges that have come
@@ -70,13 +55,7 @@ class SequenceController:
         return list(dict.fromkeys(name for _, name, _ in self._edges[self._taken :]))
 
     def do(self, step: Action) -> None:
-        """Do one step to its end.
-
-        Raises
-        ------
-        AxisError
-            It does not end, and why.
-        """
+        """Do one step to its end."""
         self._way = self._speed = 0.0
         self.host.acknowledge()
         if isinstance(step, Go):
@@ -191,15 +170,7 @@ class SequenceController:
 
 
 def input_edges(inputs: dict[str, Stretches], start: int) -> list[tuple[int, str, bool]]:
-    """Changes of the input signals in order: (tick, name, on).
-
-    Parameters
-    ----------
-    inputs : dict
-        Stretches of each signal [s since the start of the sequence].
-    start : int
-        Tick of that start.
-    """
+    """Changes of the input signals in order: (tick, name, on)."""
     edges: list[tuple[int, str, bool]] = []
     for name, stretches in inputs.items():
         # A pulse lasts a tick at least; two that touch in the same tick are one.

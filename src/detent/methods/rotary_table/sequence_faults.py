@@ -29,21 +29,11 @@ LONGEST_JOB = 1e6
 
 @dataclass(frozen=True, slots=True)
 class StepFault:
-    """What is wrong with a step among the others.
+    """What is wrong with a step among the others."""
 
-    Attributes
-    ----------
-    index : int
-        Of the step in the job, from 0.
-    key : str
-        What of the step is meant, in the word of the job file.
-    came, allowed, remedy : str
-        As in `detent.errors.FileProblem`.
-    """
-
-    index: int
-    key: str
-    came: str
+    index: int  # of the step in the job, from 0
+    key: str  # what of the step is meant, in the word of the job file
+    came: str  # and allowed, remedy: as in `detent.errors.FileProblem`
     allowed: str
     remedy: str
 
@@ -53,18 +43,6 @@ def find_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> list[
 
     Labels and loops; signals that are not among the inputs; a signal that cannot come on any more when its step begins,
     by the times that the steps before it take at least, so that the step would wait for ever.
-
-    Parameters
-    ----------
-    steps : sequence of Step
-        The steps of a job.
-    inputs : mapping
-        Stretches of the input signals.
-
-    Returns
-    -------
-    list of StepFault
-        Empty if all is well.
     """
     faults = [*_label_faults(steps), *_signal_faults(steps, inputs)]
     count = count_actions(steps)

@@ -52,23 +52,7 @@ _Reader = Callable[[str, object], Any]
 
 
 def load_sequence(path: str | PathLike[str]) -> SequenceJob:
-    """Read the job of a rotary table.
-
-    Parameters
-    ----------
-    path : str or path
-        A sequence of steps (``.toml``, UTF-8), see `parse_sequence`.
-
-    Returns
-    -------
-    SequenceJob
-        With at least one step. Whether the axis can do it is not checked here.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or something in it is wrong: all of it is told, with line and column.
-    """
+    """Read the job of a rotary table."""
     return parse_sequence(str(path), read_text(path, (".toml",), WHAT_A_JOB_IS))
 
 
@@ -81,23 +65,6 @@ def parse_sequence(file: str, text: str) -> SequenceJob:
     an output signal on and off; ``repeat`` names the ``label`` of an earlier step and does the steps from there to here
     ``times`` times altogether. Each ``[[input]]`` is a stretch of time in which the signal ``name`` is on, ``from`` and
     ``to`` counted from the start of the sequence.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-
-    Returns
-    -------
-    SequenceJob
-        With at least one step.
-
-    Raises
-    ------
-    InputError
-        All that is wrong, each with line and column.
     """
     problems: list[FileProblem] = []
     tables = JobTables(file, text, ("input", "step"), problems)

@@ -273,8 +273,6 @@ class SequenceJob:
 def join_stretches(stretches: Iterable[tuple[float, float]]) -> Stretches:
     """Stretches in order; those that overlap or touch become one.
 
-    Examples
-    --------
     >>> join_stretches([(5.0, 6.0), (1.0, 2.0), (2.0, 3.0)])
     ((1.0, 3.0), (5.0, 6.0))
     """
@@ -290,8 +288,6 @@ def join_stretches(stretches: Iterable[tuple[float, float]]) -> Stretches:
 def next_on(stretches: Stretches, time: float) -> tuple[float, float] | None:
     """Stretch that a signal is in at a time [s], or the next one; None when none is left.
 
-    Examples
-    --------
     >>> next_on(((1.0, 2.0), (5.0, 6.0)), 2.0)
     (5.0, 6.0)
     """
@@ -317,8 +313,6 @@ def find_loops(steps: Sequence[Step]) -> dict[int, int]:
 def count_actions(steps: Sequence[Step]) -> int:
     """Number of steps done, repeats counted.
 
-    Examples
-    --------
     >>> count_actions([Go(1, label="again"), Wait(1.0), Repeat("again", 3), Go(2)])
     7
     """
@@ -337,8 +331,6 @@ def count_actions(steps: Sequence[Step]) -> int:
 def write_out(steps: Sequence[Step]) -> Iterator[tuple[int, Action]]:
     """Steps in the order in which they are done: (index, step).
 
-    Examples
-    --------
     >>> [index for index, _ in write_out([Go(1, label="a"), Wait(1.0), Repeat("a", 2), Go(2)])]
     [0, 1, 0, 1, 3]
     """

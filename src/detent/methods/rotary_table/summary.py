@@ -16,20 +16,7 @@ SMALL = 360 * ARCSEC
 
 
 def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple[str, str]]:
-    """Name and text of each figure; what a run did not come to is left out.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    run : SequenceRun
-        Done or not.
-
-    Returns
-    -------
-    list of (str, str)
-        Such as ("steps", "30 of 30: 8 positionings, 3 jogs").
-    """
+    """Name and text of each figure; what a run did not come to is left out."""
     figures, unit = sequence_figures(run), CountUnit(spec.count, "count")
     kinds = kinds_text(figures)
     rows = [("steps", f"{count(figures.made)} of {count(figures.asked)}{f': {kinds}' if kinds else ''}")]
@@ -49,18 +36,7 @@ def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple
 
 
 def kinds_text(figures: SequenceFigures) -> str:
-    """Count the steps that move the table.
-
-    Parameters
-    ----------
-    figures : SequenceFigures
-        Of the sequence.
-
-    Returns
-    -------
-    str
-        Such as "8 positionings, 3 jogs"; empty if there was none.
-    """
+    """Count the steps that move the table."""
     texts = [count(n, word) for n, word in ((figures.positionings, "positioning"), (figures.jogs, "jog")) if n]
     return ", ".join(texts)
 
@@ -78,18 +54,6 @@ def _whose(worst: WorstStep) -> str:
 def times(n: int) -> str:
     """How often.
 
-    Parameters
-    ----------
-    n : int
-        Number of times.
-
-    Returns
-    -------
-    str
-        In words as far as there are some.
-
-    Examples
-    --------
     >>> times(1), times(2), times(12)
     ('once', 'twice', '12 times')
     """
@@ -99,18 +63,6 @@ def times(n: int) -> str:
 def turns(value: float) -> str:
     """Write a way in turns.
 
-    Parameters
-    ----------
-    value : float
-        Way of the table [rad].
-
-    Returns
-    -------
-    str
-        With two decimals.
-
-    Examples
-    --------
     >>> turns(math.tau), turns(1.25 * math.tau)
     ('1.00 turns', '1.25 turns')
     """
@@ -120,20 +72,6 @@ def turns(value: float) -> str:
 def degrees(value: float, digits: int = 3) -> str:
     """Write an angle [rad] or a speed [rad/s] in degrees, without its unit.
 
-    Parameters
-    ----------
-    value : float
-        What to write.
-    digits : int
-        Significant digits.
-
-    Returns
-    -------
-    str
-        Such as "61.2" or "2.00".
-
-    Examples
-    --------
     >>> degrees(math.pi), degrees(0.0349)
     ('180', '2.00')
     """
@@ -144,18 +82,6 @@ def degrees(value: float, digits: int = 3) -> str:
 def angle(value: float) -> str:
     """Write a small angle in seconds of arc, and one that is not small in degrees.
 
-    Parameters
-    ----------
-    value : float
-        Angle [rad].
-
-    Returns
-    -------
-    str
-        With its unit.
-
-    Examples
-    --------
     >>> [angle(value).replace(GAP, " ") for value in (1.704e-5, 0.0017, 0.0349)]
     ['3.5 arcsec', '351 arcsec', '2.00 deg']
     """
@@ -168,18 +94,6 @@ def angle(value: float) -> str:
 def percent(share: float) -> float:
     """A relative error in percent, to a ten-thousandth: what is less is nothing.
 
-    Parameters
-    ----------
-    share : float
-        Relative error.
-
-    Returns
-    -------
-    float
-        In percent.
-
-    Examples
-    --------
     >>> percent(-0.05014), percent(2e-9)
     (-5.014, 0.0)
     """
@@ -190,18 +104,7 @@ def percent(share: float) -> float:
 
 
 def sequence_figures(run: SequenceRun) -> SequenceFigures:
-    """Sums and extremes of a run.
-
-    Parameters
-    ----------
-    run : SequenceRun
-        Done or not.
-
-    Returns
-    -------
-    SequenceFigures
-        The error is that of positionings that ended.
-    """
+    """Sums and extremes of a run."""
     ended = run.steps if run.done else run.steps[:-1]
     moved = [step for step in run.steps if step.kind in {"go", "jog"}]
     return SequenceFigures(

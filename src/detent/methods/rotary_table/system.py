@@ -163,20 +163,7 @@ def tick(p: RotaryTableParams, r: RotaryTable, machine: Machine) -> bool:
 
 
 def switch_on(p: RotaryTableParams, r: RotaryTable, turns: float, task_at: int, seed: int) -> None:
-    """Power-on at rest with the motor at an angle in turns; `seed` starts the noise of both comparators.
-
-    Parameters
-    ----------
-    p, r : RotaryTableParams, RotaryTable
-        Parameters; state, all zero.
-    turns : float
-        Motor angle [turns]; `gear.ratio` of them are one turn of the table.
-    task_at : int
-        Tick of the first pass of the timer task. With that of an interrupt, `delay_ticks` modulo `strobe_ticks`, each
-        pass is interrupted.
-    seed : int
-        Start of all noise.
-    """
+    """Power-on at rest with the motor at an angle in turns; `seed` starts the noise of both comparators."""
     stand_at(r.machine.motor, turns)
     r.detector.fine.noise.state = seed
     r.detector.coarse.noise.state = seed ^ 0x5DEECE66D

@@ -24,15 +24,7 @@ def endless_phase(p: RotaryTableParams, r: RotaryTable) -> int:
 
 
 class TableObserver:
-    """Looks at a table whose axis has taken its first angle.
-
-    Parameters
-    ----------
-    spec : RotaryTableSpec
-        The axis.
-    machine : Machine
-        Its machine, after the first interrupt.
-    """
+    """Looks at a table whose axis has taken its first angle."""
 
     def __init__(self, spec: RotaryTableSpec, machine: Machine[RotaryTableParams, RotaryTable]) -> None:
         self._spec, self._machine = spec, machine

@@ -52,13 +52,7 @@ def stepper_motor(table: StepperTable) -> StepperMotor:
 
 
 def pull_out(table: StepperTable) -> PullOut:
-    """Pull-out torque of a motor against step frequency, in the way the file states it.
-
-    Raises
-    ------
-    ValueError
-        Constants of that way are missing; the rules of the file find it first.
-    """
+    """Pull-out torque of a motor against step frequency, in the way the file states it."""
     motor, drive = table.motor, table.drive
     if motor.pull_out == "points":
         return MeasuredPullOut(tuple(motor.curve_frequency), tuple(motor.curve_torque))
@@ -137,18 +131,10 @@ def _apart(zones: Iterable[Zone]) -> list[Zone]:
 
 @dataclass(slots=True)
 class MotorTables:
-    """Ramp and tables of one motor, as they are at power-on: between its extremes.
+    """Ramp and tables of one motor, as they are at power-on: between its extremes."""
 
-    Attributes
-    ----------
-    ramp : StepRamp
-        Frequencies of a run-up.
-    up, down : StepEnvelope
-        Table of each direction.
-    """
-
-    ramp: StepRamp
-    up: StepEnvelope
+    ramp: StepRamp  # frequencies of a run-up
+    up: StepEnvelope  # and down: table of each direction
     down: StepEnvelope
 
 
@@ -161,21 +147,7 @@ def make_tables(table: StepperTable) -> MotorTables:
 
 
 def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> "StepperParams":
-    """Parameters of one motor.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        As `load_spec` returns it.
-    name : str
-        The motor.
-    tables : MotorTables
-        As `make_tables` gives them: their limits are numbered.
-
-    Returns
-    -------
-    StepperParams
-    """
+    """Parameters of one motor."""
     from detent.methods.stepper_envelope.system import StepperParams, load_rule
     from detent.plant.stepper_rotor import fill_curve
 

@@ -46,34 +46,12 @@ MILLI = 1e3
 
 
 def path_end(path: StagePath) -> float:
-    """Time up to which the job is drawn [s].
-
-    Parameters
-    ----------
-    path : StagePath
-        The whole job.
-
-    Returns
-    -------
-    float
-        Since its start.
-    """
+    """Time up to which the job is drawn [s]."""
     return min(float(path.t[-1]), PATH_SECONDS)
 
 
 def path_charts(path: StagePath) -> list[Chart]:
-    """Draw where each motor was, above one another.
-
-    Parameters
-    ----------
-    path : StagePath
-        The whole job, of which no more than `PATH_SECONDS` are drawn.
-
-    Returns
-    -------
-    list of dict
-        One chart per motor, at most `MOST_MOTORS`: position [mm] over time [s].
-    """
+    """Draw where each motor was, above one another."""
     part = slice(0, int(np.searchsorted(path.t, path_end(path), side="right")))
     timeline = Timeline(name="path", t=path.t[part], label="time since the job began", unit="s")
     panels = [
@@ -98,22 +76,7 @@ def _path_curves(motor: MotorPath, part: slice) -> list[Curve]:
 
 
 def runs_chart(runs: MotorRuns, name: str, *, height: int = 300) -> Chart:
-    """Draw the steps of a motor under its envelope, up above zero and down below it.
-
-    Parameters
-    ----------
-    runs : MotorRuns
-        The runs.
-    name : str
-        Id of the element it is drawn in.
-    height : int
-        Height [px].
-
-    Returns
-    -------
-    dict
-        One chart: step frequency [Hz] over position [mm].
-    """
+    """Draw the steps of a motor under its envelope, up above zero and down below it."""
     window = shown_window(runs)
     at, up, down = _cut(runs, window)
     unit, per_hz, digits = ("kHz", 1e-3, 4) if runs.max_hz >= LONG_NUMBERS else ("Hz", 1.0, 1)
@@ -138,18 +101,7 @@ def runs_chart(runs: MotorRuns, name: str, *, height: int = 300) -> Chart:
 
 
 def shown_zones(runs: MotorRuns) -> list[ZoneSpan]:
-    """Zones that reach into the part of the travel that is drawn.
-
-    Parameters
-    ----------
-    runs : MotorRuns
-        The runs.
-
-    Returns
-    -------
-    list of ZoneSpan
-        As the axis file lists them.
-    """
+    """Zones that reach into the part of the travel that is drawn."""
     low, high = shown_window(runs)
     return [zone for zone in runs.zones if zone.begin < high and zone.end > low]
 
@@ -161,34 +113,12 @@ def _halves(most: float, up: Numbers, down: Numbers) -> tuple[float, float]:
 
 
 def limit_text(runs: MotorRuns) -> str:
-    """The motor's limit, as frequency and as speed.
-
-    Parameters
-    ----------
-    runs : MotorRuns
-        Of the motor.
-
-    Returns
-    -------
-    str
-        Such as "limit 4 000 Hz, 20 mm/s".
-    """
+    """The motor's limit, as frequency and as speed."""
     return f"limit {count(round(runs.max_hz))}{GAP}Hz, {stated(runs.max_hz * runs.step * MM)}{GAP}mm/s"
 
 
 def shown_window(runs: MotorRuns) -> tuple[float, float]:
-    """Part of the travel that is drawn: all of it, or the neighbourhood of the runs if these are short.
-
-    Parameters
-    ----------
-    runs : MotorRuns
-        The runs.
-
-    Returns
-    -------
-    (float, float)
-        Its ends [m].
-    """
+    """Part of the travel that is drawn: all of it, or the neighbourhood of the runs if these are short [m]."""
     places = np.concatenate([arc.position for arc in runs.arcs])
     low, high = float(places.min()), float(places.max())
     first, last = runs.travel
@@ -218,18 +148,7 @@ def _zone_band(runs: MotorRuns, zone: ZoneSpan) -> Chart:
 
 
 def detail_charts(detail: MoveDetail) -> list[Chart]:
-    """Draw one motor in one move: frequency against position, torque of every step, and how the rotor followed.
-
-    Parameters
-    ----------
-    detail : MoveDetail
-        The move.
-
-    Returns
-    -------
-    list of dict
-        One chart, two more if there are torques, and three more if the rotor was recorded.
-    """
+    """Draw one motor in one move: frequency against position, torque of every step, and how the rotor followed."""
     charts = [runs_chart(detail.runs, "detail-runs", height=260)]
     if detail.torques:
         charts += _torque_charts(detail.torques)
@@ -300,18 +219,7 @@ def _rotor_charts(rotor: RotorPath) -> list[Chart]:
 
 
 def rest_charts(detail: MoveDetail) -> list[Chart]:
-    """Draw how the rotor comes to rest after the last step.
-
-    Parameters
-    ----------
-    detail : MoveDetail
-        The move.
-
-    Returns
-    -------
-    list of dict
-        One chart: lag [step] over time [ms]; none if nothing was recorded there, or if steps were lost.
-    """
+    """Draw how the rotor comes to rest after the last step."""
     rotor = detail.rotor
     if rotor is None or detail.motion.lost:
         return []

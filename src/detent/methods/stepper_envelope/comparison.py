@@ -45,21 +45,11 @@ METHODS = {
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """One run over a way.
+    """One run over a way."""
 
-    Attributes
-    ----------
-    seconds : float
-        From the start signal to the end of the last period [s].
-    lost : int
-        Steps that the rotor is off in the end.
-    peak_lag : float
-        Largest distance of the rotor from its field [step].
-    """
-
-    seconds: float
-    lost: int
-    peak_lag: float
+    seconds: float  # from the start signal to the end of the last period [s]
+    lost: int  # steps that the rotor is off in the end
+    peak_lag: float  # largest distance of the rotor from its field [step]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,15 +91,9 @@ class StepComparison:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Position and speed over time.
+    """Position and speed over time."""
 
-    Attributes
-    ----------
-    t, position, speed : float64 array, shape (n,)
-        [s], [m] from the start, [m/s].
-    """
-
-    t: Numbers
+    t: Numbers  # and position, speed: [s], [m] from the start, [m/s]
     position: Numbers
     speed: Numbers
 
@@ -154,13 +138,7 @@ class JerkComparison:
 
 
 def compare_steps(spec: StepperEnvelopeSpec, progress: Progress | None = None) -> tuple[StepComparison, ...]:
-    """Run each motor of an axis over several ways with each method, on its rotor.
-
-    Returns
-    -------
-    tuple of StepComparison
-        One per motor.
-    """
+    """Run each motor of an axis over several ways with each method, on its rotor."""
     return tuple(_compare_motor(spec, name, progress) for name in spec.stepper)
 
 
@@ -215,20 +193,7 @@ def _use_frequencies(p: StepperParams) -> None:
 
 
 def compare_jerk(spec: StepperEnvelopeSpec, name: str | None = None) -> JerkComparison:
-    """Hold the envelope of one motor, over its whole travel upwards, against a profile of limited jerk.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    name : str, optional
-        The motor; the first of the file by default.
-
-    Raises
-    ------
-    DetentError
-        There is no such motor, or no profile can be found.
-    """
+    """Hold the envelope of one motor, over its whole travel upwards, against a profile of limited jerk."""
     name = next(iter(spec.stepper)) if name is None else name
     if name not in spec.stepper:
         raise DetentError(f"motor: came {name!r}; allowed: one of {', '.join(spec.stepper)}; name one of these")

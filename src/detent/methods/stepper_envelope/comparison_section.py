@@ -23,34 +23,12 @@ STEPS_CAPTION = (
 
 
 def comparison_charts(data: StageReportData) -> list[Chart]:
-    """Charts of the comparisons.
-
-    Parameters
-    ----------
-    data : StageReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
+    """Charts of the comparisons."""
     return jerk_charts(data.jerk) if data.jerk else []
 
 
 def comparison_section(data: StageReportData) -> str:
-    """Figures of the comparisons under their title.
-
-    Parameters
-    ----------
-    data : StageReportData
-        What to show.
-
-    Returns
-    -------
-    str
-        HTML; empty if there are none.
-    """
+    """Figures of the comparisons under their title."""
     figures = [_steps_figure(found, first=k == 0) for k, found in enumerate(data.steps)]
     if data.jerk:
         figures.append(_jerk_figure(data.jerk))

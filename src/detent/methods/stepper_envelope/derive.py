@@ -39,15 +39,7 @@ PULL_OUT_FORMULA = {
 
 
 class MotorFigures:
-    """Figures of one motor.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    name : str
-        The motor.
-    """
+    """Figures of one motor."""
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         self.spec, self.name, self.table = spec, name, spec.stepper[name]
@@ -168,20 +160,7 @@ class MotorFigures:
 
 
 def first_crossing(function: Callable[[float], float], low: float) -> float | None:
-    """Find where a function of frequency first falls to 0.
-
-    Parameters
-    ----------
-    function : callable
-        Of a frequency [Hz].
-    low : float
-        Where to begin [Hz].
-
-    Returns
-    -------
-    float or None
-        The frequency; `low` where the function is 0 or less from there on, None where it never is up to 1 MHz.
-    """
+    """Find where a function of frequency first falls to 0."""
     places = np.geomspace(low, HIGHEST_HZ, PLACES).tolist()
     below = next((k for k, hz in enumerate(places) if function(hz) <= 0), None)
     if below is None or below == 0:

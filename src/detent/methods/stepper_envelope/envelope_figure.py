@@ -38,18 +38,6 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
 
     The run between a direction's extremes is filled; outside of them a dashed line shows what the table allows there.
     What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and above.
-
-    Parameters
-    ----------
-    tables : EnvelopeTables
-        Both tables of a motor.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
     """
     path = check_figure_path(path)
     top = HEADROOM * max(tables.up.zones.limits)

@@ -58,42 +58,19 @@ CAUSES = ("INFEASIBLE", "OUT_OF_RANGE")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnvelopeTables:
-    """Both tables of one motor, and what firmware must know to use them.
+    """Both tables of one motor, and what firmware must know to use them."""
 
-    Attributes
-    ----------
-    motor : str
-        Name of the motor; `motor_identifier` makes the prefix of all names in C from it.
-    axis : str
-        Name of the axis, for people.
-    up, down : StepEnvelope
-        Tables towards growing and towards falling positions: one ramp, one travel, one numbering of the zone limits.
-    clock_hz : int
-        Ticks of the step timer per second [Hz].
-    reload : bool
-        Words are periods of the timer in ticks instead of frequencies in Hz.
-    travel_per_step : float
-        Travel of the moved mass per step [m].
-    first_position : float
-        Place of step boundary 0 [m].
-    pause : int
-        Waiting time of a reversal, in periods of the start frequency, 0..255.
-
-    Raises
-    ------
-    DetentError
-        The tables do not belong together, or timer, travel or pause cannot be.
-    """
-
-    motor: str
-    axis: str
+    motor: str  # name of the motor; `motor_identifier` makes the prefix of all names in C from it
+    axis: str  # name of the axis, for people
+    # up, down: tables towards growing and towards falling positions: one ramp, one travel, one numbering of the zone
+    # limits
     up: StepEnvelope
     down: StepEnvelope
-    clock_hz: int
-    reload: bool
-    travel_per_step: float
-    first_position: float = 0.0
-    pause: int = 1
+    clock_hz: int  # ticks of the step timer per second [Hz]
+    reload: bool  # words are periods of the timer in ticks instead of frequencies in Hz
+    travel_per_step: float  # travel of the moved mass per step [m]
+    first_position: float = 0.0  # place of step boundary 0 [m]
+    pause: int = 1  # waiting time of a reversal, in periods of the start frequency, 0..255
 
     def __post_init__(self) -> None:
         up, down = self.up, self.down
@@ -161,18 +138,6 @@ def motor_identifier(name: str) -> str:
 
     Two motors of one firmware need different ones; "Zoom A" and "zoom-a" have the same.
 
-    Parameters
-    ----------
-    name : str
-        Any text.
-
-    Returns
-    -------
-    str
-        Lower-case letters a to z, digits and single underscores, beginning with a letter.
-
-    Examples
-    --------
     >>> [motor_identifier(name) for name in ("Zoom A", "2nd stage", "Schärfe", "")]
     ['zoom_a', 'motor_2nd_stage', 'scharfe', 'motor']
     """
@@ -192,18 +157,6 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
     Step i lies between the boundaries i and i + 1; `position` is that of boundary i. `permissible` is the frequency
     that ramp and zone allow; `period` is what the timer loads for it, words rounded. A step that is not allowed (a
     sentinel) has index -1, and 0 for permissible and period.
-
-    Parameters
-    ----------
-    tables : EnvelopeTables
-        What to write.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
     """
     path = Path(path)
     columns = _csv_columns(tables)
@@ -241,18 +194,6 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
     Every name in it begins with `motor_identifier` of the motor, so that one firmware can include several. The rule is
     the ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
     arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
-
-    Parameters
-    ----------
-    tables : EnvelopeTables
-        What to write.
-    path : str or Path
-        Target; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
     """
     path = Path(path)
     part = part_of(path)

@@ -20,19 +20,11 @@ from detent.units import format_quantity
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What one motor does in a move, in steps of its own.
+    """What one motor does in a move, in steps of its own."""
 
-    Attributes
-    ----------
-    start, target : int
-        Step boundaries.
-    turn : int or None
-        Where it turns on the way.
-    """
-
-    start: int
+    start: int  # and target: step boundaries
     target: int
-    turn: int | None = None
+    turn: int | None = None  # where it turns on the way
 
     @property
     def steps(self) -> int:
@@ -42,15 +34,7 @@ class Leg:
 
 
 class StageHost:
-    """Host of a stage at power-on.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    """
+    """Host of a stage at power-on."""
 
     def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
         self.spec, self.stage = spec, Stage(spec, recorder)
@@ -84,13 +68,7 @@ class StageHost:
             start_move(motor.r.rule, heading, int(leg.turn is not None))
 
     def wait(self, legs: dict[str, Leg]) -> None:
-        """Wait until all motors have come to rest.
-
-        Raises
-        ------
-        AxisError
-            One of them reports a fault, or does not come to rest.
-        """
+        """Wait until all motors have come to rest."""
         limit = 1.0 + 2.0 * sum(leg.steps / self._slowest(name) for name, leg in legs.items())
         late = self.stage.wait_for(legs, limit)
         for name in legs:
@@ -176,13 +154,7 @@ def _tables(motor: StageMotor, heading: int) -> tuple[StepEnvelope, StepEnvelope
 
 
 def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
-    """Refuse what the axis cannot be told to do, before anything moves.
-
-    Raises
-    ------
-    InputError
-        All problems, each with the line of its move, what came, what is allowed, and a value that would do.
-    """
+    """Refuse what the axis cannot be told to do, before anything moves."""
     problems = list(_job_problems(spec, job))
     if problems:
         raise InputError(problems)

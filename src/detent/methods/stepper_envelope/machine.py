@@ -40,15 +40,7 @@ def _registers_of(names: tuple[str, ...]) -> type[Registers]:
 
 
 class StageMotor:
-    """One motor of a stage at power-on, with its tables.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    name : str
-        The motor.
-    """
+    """One motor of a stage at power-on, with its tables."""
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         self.name, self.table = name, spec.stepper[name]
@@ -97,15 +89,7 @@ class StageMotor:
 
 
 class Stage:
-    """All motors of an axis, and the time they share.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    recorder : Recorder or Capture, optional
-        Records registers on the way; its class is that of `stage_registers`.
-    """
+    """All motors of an axis, and the time they share."""
 
     def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
         self.spec, self.tick, self.recorder = spec, instant(spec), recorder
@@ -139,20 +123,7 @@ class Stage:
             self._bring_to(min(end, self.instant + self._room()))
 
     def wait_for(self, names: Iterable[str], seconds: float) -> set[str]:
-        """Wait until each of these motors has an event for the host, at most so long.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Motors.
-        seconds : float
-            Longest time [s].
-
-        Returns
-        -------
-        set of str
-            Those that had no event; empty when all had. All motors are then at the instant of the last event.
-        """
+        """Wait until each of these motors has an event for the host, at most so long."""
         waiting, end = set(names), self.instant + round(seconds / self.tick)
         reached = self.instant
         while waiting and self.instant < end:

@@ -40,18 +40,7 @@ MOST_ZONES = 4
 
 
 def make_stage_page(data: StageReportData) -> Page:
-    """What the page is made of.
-
-    Parameters
-    ----------
-    data : StageReportData
-        What to show.
-
-    Returns
-    -------
-    Page
-        For `detent.page.page.write_page`.
-    """
+    """What the page is made of."""
     return {
         "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
         "body": [
@@ -64,18 +53,7 @@ def make_stage_page(data: StageReportData) -> Page:
 
 
 def all_charts(data: StageReportData) -> list[Chart]:
-    """Every chart of the page.
-
-    Parameters
-    ----------
-    data : StageReportData
-        What to show.
-
-    Returns
-    -------
-    list of dict
-        In the order of the page.
-    """
+    """Every chart of the page."""
     drawn = stage_charts.path_charts(data.path) if data.path else []
     shown = data.runs[: stage_charts.MOST_MOTORS]
     drawn += [stage_charts.runs_chart(runs, f"runs-{k}") for k, runs in enumerate(shown)]

@@ -15,91 +15,43 @@ from detent.page.parts import Event, Note, Numbers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tile:
-    """One place of a list of tiles, and how the stage came there.
+    """One place of a list of tiles, and how the stage came there."""
 
-    Attributes
-    ----------
-    move : int
-        Number of the move.
-    label : str
-        Name of the tile.
-    target, place : (float, float)
-        Where the stage had to go, and where its rotors stood in the end [m].
-    seconds : float
-        Time of the way there, until every rotor was at rest [s].
-    lag : float
-        Largest distance of a rotor from its field on that way [step].
-    off : bool
-        A rotor stood steps beside its place.
-    """
-
-    move: int
-    label: str
-    target: tuple[float, float]
-    place: tuple[float, float]
-    seconds: float
-    lag: float
-    off: bool
+    move: int  # number of the move
+    label: str  # name of the tile
+    target: tuple[float, float]  # and place: where the stage had to go, and where its rotors stood in the end [m]
+    place: tuple[float, float]  # [m]
+    seconds: float  # time of the way there, until every rotor was at rest [s]
+    lag: float  # largest distance of a rotor from its field on that way [step]
+    off: bool  # a rotor stood steps beside its place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TilePlan:
-    """The tiles as one sees them from above.
+    """The tiles as one sees them from above."""
 
-    Attributes
-    ----------
-    motors : (str, str)
-        What moves the stage to the right, and what moves it up in the picture.
-    start : (float, float)
-        Where the stage stood first [m].
-    tiles : sequence of Tile
-        In the order of the visits, at least one.
-    """
-
-    motors: tuple[str, str]
-    start: tuple[float, float]
-    tiles: Sequence[Tile]
+    motors: tuple[str, str]  # what moves the stage to the right, and what moves it up in the picture
+    start: tuple[float, float]  # where the stage stood first [m]
+    tiles: Sequence[Tile]  # in the order of the visits, at least one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorPath:
-    """Where one motor was.
+    """Where one motor was."""
 
-    Attributes
-    ----------
-    motor : str
-        Its name.
-    counted : ndarray
-        Position of record [m], shape (n,).
-    target : ndarray
-        Where it had to go [m], shape (n,); NaN in a manual run.
-    rotor : ndarray, optional
-        Where its rotor was [m], shape (n,); None if that was not recorded.
-    astray : bool
-        It lost steps on the way: the counted position is not where it was.
-    """
-
-    motor: str
-    counted: Numbers
-    target: Numbers
-    rotor: Numbers | None
-    astray: bool
+    motor: str  # its name
+    counted: Numbers  # position of record [m], shape (n,)
+    target: Numbers  # where it had to go [m], shape (n,); NaN in a manual run
+    rotor: Numbers | None  # where its rotor was [m], shape (n,); None if that was not recorded
+    astray: bool  # it lost steps on the way: the counted position is not where it was
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StagePath:
-    """Where the motors were during the job.
+    """Where the motors were during the job."""
 
-    Attributes
-    ----------
-    t : ndarray
-        Time [s], shape (n,).
-    motors : sequence of MotorPath
-        Those that moved, in the order of the axis file.
-    """
-
-    t: Numbers
-    motors: Sequence[MotorPath]
+    t: Numbers  # time [s], shape (n,)
+    motors: Sequence[MotorPath]  # those that moved, in the order of the axis file
 
 
 # ---- frequency against position
@@ -107,95 +59,45 @@ class StagePath:
 
 @dataclass(frozen=True, slots=True)
 class ZoneSpan:
-    """A stretch of the travel with its own speed limit.
+    """A stretch of the travel with its own speed limit."""
 
-    Attributes
-    ----------
-    name : str
-        As in the axis file.
-    begin, end : float
-        Its ends [m].
-    hz : float
-        Limit [Hz].
-    direction : str
-        "both", "up" or "down".
-    """
-
-    name: str
-    begin: float
-    end: float
-    hz: float
-    direction: str
+    name: str  # as in the axis file
+    begin: float  # and end: its ends [m]
+    end: float  # [m]
+    hz: float  # limit [Hz]
+    direction: str  # "both", "up" or "down"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """Permissible step frequency along the travel; each value holds up to the next place.
+    """Permissible step frequency along the travel; each value holds up to the next place."""
 
-    Attributes
-    ----------
-    position : ndarray
-        Places, rising [m], shape (n,).
-    up, down : ndarray
-        Permissible frequency in each direction, 0 where no step is allowed [Hz], shape (n,).
-    """
-
-    position: Numbers
-    up: Numbers
-    down: Numbers
+    position: Numbers  # places, rising [m], shape (n,)
+    up: Numbers  # and down: permissible frequency in each direction, 0 where no step is allowed [Hz], shape (n,)
+    down: Numbers  # [Hz]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """Steps of one motor that followed one another in one direction.
+    """Steps of one motor that followed one another in one direction."""
 
-    Attributes
-    ----------
-    direction : int
-        1 up, -1 down.
-    position : ndarray
-        Middle of each step [m], shape (n,), with the place of rest before the first and after the last.
-    hz : ndarray
-        Frequency of each step [Hz], shape (n,); 0 at both ends.
-    """
-
-    direction: int
-    position: Numbers
-    hz: Numbers
+    direction: int  # 1 up, -1 down
+    position: Numbers  # middle of each step [m], shape (n,), with the place of rest before the first and after the last
+    hz: Numbers  # frequency of each step [Hz], shape (n,); 0 at both ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorRuns:
-    """All recorded runs of one motor under its envelope.
+    """All recorded runs of one motor under its envelope."""
 
-    Attributes
-    ----------
-    motor : str
-        Its name.
-    step : float
-        Travel per step [m].
-    travel : (float, float)
-        Ends of the travel [m].
-    max_hz : float
-        Limit of the motor [Hz].
-    zones : sequence of ZoneSpan
-        Its zones.
-    envelope : Envelope
-        Between the ends of the travel.
-    arcs : sequence of Arc
-        In order of time, at least one.
-    left_out : int
-        Moves of this motor that are not among them.
-    """
-
-    motor: str
-    step: float
-    travel: tuple[float, float]
-    max_hz: float
-    zones: Sequence[ZoneSpan]
-    envelope: Envelope
-    arcs: Sequence[Arc]
-    left_out: int
+    motor: str  # its name
+    step: float  # travel per step [m]
+    travel: tuple[float, float]  # ends of the travel [m]
+    max_hz: float  # limit of the motor [Hz]
+    zones: Sequence[ZoneSpan]  # its zones
+    envelope: Envelope  # between the ends of the travel
+    arcs: Sequence[Arc]  # in order of time, at least one
+    left_out: int  # moves of this motor that are not among them
 
 
 # ---- one move
@@ -203,138 +105,61 @@ class MotorRuns:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepTorques:
-    """What every step of a move asks of its motor.
+    """What every step of a move asks of its motor."""
 
-    Attributes
-    ----------
-    hz : ndarray
-        Frequency of each step [Hz], shape (n,).
-    available, needed : ndarray
-        Pull-out torque at that frequency, torque for friction and acceleration [N m], shape (n,).
-    margin : ndarray
-        The first over the second, shape (n,); infinite where no torque is needed.
-    safety : float
-        What the ramp divides the pull-out torque by.
-    """
-
-    hz: Numbers
+    hz: Numbers  # frequency of each step [Hz], shape (n,)
+    # available, needed: pull-out torque at that frequency, torque for friction and acceleration [N m], shape (n,)
     available: Numbers
-    needed: Numbers
-    margin: Numbers
-    safety: float
+    needed: Numbers  # [N m]
+    margin: Numbers  # the first over the second, shape (n,); infinite where no torque is needed
+    safety: float  # what the ramp divides the pull-out torque by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RotorPath:
-    """How the rotor followed in one move.
+    """How the rotor followed in one move."""
 
-    Attributes
-    ----------
-    t : ndarray
-        Time since the start signal [s], shape (n,).
-    velocity, velocity_ref : ndarray
-        Speed of the rotor and of its field, as travel [m/s], shape (n,).
-    lag : ndarray
-        Field less rotor [step], shape (n,).
-    tolerance : float
-        Lag that counts as at rest [step].
-    events : sequence of Event
-        In order of time.
-    """
-
-    t: Numbers
-    velocity: Numbers
-    velocity_ref: Numbers
-    lag: Numbers
-    tolerance: float
-    events: Sequence[Event]
+    t: Numbers  # time since the start signal [s], shape (n,)
+    velocity: Numbers  # and velocity_ref: speed of the rotor and of its field, as travel [m/s], shape (n,)
+    velocity_ref: Numbers  # [m/s]
+    lag: Numbers  # field less rotor [step], shape (n,)
+    tolerance: float  # lag that counts as at rest [step]
+    events: Sequence[Event]  # in order of time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveDetail:
-    """One motor in one move, step by step.
+    """One motor in one move, step by step."""
 
-    Attributes
-    ----------
-    number : int
-        Number of the move.
-    label : str
-        What the job calls it.
-    why : str
-        Why this one is shown: "the motion with the least torque margin".
-    motion : MotionResult
-        Its figures.
-    runs : MotorRuns
-        Its steps under the table of this move.
-    torques : StepTorques, optional
-        None if the ramp indices were not recorded.
-    rotor : RotorPath, optional
-        None if the rotor was not recorded.
-    """
-
-    number: int
-    label: str
-    why: str
-    motion: MotionResult
-    runs: MotorRuns
-    torques: StepTorques | None
-    rotor: RotorPath | None
+    number: int  # number of the move
+    label: str  # what the job calls it
+    why: str  # why this one is shown: "the motion with the least torque margin"
+    motion: MotionResult  # its figures
+    runs: MotorRuns  # its steps under the table of this move
+    torques: StepTorques | None  # None if the ramp indices were not recorded
+    rotor: RotorPath | None  # None if the rotor was not recorded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageReportData:
-    """Everything `page.make_stage_page` shows. Parts that are None or empty are left out.
+    """Everything `page.make_stage_page` shows. Parts that are None or empty are left out."""
 
-    Attributes
-    ----------
-    axis_name, job_name : str
-        As in the axis file; the job's file name.
-    kind : str
-        "moves", or "tiles" where the job is a list of tiles.
-    done : bool
-        Every move ended in its place and no step was lost.
-    failure : str
-        Why not, and what to do; only read if `done` is False.
-    figures : StageFigures
-        The headline figures.
-    moves : sequence of StageMoveResult
-        Moves that were made, in order.
-    plan : TilePlan, optional
-        Tiles from above.
-    path : StagePath, optional
-        The whole job.
-    runs : sequence of MotorRuns
-        Frequency against position, of motors that moved.
-    detail : MoveDetail, optional
-        One move in detail.
-    steps : sequence of StepComparison
-        The method beside its alternatives, by motor.
-    jerk : JerkComparison, optional
-        The method beside a profile of limited jerk.
-    notes : sequence of Note
-        In any order: the page puts errors and warnings first.
-    settings : mapping of str to str
-        Small print at the page's end: axis file, ...
-    version : str
-        Of detent; the package's own if empty.
-    """
-
-    axis_name: str
+    axis_name: str  # and job_name: as in the axis file; the job's file name
     job_name: str
-    kind: str
-    done: bool
-    figures: StageFigures
-    failure: str = ""
-    moves: Sequence[StageMoveResult] = ()
-    plan: TilePlan | None = None
-    path: StagePath | None = None
-    runs: Sequence[MotorRuns] = ()
-    detail: MoveDetail | None = None
-    steps: Sequence[StepComparison] = ()
-    jerk: JerkComparison | None = None
-    notes: Sequence[Note] = ()
-    settings: dict[str, str] = field(default_factory=dict[str, str])
-    version: str = ""
+    kind: str  # "moves", or "tiles" where the job is a list of tiles
+    done: bool  # every move ended in its place and no step was lost
+    figures: StageFigures  # the headline figures
+    failure: str = ""  # why not, and what to do; only read if `done` is False
+    moves: Sequence[StageMoveResult] = ()  # moves that were made, in order
+    plan: TilePlan | None = None  # tiles from above
+    path: StagePath | None = None  # the whole job
+    runs: Sequence[MotorRuns] = ()  # frequency against position, of motors that moved
+    detail: MoveDetail | None = None  # one move in detail
+    steps: Sequence[StepComparison] = ()  # the method beside its alternatives, by motor
+    jerk: JerkComparison | None = None  # the method beside a profile of limited jerk
+    notes: Sequence[Note] = ()  # in any order: the page puts errors and warnings first
+    settings: dict[str, str] = field(default_factory=dict[str, str])  # small print at the page's end: axis file, ...
+    version: str = ""  # of detent; the package's own if empty
 
     @property
     def word(self) -> str:

@@ -39,43 +39,17 @@ NEEDED_PATH = ("rule.position",)
 
 
 class Beside(TypedDict, total=False):
-    """What a report shows beside the run.
+    """What a report shows beside the run."""
 
-    Attributes
-    ----------
-    steps : tuple of StepComparison
-        Each motor beside recomputation at every step, and beside constant frequencies.
-    jerk : JerkComparison, optional
-        One motor beside a profile of limited jerk.
-    settings : dict of str to str
-        Small print: file, command.
-    """
-
-    steps: tuple[StepComparison, ...]
-    jerk: JerkComparison | None
-    settings: dict[str, str]
+    steps: tuple[StepComparison, ...]  # each motor beside recomputation at every step, and beside constant frequencies
+    jerk: JerkComparison | None  # one motor beside a profile of limited jerk
+    settings: dict[str, str]  # small print: file, command
 
 
 def stage_report(
     spec: StepperEnvelopeSpec, run: StageRun, trace: Trace | None, **beside: Unpack[Beside]
 ) -> StageReportData:
-    """Everything the report of a job on a stage shows.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    run : StageRun
-        Its outcome.
-    trace : Trace, optional
-        What was recorded; figures over time are left out where it lacks their signals.
-    **beside : Beside
-        Comparisons and small print.
-
-    Returns
-    -------
-    StageReportData
-    """
+    """Everything the report of a job on a stage shows."""
     moves = move_results(run)
     if trace is not None and len(trace) < FEWEST_ROWS:
         trace = None
@@ -101,18 +75,7 @@ def stage_report(
 
 
 def move_results(run: StageRun) -> list[StageMoveResult]:
-    """How each move went.
-
-    Parameters
-    ----------
-    run : StageRun
-        The run.
-
-    Returns
-    -------
-    list of StageMoveResult
-        In order.
-    """
+    """How each move went."""
     lost = dict.fromkeys(run.lost, 0)
     found: list[StageMoveResult] = []
     for move in run.moves:

@@ -169,30 +169,7 @@ class StageRun:
 def run_stage(
     spec: StepperEnvelopeSpec, job: StageJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
 ) -> StageRun:
-    """Do a job on the stage of `spec`, from power-on.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    job : StageJob
-        What to do.
-    recorder : Recorder or Capture, optional
-        Records registers on the way.
-    progress : callable, optional
-        Told the share done.
-
-    Returns
-    -------
-    StageRun
-        What the stage did; lost steps are told in `failure`, not raised, and do not end the job: nothing in an
-        open-loop axis would notice them.
-
-    Raises
-    ------
-    InputError
-        A move cannot be commanded to this axis.
-    """
+    """Do a job on the stage of `spec`, from power-on."""
     check_stage_job(spec, job)
     host, result = StageHost(spec, recorder), StageRun(job, lost=dict.fromkeys(spec.stepper, 0))
     try:

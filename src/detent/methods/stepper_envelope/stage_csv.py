@@ -26,26 +26,6 @@ def parse_stage_csv(file: str, text: str, motors: Sequence[str]) -> StageJob:
     empty cell leaves its motor where it is. Columns ``dwell [ms]``, ``repeat``, ``label`` and ``tile`` say more; with
     ``tile`` the file is a list of tiles. Other columns are passed over. How lines are written is said in
     `detent.files.job_csv`.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    motors : sequence of str
-        Motors of the axis.
-
-    Returns
-    -------
-    StageJob
-        Of kind "tiles" or "moves", with at least one move; its notes say which columns were taken, where there was a
-        choice.
-
-    Raises
-    ------
-    InputError
-        All that is wrong, each with line and column.
     """
     rows = StageRows(file)
     table = JobTable(file, text, rows.problems)
@@ -69,27 +49,14 @@ def parse_stage_csv(file: str, text: str, motors: Sequence[str]) -> StageJob:
 
 @dataclass(slots=True)
 class _Header:
-    """What the header says.
+    """What the header says."""
 
-    Attributes
-    ----------
-    motors : sequence of str
-        Motors of the axis.
-    places : list of int
-        Columns of places that are taken; none where the header could not be read.
-    labels : list of int
-        Columns of what a place is called.
-    has_tiles : bool
-        One of these is named "tile".
-    notes : tuple of str
-        Which columns were taken and which not, where there was a choice.
-    """
-
-    motors: Sequence[str]
+    motors: Sequence[str]  # motors of the axis
+    # columns of places that are taken; none where the header could not be read
     places: list[int] = field(default_factory=list[int])
-    labels: list[int] = field(default_factory=list[int])
-    has_tiles: bool = False
-    notes: tuple[str, ...] = ()
+    labels: list[int] = field(default_factory=list[int])  # columns of what a place is called
+    has_tiles: bool = False  # one of these is named "tile"
+    notes: tuple[str, ...] = ()  # which columns were taken and which not, where there was a choice
 
     def read(self, table: JobTable) -> None:
         """Read the columns, and choose one for each motor."""

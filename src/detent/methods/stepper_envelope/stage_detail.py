@@ -40,28 +40,10 @@ def move_detail(
     steps: dict[str, MadeSteps],
     results: list[StageMoveResult],
 ) -> MoveDetail | None:
-    """The most telling of the motions that were recorded whole.
+    """The most telling of the motions that were recorded whole; None if no motion was recorded whole.
 
     It is the one that lost steps or missed its place first, else the one that had to pass a stop, else the one with the
     least torque margin, of several such the longest.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    run : StageRun
-        Its outcome.
-    trace : Trace
-        What was recorded.
-    steps : dict of MadeSteps by motor
-        Steps in the trace.
-    results : list of StageMoveResult
-        Figures of the moves.
-
-    Returns
-    -------
-    MoveDetail or None
-        None if no motion was recorded whole.
     """
     whole = [motion for motion in run.made if _recorded(trace, steps, motion)]
     if not whole:

@@ -53,33 +53,12 @@ METHOD_COSTS = {
 
 
 def method_name(method: str) -> str:
-    """Name of a compared method in full.
-
-    Parameters
-    ----------
-    method : str
-        As in `StepComparison.methods`.
-
-    Returns
-    -------
-    str
-    """
+    """Name of a compared method in full."""
     return METHOD_NAMES.get(method, method)
 
 
 def steps_table(found: StepComparison) -> Table:
-    """One motor with each method as a table.
-
-    Parameters
-    ----------
-    found : StepComparison
-        The comparison.
-
-    Returns
-    -------
-    tuple
-        Title, heads, and one row per method: the time of each way, and the steps lost if there are some.
-    """
+    """One motor with each method as a table."""
     title = f"Motor {found.motor}: time of a way, and steps lost ({format_quantity(found.step, 'm')} a step)"
     heads = ("method", *(f"{way} steps" for way in found.ways), "worked out per step")
     rows: list[tuple[str, ...]] = []
@@ -94,18 +73,7 @@ def _course(seconds: float, lost: int) -> str:
 
 
 def jerk_table(found: JerkComparison) -> Table:
-    """The envelope and the profile of limited jerk as a table.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        The comparison.
-
-    Returns
-    -------
-    tuple
-        Title, heads, and one row per profile.
-    """
+    """The envelope and the profile of limited jerk as a table."""
     way = format_quantity(found.way, "m")
     title = f"Motor {found.motor}: {way} without zones, limits {_limits(found)}"
     profiles = (("envelope", found.envelope), ("time-optimal, jerk limited (ruckig)", found.smooth))
@@ -128,20 +96,7 @@ def _limits(found: JerkComparison) -> str:
 
 
 def plot_steps(found: StepComparison, path: str | Path) -> None:
-    """Draw how long each way takes with each method, as a multiple of the envelope's time, and the steps it loses.
-
-    Parameters
-    ----------
-    found : StepComparison
-        One motor with all methods.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Draw how long each way takes with each method, as a multiple of the envelope's time, and the steps it loses."""
     path = check_figure_path(path)
     ratios = np.array([found.seconds(k) / found.seconds(0) for k in range(len(found.methods))])
     with new_figure(path, 9.0, 1.8 + 0.19 * ratios.size + 0.3 * len(found.ways)) as figure:
@@ -176,20 +131,7 @@ def _way(found: StepComparison, way: int) -> str:
 
 
 def plot_jerk(found: JerkComparison, path: str | Path) -> None:
-    """Draw the speed of the envelope's run and of the profile of limited jerk: the whole way, and both ends magnified.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        Both profiles.
-    path : str or Path
-        Target ending in ``.png``, ``.svg`` or ``.pdf``; replaced if it exists.
-
-    Raises
-    ------
-    DetentError
-        The file cannot be written.
-    """
+    """Draw the speed of the envelope's run and of the jerk-limited profile: the whole way, and both ends magnified."""
     path = check_figure_path(path)
     last, window = max(found.envelope.seconds, found.smooth.seconds), magnified(found)
     with new_figure(path, 9.0, 6.4) as figure:

@@ -12,26 +12,7 @@ from detent.methods.stepper_envelope.stage_toml import parse_stage_toml
 
 
 def load_stage_job(path: str | PathLike[str], motors: Sequence[str]) -> StageJob:
-    """Read the job of a stepper stage; the ending of the name says what it is.
-
-    Parameters
-    ----------
-    path : str or path
-        A list of places (``.csv``), see `stage_csv`, or of moves (``.toml``), see
-        `stage_toml`; UTF-8.
-    motors : sequence of str
-        Motors of the axis, at least one.
-
-    Returns
-    -------
-    StageJob
-        With at least one move. Whether the axis can do it is not checked here.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or something in it is wrong: all of it is told, with line and column.
-    """
+    """Read the job of a stepper stage; the ending of the name says what it is."""
     file = str(Path(path))
     text = read_text(path, (".csv", ".toml"), "a list of places (.csv) or of moves (.toml)")
     check_motors(file, motors)

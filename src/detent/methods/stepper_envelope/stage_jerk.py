@@ -13,18 +13,7 @@ MM = 1e3
 
 
 def jerk_charts(found: JerkComparison) -> list[Chart]:
-    """Draw the speed of both profiles: the whole way, and its two ends magnified.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        The comparison.
-
-    Returns
-    -------
-    list of dict
-        Three charts: speed [mm/s] over time.
-    """
+    """Draw the speed of both profiles: the whole way, and its two ends magnified."""
     last, window = max(found.envelope.seconds, found.smooth.seconds), magnified(found)
     parts = (("jerk-whole", 0.0, last), ("jerk-begin", 0.0, window), ("jerk-end", last - window, last))
     top = round(1.15 * found.speed * MM, 3)
@@ -43,18 +32,7 @@ def jerk_charts(found: JerkComparison) -> list[Chart]:
 
 
 def magnified(found: JerkComparison) -> float:
-    """Time at both ends of the way in which the profiles differ.
-
-    Parameters
-    ----------
-    found : JerkComparison
-        The comparison.
-
-    Returns
-    -------
-    float
-        A little more than it takes both to come up to their largest speed, at most half of the time [s].
-    """
+    """Time at both ends of the way in which the profiles differ [s]."""
     half = 0.5 * max(found.envelope.seconds, found.smooth.seconds)
     risen = [
         float(profile.t[int(np.argmax(profile.speed >= 0.999 * profile.speed.max()))])
@@ -64,22 +42,7 @@ def magnified(found: JerkComparison) -> float:
 
 
 def speed_at(profile: Profile, t: Numbers, *, step: bool = False) -> Numbers:
-    """Speed of a profile at any moments.
-
-    Parameters
-    ----------
-    profile : Profile
-        The profile.
-    t : ndarray
-        Moments [s], shape (n,).
-    step : bool
-        Each speed holds until the next one; else it changes evenly.
-
-    Returns
-    -------
-    ndarray
-        [m/s], shape (n,); NaN after its end.
-    """
+    """Speed of a profile at any moments [m/s], shape (n,); NaN after its end."""
     if step:
         rows = (np.searchsorted(profile.t, t, side="right") - 1).clip(0)
         speed: Numbers = profile.speed[rows]

@@ -40,18 +40,7 @@ LONE = 1e-3
 
 
 def plan_drawing(plan: TilePlan) -> str:
-    """Draw the tiles and the path of the stage, to scale.
-
-    Parameters
-    ----------
-    plan : TilePlan
-        The tiles; of more than `MOST_TILES` the first.
-
-    Returns
-    -------
-    str
-        HTML that holds an SVG element in the colours of the page; on a narrow screen it scrolls within itself.
-    """
+    """Draw the tiles and the path of the stage, to scale."""
     tiles = plan.tiles[:MOST_TILES]
     view = _View(tiles)
     usual = median(tile.seconds for tile in tiles) or 1.0
@@ -64,18 +53,7 @@ def plan_drawing(plan: TilePlan) -> str:
 
 
 def plan_legend(plan: TilePlan) -> str:
-    """Say what the colours of the drawing mean.
-
-    Parameters
-    ----------
-    plan : TilePlan
-        The tiles.
-
-    Returns
-    -------
-    str
-        HTML.
-    """
+    """Say what the colours of the drawing mean."""
     usual = median(tile.seconds for tile in plan.tiles[:MOST_TILES]) or 1.0
     swatches = (
         (_look(usual, usual), f"{_short(usual)}, the median, or less"),

@@ -18,13 +18,7 @@ WORDS = (*KEYS, "tile")
 
 
 def check_motors(file: str, motors: Sequence[str]) -> None:
-    """Refuse motors that no file could tell from its own words.
-
-    Raises
-    ------
-    InputError
-        A motor is named as one of `WORDS`.
-    """
+    """Refuse motors that no file could tell from its own words."""
     taken = [motor for motor in motors if motor in WORDS]
     if taken:
         came = f'an axis with a motor named "{taken[0]}"'
@@ -33,13 +27,7 @@ def check_motors(file: str, motors: Sequence[str]) -> None:
 
 
 def check_label(text: str) -> str:
-    """Check what a move is called.
-
-    Raises
-    ------
-    RefusedValueError
-        It is too long for a table, or cannot be printed.
-    """
+    """Check what a move is called."""
     if len(text) > MAX_SHOWN:
         raise RefusedValueError("", f"up to {MAX_SHOWN} characters", "shorten it")
     if not text.isprintable():
@@ -50,13 +38,7 @@ def check_label(text: str) -> str:
 def to_stage_job(
     rows: StageRows, motors: Sequence[str], *, kind: str, repeat: int = 1, notes: tuple[str, ...] = ()
 ) -> StageJob:
-    """Make the rows a job that does the list `repeat` times.
-
-    Raises
-    ------
-    InputError
-        There are problems, no moves, or too many.
-    """
+    """Make the rows a job that does the list `repeat` times."""
     moves = rows.written_out(repeat, missing=f"add a move with a place for {' or '.join(motors)}")
     named = {motor for move in moves for motor in move.motors}
     return StageJob(PurePath(rows.file).name, kind, moves, tuple(motor for motor in motors if motor in named), notes)

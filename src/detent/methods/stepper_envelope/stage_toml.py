@@ -25,25 +25,6 @@ def parse_stage_toml(file: str, text: str, motors: Sequence[str]) -> StageJob:
     move of one motor may have a ``turn``, or ``changed_at`` and ``changed_to``. With ``jog = "x"``, ``speed`` and
     ``duration`` it is a manual run instead. Each may have ``dwell``, ``repeat`` and ``label``. A ``repeat`` before the
     first of them does the whole list so many times.
-
-    Parameters
-    ----------
-    file : str
-        The file as the user named it.
-    text : str
-        Its text.
-    motors : sequence of str
-        Motors of the axis.
-
-    Returns
-    -------
-    StageJob
-        Of kind "moves", with at least one move.
-
-    Raises
-    ------
-    InputError
-        All that is wrong, each with line and column.
     """
     rows = StageRows(file)
     tables = JobTables(file, text, ("move",), rows.problems)

@@ -24,47 +24,19 @@ FLAT = 20
 
 
 def has(trace: Trace, motor: str, names: tuple[str, ...]) -> bool:
-    """Whether registers of a motor were recorded.
-
-    Parameters
-    ----------
-    trace : Trace
-        What was recorded.
-    motor : str
-        Its name.
-    names : tuple of str
-        Registers, without the motor's name.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether registers of a motor were recorded."""
     return all(f"{motor}.{name}" in trace for name in names)
 
 
 @dataclass(frozen=True, slots=True)
 class MadeSteps:
-    """Steps of one motor as a trace shows them: the last one in each row, as far as it is a new one.
+    """Steps of one motor as a trace shows them: the last one in each row, as far as it is a new one."""
 
-    Attributes
-    ----------
-    t : ndarray
-        Time of the row [s], shape (n,).
-    position : ndarray of int
-        Step boundary that the step leads to, shape (n,).
-    direction : ndarray of int
-        1 up, -1 down, shape (n,).
-    hz : ndarray
-        Frequency of the step [Hz], shape (n,).
-    index : ndarray of int, optional
-        Ramp index of the step, shape (n,); None if it was not recorded.
-    """
-
-    t: Numbers
-    position: Numbers
-    direction: Numbers
-    hz: Numbers
-    index: Numbers | None
+    t: Numbers  # time of the row [s], shape (n,)
+    position: Numbers  # step boundary that the step leads to, shape (n,)
+    direction: Numbers  # 1 up, -1 down, shape (n,)
+    hz: Numbers  # frequency of the step [Hz], shape (n,)
+    index: Numbers | None  # ramp index of the step, shape (n,); None if it was not recorded
 
     def between(self, begin: float, end: float) -> "MadeSteps":
         """Steps of a stretch of time [s]."""
@@ -85,22 +57,7 @@ class MadeSteps:
 
 
 def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
-    """Steps that a motor made.
-
-    Parameters
-    ----------
-    trace : Trace
-        What was recorded.
-    motor : str
-        Its name.
-    clock_hz : float
-        Clock of the step timer [Hz].
-
-    Returns
-    -------
-    MadeSteps or None
-        None if the registers are not in the trace.
-    """
+    """Steps that a motor made; None if the registers are not in the trace."""
     if not has(trace, motor, NEEDED_STEPS):
         return None
     position, direction, period = (trace[f"{motor}.{name}"].astype(np.int64) for name in NEEDED_STEPS)
@@ -117,18 +74,10 @@ def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Steps of one direction, and the extremes they were made between.
+    """Steps of one direction, and the extremes they were made between."""
 
-    Attributes
-    ----------
-    made : MadeSteps
-        At least one.
-    start, stop : int
-        Step boundaries.
-    """
-
-    made: MadeSteps
-    start: int
+    made: MadeSteps  # at least one
+    start: int  # and stop: step boundaries
     stop: int
 
     @property
@@ -138,24 +87,7 @@ class Leg:
 
 
 def legs_of(made: MadeSteps, table: StepperTable, move: StageMoveRecord, motor: MotorMove) -> list[Leg]:
-    """Runs of a motor in a move, from rest or turn to turn or rest.
-
-    Parameters
-    ----------
-    made : MadeSteps
-        All its steps.
-    table : StepperTable
-        Its part of the axis file.
-    move : StageMoveRecord
-        The move.
-    motor : MotorMove
-        Its part of the move.
-
-    Returns
-    -------
-    list of Leg
-        In order of time; empty if the trace shows no step of it.
-    """
+    """Runs of a motor in a move, from rest or turn to turn or rest."""
     parts = made.between(move.begin, motor.arrived).legs()
     # Between two rows there may be a step that nobody saw, but not at a turn: the last step there is slow.
     ends = [int(part.position[-1]) for part in parts[:-1]]
@@ -164,21 +96,7 @@ def legs_of(made: MadeSteps, table: StepperTable, move: StageMoveRecord, motor: 
 
 
 def arc_of(leg: Leg, table: StepperTable, points: int) -> Arc:
-    """A run as a curve of frequency against position.
-
-    Parameters
-    ----------
-    leg : Leg
-        The run.
-    table : StepperTable
-        The motor's part of the axis file.
-    points : int
-        Points of the curve, about; at least 4.
-
-    Returns
-    -------
-    Arc
-    """
+    """A run as a curve of frequency against position."""
     made = leg.made
     kept = _corners(made.hz, points - 2)
     middle = made.position[kept] - 0.5 * leg.direction
@@ -201,36 +119,13 @@ def _corners(hz: Numbers, points: int) -> NDArray[np.intp]:
 
 
 def travel_envelope(table: StepperTable) -> Envelope:
-    """Permissible frequency between the ends of the travel, zones included.
-
-    Parameters
-    ----------
-    table : StepperTable
-        The motor's part of the axis file.
-
-    Returns
-    -------
-    Envelope
-    """
+    """Permissible frequency between the ends of the travel, zones included."""
     ramp, (up, down) = make_tables(table).ramp, zone_maps(table)
     return _envelope(table, StepEnvelope(ramp, up, 1), StepEnvelope(ramp, down, -1))
 
 
 def move_envelope(table: StepperTable, legs: list[Leg]) -> Envelope:
-    """Permissible frequency between the extremes of a move.
-
-    Parameters
-    ----------
-    table : StepperTable
-        The motor's part of the axis file.
-    legs : list of Leg
-        Runs of the move; of several in one direction, the first.
-
-    Returns
-    -------
-    Envelope
-        0 beyond the extremes, and in a direction without a run.
-    """
+    """Permissible frequency between the extremes of a move."""
     ramp, maps = make_tables(table).ramp, zone_maps(table)
     first = {leg.direction: leg for leg in reversed(legs)}
     found = [
@@ -261,43 +156,14 @@ def _between_extremes(half: StepEnvelope | None, steps: int) -> Numbers:
 
 
 def zone_spans(table: StepperTable) -> list[ZoneSpan]:
-    """Zones of a motor.
-
-    Parameters
-    ----------
-    table : StepperTable
-        Its part of the axis file.
-
-    Returns
-    -------
-    list of ZoneSpan
-        As the axis file lists them.
-    """
+    """Zones of a motor."""
     return [
         ZoneSpan(name, zone.begin, zone.end, table.hz(zone.speed), zone.direction) for name, zone in table.zone.items()
     ]
 
 
 def motor_runs(name: str, table: StepperTable, envelope: Envelope, arcs: list[Arc], *, left_out: int = 0) -> MotorRuns:
-    """Put runs of a motor together with what bounds them.
-
-    Parameters
-    ----------
-    name : str
-        The motor.
-    table : StepperTable
-        Its part of the axis file.
-    envelope : Envelope
-        What the runs were made under.
-    arcs : list of Arc
-        The runs.
-    left_out : int
-        Moves that are not among them.
-
-    Returns
-    -------
-    MotorRuns
-    """
+    """Put runs of a motor together with what bounds them."""
     return MotorRuns(
         motor=name,
         step=table.step,
@@ -314,20 +180,7 @@ def motor_runs(name: str, table: StepperTable, envelope: Envelope, arcs: list[Ar
 
 
 def step_torques(table: StepperTable, legs: list[Leg]) -> StepTorques | None:
-    """What every step of a move asks of the motor.
-
-    Parameters
-    ----------
-    table : StepperTable
-        The motor's part of the axis file.
-    legs : list of Leg
-        Runs of the move.
-
-    Returns
-    -------
-    StepTorques or None
-        None if the ramp indices were not recorded, or no step can be made out.
-    """
+    """What every step of a move asks of the motor."""
     motor, load, maps = stepper_motor(table), stepper_load(table), zone_maps(table)
     ramp = make_tables(table).ramp.hz
     rows: list[Numbers] = []

@@ -15,20 +15,7 @@ PULL_OUT_LAG = 2.0
 
 
 def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[str, str]]:
-    """Name and text of each figure; what a run did not come to is left out.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    run : StageRun
-        Done or not.
-
-    Returns
-    -------
-    list of (str, str)
-        Such as ("lost steps", "0 of 25 850").
-    """
+    """Name and text of each figure; what a run did not come to is left out."""
     figures, word = stage_figures(spec, run), "tile" if run.job.kind == "tiles" else "move"
     labels = {move.number: move.label for move in run.moves}
 
@@ -57,38 +44,13 @@ def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[s
 
 
 def rate(figures: StageFigures, word: str) -> str:
-    """How many moves are made in a minute.
-
-    Parameters
-    ----------
-    figures : StageFigures
-        Of the run.
-    word : str
-        What a move is called.
-
-    Returns
-    -------
-    str
-        Such as "444 tiles per minute".
-    """
+    """How many moves are made in a minute."""
     return f"{number(figures.rate * 60)} {word}s per minute"
 
 
 def stated(value: float) -> str:
     """Write a value that a file states, without zeros that nobody wrote.
 
-    Parameters
-    ----------
-    value : float
-        The value, in the unit that is written behind it.
-
-    Returns
-    -------
-    str
-        With four digits at most.
-
-    Examples
-    --------
     >>> stated(0.5), stated(55.000000001), stated(-40.0), stated(87.439)
     ('0.5', '55', '−40', '87.44')
     """
@@ -98,21 +60,6 @@ def stated(value: float) -> str:
 def called(number_of: int, label: str, kind: str) -> str:
     """What a move is called in a sentence: a tile goes by its name.
 
-    Parameters
-    ----------
-    number_of : int
-        Number of the move.
-    label : str
-        The tile, or what the job calls it.
-    kind : str
-        Kind of the job, "moves" or "tiles".
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> called(1, "B7", "tiles"), called(1, "zoom in", "moves")
     ('tile B7', 'move 1')
     """
@@ -122,18 +69,6 @@ def called(number_of: int, label: str, kind: str) -> str:
 def steps(value: float) -> str:
     """Write a distance in steps.
 
-    Parameters
-    ----------
-    value : float
-        Distance [step].
-
-    Returns
-    -------
-    str
-        With three digits.
-
-    Examples
-    --------
     >>> steps(1.0), steps(0.0561), steps(1.01738)
     ('1 step', '0.0561 steps', '1.02 steps')
     """
@@ -142,18 +77,7 @@ def steps(value: float) -> str:
 
 
 def lost_text(figures: StageFigures) -> str:
-    """Steps lost, by motor where there are some.
-
-    Parameters
-    ----------
-    figures : StageFigures
-        Of the run.
-
-    Returns
-    -------
-    str
-        Such as "0 of 25 850", or "x 12 (from move 3 on), of 25 850".
-    """
+    """Steps lost, by motor where there are some."""
     made = count(figures.steps)
     if not figures.first_lost:
         return f"0 of {made}"
@@ -172,19 +96,7 @@ def _moving(figures: StageFigures) -> str:
 
 
 def stage_figures(spec: StepperEnvelopeSpec, run: StageRun) -> StageFigures:
-    """Sums and extremes of a run.
-
-    Parameters
-    ----------
-    spec : StepperEnvelopeSpec
-        The axis.
-    run : StageRun
-        Done or not.
-
-    Returns
-    -------
-    StageFigures
-    """
+    """Sums and extremes of a run."""
     made = run.made
     spans = [[motor.arrived - move.begin for motor in move.motors.values()] for move in run.moves]
     loses = [motion for motion in made if motion[2].lost]

@@ -156,26 +156,7 @@ def tables(up: NDArray[np.int16], down: NDArray[np.int16]) -> tuple[Entries, Ent
 
 
 def load_rule(p: StepperParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool) -> None:
-    """Put ramp list and zone limits into the control unit, in the words of its timer.
-
-    Parameters
-    ----------
-    p : StepperParams
-        Written: `rule` and `timer`.
-    ramp : StepRamp
-        Ramp list.
-    limits : sequence of float
-        Zone limits by their numbers, `ZoneMap.limits` [Hz].
-    clock_hz : int
-        Ticks of the timer per second.
-    reload : bool
-        Words are periods in ticks instead of frequencies in Hz. A limit is rounded to the slower side.
-
-    Raises
-    ------
-    ValueError
-        Ramp or limits do not fit the registers.
-    """
+    """Put ramp list and zone limits into the control unit, in the words of its timer."""
     if len(ramp) > RAMP or len(limits) > LIMITS:
         raise ValueError(
             f"{len(ramp)} ramp entries and {len(limits)} zone limits, must be {RAMP} and {LIMITS} or fewer"
