@@ -1,7 +1,7 @@
 """What a look at a specification finds: derived figures, contradictions between keys, and cautions.
 
 A contradiction makes the file wrong; a caution does not: the axis can be built and run, but something about it will
-surprise. Each method finds its own (`methods.Method`); the forms are common, so that one command shows them all.
+surprise. Each method finds its own (its `checks` and `derive`); the forms are common, so that one command shows them.
 """
 
 from dataclasses import dataclass
@@ -12,21 +12,7 @@ from detent.units import format_quantity
 
 @dataclass(frozen=True, slots=True)
 class Derived:
-    """One derived figure.
-
-    Attributes
-    ----------
-    name : str
-        What it is.
-    value : float
-        The figure in `unit`.
-    unit : str
-        SI unit, or the unit of the specification ("count", "emitter").
-    text : str
-        Value and unit as a person reads them.
-    formula : str
-        How it was computed.
-    """
+    """One derived figure: `value` in `unit` (SI, or "count", "emitter"), as a person reads it, how it was computed."""
 
     name: str
     value: float
@@ -47,10 +33,10 @@ def count_figure(name: str, value: float, formula: str, unit: str = "count") -> 
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """Keys that do not go together."""
+    """Keys that do not go together, the one to blame first in front; `allowed` and `remedy` as in `FileProblem`."""
 
-    keys: tuple[str, ...]  # dotted keys the rule looked at, the one to blame first
-    allowed: str  # and remedy: as in `FileProblem`
+    keys: tuple[str, ...]
+    allowed: str
     remedy: str
 
     @property
@@ -60,25 +46,13 @@ class Contradiction:
 
 
 def wrong(keys: str, allowed: str, remedy: str) -> Contradiction:
-    """Contradiction between keys, written with spaces between them; the one to blame first is the first."""
+    """Contradiction between keys, written with spaces between them."""
     return Contradiction(tuple(keys.split()), allowed, remedy)
 
 
 @dataclass(frozen=True, slots=True)
 class Caution:
-    """One thing that looks wrong.
-
-    Attributes
-    ----------
-    name : str
-        What it is about.
-    value, limit : str
-        The figure and what it should be, with units.
-    consequence : str
-        What will happen.
-    remedy : str
-        What to do about it.
-    """
+    """One thing that looks wrong: its figure and what it should be, what will happen, what to do about it."""
 
     name: str
     value: str

@@ -1,4 +1,4 @@
-"""The value nearest to a refused one that would do, as a message names it: ready to be copied into the file."""
+"""The value that would do in place of a refused one, as a message names it: ready to be copied into the file."""
 
 import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
@@ -27,7 +27,7 @@ def at_most(value: float, unit: str, digits: int = 4) -> str:
 
 
 def at_least(value: float, unit: str, digits: int = 4) -> str:
-    """Write the smallest short number that is not below a bound; parameters as `at_most`.
+    """Write the smallest short number that is not below a bound.
 
     >>> at_least(0.407166, "m/s")
     '"407.2 mm/s"'
@@ -53,38 +53,8 @@ def put(key: str, text: object) -> str:
     return f"set {key} = {text}"
 
 
-def offer(model: type[Table], key: str, text: object) -> str:
-    """`put`, if the key accepts the value at all; empty where the value lies beyond the key's own bounds."""
-    field = field_at(model, tuple(key.split(".")))
-    unit = unit_of(field)
-    value = parse_quantity(str(text).strip('"'), unit) if unit else float(str(text))
-    return put(key, text) if _accepts(field, value) else ""
-
-
-def _accepts(field: FieldInfo, value: float) -> bool:
-    """True when a value lies within the bounds of a field."""
-    for bound in field.metadata:
-        if isinstance(bound, Ge | Gt):
-            least = float(str(bound.ge if isinstance(bound, Ge) else bound.gt))
-            if value < least or (value == least and isinstance(bound, Gt)):
-                return False
-        elif isinstance(bound, Le | Lt):
-            most = float(str(bound.le if isinstance(bound, Le) else bound.lt))
-            if value > most or (value == most and isinstance(bound, Lt)):
-                return False
-    return True
-
-
-def either(*remedies: str) -> str:
-    """Join remedies of which each would do; empty ones are left out."""
-    return " or ".join(remedy for remedy in remedies if remedy)
-
-
 class Remedies:
-    """Values that would do, for the keys of a model: what they name is within the key's own bounds.
-
-    Each takes the bound and what is said where the key has no such value.
-    """
+    """Values that would do, for the keys of a model: each within the key's own bounds, or else what is said instead."""
 
     def __init__(self, model: type[Table]) -> None:
         self._model = model
@@ -109,10 +79,24 @@ class Remedies:
         if unit:
             written = _written(value, unit, digits, rounding)
             value = parse_quantity(written.strip('"'), unit)
+        elif field.annotation is int:
+            value = int(Decimal(repr(value)).to_integral_value(rounding))
+            written = str(value)
         else:
-            whole = field.annotation is int
-            value = (
-                float(Decimal(repr(value)).to_integral_value(rounding)) if whole else _rounded(value, digits, rounding)
-            )
-            written = f"{value:.0f}" if whole else f"{value!r}"
+            value = _rounded(value, digits, rounding)
+            written = f"{value:.{digits}g}"
         return put(key, written) if _accepts(field, value) else otherwise
+
+
+def _accepts(field: FieldInfo, value: float) -> bool:
+    """True when a value lies within the bounds of a field."""
+    for bound in field.metadata:
+        if isinstance(bound, Ge | Gt):
+            least = float(str(bound.ge if isinstance(bound, Ge) else bound.gt))
+            if value < least or (value == least and isinstance(bound, Gt)):
+                return False
+        elif isinstance(bound, Le | Lt):
+            most = float(str(bound.le if isinstance(bound, Le) else bound.lt))
+            if value > most or (value == most and isinstance(bound, Lt)):
+                return False
+    return True

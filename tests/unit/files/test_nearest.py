@@ -1,8 +1,10 @@
 """Values that a message names: short, on the right side of their bound, and as the file wants them."""
 
+import math
+
 import pytest
 
-from detent.files.nearest import at_least, at_most, either, offer, put
+from detent.files.nearest import Remedies, at_least, at_most, put
 from detent.methods.phase_servo.schema import PhaseServoSpec
 
 
@@ -27,25 +29,31 @@ def test_digits_are_a_choice():
 
 
 @pytest.mark.parametrize(
-    ("key", "text", "accepted"),
+    ("key", "value", "text"),
     [
-        ("method.threshold", 1, True),
-        ("method.threshold", 0, False),
-        ("method.threshold", 1025, False),
-        ("limits.speed", '"10 m/s"', True),
-        ("limits.speed", '"10.01 m/s"', False),
-        ("limits.speed", '"0 m/s"', False),
-        ("detector.offset_error", '"-45 %"', True),
-        ("detector.offset_error", '"-45.1 %"', False),
-        ("motor.max_current", '"1 A"', True),
-        ("motor.max_current", '"0 A"', False),
+        ("method.threshold", 1.0, "1"),
+        ("method.threshold", 7.6, "7"),
+        ("method.threshold", 0, ""),
+        ("method.threshold", 1025, ""),
+        ("limits.speed", 10.0, '"10 m/s"'),
+        ("limits.speed", 10.01, ""),
+        ("limits.speed", 0.0, ""),
+        ("limits.speed", math.inf, ""),
+        ("limits.speed", math.nan, ""),
+        ("detector.offset_error", -0.45, '"-45 %"'),
+        ("detector.offset_error", -0.451, ""),
+        ("motor.max_current", 1.0, '"1 A"'),
+        ("motor.max_current", 0.0, ""),
     ],
 )
-def test_a_value_beyond_the_bounds_of_its_key_is_not_offered(key, text, accepted):
-    assert offer(PhaseServoSpec, key, text) == (f"set {key} = {text}" if accepted else "")
+def test_a_value_beyond_the_bounds_of_its_key_is_not_named(key, value, text):
+    remedy = Remedies(PhaseServoSpec)
+    assert remedy.most(key, value, "do without") == (put(key, text) if text else "do without")
 
 
-def test_remedies_are_joined():
-    assert put("method.threshold", 7) == "set method.threshold = 7"
-    assert either(put("a.b", [1, 2]), "", "do without") == "set a.b = [1, 2] or do without"
-    assert either("", "") == ""
+def test_values_keep_to_their_side():
+    remedy = Remedies(PhaseServoSpec)
+    assert remedy.least("method.threshold", 7.2) == "set method.threshold = 8"
+    assert remedy.least("limits.speed", 0.123456) == 'set limits.speed = "123.5 mm/s"'
+    assert remedy.least("detector.offset_error", -0.123456) == 'set detector.offset_error = "-12.34 %"'
+    assert remedy.exactly("limits.speed", 0.123456) == 'set limits.speed = "123.456 mm/s"'

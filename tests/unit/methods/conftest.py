@@ -15,7 +15,10 @@ def golden(request):
     """Compare what a finding says, by its name, with the golden file; GOLDEN=write writes it there."""
 
     def compare(name, finding):
-        title, said = json.dumps(f"{request.path.parent.name}, {name}"), str(finding)
+        # A bad file has its group in front.
+        name = request.node.callspec.id if "bad" in request.fixturenames else name
+        title = json.dumps(f"{request.path.parent.name} {request.path.stem.removeprefix('test_')}, {name}")
+        said = str(finding)
         told = dict(line.split(" -> ", 1) for line in _lines())
         if os.environ.get("GOLDEN") == "write":
             lines = sorted(f"{one} -> {text}" for one, text in (told | {title: said}).items())

@@ -48,8 +48,6 @@ class Machine:
         """Whether every mode of the loops decays."""
         return self.loop.spectral_radius < 1.0
 
-    # ----------------------------------------------------------------------------------------------- two masses
-
     @property
     def anti_resonance(self) -> float:
         """The load swings against the motor held still [rad/s]; 0 for a rigid axis."""
@@ -72,8 +70,6 @@ class Machine:
         """Damping ratio of that swing."""
         coupling = self.spec.mechanics.coupling
         return 0.0 if coupling is None else 0.5 * coupling.damping * self.inverse_mass / self.resonance
-
-    # ----------------------------------------------------------------------------------------------- forces
 
     def resisting(self, sense: int, speed: float) -> float:
         """Force that holds a speed [m/s] in the direction `sense`, 1 or -1, without back-EMF [N]."""
@@ -111,8 +107,6 @@ class Machine:
             forward += max(friction.positive.static, friction.positive.coulomb) + friction.offset
             backward += max(friction.negative.static, friction.negative.coulomb) - friction.offset
         return max(forward + weight, backward - weight)
-
-    # ----------------------------------------------------------------------------------------------- errors
 
     def _left(self, sense: int) -> float:
         """Command at limits.speed that feed-forward leaves to the loops [V]."""

@@ -38,8 +38,6 @@ class Machine:
         self.coulomb = max(friction.right.coulomb, friction.left.coulomb)
         self.rate = spec.limits.speed / spec.pulse
 
-    # ---------------------------------------------------------------------------------------------- loop
-
     def loop_with(self, *, coefficient: float, scale: float, sample_period: float, more: float = 1.0) -> "SampledLoop":
         """Model of the loop with another filter, scale and window, and with `more` times the gain."""
         from detent.analysis.sampled_loop import SampledLoop
@@ -108,8 +106,6 @@ class Machine:
         """Largest following error on that ramp, with what friction adds [pulses]."""
         friction = self.coulomb / self.spec.force_per_count / self.spec.method.position_gain
         return float(self.ramp.following_error.max()) + friction
-
-    # ---------------------------------------------------------------------------------------------- what friction does
 
     @property
     def resting_error(self) -> int:

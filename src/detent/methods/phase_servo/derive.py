@@ -33,8 +33,6 @@ class Machine:
         # One count of the drive word changes the mean of a sawtooth between -ES and +ES by this (3.9).
         self.volts_per_count = 2 * spec.drive.supply / (1 << spec.drive.pwm_bits)
 
-    # ---------------------------------------------------------------------------------------------- electrical side
-
     @property
     def pwm_hz(self) -> float:
         """Frequency of the sawtooth [Hz]."""
@@ -60,8 +58,6 @@ class Machine:
         """Largest change of the current within a tick [A]: full supply and back-EMF together on the winding."""
         volts = self.spec.drive.supply + self.volts_per_speed * self.spec.limits.speed
         return volts / self.spec.motor.inductance * self.spec.tick
-
-    # ---------------------------------------------------------------------------------------------- table and counts
 
     @property
     def speed_per_count(self) -> float:
@@ -94,8 +90,6 @@ class Machine:
             )
         return low
 
-    # ---------------------------------------------------------------------------------------------- motion
-
     @property
     def acceleration(self) -> float:
         """What the largest force does against friction [m/s^2]; below 0 if it does not overcome it."""
@@ -126,8 +120,6 @@ class Machine:
     def switch_time(self) -> float:
         """Time of that deceleration [s]."""
         return 2 * self.switch_distance / self.switch_speed
-
-    # ---------------------------------------------------------------------------------------------- loops
 
     @property
     def gain(self) -> float:

@@ -34,8 +34,6 @@ class Machine:
         self.gain = spec.method.position_gain
         self.speed = spec.limits.speed
 
-    # ---------------------------------------------------------------------------------------------- loop
-
     @cached_property
     def loop(self) -> HeldLoop:
         """Exact model of the position loop."""
@@ -61,8 +59,6 @@ class Machine:
     def peak_acceleration(self) -> float:
         """Largest acceleration of the table over that of its command."""
         return self.loop.stop(math.inf)[1]
-
-    # ---------------------------------------------------------------------------------------------- drive
 
     def word_at(self, speed: float) -> float:
         """Speed word that holds a speed of the table [rad/s] against droop and friction [count]."""
@@ -92,8 +88,6 @@ class Machine:
         """Deviation that holds a torque at the motor [rad]: neither loop has an integral part."""
         return torque / self.stiffness / self.spec.ratio / self.gain
 
-    # ---------------------------------------------------------------------------------------------- rest
-
     @property
     def breaking_word(self) -> int:
         """Least speed word whose torque at standstill is above static friction [count]."""
@@ -111,8 +105,6 @@ class Machine:
         """Largest error of an angle by the noise of the fine resolver [count]."""
         return math.ceil(self.spec.detector.fine.noise / FULL_TURN * self.spec.detector.fine.counts)
 
-    # ---------------------------------------------------------------------------------------------- jog
-
     @property
     def latency_way(self) -> float:
         """Way in a period of the timer task at limits.speed [rad]."""
@@ -124,8 +116,6 @@ class Machine:
         # The actual angle lags, and so does a crossing that has to be waited for.
         lag = self.following_error(speed) if method.judge == "actual" or method.guarded else 0.0
         return speed * method.task_period + lag
-
-    # ---------------------------------------------------------------------------------------------- detector
 
     @property
     def allowed_coarse_error(self) -> float:

@@ -50,8 +50,6 @@ class MotorFigures:
         self.linear = self.table.limits.acceleration / self.table.step
         """Limit a_lin of the linear part of the ramp [step/s^2]."""
 
-    # -------------------------------------------------------------------------------------------------------- torque
-
     @property
     def natural_hz(self) -> float:
         """Frequency at which the loaded rotor swings about its step [Hz]."""
@@ -105,8 +103,6 @@ class MotorFigures:
         """Distance from its step at which friction can hold a resting rotor [step]."""
         return math.asin(min(self.load.friction_torque / self.motor.holding_torque, 1.0)) * 2 / math.pi
 
-    # ---------------------------------------------------------------------------------------------------------- ways
-
     @property
     def braking_steps(self) -> int:
         """Steps to come down from the largest frequency."""
@@ -137,8 +133,6 @@ class MotorFigures:
         stored = self.ramp.hz if words == "reload" else np.rint(self.ramp.hz)
         made = clock / np.rint(clock / stored)
         return float(np.max(np.abs(made / self.ramp.hz - 1)))
-
-    # ---------------------------------------------------------------------------------------------------- the winding
 
     @property
     def resistance(self) -> float | None:
