@@ -9,7 +9,7 @@ from typing import Any
 
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
-from detent.errors import SERVO_FAULT_TEXT, AxisError, FileProblem, InputError
+from detent.errors import MOST_PROBLEMS, SERVO_FAULT_TEXT, AxisError, FileProblem, InputError
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.moves.job import Move, MoveJob
 from detent.methods.phase_servo.schema import PhaseServoSpec
@@ -186,9 +186,6 @@ def check_job(host: Host, job: MoveJob) -> list[Destination]:
     if problems:
         raise InputError(problems)
     return found
-
-
-MOST_PROBLEMS = 20
 
 
 def _problems(host: Host, name: str, to: Destination, asked: float) -> list[FileProblem]:
