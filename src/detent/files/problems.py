@@ -175,6 +175,7 @@ class Reporter:
         allowed = describe_allowed(field)
         remedy = f"give {path[-1]} a value in this range ({field.description})"
         if error["type"] in {"quantity", "refused"}:
+            allowed = str(error["ctx"].get("allowed", allowed)) if error["type"] == "refused" else allowed
             remedy = str(error["ctx"].get("remedy", remedy))
         elif options_of(field):
             remedy = f'write "{_nearest_option(str(error["input"]), options_of(field))}"'

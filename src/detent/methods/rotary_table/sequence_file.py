@@ -1,10 +1,9 @@
 """Jobs of a rotary table, read from TOML: the steps of its sequence controller, and when its input signals come."""
 
-from collections.abc import Iterator
 from os import PathLike
 from pathlib import PurePath
 
-from detent.errors import FileProblem, InputError
+from detent.errors import InputError
 from detent.files.fields import Table, rows
 from detent.files.locate import Index
 from detent.files.problems import Reporter
@@ -51,23 +50,12 @@ def parse_sequence(file: str, text: str) -> SequenceJob:
     stretches: dict[str, list[tuple[float, float]]] = {}
     for row in found.input:
         stretches.setdefault(row.name, []).append((row.begin, row.end))
-    reporter = Reporter(file, source.places, {}, SequenceFile)
-    problems = [reporter.placed(("input", Index(number)), fault) for number, fault in _empty_stretches(found.input)]
     inputs = {name: join_stretches(found) for name, found in stretches.items()}
-    if not problems:
-        faults = find_faults(steps, inputs)
-        problems = [reporter.placed(("step", Index(number)), fault) for number, fault in faults]
-    if problems:
-        refuse(problems)
+    faults = find_faults(steps, inputs)
+    if faults:
+        reporter = Reporter(file, source.places, {}, SequenceFile)
+        refuse(reporter.placed(("step", Index(number)), fault) for number, fault in faults)
     return SequenceJob(PurePath(file).name, tuple(steps), inputs)
-
-
-def _empty_stretches(inputs: list[InputRow]) -> Iterator[tuple[int, FileProblem]]:
-    """Stretches that end before they begin, by their number."""
-    for number, row in enumerate(inputs):
-        if not row.begin < row.end:
-            allowed = f"a time after from, {row.begin:g} s"
-            yield number, FileProblem.of_key("to", "", allowed, "correct one of the two")
 
 
 def _make_step(row: StepRow, line: int) -> Step:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from detent.errors import FileProblem
@@ -69,6 +69,16 @@ class InputRow(Row, frozen=True):
     name: Name = required("the signal", '"feed"', allowed=f"a name: {WHAT_A_NAME_IS}")
     begin: Time = required("when it comes", '"1 s"', alias="from", ge=0, le=LONGEST_TIME)
     end: Time = required("when it goes", '"4 s"', alias="to", ge=0, le=LONGEST_TIME)
+
+    @field_validator("end")
+    @classmethod
+    def is_later(cls, end: float, info: ValidationInfo) -> float:
+        """Refuse a stretch that ends before it begins."""
+        begin = info.data.get("begin", -1.0)
+        if begin < end:
+            return end
+        allowed = f"a time after from, {begin:g} s"
+        raise PydanticCustomError("refused", "too early", {"allowed": allowed, "remedy": "correct one of the two"})
 
 
 class StepRow(Row, frozen=True):
