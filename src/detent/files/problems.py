@@ -111,8 +111,7 @@ class Reporter:
         elif elsewhere:
             remedy = f"move it to {self._header(named_as(min(elsewhere, key=len)[:-1], path))}"
         else:
-            is_axis = "axis" in self._root.model_fields
-            remedy = f"remove it{', or look the key up with `detent check` or in the reference' if is_axis else ''}"
+            remedy = "remove it" + self._axis(", or look the key up with `detent check` or in the reference")
         return self.problem(path, what, f"{place}: {', '.join(keys)}", remedy)
 
     def _header(self, path: Path) -> str:
@@ -125,6 +124,10 @@ class Reporter:
         came = "a single table" if isinstance(value, dict) else self.came(path, value)
         remedy = f"write {self._header(path)}, with two brackets, before the keys of each"
         return self.problem(path, came, f"tables {self._header(path)}", remedy)
+
+    def _axis(self, text: str) -> str:
+        """What is said of axis files only."""
+        return text if "axis" in self._root.model_fields else ""
 
     def wrong_name(self, path: Path, field: FieldInfo) -> FileProblem:
         """Problem of a table whose name will not do."""
@@ -164,7 +167,7 @@ class Reporter:
             remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
             return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
         if isinstance(value, list):
-            remedy = f"write [{dotted(path)}] once, with single brackets: one file describes one axis"
+            remedy = f"write [{dotted(path)}] once, with single brackets{self._axis(': one file describes one axis')}"
             return self.problem(path, "a list", f"one table [{dotted(path)}]", remedy)
         remedy = f"write [{dotted(path)}] on a line of its own and its keys below it"
         return self.problem(path, self.came(path, value), f"the table [{dotted(path)}] with {keys}", remedy)

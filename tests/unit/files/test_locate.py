@@ -78,7 +78,7 @@ def test_keys_around_an_error_are_found():
 
 
 def test_tables_of_a_list_are_told_apart_by_their_number():
-    places = locate_keys('[[m]]\na = 1\n[m.b]\nc = 2\n[[m]]\nb.c = 3\n[x]\nl = [1, {a = 4}] # two\n')
+    places = locate_keys("[[m]]\na = 1\n[m.b]\nc = 2\n[[m]]\nb.c = 3\n[x]\nl = [1, {a = 4}] # two\n")
     assert {path: (place.line, place.column) for path, place in places.items()} == {
         ("m",): (1, 1),
         ("m", "0"): (1, 1),
