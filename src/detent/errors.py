@@ -8,6 +8,9 @@ register, and its text stands here.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+MOST_PROBLEMS = 20
+"""Problems of one job or recording told at most: a file of another kind would have one in each line."""
+
 
 class DetentError(Exception):
     """Root of every error detent raises on purpose.
@@ -48,6 +51,11 @@ class FileProblem:
     came: str
     allowed: str
     remedy: str
+
+    @classmethod
+    def of_key(cls, key: str, came: str, allowed: str, remedy: str) -> "FileProblem":
+        """Problem of a key; whoever reads the file adds the place, and the value as written where `came` is empty."""
+        return cls("", 0, 0, key, came, allowed, remedy)
 
     def __str__(self) -> str:
         """Give the problem as one line that editors and terminals can jump from."""

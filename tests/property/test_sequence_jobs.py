@@ -209,7 +209,7 @@ def test_loops_are_refused_exactly_where_two_of_them_cross(leaves, loops):
                 spans.append((places[first], len(steps)))
                 steps.append(Repeat(f"n{first}", 2))
     crossing = any(a < c <= b < d for a, b in spans for c, d in spans)
-    assert bool([fault for fault in find_faults(steps, {}) if fault.key == "repeat"]) == crossing
+    assert bool([fault for _, fault in find_faults(steps, {}) if fault.key == "repeat"]) == crossing
 
 
 stretches = st.lists(

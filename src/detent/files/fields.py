@@ -5,10 +5,11 @@ Everything else that knows about keys (validation, messages, the printed axis, t
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast, get_args, get_origin
+from types import NoneType, UnionType
+from typing import Annotated, Any, Final, Literal, Union, cast, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -16,6 +17,10 @@ from detent.units import QuantityError, describe_kind, format_quantity, parse_qu
 
 LIST_EXAMPLE = "[20000, 20096]"
 """List of whole numbers shown for a key that has no example of its own."""
+
+
+IN_SI: Final = "values are in SI units"
+"""Context of a validation of numbers that a program gives, where a file would have text with a unit."""
 
 
 class AnyName(str):
@@ -32,13 +37,15 @@ class Unit:
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Put the reading of the text before the check of the number."""
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
+        return core_schema.with_info_before_validator_function(self.read, handler(source))
 
-    def read(self, value: object) -> object:
+    def read(self, value: object, info: ValidationInfo) -> object:
         """Read the text of a quantity; anything else is refused with an example."""
-        kind, example = describe_kind(self.symbol)
-        allowed = f'{kind} with its unit, such as "{example}"'
+        if info.context == IN_SI:
+            return value
         if not isinstance(value, str):
+            kind, example = describe_kind(self.symbol)
+            allowed = f'{kind} with its unit, such as "{example}"'
             remedy = f'write it as text with a unit, as in "{example}"'
             raise PydanticCustomError("quantity", "not a quantity", {"allowed": allowed, "remedy": remedy})
         try:
@@ -49,7 +56,7 @@ class Unit:
 
 
 class Table(BaseModel, frozen=True):
-    """A table of the axis file: unknown keys are errors, nothing is converted silently, nothing changes later.
+    """A table of a file: unknown keys are errors, nothing is converted silently, nothing changes later.
 
     Each model says ``frozen=True`` again: pyright lets a method narrow a common field only where it reads that.
     """
@@ -57,17 +64,26 @@ class Table(BaseModel, frozen=True):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def required(doc: str, example: str, *, allowed: str = "", **bounds: float) -> Any:
+def required(doc: str, example: str, *, allowed: str = "", alias: str | None = None, **bounds: float) -> Any:
     """Declare a key that must be stated."""
     constraints: dict[str, Any] = dict(bounds)
-    return Field(description=doc, examples=[example], json_schema_extra={"allowed": allowed}, **constraints)
+    extra: dict[str, Any] = {"allowed": allowed}
+    return Field(description=doc, examples=[example], alias=alias, json_schema_extra=extra, **constraints)
 
 
-def optional(doc: str, default: object, *, derived: str = "", allowed: str = "", **bounds: float) -> Any:
+def optional(
+    doc: str, default: object, *, derived: str = "", allowed: str = "", alias: str | None = None, **bounds: float
+) -> Any:
     """Declare a key that may be left out."""
     constraints: dict[str, Any] = dict(bounds)
     constraints["default_factory" if callable(default) else "default"] = default
-    return Field(description=doc, json_schema_extra={"allowed": allowed, "derived": derived}, **constraints)
+    extra: dict[str, Any] = {"allowed": allowed, "derived": derived}
+    return Field(description=doc, alias=alias, json_schema_extra=extra, **constraints)
+
+
+def rows(doc: str) -> Any:
+    """Declare a list of tables, as in ``[[move]]``; the field's type is ``list[SomeTable]``."""
+    return Field(description=doc, default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +110,11 @@ def is_named(field: FieldInfo) -> bool:
     return get_origin(field.annotation) is dict
 
 
+def is_rows(field: FieldInfo) -> bool:
+    """True for a list of tables."""
+    return table_of(field) is not None and is_list(field)
+
+
 def file_key(name: str, field: FieldInfo) -> str:
     """Key of a field as written in the file."""
     return field.alias or name
@@ -111,6 +132,14 @@ def table_of(field: FieldInfo) -> type[Table] | None:
         if isinstance(candidate, type) and issubclass(candidate, Table):
             return candidate
     return None
+
+
+def type_of(field: FieldInfo) -> object:
+    """Type of a value that is stated: that of the field, without None."""
+    stated: object = field.annotation
+    if get_origin(stated) in {Union, UnionType}:
+        stated = next(part for part in get_args(stated) if part is not NoneType)
+    return get_args(stated)[0] if get_origin(stated) is Annotated else stated
 
 
 def is_list(field: FieldInfo) -> bool:
@@ -193,17 +222,17 @@ def describe_allowed(field: FieldInfo) -> str:
         return " or ".join(f'"{option}"' for option in options)
     if is_list(field):
         return _describe_list(field)
-    if field.annotation is bool:
+    if type_of(field) is bool:
         return "true or false"
-    if field.annotation is str:
+    if type_of(field) is str:
         return "text in quotes"
     return _describe_number(field)
 
 
 def options_of(field: FieldInfo) -> tuple[str, ...]:
     """Words a field may hold, when it is a choice."""
-    if get_origin(field.annotation) is Literal:
-        return tuple(str(option) for option in get_args(field.annotation))
+    if get_origin(type_of(field)) is Literal:
+        return tuple(str(option) for option in get_args(type_of(field)))
     return ()
 
 
@@ -233,7 +262,7 @@ def _describe_number(field: FieldInfo) -> str:
     if unit:
         kind, example = describe_kind(unit)
         return f"{kind} {bounds}" if bounds else f'{kind} such as "{example}"'
-    kind = "a whole number" if field.annotation is int else "a number"
+    kind = "a whole number" if type_of(field) is int else "a number"
     return f"{kind} {bounds}".rstrip()
 
 

@@ -19,6 +19,12 @@ _TABLES = {"table", "table_array_element"}
 _KEYS = {"bare_key", "quoted_key", "dotted_key"}
 
 
+class Index(str):
+    """Number of a table in a list of tables, as part of a path; messages leave it out, for they tell the line."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a key stands."""
@@ -45,7 +51,7 @@ def find_place(places: dict[Path, Place], path: Path) -> Place:
         inside = [place for known, place in places.items() if known[:length] == path[:length]]
         if inside:
             return min(inside, key=lambda place: (place.line, place.column))
-    return Place(1, 1, "")
+    return places.get((), Place(1, 1, ""))
 
 
 @cache
@@ -59,10 +65,16 @@ def _parser() -> "Parser":
 
 def _walk(node: "Node", prefix: Path) -> "Iterator[tuple[Path, Node, Node]]":
     """Walk all keys below a node: (path, node of the key, node of the value or of the header)."""
+    last: dict[Path, int] = {}  # of each list of tables, the number of its last one
     for child in node.named_children:
         key = next((part for part in child.named_children if part.type in _KEYS), None)
         if child.type in _TABLES and key is not None:
-            path = _key_parts(key)
+            *around, name = _key_parts(key)
+            path = (*_inside(tuple(around), last), name)
+            if child.type == "table_array_element":
+                yield path, child, key
+                last[path] = last.get(path, -1) + 1
+            path = _inside((name,), last, path[:-1])
             yield path, child, key
             yield from _walk(child, path)
         elif child.type == "pair" and key is not None:
@@ -80,6 +92,21 @@ def _walk_pair(pair: "Node", key: "Node", prefix: Path) -> "Iterator[tuple[Path,
     yield path, key, value
     if value.type == "inline_table":
         yield from _walk(value, path)
+    elif value.type == "array":
+        elements = [part for part in value.named_children if part.type != "comment"]
+        for number, table in enumerate(elements):
+            if table.type == "inline_table":
+                yield (*path, Index(number)), table, table
+                yield from _walk(table, (*path, Index(number)))
+
+
+def _inside(path: Path, last: dict[Path, int], done: Path = ()) -> Path:
+    """A path with the number of the last table of each list that it goes through."""
+    for part in path:
+        done = (*done, part)
+        if done in last:
+            done = (*done, Index(last[done]))
+    return done
 
 
 def _key_parts(key: "Node") -> Path:

@@ -3,7 +3,6 @@
 import difflib
 import re
 from collections.abc import Iterator, Sequence
-from itertools import takewhile
 from typing import Any, cast
 
 from pydantic.fields import FieldInfo
@@ -19,18 +18,18 @@ from detent.files.fields import (
     file_key,
     is_list,
     is_named,
+    is_rows,
     leaf_fields,
     list_example,
     named_as,
     options_of,
     table_of,
+    type_of,
     unit_of,
 )
-from detent.files.locate import Path, Place, find_place
+from detent.files.locate import Index, Path, Place, find_place
+from detent.files.text import MAX_SHOWN
 from detent.units import format_quantity
-
-MAX_SHOWN = 60
-"""Characters of a value shown in a message."""
 
 MAX_ELEMENTS = 3
 """Wrong numbers of a list shown in a message."""
@@ -52,13 +51,18 @@ class Reporter:
         place = find_place(self._places, path)
         return FileProblem(self._file, place.line, place.column, dotted(path), came, allowed, remedy)
 
+    def placed(self, path: Path, fault: FileProblem) -> FileProblem:
+        """A problem of a table that knows neither its file nor its place; without `came`, the value as written."""
+        path = (*path, *fault.key.split(".")) if fault.key else path
+        return self.problem(path, fault.came or self.came(path), fault.allowed, fault.remedy)
+
     def is_stated(self, path: Path) -> bool:
         """True when the file or an override gives this key."""
         return path in self._overrides or path in self._places
 
     def came(self, path: Path, value: object = None) -> str:
         """Value of a key as it was written."""
-        text = self._overrides.get(path) or (self._places[path].text if path in self._places else repr(value))
+        text = self._overrides.get(path) or (self._places[path].text if path in self._places else _written(value))
         return _shortened(text)
 
     def from_errors(self, errors: Sequence[dict[str, Any]]) -> FileProblem:
@@ -85,17 +89,33 @@ class Reporter:
         """Unknown key: name the nearest known one, or the table it belongs to."""
         *around, key = path
         keys = known_keys(self._root, tuple(around))
-        what = f"the unknown table [{dotted(path)}]" if isinstance(value, dict) else f'the unknown key "{key}"'
-        place = f"in [{dotted(around)}]" if around else "at the top of the file"
+        is_table = isinstance(value, dict) or _is_rows_value(value)
+        what = f"the unknown table [{dotted(path)}]" if is_table else f'the unknown key "{_shortened(key)}"'
+        place = f"in {self._header(tuple(around))}" if around else "at the top of the file"
         near = nearest_key(self._root, path)
         elsewhere = [known for known, _ in leaf_fields(self._root) if known[-1] == key]
         if near:
             remedy = f'did you mean "{near}"?'
         elif elsewhere:
-            remedy = f"move it to [{dotted(named_as(elsewhere[0][:-1], path))}]"
+            remedy = f"move it to {self._header(named_as(min(elsewhere, key=len)[:-1], path))}"
         else:
-            remedy = "remove it, or look the key up with `detent check` or in the reference"
+            remedy = "remove it" + self._axis(", or look the key up with `detent check` or in the reference")
         return self.problem(path, what, f"{place}: {', '.join(keys)}", remedy)
+
+    def _header(self, path: Path) -> str:
+        """A table as its header is written."""
+        inside = path[:-1] if isinstance(path[-1], Index) else path
+        return f"[[{dotted(inside)}]]" if is_rows(field_at(self._root, inside)) else f"[{dotted(inside)}]"
+
+    def _no_rows(self, path: Path, value: object) -> FileProblem:
+        """Something else where a list of tables must stand."""
+        came = "a single table" if isinstance(value, dict) else self.came(path, value)
+        remedy = f"write {self._header(path)}, with two brackets, before the keys of each"
+        return self.problem(path, came, f"tables {self._header(path)}", remedy)
+
+    def _axis(self, text: str) -> str:
+        """What is said of axis files only."""
+        return text if "axis" in self._root.model_fields else ""
 
     def wrong_name(self, path: Path, field: FieldInfo) -> FileProblem:
         """Problem of a table whose name will not do."""
@@ -126,6 +146,8 @@ class Reporter:
 
     def _not_a_table(self, path: Path, value: object) -> FileProblem:
         """Report a value where a table must stand, or several tables where there is one."""
+        if is_rows(field_at(self._root, path)):
+            return self._no_rows(path, value)
         keys = ", ".join(known_keys(self._root, path))
         if is_named(field_at(self._root, path)):
             table = dotted((*path, example_of(field_at(self._root, path))))
@@ -133,7 +155,7 @@ class Reporter:
             remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
             return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
         if isinstance(value, list):
-            remedy = f"write [{dotted(path)}] once, with single brackets: one file describes one axis"
+            remedy = f"write [{dotted(path)}] once, with single brackets{self._axis(': one file describes one axis')}"
             return self.problem(path, "a list", f"one table [{dotted(path)}]", remedy)
         remedy = f"write [{dotted(path)}] on a line of its own and its keys below it"
         return self.problem(path, self.came(path, value), f"the table [{dotted(path)}] with {keys}", remedy)
@@ -143,8 +165,9 @@ class Reporter:
         came = self.came(path, error["input"])
         allowed = describe_allowed(field)
         remedy = f"give {path[-1]} a value in this range ({field.description})"
-        if error["type"] == "quantity":
-            remedy = str(error["ctx"]["remedy"])
+        if error["type"] in {"quantity", "refused"}:
+            allowed = str(error["ctx"].get("allowed", allowed)) if error["type"] == "refused" else allowed
+            remedy = str(error["ctx"].get("remedy", remedy))
         elif options_of(field):
             remedy = f'write "{_nearest_option(str(error["input"]), options_of(field))}"'
         elif error["type"].endswith("_type"):
@@ -172,8 +195,10 @@ class Reporter:
 
 
 def key_path(location: Sequence[str | int]) -> Path:
-    """Path of the key at a location of pydantic's, which may go on into a list by a number."""
-    return tuple(str(part) for part in takewhile(lambda part: isinstance(part, str), location) if part != "[key]")
+    """Path of the key at a location of pydantic's, which may go on into a list of values by a number."""
+    last = max((k for k, part in enumerate(location) if isinstance(part, str)), default=-1)
+    parts = [part for part in location[: last + 1] if part != "[key]"]
+    return tuple(Index(part) if isinstance(part, int) else part for part in parts)
 
 
 def field_at(root: type[Table], path: Path) -> FieldInfo:
@@ -181,8 +206,8 @@ def field_at(root: type[Table], path: Path) -> FieldInfo:
     table: type[Table] | None = root
     field: FieldInfo | None = None
     for key in path:
-        if field is not None and is_named(field):
-            # One of the tables, whatever its name: a required table like any other.
+        if field is not None and (is_named(field) or isinstance(key, Index)):
+            # One of the tables, whatever its name or number: a required table like any other.
             field = FieldInfo(annotation=table, description=field.description)
             continue
         fields = {
@@ -231,13 +256,26 @@ def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[
 
 def dotted(path: Sequence[str]) -> str:
     """Key as written in messages; parts that need quotes get them."""
-    return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in path)
+    parts = [_shortened(part) for part in path if not isinstance(part, Index)]
+    return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in parts)
 
 
 def _shortened(text: str) -> str:
     """First line of a text, and no more of it than a message has room for."""
     first, *more = text.splitlines() or [""]
     return f"{first[:MAX_SHOWN]}..." if more or len(first) > MAX_SHOWN else first
+
+
+def _written(value: object) -> str:
+    """What can be said of a value whose text is not known."""
+    if isinstance(value, dict | list):
+        return "a table" if isinstance(value, dict) else "a list"
+    return repr(value)
+
+
+def _is_rows_value(value: object) -> bool:
+    """True for a list of tables, as the parser gives it."""
+    return isinstance(value, list) and all(isinstance(part, dict) for part in cast("list[object]", value))
 
 
 def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -259,19 +297,19 @@ def _nearest_option(came: str, options: tuple[str, ...]) -> str:
 
 def _type_remedy(key: str, field: FieldInfo, value: object) -> str:
     """What to do about a value of the wrong type."""
-    if field.annotation is bool:
+    if type_of(field) is bool:
         return f"write {key} = true or {key} = false, without quotes"
-    if field.annotation is str:
+    if type_of(field) is str:
         return f'put it in quotes: {key} = "{value}"'
     if isinstance(value, str):
         return f"write the number without quotes and without a unit, as in {key} = {_example_number(field)}"
-    kind = "a whole number" if field.annotation is int else "a number"
+    kind = "a whole number" if type_of(field) is int else "a number"
     return f"write {kind}, as in {key} = {_example_number(field)}"
 
 
 def _example_number(field: FieldInfo) -> str:
-    """Number that would do: the example, or the default."""
-    return example_of(field) or str(field.default)
+    """Number that would do: the example, or the default, or 1 where that is none."""
+    return example_of(field) or str(1 if field.is_required() or field.default is None else field.default)
 
 
 def default_text(field: FieldInfo) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from detent.errors import FileProblem, InputError
-from detent.files.locate import Place, locate_keys
+from detent.files.locate import Index, Place, locate_keys
 
 MAX_BYTES = 1_000_000
 """Largest axis file read; a real one has a few thousand bytes."""
@@ -32,6 +32,10 @@ class Source:
     problems: tuple[FileProblem, ...] = ()  # errors of syntax
     is_whole: bool = True  # False when lines were left out: then a missing key proves nothing
     is_readable: bool = True  # False when not even the tables are trustworthy
+
+    def line_of(self, name: str, number: int) -> int:
+        """Line in which a table of a list begins."""
+        return self.places[name, Index(number)].line
 
 
 def read_source(path: Path | str) -> Source:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from detent.errors import FileProblem, InputError
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Source, Values
 from detent.logs.log_units import Conversion, bits_of, find_conversion, split_heading

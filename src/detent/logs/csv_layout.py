@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from detent.errors import InputError
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.csv_cells import MISSING, is_moment, is_number
 from detent.logs.log_units import is_unit, split_heading
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import InputError
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.log import Finding, Rows, Values
 
 MAX_CELLS = 50_000_000

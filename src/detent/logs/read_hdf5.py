@@ -9,7 +9,7 @@ import numpy as np
 
 from detent.errors import InputError
 from detent.files.file_bytes import check_file
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
 from detent.logs.raw_table import MAX_CELLS, MAX_COLUMNS, MAX_CONSTANTS, Item, RawTable, table_of, tell

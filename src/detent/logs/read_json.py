@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.file_bytes import kind_of, read_bytes
-from detent.files.job_text import decode_utf8
-from detent.files.job_values import short
+from detent.files.text import decode_utf8, short
 from detent.logs.csv_cells import is_moment, read_cell, read_moments
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading

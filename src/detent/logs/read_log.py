@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from detent.errors import InputError
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.choose import choose_columns, make_draft
 from detent.logs.dirt import clean
 from detent.logs.draft import Draft, tell_count

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.files.job_values import short
+from detent.files.text import short
 from detent.logs.log import Action, Finding, Kind, Severity, Values, row_ranges
 from detent.logs.raw_table import BrokenRow, RawTable
 from detent.logs.roles import words_of

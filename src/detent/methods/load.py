@@ -26,7 +26,8 @@ from detent.files.fields import (
 from detent.files.findings import Contradiction
 from detent.files.locate import Path
 from detent.files.overrides import apply_overrides, as_table, put_value
-from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path, nearest_key
+from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path
+from detent.files.read import told_errors
 from detent.files.source import Source, read_source
 from detent.methods.method import Method
 from detent.methods.registry import METHODS
@@ -200,23 +201,15 @@ def _tell(
     found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool
 ) -> list[FileProblem]:
     """Problems of one validation, without those that only follow from others."""
-    by_key: dict[Path, list[dict[str, Any]]] = {}
-    for entry in found:
-        by_key.setdefault(key_path(entry["loc"]), []).append(entry)
-    unknown = [path for path, entries in by_key.items() if entries[0]["type"] == "extra_forbidden"]
-    misspelt = {(*path[:-1], nearest_key(method.spec, path)) for path in unknown}
     problems: list[FileProblem] = []
-    for path, entries in by_key.items():
-        kind = entries[0]["type"]
-        follows = path[:-1] in layers.doubtful or path in misspelt or not is_whole
-        # A default that is made from another key cannot be made when that key is wrong.
-        if kind == "default_factory_not_called" or (kind == "missing" and follows):
-            continue
-        problem = reporter.from_errors(entries)
-        if kind == "quantity":
-            problem = replace(problem, remedy=problem.remedy + _other_motion(method, path, entries[0]["input"]))
-        # The model knows the one method it was made for; a file may name any.
-        problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
+    told = told_errors(found, reporter, method.spec, is_whole=is_whole, doubtful=layers.doubtful)
+    for path, problem, error in told:
+        if error["type"] == "quantity":
+            other = _other_motion(method, path, error["input"])
+            problems.append(replace(problem, remedy=problem.remedy + other))
+        else:
+            # The model knows the one method it was made for; a file may name any.
+            problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
     return problems
 
 

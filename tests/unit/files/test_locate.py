@@ -75,3 +75,20 @@ def test_keys_around_an_error_are_found():
     places = locate_keys("a = 1\nb = = 2\n[t]\nc = 3\n")
     assert places["a",].line == 1
     assert places["t", "c"].line == 4
+
+
+def test_tables_of_a_list_are_told_apart_by_their_number():
+    places = locate_keys("[[m]]\na = 1\n[m.b]\nc = 2\n[[m]]\nb.c = 3\n[x]\nl = [1, {a = 4}] # two\n")
+    assert {path: (place.line, place.column) for path, place in places.items()} == {
+        ("m",): (1, 1),
+        ("m", "0"): (1, 1),
+        ("m", "0", "a"): (2, 1),
+        ("m", "0", "b"): (3, 1),
+        ("m", "0", "b", "c"): (4, 1),
+        ("m", "1"): (5, 1),
+        ("m", "1", "b", "c"): (6, 1),
+        ("x",): (7, 1),
+        ("x", "l"): (8, 1),
+        ("x", "l", "1"): (8, 9),
+        ("x", "l", "1", "a"): (8, 10),
+    }

@@ -87,11 +87,11 @@ def test_options_override_the_mapping(write):
 @pytest.mark.parametrize(
     ("text", "line", "key", "came"),
     [
-        ('[columns]\nposition = "qm [V]"', 2, "columns.position", 'the unit "V"'),
+        ('[columns]\nposition = "qm [V]"', 2, "columns.position.unit", "V"),
         ('[columns]\npositon = "qm"', 2, "columns.positon", 'the unknown key "positon"'),
         ("[columns]\nposition = 3", 2, "columns.position", "3"),
-        ('[columns]\nposition = {unit = "m"}', 2, "columns.position", "position without a column"),
-        ('[columns.position]\ncolumn = "q"\nunit = "furlong/x"', 3, "columns.position.unit", 'the unit "furlong/x"'),
+        ('[columns]\nposition = {unit = "m"}', 2, "columns.position.column", "nothing"),
+        ('[columns.position]\ncolumn = "q"\nunit = "furlong/x"', 3, "columns.position.unit", '"furlong/x"'),
         ("[columns.position]\ncolumn = 0", 2, "columns.position.column", "0"),
         ('[columns.position]\ncolumn = "q"\nsign = 2', 3, "columns.position.sign", "2"),
         ('[columns.position]\ncolumn = "q"\nfactor = 0', 3, "columns.position.factor", "0"),
@@ -105,11 +105,11 @@ def test_options_override_the_mapping(write):
         ("[log]\nseparator = 3", 2, "log.separator", '"3"'),
         ("[log]\ntable = 3", 2, "log.table", "3"),
         ('[log]\nperiod = "0 s"', 2, "log.period", '"0 s"'),
-        ('[log]\nperiod = "1 mm"', 2, "log.period", 'the unit "mm", which measures something else'),
+        ('[log]\nperiod = "1 mm"', 2, "log.period", '"1 mm"'),
         ("[log]\nfirst = 1", 2, "log.first", 'the unknown key "first"'),
         ("log = 3", 1, "log", "3"),
         ('[constants]\ngtau = "35"', 2, "constants.gtau", '"35"'),
-        ("[coulmns]", 1, "coulmns", 'the unknown key "coulmns"'),
+        ("[coulmns]", 1, "coulmns", "the unknown table [coulmns]"),
         ("[columns]\nposition = qm", 2, "position", "`position = qm`"),
     ],
 )
@@ -138,12 +138,12 @@ def test_files_that_are_no_mapping(write, tmp_path):
     [
         ("position", '"position"', "write SIGNAL=COLUMN [UNIT]"),
         ("positon=qm", 'the unknown key "positon"', 'did you mean "position"?'),
-        ("force=x [mm]", 'the unit "mm"', "write a unit as in [mN]"),
-        ("torque=x [mm]", 'the unit "mm"', "write a unit as in [mN*m]"),
-        ("position=x [V]", 'the unit "V"', "write a unit as in [mm], or one of counts"),
-        ("command=x [V]", 'the unit "V"', "write a unit as in [%]"),
-        ("header=two", '"header=two"', "write a whole number without quotes, as in header = 3"),
-        ("period=fast", '"fast" is not a number with a unit', "write a time as"),
+        ("force=x [mm]", '"x [mm]"', "write a unit as in [mN]"),
+        ("torque=x [mm]", '"x [mm]"', "write a unit as in [mN*m]"),
+        ("position=x [V]", '"x [V]"', "write a unit as in [mm], or one of counts"),
+        ("command=x [V]", '"x [V]"', "write a unit as in [%]"),
+        ("header=two", '"two"', "write the number without quotes"),
+        ("period=fast", '"fast"', "write a time as"),
     ],
 )
 def test_slips_in_options(option, came, remedy):

@@ -4,12 +4,12 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from detent.errors import FileProblem, InputError
+from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.guard import Arrival, Guard
 from detent.methods.cascade.host import CascadeHost, Peaks
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.moves.job import MOST_PROBLEMS, Move, MoveJob
+from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_move
 from detent.record.machine import AnyRecorder, Progress
 from detent.sensing.gauge import set_gauge

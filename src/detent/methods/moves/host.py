@@ -7,12 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from detent.errors import FileProblem, InputError
+from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.moves.job import Move, MoveJob
 from detent.record.machine import Machine
 from detent.units import format_quantity
-
-MOST_PROBLEMS = 20
 
 Problem = Callable[[str, str, str, str], FileProblem]
 """Makes a problem of the move from key, what came, what is allowed and what to do."""

@@ -6,13 +6,15 @@ move is that and nothing else. Files of moves are read in `move_file`; here ever
 
 from __future__ import annotations
 
-import math
 import unicodedata
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
-from detent.errors import DetentError, FileProblem, InputError
+from detent.errors import MOST_PROBLEMS, FileProblem, InputError
+from detent.files.fields import Table, optional, rows
+from detent.files.quantities import Length, Time, Velocity
+from detent.files.read import Row, check_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,12 +22,10 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 AnyMove = TypeVar("AnyMove", bound="DataclassInstance")
+AnyRow = TypeVar("AnyRow", bound=Row)
 
 MOST_MOVES = 100_000
 """Moves of a job at most, repeats counted: hours of any axis, and still a job that fits into a report."""
-
-MOST_PROBLEMS = 20
-"""Problems of one file reported at most: a file of another kind would have one in each line."""
 
 TAB_WIDTH = 8
 """Characters between the tab stops of plain text."""
@@ -33,6 +33,25 @@ TAB_WIDTH = 8
 # A form feed brings another sheet under the hammer: to the carriage that is the beginning of a line, like the others.
 _LINE_BEGINS = {"\n", "\r", "\f"}
 _WHAT_TEXT_HOLDS = "printable characters, spaces, tabs, line ends and form feeds"
+
+
+class MoveRow(Row, frozen=True):
+    """A move as a file says it."""
+
+    one_of: ClassVar[tuple[str, ...]] = ("target", "by")
+    target: Length | None = optional("where to", None)
+    by: Length | None = optional("how far from where the move before went to", None)
+    dwell: Time = optional("how long the axis stands after it is ready", 0.0, ge=0)
+    repeat: int = optional("how often it is done in succession", 1, ge=1, le=MOST_MOVES)
+    speed: Velocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
+    sample_period: Time | None = optional("of the servo in this move", None, derived="the axis's own", gt=0)
+
+
+class MoveFile(Table, Generic[AnyRow], frozen=True):
+    """A file of moves."""
+
+    repeat: int = optional("how often the whole list is done", 1, ge=1, le=MOST_MOVES)
+    move: list[AnyRow] = rows("a move")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,27 +95,8 @@ class Move:
 
     def __post_init__(self) -> None:
         """Refuse what no axis could do."""
-        if (self.target is None) == (self.by is None):
-            raise bad_move(self.number, f"target {self.target} and by {self.by}", "exactly one of target and by")
-        way = self.by if self.target is None else self.target
-        if way is None or not math.isfinite(way):
-            raise bad_move(self.number, f"a way of {way} m", "a finite number of metres")
-        check_dwell(self.number, self.dwell)
-        for name, value, unit in (("speed", self.speed, "m/s"), ("sample period", self.sample_period, "s")):
-            if value is not None and not 0 < value < math.inf:
-                allowed = f"more than 0 {unit}, or None for the axis's own"
-                raise bad_move(self.number, f"a {name} of {value} {unit}", allowed)
-
-
-def check_dwell(number: int, dwell: float) -> None:
-    """Refuse a time that nothing can stand [s], in move `number`."""
-    if not 0 <= dwell < math.inf:
-        raise bad_move(number, f"a dwell of {dwell} s", "0 s or more")
-
-
-def bad_move(number: int, came: str, allowed: str) -> DetentError:
-    """Error about move `number`: what came, what is allowed."""
-    return DetentError(f"move {number}: came {came}; allowed: {allowed}; do: correct the move")
+        names = ("target", "by", "dwell", "speed", "sample_period")
+        check_values(MoveRow, f"move {self.number}", {name: getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +123,19 @@ class MoveJob:
         return len(self.moves)
 
 
-def expand_moves(file: str, rows: Sequence[tuple[AnyMove, int]], repeat: int = 1) -> tuple[AnyMove, ...]:
+def expand_moves(
+    file: str, rows: Sequence[tuple[AnyMove, int]], repeat: int = 1, *, missing: str = "add a move with a target"
+) -> tuple[AnyMove, ...]:
     """Write out the repeats of a list, and number the moves.
 
     >>> step = Move(number=1, row=3, by=0.001)
     >>> [(move.number, move.row, move.by) for move in expand_moves("steps.toml", [(step, 3)])]
     [(1, 3, 0.001), (2, 3, 0.001), (3, 3, 0.001)]
     """
+    if not rows:
+        raise InputError.of_file(file, "no moves", "a list of at least one move", missing)
+    if len(rows) > MOST_MOVES:
+        raise too_many_moves(file, f"more than {MOST_MOVES} moves")
     count = repeat * sum(times for _, times in rows)
     if count > MOST_MOVES:
         raise too_many_moves(file, f"{count} moves, repeats counted")

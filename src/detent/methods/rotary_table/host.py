@@ -5,21 +5,20 @@ say that the table has come to rest, that a start was refused, and whether the t
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from detent.control.table_positioner import HOLD, POWER_ON
-from detent.errors import TABLE_REFUSAL_TEXT, FileProblem, InputError
+from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import at_least, at_most
 from detent.kernel.loop import advance
 from detent.methods.rotary_table import system as rotary_table
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.rotary_table.sequence_faults import StepFault, find_faults
+from detent.methods.rotary_table.sequence_faults import Fault, find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
-
-MOST_PROBLEMS = 20
 
 MARGIN = 0.5
 """What a step may take longer than twice the time of its way [s]."""
@@ -152,43 +151,43 @@ def check_sequence(spec: RotaryTableSpec, job: SequenceJob) -> None:
     for index, step in enumerate(job.steps):
         faults += _step_faults(spec, index, step)
     if faults:
-        raise InputError([_problem(job, fault) for fault in faults[:MOST_PROBLEMS]])
+        raise InputError([_problem(job, *fault) for fault in faults[:MOST_PROBLEMS]])
 
 
-def _problem(job: SequenceJob, fault: StepFault) -> FileProblem:
+def _problem(job: SequenceJob, index: int, fault: FileProblem) -> FileProblem:
     """A fault of a step with its line; a job that comes from no file names the step by its number."""
-    row = job.steps[fault.index].row
-    step = "step" if row else f"step[{fault.index + 1}]"
+    row = job.steps[index].row
+    step = "step" if row else f"step[{index + 1}]"
     key = f"{step}.{fault.key}" if fault.key else step
-    return FileProblem(job.name, row, 1 if row else 0, key, fault.came, fault.allowed, fault.remedy)
+    return replace(fault, file=job.name, line=row, column=1 if row else 0, key=key)
 
 
-def _step_faults(spec: RotaryTableSpec, index: int, step: Step) -> list[StepFault]:
+def _step_faults(spec: RotaryTableSpec, index: int, step: Step) -> list[Fault]:
     """What this axis cannot do of a step."""
     if isinstance(step, Go) and str(step.number) not in spec.position:
         numbers = describe_numbers(sorted(int(number) for number in spec.position))
         remedy = f"name one of these, or add [position.{step.number}] to the axis file"
-        return [StepFault(index, "go", f"position number {step.number}", numbers, remedy)]
+        return [(index, FileProblem.of_key("go", f"position number {step.number}", numbers, remedy))]
     return _jog_faults(spec, index, step) if isinstance(step, Jog) else []
 
 
-def _jog_faults(spec: RotaryTableSpec, index: int, jog: Jog) -> list[StepFault]:
+def _jog_faults(spec: RotaryTableSpec, index: int, jog: Jog) -> list[Fault]:
     """Speed and time of a jog against dial and timer task."""
-    found: list[StepFault] = []
+    found: list[Fault] = []
     top, least = spec.limits.speed, 1.0 / spec.per_interrupt(1.0)
     if jog.speed is not None and jog.speed > top * (1 + 1e-9):
         allowed = f"up to limits.speed, {format_quantity(top, 'rad/s')}"
         remedy = f"write speed = {at_most(top, 'rad/s')}, or raise limits.speed"
-        found.append(StepFault(index, "speed", format_quantity(jog.speed, "rad/s"), allowed, remedy))
+        found.append((index, FileProblem.of_key("speed", format_quantity(jog.speed, "rad/s"), allowed, remedy)))
     if jog.speed is not None and dial_of(spec, jog.speed) < 1:
         allowed = f"a step of the dial, {format_quantity(least, 'rad/s')}, or more"
         remedy = f"write speed = {at_least(least, 'rad/s')}, or raise method.fraction_bits"
-        found.append(StepFault(index, "speed", format_quantity(jog.speed, "rad/s"), allowed, remedy))
+        found.append((index, FileProblem.of_key("speed", format_quantity(jog.speed, "rad/s"), allowed, remedy)))
     task = spec.method.task_period
     if jog.duration is not None and jog.duration < task * (1 - 1e-9):
         allowed = f"method.task_period, {format_quantity(task, 's')}, or longer: the button is looked at so often"
         remedy = f"write for = {at_least(task, 's')}, or shorten method.task_period"
-        found.append(StepFault(index, "for", format_quantity(jog.duration, "s"), allowed, remedy))
+        found.append((index, FileProblem.of_key("for", format_quantity(jog.duration, "s"), allowed, remedy)))
     return found
 
 

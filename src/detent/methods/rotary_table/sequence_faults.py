@@ -5,8 +5,8 @@ place, and a job made by a program before it runs.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from detent.errors import FileProblem
 from detent.methods.rotary_table.sequence_job import (
     MOST_STEPS,
     Action,
@@ -27,18 +27,11 @@ LONGEST_JOB = 1e6
 """Longest time that the steps of a job may take by what they say, repeats counted [s]."""
 
 
-@dataclass(frozen=True, slots=True)
-class StepFault:
-    """What is wrong with a step among the others."""
-
-    index: int  # of the step in the job, from 0
-    key: str  # what of the step is meant, in the word of the job file
-    came: str  # and allowed, remedy: as in `detent.errors.FileProblem`
-    allowed: str
-    remedy: str
+Fault = tuple[int, FileProblem]
+"""Number of a step in the job, from 0, and what is wrong with it among the others."""
 
 
-def find_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> list[StepFault]:
+def find_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> list[Fault]:
     """What is wrong with the steps among one another, whatever axis they are for.
 
     Labels and loops; signals that are not among the inputs; a signal that cannot come on any more when its step begins,
@@ -48,7 +41,7 @@ def find_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> list[
     count = count_actions(steps)
     if count > MOST_STEPS:
         came, remedy = f"{count} steps, repeats counted", "lower the repeats"
-        faults.append(StepFault(_last_repeat(steps), "times", came, f"up to {MOST_STEPS} steps", remedy))
+        faults.append((_last_repeat(steps), FileProblem.of_key("times", came, f"up to {MOST_STEPS} steps", remedy)))
     return faults or list(_time_faults(steps, inputs))
 
 
@@ -57,7 +50,7 @@ def _last_repeat(steps: Sequence[Step]) -> int:
     return max((index for index, step in enumerate(steps) if isinstance(step, Repeat)), default=len(steps) - 1)
 
 
-def _label_faults(steps: Sequence[Step]) -> Iterator[StepFault]:
+def _label_faults(steps: Sequence[Step]) -> Iterator[Fault]:
     """Labels given twice, loops without a beginning, loops of which neither lies inside the other."""
     labels: dict[str, int] = {}
     for index, step in enumerate(steps):
@@ -66,7 +59,7 @@ def _label_faults(steps: Sequence[Step]) -> Iterator[StepFault]:
                 yield _no_such_label(index, step.label, labels)
         elif step.label in labels:
             allowed, remedy = "each label once", "give one of the steps another label"
-            yield StepFault(index, "label", f'the label "{step.label}" again', allowed, remedy)
+            yield (index, FileProblem.of_key("label", f'the label "{step.label}" again', allowed, remedy))
         elif step.label:
             labels[step.label] = index
     loops = find_loops(steps)
@@ -74,17 +67,17 @@ def _label_faults(steps: Sequence[Step]) -> Iterator[StepFault]:
         if any(other < begin <= last < end for last, other in loops.items()):
             came = "a loop that begins inside an earlier loop and ends outside it"
             remedy = "begin it where the earlier loop begins, or before that, or after the earlier loop"
-            yield StepFault(end, "repeat", came, "loops inside one another or apart", remedy)
+            yield (end, FileProblem.of_key("repeat", came, "loops inside one another or apart", remedy))
 
 
-def _no_such_label(index: int, label: str, labels: Mapping[str, int]) -> StepFault:
+def _no_such_label(index: int, label: str, labels: Mapping[str, int]) -> Fault:
     known = ", ".join(f'"{name}"' for name in labels) or "none of them has one"
     remedy = f'write label = "{label}" in the first step of the loop, or correct the name'
     came = f'the label "{label}", which no step before has'
-    return StepFault(index, "repeat", came, f"the label of an earlier step: {known}", remedy)
+    return (index, FileProblem.of_key("repeat", came, f"the label of an earlier step: {known}", remedy))
 
 
-def _signal_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> Iterator[StepFault]:
+def _signal_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> Iterator[Fault]:
     """Steps that ask for a signal nobody gives, or set one that comes from outside."""
     known = ", ".join(f'"{name}"' for name in inputs) or "the job has none"
     for index, step in enumerate(steps):
@@ -92,10 +85,10 @@ def _signal_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> It
         if isinstance(step, Output):
             if signal in inputs:
                 remedy = "give the output another name"
-                yield StepFault(index, key, f'the input "{signal}"', "a name that no input has", remedy)
+                yield (index, FileProblem.of_key(key, f'the input "{signal}"', "a name that no input has", remedy))
         elif signal is not None and not inputs.get(signal):
             came, remedy = f'the unknown input "{signal}"', f'add [[input]] with name = "{signal}", or correct the name'
-            yield StepFault(index, key, came, f"an input of this job: {known}", remedy)
+            yield (index, FileProblem.of_key(key, came, f"an input of this job: {known}", remedy))
 
 
 def _signal_of(step: Step) -> tuple[str | None, str]:
@@ -109,7 +102,7 @@ def _signal_of(step: Step) -> tuple[str | None, str]:
     return None, ""
 
 
-def _time_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> Iterator[StepFault]:
+def _time_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> Iterator[Fault]:
     """The first step that would wait for ever, or that begins later than any job may last."""
     time = 0.0
     for index, step in write_out(steps):
@@ -122,12 +115,12 @@ def _time_faults(steps: Sequence[Step], inputs: Mapping[str, Stretches]) -> Iter
                 "a signal that comes on after the step begins",
                 f'let "{signal}" be on later, or repeat less',
             )
-            yield StepFault(index, key, came, allowed, remedy)
+            yield (index, FileProblem.of_key(key, came, allowed, remedy))
             return
         time = later
         if time > LONGEST_JOB:
             came, allowed = f"a sequence of more than {LONGEST_JOB:g} s", f"up to {LONGEST_JOB:g} s"
-            yield StepFault(index, "", came, allowed, "shorten the waits, or repeat less")
+            yield (index, FileProblem.of_key("", came, allowed, "shorten the waits, or repeat less"))
             return
 
 

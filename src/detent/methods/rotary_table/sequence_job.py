@@ -7,16 +7,19 @@ another is found in `sequence_faults`. Here everything is in SI units.
 
 from __future__ import annotations
 
-import math
 import re
 from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Annotated, Any, Literal
 
-from detent.errors import DetentError
+from pydantic import AfterValidator, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+from detent.errors import FileProblem
+from detent.files.fields import optional, required
+from detent.files.quantities import AngularVelocity, Time
+from detent.files.read import Row, check_values
 
 MOST_STEPS = 100_000
 """Steps of a job at most, repeats counted."""
@@ -31,6 +34,119 @@ SIGNAL_NAME = re.compile(r"[^\W_][\w.:-]{0,39}")
 """Names of signals and labels: a letter or digit, then up to 39 letters, digits and ``_ . : -``."""
 
 WHAT_A_NAME_IS = "a letter or digit, then up to 39 letters, digits and _ . : -"
+
+
+ACTIONS: dict[str, tuple[str, ...]] = {
+    "go": ("label",),
+    "jog": ("speed", "while", "for", "label"),
+    "wait": ("label",),
+    "wait_for": ("level", "label"),
+    "set": ("label",),
+    "clear": ("label",),
+    "repeat": ("times",),
+}
+"""What a step can be, and the keys that it may have beside."""
+
+
+def _check_name(name: str) -> str:
+    if not SIGNAL_NAME.fullmatch(name):
+        raise PydanticCustomError("refused", "not a name", {})
+    return name
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+
+
+def name_key(doc: str, alias: str | None = None) -> Any:
+    """Declare a key that may hold a name."""
+    what = "the label of an earlier step" if "label" in doc else "a name"
+    return optional(doc, None, alias=alias, allowed=f"{what}: {WHAT_A_NAME_IS}")
+
+
+class InputRow(Row, frozen=True):
+    """A stretch of time in which an input signal is on; a signal may have several."""
+
+    name: Name = required("the signal", '"feed"', allowed=f"a name: {WHAT_A_NAME_IS}")
+    begin: Time = required("when it comes", '"1 s"', alias="from", ge=0, le=LONGEST_TIME)
+    end: Time = required("when it goes", '"4 s"', alias="to", ge=0, le=LONGEST_TIME)
+
+    @field_validator("end")
+    @classmethod
+    def is_later(cls, end: float, info: ValidationInfo) -> float:
+        """Refuse a stretch that ends before it begins."""
+        begin = info.data.get("begin", -1.0)
+        if begin < end:
+            return end
+        allowed = f"a time after from, {begin:g} s"
+        raise PydanticCustomError("refused", "too early", {"allowed": allowed, "remedy": "correct one of the two"})
+
+
+class StepRow(Row, frozen=True):
+    """A step as a file says it: one of `ACTIONS`, and what belongs to it."""
+
+    go: int | None = optional(
+        "position number", None, allowed=f"a position number from 0 to {LAST_NUMBER}", ge=0, le=LAST_NUMBER
+    )
+    jog: Literal["+", "-"] | None = optional("direction of a jog", None, allowed='"+" (to larger angles) or "-"')
+    wait: Time | None = optional("how long to wait", None, ge=0, le=LONGEST_TIME)
+    wait_for: Name | None = name_key("an input to wait for")
+    set_on: Name | None = name_key("an output to switch on", alias="set")
+    clear: Name | None = name_key("an output to switch off")
+    repeat: Name | None = name_key("the label of an earlier step")
+    speed: AngularVelocity | None = optional("speed of a jog", None, derived="the axis's largest", gt=0)
+    signal: Name | None = name_key("an input that holds the button down", alias="while")
+    duration: Time | None = optional("how long the button is held down", None, alias="for", gt=0, le=LONGEST_TIME)
+    level: bool = optional("level of the input that ends the wait", default=True, allowed="true (on) or false (off)")
+    times: int | None = optional("how often the loop is done altogether", None, ge=1, le=MOST_STEPS)
+    label: Annotated[str, AfterValidator(lambda name: name and _check_name(name))] = optional(
+        "name of the step, for a repeat", "", allowed=f"a name: {WHAT_A_NAME_IS}"
+    )
+
+    @classmethod
+    def faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
+        """Keys that do not go together, or that the step lacks."""
+        actions = [key for key in stated if key in ACTIONS]
+        one = f"exactly one of {', '.join(ACTIONS)}"
+        if len(actions) > 1:
+            yield FileProblem.of_key(actions[1], " and ".join(actions), one, "write a [[step]] for each")
+        elif not actions:
+            if is_whole:
+                yield FileProblem.of_key("", "a step that does nothing", one, "add go = 1, or another of these")
+        else:
+            yield from _beside(actions[0], [key for key in stated if key in cls.known()])
+            if is_whole:
+                yield from _lacking(actions[0], stated)
+
+
+def _beside(action: str, stated: Iterable[str]) -> Iterator[FileProblem]:
+    """Keys that do not belong to the action."""
+    remedies = {
+        ("go", "speed"): "remove it; the speed to a position stands in the axis file, in [position.NUMBER]",
+        ("repeat", "label"): "remove it; put the label on a step that does something",
+    }
+    for key in stated:
+        if key not in (action, *ACTIONS[action]):
+            owners = " or ".join(name for name, keys in ACTIONS.items() if key in keys)
+            allowed = f"beside {action}: {', '.join(ACTIONS[action])} ({key} belongs to {owners})"
+            yield FileProblem.of_key(key, f"{key} beside {action}", allowed, remedies.get((action, key), "remove it"))
+
+
+def _lacking(action: str, stated: Mapping[str, Any]) -> Iterator[FileProblem]:
+    """Keys that the action needs."""
+    if action == "repeat" and "times" not in stated:
+        allowed = "a whole number of times, the first counted"
+        yield FileProblem.of_key("repeat", "repeat without times", allowed, "add times = 2")
+    held = [key for key in ("while", "for") if key in stated]
+    if action == "jog" and len(held) != 1:
+        came = "jog with while and for" if held else "jog without an end"
+        remedy = "remove one of the two" if held else 'add for = "2 s", or while with the name of an input'
+        yield FileProblem.of_key("jog", came, "exactly one of while (a signal) and for (a time)", remedy)
+
+
+def _check(row: int, **values: object) -> None:
+    """Refuse a step that no file could have; keys that are words of Python end in an underscore."""
+    where = f"step of line {row}" if row else "step"
+    check_values(StepRow, where, {key.removesuffix("_"): value for key, value in values.items()})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +174,7 @@ class Go:
 
     def __post_init__(self) -> None:
         """Refuse numbers that no position table has."""
-        if not 0 <= self.number <= LAST_NUMBER:
-            came, allowed = f"position number {self.number}", f"a whole number from 0 to {LAST_NUMBER}"
-            raise _bad_step(self.row, came, allowed, "name an entry of the axis's position table")
-        _check_name(self.row, "label", self.label, empty=True)
+        _check(self.row, go=self.number, label=self.label)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +212,9 @@ class Jog:
 
     def __post_init__(self) -> None:
         """Refuse what no panel could do."""
-        if self.direction not in (1, -1):
-            raise _bad_step(self.row, f"a jog in direction {self.direction}", "1 or -1", "correct the direction")
-        if self.speed is not None and not 0 < self.speed < math.inf:
-            remedy = "correct the speed, or leave it out for the axis's largest"
-            raise _bad_step(self.row, f"a jog at {self.speed} rad/s", "more than 0 rad/s", remedy)
-        _check_one(self.row, "a jog", self.signal, self.duration)
-        if self.duration is not None and not 0 < self.duration <= LONGEST_TIME:
-            allowed = f"more than 0 s, up to {LONGEST_TIME:g} s"
-            raise _bad_step(self.row, f"a jog for {self.duration} s", allowed, "correct the time")
-        _check_name(self.row, "label", self.label, empty=True)
+        signs = {1: "+", -1: "-"}
+        jog = signs.get(self.direction, self.direction)
+        _check(self.row, jog=jog, speed=self.speed, while_=self.signal, for_=self.duration, label=self.label)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +246,8 @@ class Wait:
 
     def __post_init__(self) -> None:
         """Refuse waits without a meaning."""
-        _check_one(self.row, "a wait", self.signal, self.duration)
-        if self.duration is not None and not 0 <= self.duration <= LONGEST_TIME:
-            raise _bad_step(
-                self.row, f"a wait of {self.duration} s", f"0 s up to {LONGEST_TIME:g} s", "correct the time"
-            )
-        _check_name(self.row, "label", self.label, empty=True)
+        ended = {} if self.signal is None else {"level": self.level}
+        _check(self.row, wait=self.duration, wait_for=self.signal, label=self.label, **ended)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,8 +276,7 @@ class Output:
 
     def __post_init__(self) -> None:
         """Refuse names that are none."""
-        _check_name(self.row, "output", self.signal)
-        _check_name(self.row, "label", self.label, empty=True)
+        _check(self.row, **{"set" if self.on else "clear": self.signal}, label=self.label)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,10 +304,7 @@ class Repeat:
 
     def __post_init__(self) -> None:
         """Refuse loops that are done no time."""
-        if not 1 <= self.times <= MOST_STEPS:
-            allowed = f"a whole number from 1 to {MOST_STEPS}"
-            raise _bad_step(self.row, f"a loop done {self.times} times", allowed, "correct the number")
-        _check_name(self.row, "label", self.label)
+        _check(self.row, repeat=self.label, times=self.times)
 
 
 Step = Go | Jog | Wait | Output | Repeat
@@ -217,24 +315,6 @@ Action = Go | Jog | Wait | Output
 
 Stretches = tuple[tuple[float, float], ...]
 """Times [s] in which a signal is on: from, to; in order, apart from one another."""
-
-
-def _check_one(row: int, what: str, signal: str | None, duration: float | None) -> None:
-    if (signal is None) == (duration is None):
-        came = f"{what} with {'neither a time nor a signal' if signal is None else 'both a time and a signal'}"
-        raise _bad_step(row, came, "exactly one of the two", "correct the step")
-    if signal is not None:
-        _check_name(row, "signal", signal)
-
-
-def _check_name(row: int, what: str, name: str, *, empty: bool = False) -> None:
-    if not (empty and not name) and not SIGNAL_NAME.fullmatch(name):
-        raise _bad_step(row, f"the {what} {name!r}", WHAT_A_NAME_IS, "correct the name")
-
-
-def _bad_step(row: int, came: str, allowed: str, remedy: str) -> DetentError:
-    where = f"step of line {row}" if row else "step"
-    return DetentError(f"{where}: came {came}; allowed: {allowed}; do: {remedy}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,135 @@ everything is in SI units, and nothing is known of the motors but their names.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, cast
 
-from detent.methods.moves.job import bad_move, check_dwell
+from pydantic import AfterValidator, create_model
+from pydantic_core import PydanticCustomError
+
+from detent.errors import FileProblem
+from detent.files.fields import Table, optional
+from detent.files.quantities import Length, Time, Velocity
+from detent.files.read import Row, check_values, example_value
+from detent.files.text import MAX_SHOWN
+from detent.methods.moves.job import MOST_MOVES
+
+
+def _check_label(text: str) -> str:
+    if len(text) > MAX_SHOWN or not text.isprintable():
+        raise PydanticCustomError("refused", "not a label", {})
+    return text
+
+
+def _check_speed(speed: float | None) -> float | None:
+    if speed == 0:
+        raise PydanticCustomError("refused", "no motion", {"remedy": "write a minus for the negative direction"})
+    return speed
+
+
+Label = Annotated[str, AfterValidator(_check_label)]
+
+_LABEL = f"text of up to {MAX_SHOWN} printable characters"
+
+
+class StageRow(Row, frozen=True):
+    """A move or a manual run as a file says it; `stage_row` adds the motors, whose keys are places."""
+
+    motors: ClassVar[tuple[str, ...]] = ()
+    by: Table | None = optional("ways of motors from the places before", None)
+    turn: Length | None = optional("where the motor turns before it goes to its place", None)
+    changed_at: Length | None = optional("where the motor is when its stop is changed", None)
+    changed_to: Length | None = optional("the new stop", None)
+    jog: str | None = optional("the motor that is driven by hand", None)
+    speed: Annotated[Velocity | None, AfterValidator(_check_speed)] = optional(
+        "speed of a manual run", None, allowed="a velocity other than 0 mm/s"
+    )
+    duration: Time | None = optional("how long the motor is driven by hand", None, gt=0)
+    dwell: Time = optional("how long the stage stands after it is ready", 0.0, ge=0)
+    repeat: int = optional("how often it is done in succession", 1, ge=1, le=MOST_MOVES)
+    label: Label = optional("what it is for", "", allowed=_LABEL)
+
+    @classmethod
+    def faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
+        """Keys that do not go together, or that the row lacks."""
+        yield from (cls._jog_faults if "jog" in stated else cls._move_faults)(stated, is_whole=is_whole)
+
+    @classmethod
+    def _jog_faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
+        """What is wrong with a manual run as a whole."""
+        if isinstance(stated["jog"], str) and stated["jog"] not in cls.motors:
+            allowed = f"a motor: {', '.join(cls.motors)}"
+            yield FileProblem.of_key("jog", "", allowed, "name a motor of the axis file")
+        for key in stated:
+            if key in (*cls.motors, "by", "turn", "changed_at", "changed_to"):
+                allowed, remedy = "beside jog: speed, duration, dwell, repeat, label", "give it a [[move]] of its own"
+                yield FileProblem.of_key(key, f'the key "{key}" beside jog', allowed, remedy)
+        if is_whole:
+            yield from cls._lacking(stated, ("speed", "duration"), "of a jog")
+
+    @classmethod
+    def _move_faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
+        """What is wrong with an automatic move as a whole."""
+        by = cast("dict[str, Any]", stated["by"]) if isinstance(stated.get("by"), dict) else {}
+        ways = [motor for motor in cls.motors if motor in stated or motor in by]
+        for key in ("speed", "duration"):
+            if key in stated:
+                remedy = f'remove it, for the tables decide how fast; or add jog = "{cls.motors[0]}" for a manual run'
+                yield FileProblem.of_key(key, f'the key "{key}" without jog', "speed and duration of a jog", remedy)
+        for motor in (motor for motor in ways if motor in stated and motor in by):
+            allowed = f"{motor} (a place) or by.{motor} (a way from the place before)"
+            yield FileProblem.of_key(f"by.{motor}", f"{motor} and by.{motor}", allowed, "remove one of the two")
+        if not ways and is_whole and (not stated.get("by") or by):
+            motors, first = ", ".join(cls.motors), cls.motors[0]
+            remedy = f'add {first} = "12 mm" or by = {{{first} = "1 mm"}}'
+            yield FileProblem.of_key(first, "no motor", f"a place or a way for at least one of {motors}", remedy)
+        changed = [key for key in ("changed_at", "changed_to") if key in stated]
+        if changed and is_whole:
+            yield from cls._lacking(stated, ("changed_at", "changed_to"), "of a stop changed on the way")
+        if "turn" in stated and changed:
+            allowed = "one of them: the motor would pass the place twice"
+            yield FileProblem.of_key(changed[0], f"turn and {changed[0]}", allowed, "divide the move into two")
+        for key in [key for key in ("turn", *changed) if key in stated][:1] if len(ways) > 1 else ():
+            came, allowed = f"{key} in a move of {len(ways)} motors", f"{key} in a move of exactly one motor"
+            yield FileProblem.of_key(key, came, allowed, "give the motor a [[move]] of its own")
+
+    @classmethod
+    def _lacking(cls, stated: Mapping[str, Any], needed: Sequence[str], what: str) -> Iterator[FileProblem]:
+        """Keys that belong together and are not all there."""
+        for key in needed:
+            if key not in stated:
+                allowed, remedy = f"{' and '.join(needed)} {what}", f"add {key} = {example_value(cls, key)}"
+                yield FileProblem.of_key(key, f"no {key}", allowed, remedy)
+
+
+class PlaceRow(StageRow, frozen=True):
+    """A line of a list of places."""
+
+    tile: Label = optional("what a place is called", "", allowed=_LABEL)
+
+
+@lru_cache(maxsize=64)
+def stage_row(motors: tuple[str, ...], base: type[StageRow] = StageRow) -> type[StageRow]:
+    """Model of a row whose places and ways are those of some motors."""
+    # Names of motors are keys only: as fields they could be words of pydantic.
+    length: Any = Length
+    places: dict[str, Any] = {
+        f"m{number}": (length | None, optional(f"place of {motor}", None, alias=motor))
+        for number, motor in enumerate(motors)
+    }
+    by: Any = create_model("StageWays", __base__=Table, **places)
+    ways: Any = (by | None, StageRow.model_fields["by"])
+    row = create_model("StageRow", __base__=base, by=ways, **places)
+    row.motors = motors
+    return row
+
+
+def places_of(table: Table | None, motors: Sequence[str]) -> dict[str, float]:
+    """Places or ways of the motors that a row, or its table of ways, names [m]."""
+    found = {motor: getattr(table, f"m{number}", None) for number, motor in enumerate(motors)}
+    return {motor: place for motor, place in found.items() if place is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,28 +197,14 @@ class StageMove:
 
     def __post_init__(self) -> None:
         """Refuse what no stage could do."""
-        motors = self.motors
-        if not motors:
-            raise bad_move(self.number, "no motor", "a target or a way for at least one motor")
-        if len(set(motors)) < len(motors):
-            both = next(motor for motor in self.targets if motor in self.by)
-            raise bad_move(self.number, f"a target and a way for {both}", "one of the two for each motor")
-        for motor, way in (*self.targets.items(), *self.by.items()):
-            _check_length(self.number, f"way of {motor}", way)
-        check_dwell(self.number, self.dwell)
-        if self.turn is not None or self.change is not None:
-            self._check_extremes(motors)
-
-    def _check_extremes(self, motors: tuple[str, ...]) -> None:
-        if len(motors) > 1:
-            raise bad_move(self.number, f"a turn or a change with {len(motors)} motors", "one motor, which it is for")
-        if self.turn is not None and self.change is not None:
-            raise bad_move(self.number, "a turn and a change", "one of the two")
-        if self.turn is not None:
-            _check_length(self.number, "turn", self.turn)
+        # No word of a file: a motor could be called as one.
+        named = {motor: f"motor {motor}" for motor in self.motors}
+        values: dict[str, Any] = {named[motor]: place for motor, place in self.targets.items()}
+        values["by"] = {named[motor]: way for motor, way in self.by.items()}
+        values |= {"dwell": self.dwell, "turn": self.turn}
         if self.change is not None:
-            _check_length(self.number, "place of the change", self.change.at)
-            _check_length(self.number, "changed stop", self.change.to)
+            values |= {"changed_at": self.change.at, "changed_to": self.change.to}
+        check_values(stage_row(tuple(named.values()) or ("motor",)), f"move {self.number}", values)
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -136,11 +247,8 @@ class StageJog:
 
     def __post_init__(self) -> None:
         """Refuse what no stage could do."""
-        if not (math.isfinite(self.speed) and self.speed):
-            raise bad_move(self.number, f"a speed of {self.speed} m/s", "a finite speed other than 0 m/s")
-        if not 0 < self.duration < math.inf:
-            raise bad_move(self.number, f"a duration of {self.duration} s", "more than 0 s")
-        check_dwell(self.number, self.dwell)
+        values = {name: getattr(self, name) for name in ("speed", "duration", "dwell")}
+        check_values(stage_row(("motor",)), f"move {self.number}", {"jog": "motor", **values})
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -176,8 +284,3 @@ class StageJob:
     def count(self) -> int:
         """Number of moves."""
         return len(self.moves)
-
-
-def _check_length(number: int, name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise bad_move(number, f"a {name} of {value} m", "a finite number of metres")

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from detent.errors import DetentError, InputError
-from detent.methods.moves.job import MOST_MOVES, MOST_PROBLEMS, Move, MoveJob, expand_moves, text_job
+from detent.errors import MOST_PROBLEMS, DetentError, InputError
+from detent.methods.moves.job import MOST_MOVES, Move, MoveJob, expand_moves, text_job
 
 PITCH = 0.00254
 
@@ -38,15 +38,15 @@ def test_a_move_says_where_or_how_far_and_leaves_the_rest_to_the_axis():
 @pytest.mark.parametrize(
     ("values", "came", "allowed"),
     [
-        ({}, "target None and by None", "exactly one"),
-        ({"target": 0.1, "by": 0.2}, "target 0.1 and by 0.2", "exactly one"),
-        ({"target": math.nan}, "a way of nan m", "a finite number"),
-        ({"by": math.inf}, "a way of inf m", "a finite number"),
-        ({"by": 0.1, "dwell": -0.5}, "a dwell of -0.5 s", "0 s or more"),
-        ({"by": 0.1, "dwell": math.inf}, "a dwell of inf s", "0 s or more"),
-        ({"by": 0.1, "speed": 0.0}, "a speed of 0.0 m/s", "more than 0 m/s"),
-        ({"by": 0.1, "speed": math.nan}, "a speed of nan m/s", "more than 0 m/s"),
-        ({"by": 0.1, "sample_period": -1e-3}, "a sample period of -0.001 s", "more than 0 s"),
+        ({}, "neither target nor by", "exactly one"),
+        ({"target": 0.1, "by": 0.2}, "target and by", "exactly one"),
+        ({"target": math.nan}, "target nan m", "a length"),
+        ({"by": math.inf}, "by inf m", "a length"),
+        ({"by": 0.1, "dwell": -0.5}, "dwell -0.5 s", "a time from 0 s"),
+        ({"by": 0.1, "dwell": math.inf}, "dwell inf s", "a time from 0 s"),
+        ({"by": 0.1, "speed": 0.0}, "speed 0.0 m/s", "a velocity above 0 m/s"),
+        ({"by": 0.1, "speed": math.nan}, "speed nan m/s", "a velocity above 0 m/s"),
+        ({"by": 0.1, "sample_period": -1e-3}, "sample_period -0.001 s", "a time above 0 s"),
     ],
 )
 def test_no_move_is_what_no_axis_can_do(values, came, allowed):

@@ -25,27 +25,27 @@ from detent.methods.rotary_table.sequence_job import (
 @pytest.mark.parametrize(
     ("make", "came"),
     [
-        (lambda: Go(-1), "position number -1"),
-        (lambda: Go(128), "position number 128"),
-        (lambda: Go(1, label="_x"), "the label '_x'"),
-        (lambda: Jog(0, duration=1.0), "a jog in direction 0"),
-        (lambda: Jog(1), "a jog with neither a time nor a signal"),
-        (lambda: Jog(1, signal="a", duration=1.0), "a jog with both a time and a signal"),
-        (lambda: Jog(1, speed=0.0, duration=1.0), "a jog at 0.0 rad/s"),
-        (lambda: Jog(1, speed=math.inf, duration=1.0), "a jog at inf rad/s"),
-        (lambda: Jog(1, speed=math.nan, duration=1.0), "a jog at nan rad/s"),
-        (lambda: Jog(-1, duration=0.0), "a jog for 0.0 s"),
-        (lambda: Jog(-1, duration=2 * LONGEST_TIME), "a jog for 200000.0 s"),
-        (lambda: Jog(1, signal=""), "the signal ''"),
-        (Wait, "a wait with neither a time nor a signal"),
-        (lambda: Wait(1.0, "a"), "a wait with both a time and a signal"),
-        (lambda: Wait(-0.1), "a wait of -0.1 s"),
-        (lambda: Wait(math.nan), "a wait of nan s"),
-        (lambda: Wait(signal="a b"), "the signal 'a b'"),
-        (lambda: Output("x" * 41, on=True), f"the output '{'x' * 41}'"),
-        (lambda: Repeat("a", 0), "a loop done 0 times"),
-        (lambda: Repeat("a", MOST_STEPS + 1), f"a loop done {MOST_STEPS + 1} times"),
-        (lambda: Repeat("", 2), "the label ''"),
+        (lambda: Go(-1), "go -1"),
+        (lambda: Go(128), "go 128"),
+        (lambda: Go(1, label="_x"), "label '_x'"),
+        (lambda: Jog(0, duration=1.0), "jog 0"),
+        (lambda: Jog(1), "jog without an end"),
+        (lambda: Jog(1, signal="a", duration=1.0), "jog with while and for"),
+        (lambda: Jog(1, speed=0.0, duration=1.0), "speed 0.0 rad/s"),
+        (lambda: Jog(1, speed=math.inf, duration=1.0), "speed inf rad/s"),
+        (lambda: Jog(1, speed=math.nan, duration=1.0), "speed nan rad/s"),
+        (lambda: Jog(-1, duration=0.0), "for 0.0 s"),
+        (lambda: Jog(-1, duration=2 * LONGEST_TIME), "for 200000.0 s"),
+        (lambda: Jog(1, signal=""), "jog without an end"),
+        (Wait, "a step that does nothing"),
+        (lambda: Wait(1.0, "a"), "wait and wait_for"),
+        (lambda: Wait(-0.1), "wait -0.1 s"),
+        (lambda: Wait(math.nan), "wait nan s"),
+        (lambda: Wait(signal="a b"), "wait_for 'a b'"),
+        (lambda: Output("x" * 41, on=True), f"set '{'x' * 41}'"),
+        (lambda: Repeat("a", 0), "times 0"),
+        (lambda: Repeat("a", MOST_STEPS + 1), f"times {MOST_STEPS + 1}"),
+        (lambda: Repeat("", 2), "a step that does nothing"),
     ],
 )
 def test_a_step_that_means_nothing_is_refused(make, came):
@@ -55,7 +55,7 @@ def test_a_step_that_means_nothing_is_refused(make, came):
 
 
 def test_a_refusal_names_the_line():
-    with pytest.raises(DetentError, match=r"^step of line 12: came position number 300"):
+    with pytest.raises(DetentError, match=r"^step of line 12: came go 300"):
         Go(300, row=12)
 
 

@@ -6,9 +6,9 @@ from itertools import pairwise
 import pytest
 from tests.places import DATA
 
-from detent.errors import InputError
-from detent.files.job_text import MAX_BYTES
-from detent.methods.moves.job import MOST_MOVES, MOST_PROBLEMS
+from detent.errors import MOST_PROBLEMS, InputError
+from detent.files.text import MAX_BYTES
+from detent.methods.moves.job import MOST_MOVES
 from detent.methods.stepper_envelope.stage_file import load_stage_job
 from detent.methods.stepper_envelope.stage_job import Change, StageJog
 
@@ -143,15 +143,15 @@ def test_csv_column_of_something_else_is_passed_over(write, name):
         ("1,nan", 3, "x", '"nan"', "a plain number"),
         ("1,1 mm", 3, "x", '"1 mm"', "a plain number"),
         ('1,"1,5"', 3, "x", '"1,5"', "a plain number"),
-        ("1,1e999", 3, "x", '"1e999 mm" is beyond any number', "a length"),
-        ("1,,2,-1", 6, "dwell", "-1 ms", "0 ms or more"),
-        ("1,1,,,0", 7, "repeat", "0", f"a whole number from 1 to {MOST_MOVES}"),
-        ("1,1,,,2.5", 7, "repeat", '"2.5"', f"a whole number from 1 to {MOST_MOVES}"),
-        ("1,,,5", 3, "x", "an empty cell", "a place for at least one of x, y"),
-        ("1", 2, "x", "an empty cell", "a place for at least one of x, y"),
+        ("1,1e999", 3, "x", "1e999 mm", "a length"),
+        ("1,,2,-1", 6, "dwell", "-1 ms", "a time from 0 s"),
+        ("1,1,,,0", 7, "repeat", "0", f"a whole number from 1 up to {MOST_MOVES}"),
+        ("1,1,,,2.5", 7, "repeat", '"2.5"', f"a whole number from 1 up to {MOST_MOVES}"),
+        ("1,,,5", 3, "x", "no motor", "a place or a way for at least one of x, y"),
+        ("1", 2, "x", "no motor", "a place or a way for at least one of x, y"),
         ("1,1,1,1,1,extra", 11, "", "6 cells", "5 as in the header"),
-        (f"{'t' * 61},1", 1, "", f"{'t' * 60}...", "up to 60 characters"),
-        ("a\x07b,1", 1, "", "a\ufffdb", "printable characters"),
+        (f"{'t' * 61},1", 1, "tile", f"{'t' * 60}...", "text of up to 60"),
+        ("a\x07b,1", 1, "tile", "a\ufffdb", "text of up to 60 printable"),
         ('1,"1', 1, "", '1,"1', "cells separated by commas or semicolons"),
     ],
 )
@@ -234,25 +234,31 @@ def test_toml_as_programs_write_it(write):
 @pytest.mark.parametrize(
     ("line", "key", "came", "allowed", "remedy"),
     [
-        ("y = 12", "y", "12", 'a length such as "12 mm"', 'write it in quotes with its unit: y = "12 mm"'),
-        ('y = "12"', "y", "the bare number 12", "a length", "write the unit after the number"),
-        ('y = "1 s"', "y", 'the unit "s", which measures something else', "a length", "use a unit"),
-        ('by = "1 mm"', "by", '"1 mm"', 'a way for each motor, as in by = {x = "1 mm"}', 'write by = {x = "1 mm"}'),
-        ('by = {z = "1 mm"}', "by.z", 'the unknown key "z"', "in by: x, y", "remove it"),
-        ("by.y = 1", "by.y", "1", "a length", 'write it in quotes with its unit: by.y = "12 mm"'),
-        ('by = {y = {a = "1 mm"}}', "by.y", '{a = "1 mm"}', "a length", "write it in quotes"),
+        ("y = 12", "y", "12", 'a length such as "12 mm"', "write it as text with a unit"),
+        ('y = "12"', "y", '"12"', "a length", "write the unit after the number"),
+        ('y = "1 s"', "y", '"1 s"', "a length", "use a unit"),
+        ('by = "1 mm"', "by", '"1 mm"', "the table [move.by] with x, y", "write [move.by] on a line"),
+        ('by = {z = "1 mm"}', "by.z", 'the unknown key "z"', "in [move.by]: x, y", "remove it"),
+        ("by.y = 1", "by.y", "1", "a length", "write it as text with a unit"),
+        ('by = {y = {a = "1 mm"}}', "by.y", '{a = "1 mm"}', "a length", "write it as text with a unit"),
         ('by = {x = "1 mm"}', "by.x", "x and by.x", "x (a place) or by.x (a way", "remove one of the two"),
-        ('z = "1 mm"', "z", 'the unknown key "z"', "in [[move]]: x, y, by, turn,", "remove it"),
-        ('target = "1 mm"', "target", 'the unknown key "target"', "in [[move]]: x, y", 'name the motor, as in x = "12'),
-        ('speed = "1 mm/s"', "speed", 'the key "speed" without jog', "in [[move]]: x, y", "remove it, for the tables"),
-        ('dwel = "1 ms"', "dwel", 'the unknown key "dwel"', "in [[move]]: x, y", 'did you mean "dwell"?'),
-        ('dwell = "-1 ms"', "dwell", '"-1 ms"', "0 ms or more", "write how long"),
-        ("repeat = 0", "repeat", "0", "a whole number from 1", "leave it out"),
-        ('repeat = "2"', "repeat", '"2"', "a whole number", "write a whole number without quotes"),
-        ("label = 3", "label", "3", "a text", 'write it in quotes, as in label = "overview"'),
-        (f'label = "{"a" * 61}"', "label", f'"{"a" * 59}...', "up to 60 characters", "shorten it"),
-        ('label = "a\\tb"', "label", '"a\\tb"', "printable characters", "remove the others"),
-        ("turn = 3", "turn", "3", "a length", "write it in quotes with its unit: turn"),
+        ('z = "1 mm"', "z", 'the unknown key "z"', "in [[move]]: ", "remove it"),
+        ('target = "1 mm"', "target", 'the unknown key "target"', "in [[move]]: ", "remove it"),
+        (
+            'speed = "1 mm/s"',
+            "speed",
+            'the key "speed" without jog',
+            "speed and duration of a jog",
+            "remove it, for the tables",
+        ),
+        ('dwel = "1 ms"', "dwel", 'the unknown key "dwel"', "in [[move]]: ", 'did you mean "dwell"?'),
+        ('dwell = "-1 ms"', "dwell", '"-1 ms"', "a time from 0 s", "give dwell a value"),
+        ("repeat = 0", "repeat", "0", "a whole number from 1", "give repeat a value"),
+        ('repeat = "2"', "repeat", '"2"', "a whole number", "write the number without quotes"),
+        ("label = 3", "label", "3", "text of up to 60", "put it in quotes: label ="),
+        (f'label = "{"a" * 61}"', "label", f'"{"a" * 59}...', "text of up to 60", "give label a value"),
+        ('label = "a\\tb"', "label", '"a\\tb"', "text of up to 60 printable", "give label a value"),
+        ("turn = 3", "turn", "3", "a length", "write it as text with a unit"),
     ],
 )
 def test_toml_key_that_will_not_do(write, line, key, came, allowed, remedy):
@@ -266,9 +272,19 @@ def test_toml_key_that_will_not_do(write, line, key, came, allowed, remedy):
 @pytest.mark.parametrize(
     ("line", "key", "came", "remedy"),
     [
-        ("", "", "no duration", 'add duration = "0.5 s"'),
-        ('duration = "0 s"', "duration", '"0 s"', "write how long the motor is driven by hand"),
-        ('duration = "-1 s"', "duration", '"-1 s"', "write how long the motor is driven by hand"),
+        ("", "duration", "no duration", 'add duration = "5 ms"'),
+        (
+            'duration = "0 s"',
+            "duration",
+            '"0 s"',
+            "give duration a value in this range (how long the motor is driven by hand)",
+        ),
+        (
+            'duration = "-1 s"',
+            "duration",
+            '"-1 s"',
+            "give duration a value in this range (how long the motor is driven by hand)",
+        ),
         ('duration = "1 s"\ny = "1 mm"', "y", 'the key "y" beside jog', "give it a [[move]] of its own"),
         ('duration = "1 s"\nturn = "1 mm"', "turn", 'the key "turn" beside jog', "give it a [[move]] of its own"),
         ('duration = "1 s"\ntarget = "1 mm"', "target", 'the unknown key "target"', "remove it"),
@@ -276,8 +292,8 @@ def test_toml_key_that_will_not_do(write, line, key, came, allowed, remedy):
 )
 def test_toml_manual_run_that_will_not_do(write, line, key, came, remedy):
     (problem,) = refusal(write("job.toml", f'[[move]]\njog = "x"\nspeed = "1 mm/s"\n{line}\n'))
-    row = 1 if not key else 3 + len(line.splitlines())
-    assert told([problem]) == [(row, 1, f"move.{key}" if key else "move", came)]
+    row = 3 + len(line.splitlines()) if line else 1
+    assert told([problem]) == [(row, 1, f"move.{key}", came)]
     assert problem.remedy == remedy
 
 
@@ -285,10 +301,10 @@ def test_toml_manual_run_that_will_not_do(write, line, key, came, remedy):
     ("line", "place", "key", "came", "allowed"),
     [
         ('jog = "z"\nspeed = "1 mm/s"', (2, 1), "move.jog", '"z"', "a motor: x, y"),
-        ('jog = 1\nspeed = "1 mm/s"', (2, 1), "move.jog", "1", "a text"),
-        ('jog = "x"\nspeed = "0 mm/s"', (3, 1), "move.speed", '"0 mm/s"', "a speed other than 0 mm/s"),
-        ('jog = "x"\nspeed = "1 mm"', (3, 1), "move.speed", 'the unit "mm", which measures something else', "a vel"),
-        ('jog = "x"', (1, 1), "move", "no speed", "speed and duration of a jog"),
+        ('jog = 1\nspeed = "1 mm/s"', (2, 1), "move.jog", "1", "text in quotes"),
+        ('jog = "x"\nspeed = "0 mm/s"', (3, 1), "move.speed", '"0 mm/s"', "a velocity other than 0 mm/s"),
+        ('jog = "x"\nspeed = "1 mm"', (3, 1), "move.speed", '"1 mm"', "a vel"),
+        ('jog = "x"', (1, 1), "move.speed", "no speed", "speed and duration of a jog"),
     ],
 )
 def test_toml_manual_run_of_nothing(write, line, place, key, came, allowed):
@@ -300,9 +316,9 @@ def test_toml_manual_run_of_nothing(write, line, place, key, came, allowed):
 @pytest.mark.parametrize(
     ("text", "place", "key", "came", "allowed"),
     [
-        ("", (1, 1), "move", "no motor", "a place or a way for at least one of x, y"),
-        ("by = {}", (1, 1), "move", "no motor", "a place or a way for at least one of x, y"),
-        ('turn = "1 mm"', (1, 1), "move", "no motor", "a place or a way for at least one of x, y"),
+        ("", (1, 1), "move.x", "no motor", "a place or a way for at least one of x, y"),
+        ("by = {}", (1, 1), "move.x", "no motor", "a place or a way for at least one of x, y"),
+        ('turn = "1 mm"', (1, 1), "move.x", "no motor", "a place or a way for at least one of x, y"),
         (
             'x = "1 mm"\nby.y = "1 mm"\nturn = "3 mm"',
             (4, 1),
@@ -320,11 +336,11 @@ def test_toml_manual_run_of_nothing(write, line, place, key, came, allowed):
         (
             'x = "1 mm"\nchanged_to = "3 mm"',
             (1, 1),
-            "move",
+            "move.changed_at",
             "no changed_at",
             "changed_at and changed_to of a stop changed on the way",
         ),
-        ('x = "1 mm"\nchanged_at = "3 mm"', (1, 1), "move", "no changed_to", "changed_at and changed_to"),
+        ('x = "1 mm"\nchanged_at = "3 mm"', (1, 1), "move.changed_to", "no changed_to", "changed_at and changed_to"),
         (
             'x = "1 mm"\nturn = "3 mm"\nchanged_at = "3 mm"\nchanged_to = "2 mm"',
             (4, 1),
@@ -343,10 +359,10 @@ def test_toml_move_that_says_too_little_or_too_much(write, text, place, key, cam
 @pytest.mark.parametrize(
     ("text", "place", "key", "came", "remedy"),
     [
-        ('repeat = 0\n[[move]]\nx = "1 m"', (1, 1), "repeat", "0", "leave it out"),
-        ('x = "1 mm"\n[[move]]\nx = "1 m"', (1, 1), "x", 'the unknown key "x"', "move it below a [[move]]"),
-        ('[move]\nx = "1 m"', (1, 1), "move", "one table [move]", "write [[move]], with two"),
-        ('[[jog]]\nmotor = "x"', (1, 1), "jog", 'the unknown table "jog"', "remove it, or name a file of moves"),
+        ('repeat = 0\n[[move]]\nx = "1 m"', (1, 1), "repeat", "0", "give repeat a value"),
+        ('x = "1 mm"\n[[move]]\nx = "1 m"', (1, 1), "x", 'the unknown key "x"', "move it to [[move]]"),
+        ('[move]\nx = "1 m"', (1, 1), "move", "a single table", "write [[move]], with two"),
+        ('[[jog]]\nmotor = "x"', (1, 1), "jog", "the unknown table [jog]", "move it to [[move]]"),
         ("repeat = 2", (0, 0), "", "no moves", "add a move with a place for x or y"),
     ],
 )

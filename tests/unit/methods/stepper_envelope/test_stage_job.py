@@ -33,18 +33,26 @@ def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
 @pytest.mark.parametrize(
     ("values", "came", "allowed"),
     [
-        ({}, "no motor", "a target or a way for at least one motor"),
-        ({"targets": {"x": 0.1, "y": 0.1}, "by": {"y": 0.1}}, "a target and a way for y", "one of the two"),
-        ({"targets": {"x": math.nan}}, "a way of x of nan m", "a finite number of metres"),
-        ({"by": {"x": 0.1, "y": -math.inf}}, "a way of y of -inf m", "a finite number of metres"),
-        ({"by": {"x": 0.1}, "dwell": -0.5}, "a dwell of -0.5 s", "0 s or more"),
-        ({"by": {"x": 0.1}, "dwell": math.nan}, "a dwell of nan s", "0 s or more"),
-        ({"by": {"x": 0.1}, "turn": math.inf}, "a turn of inf m", "a finite number of metres"),
-        ({"by": {"x": 0.1}, "change": Change(math.nan, 0)}, "a place of the change of nan m", "a finite number"),
-        ({"by": {"x": 0.1}, "change": Change(0, math.inf)}, "a changed stop of inf m", "a finite number"),
-        ({"by": {"x": 0.1, "y": 0.1}, "turn": 0.2}, "a turn or a change with 2 motors", "one motor"),
-        ({"targets": {"x": 0.1}, "by": {"y": 0.1}, "change": Change(0, 0)}, "a turn or a change with 2", "one motor"),
-        ({"by": {"x": 0.1}, "turn": 0.2, "change": Change(0, 0)}, "a turn and a change", "one of the two"),
+        ({}, "no motor", "a place or a way for at least one"),
+        ({"targets": {"x": 0.1, "y": 0.1}, "by": {"y": 0.1}}, "motor y and by.motor y", "motor y (a place) or"),
+        ({"targets": {"x": math.nan}}, '"motor x" nan', "a length"),
+        ({"by": {"x": 0.1, "y": -math.inf}}, 'by."motor y" -inf', "a length"),
+        ({"by": {"x": 0.1}, "dwell": -0.5}, "dwell -0.5 s", "a time from 0 s"),
+        ({"by": {"x": 0.1}, "dwell": math.nan}, "dwell nan s", "a time from 0 s"),
+        ({"by": {"x": 0.1}, "turn": math.inf}, "turn inf m", "a length"),
+        ({"by": {"x": 0.1}, "change": Change(math.nan, 0)}, "changed_at nan m", "a length"),
+        ({"by": {"x": 0.1}, "change": Change(0, math.inf)}, "changed_to inf m", "a length"),
+        (
+            {"by": {"x": 0.1, "y": 0.1}, "turn": 0.2},
+            "turn in a move of 2 motors",
+            "turn in a move of exactly one motor",
+        ),
+        (
+            {"targets": {"x": 0.1}, "by": {"y": 0.1}, "change": Change(0, 0)},
+            "changed_at in a move of 2 motors",
+            "changed_at in a move",
+        ),
+        ({"by": {"x": 0.1}, "turn": 0.2, "change": Change(0, 0)}, "turn and changed_at", "one of them"),
     ],
 )
 def test_no_move_is_what_no_stage_can_do(values, came, allowed):
@@ -57,12 +65,12 @@ def test_no_move_is_what_no_stage_can_do(values, came, allowed):
 @pytest.mark.parametrize(
     ("values", "came"),
     [
-        ({"speed": 0.0}, "a speed of 0.0 m/s"),
-        ({"speed": math.nan}, "a speed of nan m/s"),
-        ({"speed": -math.inf}, "a speed of -inf m/s"),
-        ({"duration": 0.0}, "a duration of 0.0 s"),
-        ({"duration": math.inf}, "a duration of inf s"),
-        ({"dwell": -1.0}, "a dwell of -1.0 s"),
+        ({"speed": 0.0}, "speed 0.0 m/s"),
+        ({"speed": math.nan}, "speed nan m/s"),
+        ({"speed": -math.inf}, "speed -inf m/s"),
+        ({"duration": 0.0}, "duration 0.0 s"),
+        ({"duration": math.inf}, "duration inf s"),
+        ({"dwell": -1.0}, "dwell -1.0 s"),
     ],
 )
 def test_no_manual_run_is_what_no_operator_can_do(values, came):

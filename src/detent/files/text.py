@@ -1,4 +1,4 @@
-"""Files of jobs as text: read as far as their kind allows, or refused with the reason."""
+"""Text files: read as far as their kind allows, or refused with the reason; and texts as they fit into a message."""
 
 from collections.abc import Collection
 from os import PathLike
@@ -6,11 +6,20 @@ from pathlib import Path
 
 from detent.errors import FileProblem, InputError
 
+MAX_SHOWN = 60
+"""Characters of a value shown in a message."""
+
 MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
 """Largest file read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly
 than it is written by hand; a list so long comes from a program, which can write CSV."""
 
 _REMEDY = "check the name after --job"
+
+
+def short(text: str) -> str:
+    """Text as it fits into a message."""
+    shown = "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text[: MAX_SHOWN + 1])
+    return shown if len(shown) <= MAX_SHOWN else f"{shown[:MAX_SHOWN]}..."
 
 
 def read_text(path: str | PathLike[str], kinds: Collection[str], allowed: str) -> str:
