@@ -52,6 +52,7 @@ def setup(app: Any) -> None:
     app.connect("autodoc-process-docstring", keep_bars)
     import figures
     import figures_cascade
+    import figures_house
     import figures_rotary
     import figures_servos
     import figures_steppers
@@ -63,3 +64,4 @@ def setup(app: Any) -> None:
     figures_rotary.draw_all()
     figures_steppers.draw_all()
     figures_cascade.draw_all()
+    figures_house.draw_all()

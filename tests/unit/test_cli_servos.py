@@ -7,7 +7,8 @@ import pytest
 from tests.unit.test_cli import call
 
 import detent
-from detent.methods.moves.run import FILTERED_SIGNALS, PHASE_SIGNALS
+from detent.methods.filtered_servo.method import SIGNALS as FILTERED_SIGNALS
+from detent.methods.phase_servo.method import SIGNALS as PHASE_SIGNALS
 from detent.record.trace_files import load_trace
 from detent.record.vcd_file import load_vcd
 

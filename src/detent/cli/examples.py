@@ -88,4 +88,4 @@ def _registers_of(method: str) -> Any:
         raise DetentError(f"registers: came {method!r}; allowed: {allowed}, or an axis file; name one of these")
     from detent.axis import load
 
-    return load(method).method.registers
+    return load(method).simulated.registers

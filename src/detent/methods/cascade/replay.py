@@ -10,7 +10,7 @@ errors of a simulation: the norm of the difference over the norm of the measurem
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velo
 from detent.methods.cascade.replay_job import ReplayJob
 from detent.methods.cascade.schema import CascadeSpec
 from detent.record.machine import AnyRecorder, Progress
+from detent.record.run import RunRecord
 from detent.units import format_quantity
 
 EFFORTS: dict[str, tuple[str, ...]] = {
@@ -74,8 +75,8 @@ class Compared:
         return float(np.linalg.norm(self.difference)) / norm if norm else math.nan
 
 
-@dataclass(slots=True)
-class ReplayRun:
+@dataclass
+class ReplayRun(RunRecord[ReplayJob]):
     """A recording beside its simulation. Times [s] count from the recording's first sample.
 
     Attributes
@@ -102,24 +103,19 @@ class ReplayRun:
         Time with the simulated command at its limit [s].
     """
 
-    job: ReplayJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
     open_loop: str = ""
     period: float = 0.0
-    time_ready: float = 0.0
-    time_end: float = 0.0
     compared: list[Compared] = field(default_factory=list[Compared])
     peak_following: float = math.nan
     limited: float = 0.0
 
+    told: ClassVar[tuple[str, ...]] = (
+        "open_loop", "period", "peak_following", "limited",
+    )  # fmt: skip
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
-        names = ("done", "failure", "warnings", "open_loop", "period", "time_end", "peak_following", "limited")
-        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "samples": len(self.job.t)}
-        found |= {name: getattr(self, name) for name in names}
-        found["notes"] = list(self.job.notes)
+        found = super().to_dict() | {"samples": len(self.job.t), "notes": list(self.job.notes)}
         found["compared"] = [
             {"signal": one.name, "unit": one.unit, "rms": one.rms, "peak": one.peak, "relative": one.relative}
             for one in self.compared

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
@@ -12,6 +12,7 @@ from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_move
 from detent.record.machine import AnyRecorder, Progress
+from detent.record.run import RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
 
@@ -95,8 +96,8 @@ class CascadeMove:
         return max(self.settled - self.begin, 0.0) if self.in_position else math.nan
 
 
-@dataclass(slots=True)
-class CascadeRun:
+@dataclass
+class CascadeRun(RunRecord[MoveJob]):
     """Outcome of a list of moves on a cascade axis. Times [s], lengths [m] or angles [rad].
 
     Attributes
@@ -120,16 +121,14 @@ class CascadeRun:
         Limit of the command [V].
     """
 
-    job: MoveJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
-    time_ready: float = 0.0
     time_off: float = math.nan
-    time_end: float = 0.0
     moves: list[CascadeMove] = field(default_factory=list[CascadeMove])
     tolerance: float = 0.0
     max_command: float = 0.0
+
+    told: ClassVar[tuple[str, ...]] = (
+        "time_off", "tolerance", "max_command", "worst_following", "worst_error", "worst_overshoot",
+    )  # fmt: skip
 
     @property
     def worst_following(self) -> float:
@@ -148,14 +147,8 @@ class CascadeRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        names = (
-            "done", "failure", "warnings", "time_ready", "time_off", "time_end", "tolerance", "max_command",
-            "worst_following", "worst_error", "worst_overshoot",
-        )  # fmt: skip
-        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind}
-        found |= {name: getattr(self, name) for name in names}
-        found["moves"] = [asdict(m) | {"error": m.error, "settling": m.settling} for m in self.moves]
-        return found
+        moves = [asdict(m) | {"error": m.error, "settling": m.settling} for m in self.moves]
+        return super().to_dict() | {"moves": moves}
 
 
 def run_cascade_moves(

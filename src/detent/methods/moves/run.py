@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from detent.errors import AxisError
 from detent.methods.moves.host import Destination, Host, check_job
 from detent.methods.moves.job import MoveJob
 from detent.record.machine import Progress
+from detent.record.run import RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
 
@@ -61,8 +62,8 @@ class MoveRecord:
         return max(self.settled - self.begin, 0.0)
 
 
-@dataclass(slots=True)
-class MoveRun:
+@dataclass
+class MoveRun(RunRecord[MoveJob]):
     """Outcome of a list of moves. Times [s], lengths [m], current [A], energy [J].
 
     Attributes
@@ -81,18 +82,16 @@ class MoveRun:
         Pulses put in and taken away, samples lost and corrupted by interference.
     """
 
-    job: MoveJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
-    time_ready: float = 0.0
-    time_end: float = 0.0
     moves: list[MoveRecord] = field(default_factory=list[MoveRecord])
     tolerance: float = 0.0
     grid: float = 0.0
     peak_current: float = 0.0
     energy: float = 0.0
     faults: dict[str, int] = field(default_factory=dict[str, int])
+
+    told: ClassVar[tuple[str, ...]] = (
+        "tolerance", "grid", "peak_current", "energy", "faults", "worst_error", "worst_overshoot", "moves_per_second",
+    )  # fmt: skip
 
     @property
     def worst_error(self) -> float:
@@ -112,14 +111,7 @@ class MoveRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        names = (
-            "done", "failure", "warnings", "time_ready", "time_end", "tolerance", "grid", "peak_current", "energy",
-            "faults", "worst_error", "worst_overshoot", "moves_per_second",
-        )  # fmt: skip
-        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind}
-        found |= {name: getattr(self, name) for name in names}
-        found["moves"] = [asdict(move) for move in self.moves]
-        return found
+        return super().to_dict() | {"moves": [asdict(move) for move in self.moves]}
 
 
 def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> MoveRun:

@@ -7,7 +7,7 @@ next line while the present one prints.
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, P
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
 from detent.record.machine import AnyRecorder, Loop, Machine, Progress
+from detent.record.run import RunRecord
 
 NOT_FIRED = -(1 << 31)
 EMITTERS_PER_COLUMN = 2.5
@@ -86,8 +87,8 @@ class Strike:
     offset: float
 
 
-@dataclass(slots=True)
-class PrintRun:
+@dataclass
+class PrintRun(RunRecord[PrintJob]):
     """Outcome of a print job. Times [s], lengths [m], current [A], energy [J].
 
     Attributes
@@ -112,12 +113,6 @@ class PrintRun:
         By "right" and "left".
     """
 
-    job: PrintJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
-    time_ready: float = 0.0
-    time_end: float = 0.0
     lines: list[LineRecord] = field(default_factory=list[LineRecord])
     strikes: list[Strike] = field(default_factory=list[Strike])
     characters: int = 0
@@ -133,6 +128,11 @@ class PrintRun:
     energy: float = 0.0
     width: float = 0.0
     identified: dict[str, Direction] = field(default_factory=dict[str, Direction])
+
+    told: ClassVar[tuple[str, ...]] = (
+        "print_time", "characters", "characters_per_second", "columns", "missed", "worst_error", "rms_error",
+        "turn_arounds", "repositions", "peak_current", "energy", "width",
+    )  # fmt: skip
 
     @property
     def print_time(self) -> float:
@@ -154,13 +154,7 @@ class PrintRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        names = (
-            "done", "failure", "warnings", "time_ready", "time_end", "print_time", "characters",
-            "characters_per_second", "columns", "missed", "worst_error", "rms_error", "turn_arounds", "repositions",
-            "peak_current", "energy", "width",
-        )  # fmt: skip
-        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "pages": self.job.pages}
-        found |= {name: getattr(self, name) for name in names}
+        found = super().to_dict() | {"pages": self.job.pages}
         found["speeds"] = {str(s): n for s, n in self.speeds.items()}
         found["identified"] = {side: asdict(line) for side, line in self.identified.items()}
         found["lines"] = [asdict(line) for line in self.lines]

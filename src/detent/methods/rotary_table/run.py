@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from detent.errors import AxisError
 from detent.methods.rotary_table.host import TableHost, check_sequence, dial_speed
@@ -11,6 +11,7 @@ from detent.methods.rotary_table.sequence_controller import Change, SequenceCont
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob, Wait
 from detent.methods.rotary_table.table_observer import FULL_TURN, TableObserver
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Progress
+from detent.record.run import RunRecord
 from detent.sensing.angle_gauge import set_angle_gauge
 from detent.units import format_quantity
 
@@ -74,8 +75,8 @@ class StepRecord:
     rollovers: int
 
 
-@dataclass(slots=True)
-class SequenceRun:
+@dataclass
+class SequenceRun(RunRecord[SequenceJob]):
     """Outcome of a sequence. Times since power-on [s], angles of the table [rad].
 
     Attributes
@@ -110,12 +111,6 @@ class SequenceRun:
         Starts of a positioning that the axis has refused.
     """
 
-    job: SequenceJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
-    time_ready: float = 0.0
-    time_end: float = 0.0
     steps: list[StepRecord] = field(default_factory=list[StepRecord])
     outputs: list[Change] = field(default_factory=list[Change])
     inputs: list[Change] = field(default_factory=list[Change])
@@ -127,6 +122,11 @@ class SequenceRun:
     rollovers: int = 0
     position: int = 0
     refused: int = 0
+
+    told: ClassVar[tuple[str, ...]] = (
+        "count", "in_position", "travel", "turns", "crossings", "rollovers", "position", "refused", "peak_deviation",
+        "worst_error",
+    )  # fmt: skip
 
     @property
     def peak_deviation(self) -> float:
@@ -140,12 +140,7 @@ class SequenceRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``; null for what is not a number."""
-        names = (
-            "done", "failure", "warnings", "time_ready", "time_end", "count", "in_position", "travel", "turns",
-            "crossings", "rollovers", "position", "refused", "peak_deviation", "worst_error",
-        )  # fmt: skip
-        found: dict[str, Any] = {"job": self.job.name, "kind": "sequence"}
-        found |= {name: getattr(self, name) for name in names}
+        found = super().to_dict()
         found["steps"] = [{key: _finite(value) for key, value in asdict(step).items()} for step in self.steps]
         for name in ("outputs", "inputs"):
             found[name] = [{"time": time, "name": signal, "on": on} for time, signal, on in getattr(self, name)]

@@ -334,6 +334,7 @@ class SequenceJob:
     name: str
     steps: tuple[Step, ...]
     inputs: dict[str, Stretches] = field(default_factory=dict[str, Stretches])
+    kind: str = "sequence"
 
     @property
     def count(self) -> int:

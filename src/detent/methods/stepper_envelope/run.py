@@ -1,7 +1,7 @@
 """A job on a simulated stepper stage, from power-on: what its host commands, and what an observer of rotors sees."""
 
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from detent.errors import AxisError
 from detent.methods.stepper_envelope.build import start_hz, stepper_load, stepper_motor
@@ -11,6 +11,7 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.planning.step_ramp import torque_margin
 from detent.record.machine import AnyRecorder, Progress
+from detent.record.run import RunRecord
 
 MOTOR_SIGNALS = (
     "rule.position", "rule.index", "rule.state", "rule.direction", "timer.period", "rotor.angle", "rotor.velocity",
@@ -106,8 +107,8 @@ class StageMoveRecord:
         return max(rests, default=self.begin) - self.begin
 
 
-@dataclass(slots=True)
-class StageRun:
+@dataclass
+class StageRun(RunRecord[StageJob]):
     """Outcome of a job on a stage.
 
     Attributes
@@ -124,14 +125,12 @@ class StageRun:
         Steps lost in all.
     """
 
-    job: StageJob
-    done: bool = False
-    failure: str = ""
-    warnings: list[str] = field(default_factory=list[str])
-    time_ready: float = 0.0
-    time_end: float = 0.0
     moves: list[StageMoveRecord] = field(default_factory=list[StageMoveRecord])
     lost: dict[str, int] = field(default_factory=dict[str, int])
+
+    told: ClassVar[tuple[str, ...]] = (
+        "lost", "worst_lag", "least_margin", "moves_per_second",
+    )  # fmt: skip
 
     @property
     def made(self) -> list[tuple[StageMoveRecord, str, MotorMove]]:
@@ -156,14 +155,8 @@ class StageRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        names = (
-            "done", "failure", "warnings", "time_ready", "time_end", "lost", "worst_lag", "least_margin",
-            "moves_per_second",
-        )  # fmt: skip
-        found: dict[str, Any] = {"job": self.job.name, "kind": self.job.kind, "notes": list(self.job.notes)}
-        found |= {name: getattr(self, name) for name in names}
-        found["moves"] = [asdict(move) for move in self.moves]
-        return found
+        moves = [asdict(move) for move in self.moves]
+        return super().to_dict() | {"notes": list(self.job.notes), "moves": moves}
 
 
 def run_stage(

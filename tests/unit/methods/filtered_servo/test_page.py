@@ -5,13 +5,15 @@ import pytest
 
 import detent
 from detent.methods.filtered_servo import system as filtered_servo
+from detent.methods.filtered_servo.host import FilteredHost
+from detent.methods.filtered_servo.method import SIGNALS
 from detent.methods.filtered_servo.page import FilteredView, command_speed, filtered_page, filtered_summary
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
 from detent.methods.moves.page import POSITION, TARGET, VELOCITY
-from detent.methods.moves.run import FILTERED_SIGNALS, MoveRun, run_moves
+from detent.methods.moves.run import MoveRun, run_moves
 from detent.page.frame import Page
 from detent.record.recorder import Recorder
 from detent.record.trace import Trace
@@ -25,8 +27,8 @@ def play(*ways: float, overrides: tuple[str, ...] = (), **common: float) -> Play
     spec = load_spec(detent.example("filtered_servo.toml"), overrides)
     assert isinstance(spec, FilteredServoSpec)
     job = MoveJob("steps", "moves", tuple(Move(n, n, by=way, **common) for n, way in enumerate(ways, 1)))
-    recorder = Recorder(FilteredServo, FILTERED_SIGNALS, every=10, period=filtered_servo.TICK)
-    return spec, run_moves(spec, job, recorder=recorder), recorder.trace()
+    recorder = Recorder(FilteredServo, SIGNALS, every=10, period=filtered_servo.TICK)
+    return spec, run_moves(FilteredHost(spec, recorder), job), recorder.trace()
 
 
 def curve_of(page: Page, chart: str, label: str) -> np.ndarray:
@@ -37,7 +39,7 @@ def curve_of(page: Page, chart: str, label: str) -> np.ndarray:
 
 
 def test_what_is_drawn_is_what_is_recorded() -> None:
-    assert {POSITION, VELOCITY, TARGET, *FilteredView.signals} <= set(FILTERED_SIGNALS)
+    assert {POSITION, VELOCITY, TARGET, *FilteredView.signals} <= set(SIGNALS)
 
 
 def test_it_follows_its_command_at_a_distance() -> None:

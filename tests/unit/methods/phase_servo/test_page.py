@@ -10,7 +10,9 @@ from detent.methods.load import load_spec
 from detent.methods.moves.job import MoveJob, text_job
 from detent.methods.moves.move_file import load_moves
 from detent.methods.moves.page import POSITION, TARGET, VELOCITY
-from detent.methods.moves.run import PHASE_SIGNALS, MoveRun, run_moves
+from detent.methods.moves.run import MoveRun, run_moves
+from detent.methods.phase_servo.host import PhaseHost
+from detent.methods.phase_servo.method import SIGNALS
 from detent.methods.phase_servo.page import PhaseView, marks_of, phase_page, phase_summary
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
@@ -29,8 +31,8 @@ PITCH = INCH / 60
 def play(job: MoveJob, *overrides: str) -> Played:
     spec = load_spec(detent.example("phase_servo.toml"), overrides)
     assert isinstance(spec, PhaseServoSpec)
-    recorder = Recorder(PhaseServo, PHASE_SIGNALS, every=256, period=spec.tick)
-    return spec, run_moves(spec, job, recorder=recorder), recorder.trace()
+    recorder = Recorder(PhaseServo, SIGNALS, every=256, period=spec.tick)
+    return spec, run_moves(PhaseHost(spec, recorder), job), recorder.trace()
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +50,7 @@ def curve_of(page: Page, chart: str, label: str) -> np.ndarray:
 
 
 def test_what_is_drawn_is_what_is_recorded() -> None:
-    assert {POSITION, VELOCITY, TARGET, *PhaseView.signals} <= set(PHASE_SIGNALS)
+    assert {POSITION, VELOCITY, TARGET, *PhaseView.signals} <= set(SIGNALS)
 
 
 def test_the_figures_of_a_whole_run(moves: Played) -> None:

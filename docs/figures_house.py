@@ -1,0 +1,75 @@
+"""The drawing of the house: its rooms as the import contract orders them, sized by their lines."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import figures
+from figures import BLUE, GREEN, GREY, ORANGE
+
+import detent
+
+PACKAGE = Path(detent.__file__).parent
+ROOT = Path(__file__).resolve().parent.parent
+METHODS = "detent.methods"
+BLOCKS = {"control", "planning", "drive", "sensing", "plant", "analysis"}
+FRAMES = {"page", "record", "files", "axisfile", "logs"}
+
+
+def contract(name_of: str) -> list[list[str]]:
+    """Layers of a contract of pyproject.toml, from the roof down; each may hold several rooms side by side."""
+    tool = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    layers = next(c["layers"] for c in tool["contracts"] if c.get("containers") == [name_of])
+    return [[room.strip() for room in layer.split("|")] for layer in layers]
+
+
+def lines_in(place: Path) -> int:
+    """Lines of Python in a room, a file or a folder."""
+    files = place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")]
+    return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files)
+
+
+def colour_of(room: str) -> str:
+    """Methods, blocks, frames, and what stands above and below them."""
+    if room == "methods" or room in {entry for layer in contract(METHODS) for entry in layer}:
+        return ORANGE
+    return BLUE if room in BLOCKS else GREEN if room in FRAMES else GREY
+
+
+def draw_floor(axes: Any, y: float, rooms: list[tuple[str, int]]) -> None:
+    """Rooms of a floor side by side, as wide as they have lines, but never too narrow for their name."""
+    widths = [max(lines**0.5, 17.0) for _, lines in rooms]
+    scale = 100.0 / max(sum(widths), 100.0)
+    x = (100.0 - scale * sum(widths)) / 2
+    for (room, lines), width in zip(rooms, widths, strict=True):
+        axes.barh(y, scale * width - 0.6, left=x + 0.3, height=0.84, color=colour_of(room), alpha=0.85)
+        text = f"{room}\n{lines / 1000:.1f}k lines" if lines >= 1000 else f"{room}\n{lines} lines"
+        axes.text(x + scale * width / 2, y, text, ha="center", va="center", color="white", fontsize=7.5)
+        x += scale * width
+
+
+def house() -> None:
+    """Every room on its floor; the methods' floor opened to show a package each."""
+    floors: list[list[tuple[str, int]]] = []
+    for layer in contract("detent"):
+        if layer == ["methods"]:
+            folder = PACKAGE / "methods"
+            inside = contract(METHODS)
+            floors.append([(room, lines_in(folder / room)) for room in inside[0]])
+            floors.append([(room, lines_in(folder / room)) for entry in inside[1:] for room in entry])
+        else:
+            floors.append([(room, lines_in(PACKAGE / room)) for room in layer])
+    with figures.picture("house.svg", 1, 0.52 * len(floors) + 0.3) as (axes,):
+        for number, rooms in enumerate(floors):
+            draw_floor(axes, float(-number), rooms)
+        axes.set_xlim(0, 100)
+        axes.set_ylim(-len(floors) + 0.4, 0.6)
+        axes.axis("off")
+
+
+FIGURES = (house,)
+
+
+def draw_all() -> None:
+    """Draw the house."""
+    figures.draw_stale(FIGURES, Path(__file__))
