@@ -197,12 +197,11 @@ def turn_around() -> None:
 def comparison() -> None:
     """Three ways of choosing the drive value on the drifted machine: what `detent compare` draws."""
     import detent
-    from detent.methods.print_head.report import comparison_figure
-    from detent.page.plots import plot_comparison
+    from detent.page.draw import draw_figures
 
     axis = detent.load(detent.example("print_head.toml"), DRIFTED)
     (drives,) = axis.compare()
-    plot_comparison(comparison_figure(drives, axis.spec), FOLDER / "comparison.svg")
+    draw_figures(drives.figures(), FOLDER / "comparison.svg")
 
 
 FIGURES = (power_up, parts_of_the_drive, two_points, transition, turn_around, comparison)

@@ -12,8 +12,8 @@ import detent
 from detent import axis as axis_module
 from detent.errors import DetentError, InputError
 from detent.methods.moves.move_file import load_moves
+from detent.methods.print_head.page import print_page
 from detent.methods.print_head.print_job import load_job
-from detent.methods.print_head.report import print_report
 from detent.methods.print_head.run import default_signals
 from detent.record.recorder import ROWS
 
@@ -201,11 +201,11 @@ def test_memory_is_bounded_and_the_file_is_not(
     assert len(done.trace) == 20_000
     assert len(detent.load_trace(tmp_path / "long.h5")) == len(run.trace)
     # The report draws from what was kept, and from the first lines when the last ones are beyond it.
-    data = print_report(done.axis.spec, done.result, done.trace, settings={})
-    assert data.errors is not None
-    assert data.errors.total == run.result.columns
-    assert data.profile is not None
-    assert data.profile.line < 11
+    page = print_page(done.axis.spec, done.result, done.trace)
+    (errors,) = [chart for chart in page.charts if chart["id"] == "histogram"]
+    assert sum(sum(series["y"]) for series in errors["series"]) == run.result.columns
+    (profile,) = [figure for figure in page.figures if figure.charts and figure.charts[0]["id"] == "profile-speed"]
+    assert int(profile.title.split()[1].rstrip(",")) < 11
 
 
 def test_the_report_is_one_file_with_its_small_print(run: detent.Run, tmp_path: Path) -> None:

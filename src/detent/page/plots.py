@@ -1,4 +1,4 @@
-"""Figures as files: signals of a trace, and the comparison of ways to choose the drive value.
+"""Figures as files: signals of a trace.
 
 matplotlib is loaded when a figure is drawn, never when this module is imported, and draws without a display.
 """
@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.methods.print_head.comparison_data import Comparison
-from detent.page.parts import INCH, Numbers
 from detent.page.thin import thin_indices
 from detent.record.trace import Trace
 
@@ -106,86 +104,6 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
 def _broken(name: str, unit: str) -> str:
     """Write a name and its unit on two lines, for the side of a low plot area."""
     return f"{name}\n[{unit}]" if unit else name
-
-
-def plot_comparison(comparison: Comparison, path: str | Path) -> None:
-    """Draw how far off speed each way of choosing the drive value is, and how it starts."""
-    path = check_figure_path(path)
-    shape = (len(comparison.methods), len(comparison.speeds), 2)
-    if comparison.errors.shape != shape:
-        raise DetentError(
-            f"{path}: errors have shape {comparison.errors.shape}, allowed: {shape} (methods, speeds, right and left)"
-        )
-    with new_figure(path, 9.0, 8.0 if comparison.starts else 4.2) as figure:
-        areas = figure.subplots(2 if comparison.starts else 1, 1, squeeze=False)[:, 0]
-        _draw_errors(areas[0], comparison)
-        if comparison.starts:
-            _draw_starts(areas[1], comparison)
-
-
-def _draw_errors(area: Axes, comparison: Comparison) -> None:
-    """Draw bars: one group per speed and direction, one bar per method."""
-    methods, speeds, _ = comparison.errors.shape
-    width = 0.8 / methods
-    percent: Numbers = 100 * comparison.errors
-    # Right and left of one speed stand close together, the speeds further apart.
-    centres = np.array([[2.3 * row, 2.3 * row + 1.0] for row in range(speeds)])
-    for index, method in enumerate(comparison.methods):
-        at = centres + (index - (methods - 1) / 2) * width
-        bars = area.bar(
-            at.ravel(), percent[index].ravel(), width * 0.92, color=_method_colour(index, methods), label=method
-        )
-        area.bar_label(bars, fmt="%+.1f", fontsize=8, padding=2)
-    area.axhline(0, color="#17202a", linewidth=0.8)
-    names = [f"{speed / INCH:g} in/s\n{side}" for speed in comparison.speeds for side in ("right", "left")]
-    area.set_xticks(centres.ravel(), names)
-    area.grid(visible=False, axis="x")
-    area.tick_params(axis="x", length=0)
-    area.margins(y=0.12)
-    area.set_ylabel("steady speed error [%]")
-    machine = f"\nmachine: {comparison.machine}" if comparison.machine else ""
-    area.set_title(f"How far off speed is the head with each way of choosing the drive (no trim)?{machine}", pad=24)
-    area.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=methods, fontsize=9, borderaxespad=0.2)
-
-
-def _draw_starts(area: Axes, comparison: Comparison) -> None:
-    target = comparison.target / INCH
-    area.axhspan(
-        target * (1 - comparison.band), target * (1 + comparison.band), color="#009E73", alpha=0.18, linewidth=0
-    )
-    for index, start in enumerate(comparison.starts):
-        kept = thin_indices(start.velocity, POINTS)
-        colour = _method_colour(index, len(comparison.starts))
-        entry = settling_time(start.t, np.abs(start.velocity), comparison.target, comparison.band)
-        name = f"{start.name}: " + ("not reached" if entry is None else f"after {entry:.2f} s")
-        area.plot(start.t[kept], np.abs(start.velocity[kept]) / INCH, color=colour, linewidth=1.8, label=name)
-    area.set_ylim(bottom=0)
-    area.margins(x=0)
-    area.set_xlabel("time since the move began [s]")
-    area.set_ylabel("speed [in/s]")
-    band = f"±{100 * comparison.band:g} %"
-    area.set_title(f"How soon is it within {band} of {target:g} in/s for good (green band, trim on)?")
-    area.legend(loc="lower right", fontsize=9)
-
-
-def settling_time(t: Numbers, speed: Numbers, target: float, band: float) -> float | None:
-    """Find the moment from which the speed stays within a band [s].
-
-    >>> import numpy as np
-    >>> settling_time(np.arange(5.0), np.array([0.0, 1.0, 0.9, 1.0, 1.0]), 1.0, 0.01)
-    3.0
-    """
-    outside = np.flatnonzero(~(np.abs(speed - target) <= band * target))
-    if not outside.size:
-        return float(t[0])
-    last = int(outside[-1])
-    return None if last == len(t) - 1 else float(t[last + 1])
-
-
-def _method_colour(index: int, methods: int) -> str:
-    """Give the last method, the one to look at, the strong colour; the others greys and orange."""
-    others = ("#9aa6b2", "#E69F00", "#CC79A7", "#56B4E9")
-    return COLOURS[0] if index == methods - 1 else others[index % len(others)]
 
 
 def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> Path:

@@ -1,5 +1,4 @@
 import dataclasses
-import doctest
 import re
 from pathlib import Path
 
@@ -7,13 +6,8 @@ import numpy as np
 import pytest
 
 from detent.errors import DetentError
-from detent.methods.print_head.comparison_data import Comparison, StartCurve
-from detent.page import plots as figures
-from detent.page.parts import INCH
-from detent.page.plots import check_figure_path, plot_comparison, plot_signals, settling_time
+from detent.page.plots import check_figure_path, plot_signals
 from detent.record.trace import Trace
-
-METHODS = ("power-on default", "nominal table", "identified")
 
 
 @pytest.fixture
@@ -36,33 +30,11 @@ def trace() -> Trace:
     )  # fmt: skip
 
 
-@pytest.fixture
-def comparison() -> Comparison:
-    t = np.linspace(0, 1, 1001)
-    return Comparison(
-        methods=METHODS,
-        speeds=[40 * INCH, 10 * INCH],
-        errors=np.array(
-            [[[-0.254, -0.199], [-0.457, -0.238]], [[-0.134, -0.125], [-0.274, -0.238]], [[0.004, -0.003]] * 2]
-        ),
-        starts=[
-            StartCurve(name=name, t=t, velocity=40 * INCH * np.minimum(t / end, stop))
-            for name, end, stop in zip(METHODS, (0.5, 0.4, 0.07), (0.9, 1.0, 1.0), strict=True)
-        ],
-        target=40 * INCH,
-        machine="slope +10 %",
-    )  # fmt: skip
-
-
 def texts(path: Path) -> list[str]:
     return [
         re.sub(r"<[^>]+>", "", text).strip()
         for text in re.findall(r"<text.*?</text>", path.read_text(encoding="utf-8"), flags=re.DOTALL)
     ]
-
-
-def test_the_examples_in_the_docstrings_hold() -> None:
-    assert doctest.testmod(figures).failed == 0
 
 
 @pytest.mark.parametrize(("suffix", "magic"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".SVG", b"<?xml")])
@@ -131,35 +103,6 @@ def test_what_cannot_be_drawn_is_said(
 def test_an_empty_trace_cannot_be_drawn(tmp_path: Path) -> None:
     with pytest.raises(DetentError, match="holds no rows"):
         plot_signals(Trace(columns={"t": np.empty(0), "x": np.empty(0)}), ["x"], tmp_path / "run.png")
-
-
-def test_the_comparison_writes_every_error_and_how_soon(tmp_path: Path, comparison: Comparison) -> None:
-    plot_comparison(comparison, tmp_path / "c.svg")
-    words = texts(tmp_path / "c.svg")
-    for text in ("-25.4", "-19.9", "-45.7", "-13.4", "-27.4", "+0.4", "-0.3", "40 in/s", "10 in/s", *METHODS):
-        assert text in words
-    assert "machine: slope +10 %" in words
-    assert "power-on default: not reached" in words
-    assert "nominal table: after 0.40 s" in words
-    assert "identified: after 0.07 s" in words
-
-
-def test_the_comparison_can_do_without_starts(tmp_path: Path, comparison: Comparison) -> None:
-    plot_comparison(dataclasses.replace(comparison, starts=()), tmp_path / "c.svg")
-    assert not any("time" in text for text in texts(tmp_path / "c.svg"))
-
-
-def test_errors_of_another_shape_are_refused(tmp_path: Path, comparison: Comparison) -> None:
-    with pytest.raises(DetentError, match=r"errors have shape \(3, 2\), allowed: \(3, 2, 2\)"):
-        plot_comparison(dataclasses.replace(comparison, errors=np.zeros((3, 2))), tmp_path / "c.png")
-
-
-def test_settling_counts_from_the_last_time_outside() -> None:
-    t = np.array([0.0, 1.0, 2.0, 3.0])
-    assert settling_time(t, np.array([1.0, 1.0, 1.0, 1.0]), 1.0, 0.01) == 0.0
-    assert settling_time(t, np.array([0.0, 1.0, 0.0, 1.0]), 1.0, 0.01) == 3.0
-    assert settling_time(t, np.array([0.0, 1.0, 1.0, 0.0]), 1.0, 0.01) is None
-    assert settling_time(t, np.array([0.0, np.nan, 1.0, 1.0]), 1.0, 0.01) == 2.0
 
 
 @pytest.mark.parametrize(

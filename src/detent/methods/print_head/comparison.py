@@ -5,7 +5,7 @@ Every way drives the same machine open loop at several speeds, and starts it wit
 """
 
 from dataclasses import asdict, dataclass
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,9 @@ from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.derive import Machine as Figures
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
 from detent.methods.print_head.system import TICK, PrintHead, switch_on
+from detent.page.chart import Chart, Curve, Panel, Timeline, line_chart, time_charts
+from detent.page.figure import Figure
+from detent.page.table import TextTable
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
@@ -40,6 +43,12 @@ START_TIME = 1.2
 
 FIRST_LINE = 0.30
 """What a line of 13.2 in lasts at 40 in/s, a little less [s]: the mean error over it says how the first line prints."""
+
+BAND = 0.01
+"""Half-width of the band of good speed, as a fraction of the commanded one."""
+
+COLOURS = ("muted", "left", "right")
+"""Of the ways, in their order."""
 
 CALCULATION_TIME = 120.0
 CODE_CALCULATE, CODE_CONTROLLED, CODE_SPEED, OK = 0x01, 0xA2, 0x99, 0x00
@@ -68,6 +77,12 @@ class DriveStart:
     # from the end of the ramp until the speed first is within 1 % of the commanded one [s]; infinite if it never is
     time_to_band: float
 
+    def settled(self, target: float) -> float:
+        """When the speed is within `BAND` of `target` [m/s] for good [s]; infinite if it never is."""
+        outside = np.flatnonzero(~(np.abs(self.velocity - target) <= BAND * target))
+        after = int(outside[-1]) + 1 if outside.size else 0
+        return float(self.t[after]) if after < len(self.t) else inf
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveComparison:
@@ -88,6 +103,8 @@ class DriveComparison:
         Starts at `target`.
     target : float
         Commanded speed of the starts [m/s].
+    machine : str
+        How the machine differs from its file, in a few words.
     """
 
     methods: tuple[str, ...]
@@ -96,6 +113,20 @@ class DriveComparison:
     errors: Numbers
     starts: tuple[DriveStart, ...]
     target: float
+    machine: str
+
+    @property
+    def table(self) -> TextTable:
+        """Steady speed errors of the drives."""
+        rows = [
+            (f"{speed / INCH:.4g} in/s", *(f"{right:+.1%} / {left:+.1%}" for right, left in self.errors[:, k, :]))
+            for k, speed in enumerate(self.speeds)
+        ]
+        return TextTable(f"Steady speed error, right / left ({self.machine})", ("speed", *self.methods), rows)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """How far off speed each drive is open loop, and how it starts with the trim."""
+        return _error_figure(self), _start_figure(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
@@ -116,6 +147,68 @@ class DriveComparison:
                 )
             ],
         }
+
+
+def _error_figure(found: DriveComparison) -> Figure:
+    caption = (
+        f"Steady speed without trim, measured less commanded, on this machine: {found.machine}. The default is what "
+        "the axis assumes at power-on, the nominal table what a conventional printer would hold, computed from the "
+        "nameplate. Look for: circles on the line; below it the head is too slow, at −100 % it does not move."
+    )
+    title = "How far off speed is the head with each way of choosing the drive?"
+    return Figure(title=title, caption=caption, charts=[_error_chart(found)], table=found.table.on_page)
+
+
+def _error_chart(found: DriveComparison) -> Chart:
+    """Steady speed error over the commanded speed, to the left negative."""
+    speeds, order = np.sort(found.speeds) / INCH, np.argsort(found.speeds)
+    # A circle needs room at either end.
+    x = np.concatenate(([-1.1 * speeds[-1]], -speeds[::-1], speeds, [1.1 * speeds[-1]]))
+    curves: list[Curve] = []
+    for method, colour, one in zip(found.methods, COLOURS, 100 * found.errors[:, order], strict=True):
+        y = np.concatenate(([np.nan], one[::-1, 1], one[:, 0], [np.nan]))
+        curves.append(Curve(label=method, colour=colour, rings=11, y=y, digits=2))
+    low, high = min(0.0, 100 * float(found.errors.min())), max(0.0, 100 * float(found.errors.max()))
+    room = 0.12 * max(high - low, 1.0)
+    span = (round(low - room, 2), round(high + room, 2))
+    panel = Panel(name="drives", label="speed error [%]", height=260, zero=True, span=span, curves=curves)
+    return line_chart(panel, x, "\u2190 to the left   commanded speed [in/s]   to the right \u2192")
+
+
+def _start_figure(found: DriveComparison) -> Figure:
+    target, band = found.target / INCH, f"±{100 * BAND:g} %"
+    caption = (
+        f"The same drives, starting to the right at {target:.4g} in/s with the trim running. Below: the end of it, "
+        f"magnified. Look for: the first to be between the dashes for good; what comes after {FIRST_LINE:.1f} s is too "
+        "late for a line of 13 in at 40 in/s."
+    )
+    longest = max((start.t for start in found.starts), key=len)
+    curves = [
+        Curve(label=method, colour=colour, width=2, y=_filled(start.velocity / INCH, len(longest)))
+        for method, colour, start in zip(found.methods, COLOURS, found.starts, strict=True)
+    ]
+    levels = [(round(target * (1 + sign * BAND), 3), f"{text}{100 * BAND:g} %") for sign, text in ((1, "+"), (-1, "−"))]
+    near = (round(0.95 * target, 3), round(1.03 * target, 3))
+    timeline = Timeline(name="drive-starts", t=longest, label="time since the move began", unit="s")
+    charts = time_charts(timeline, [
+        Panel(name="drive-starts", label="speed [in/s]", height=240, zero=True, curves=curves),
+        Panel(name="drive-starts-near", label="speed [in/s]", height=180, span=near, levels=levels, curves=curves),
+    ])  # fmt: skip
+    heads = ("drive", "slope K, right / left", "friction Vf, right / left", f"within {band} for good after [s]",
+             f"mean error over {FIRST_LINE:.2f} s [%]")  # fmt: skip
+    rows = [
+        (method, f"{way.slope_right} / {way.slope_left}", f"{way.friction_right} / {way.friction_left}",
+         f"{settled:.2f}" if isfinite(settled := start.settled(found.target)) else "not reached",
+         f"{100 * start.mean_error:+.1f}")
+        for method, way, start in zip(found.methods, found.constants, found.starts, strict=True)
+    ]  # fmt: skip
+    title = f"How soon is it within {band} of {target:.4g} in/s for good?"
+    return Figure(title=title, caption=caption, charts=charts, table=TextTable(title, heads, rows).on_page)
+
+
+def _filled(values: Numbers, rows: int) -> Numbers:
+    """Values of an axis that gave up, with a gap to the end."""
+    return np.concatenate((values, np.full(rows - len(values), np.nan)))
 
 
 def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> DriveComparison:
@@ -142,7 +235,18 @@ def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> D
         errors=np.array(errors),
         starts=tuple(bench.start(way, spec.limits.speed) for way in ways.values()),
         target=spec.limits.speed,
+        machine=drift_text(spec),
     )
+
+
+def drift_text(spec: PrintHeadSpec) -> str:
+    """How the true machine differs from its file, in a few words."""
+    d = spec.disturbance
+    drifts = {"K": d.motor_constant, "friction right": d.friction_right, "friction left": d.friction_left}
+    parts = [f"{name} {100 * value:+.3g} %" for name, value in drifts.items() if value]
+    if d.supply != spec.drive.supply:
+        parts.append(f"supply {d.supply:.4g} V instead of {spec.drive.supply:.4g} V")
+    return ", ".join(parts) or "machine as in its file"
 
 
 def default_constants(spec: PrintHeadSpec) -> DriveConstants:
@@ -217,16 +321,16 @@ class MeasuringBench:
         velocity = rows["velocity"].copy()
         steady = np.flatnonzero(rows["state"] == HIGH_STEADY)
         if len(steady) == 0:
-            return DriveStart(t=t, velocity=velocity, steady_from=np.inf, mean_error=-1.0, time_to_band=np.inf)
+            return DriveStart(t=t, velocity=velocity, steady_from=inf, mean_error=-1.0, time_to_band=inf)
         first = int(steady[0])
         error = velocity[first:] / speed - 1.0
-        good = np.flatnonzero(np.abs(error) <= 0.01)
+        good = np.flatnonzero(np.abs(error) <= BAND)
         return DriveStart(
             t=t,
             velocity=velocity,
             steady_from=float(t[first]),
             mean_error=float(np.mean(error[: round(FIRST_LINE / TICK)])),
-            time_to_band=float(good[0] * TICK) if len(good) else np.inf,
+            time_to_band=float(good[0] * TICK) if len(good) else inf,
         )
 
     def _run(self, way: DriveConstants, speed: float, direction: int, seconds: float, *, trim: bool) -> NDArray[Any]:

@@ -1,19 +1,18 @@
 """The print head as a method: what its package brings."""
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.print_head.checks import RULES, find_cautions
 from detent.methods.print_head.derive import derive
 from detent.methods.print_head.schema import PrintHeadSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -102,26 +101,7 @@ class PrintHead(Method[PrintHeadSpec]):
 
     def page(self, spec: PrintHeadSpec, result: Any, shown: Shown) -> "Page":
         """The report."""
-        from detent.methods.print_head.page import make_print_page
-        from detent.methods.print_head.report import print_report
+        from detent.methods.print_head.page import print_page
 
         settings = {"fidelity": spec.axis.fidelity} | shown.settings
-        return make_print_page(print_report(spec, result, shown.trace, settings=settings))
-
-    def table(self, spec: PrintHeadSpec, comparison: Any) -> Table:
-        """Steady speed errors of the drives."""
-        from detent.methods.print_head.report import drift_text
-
-        found = comparison
-        rows = [
-            (f"{speed / 0.0254:.4g} in/s", *(f"{right:+.1%} / {left:+.1%}" for right, left in found.errors[:, k, :]))
-            for k, speed in enumerate(found.speeds)
-        ]
-        return f"Steady speed error, right / left ({drift_text(spec)})", ("speed", *found.methods), rows
-
-    def plot(self, spec: PrintHeadSpec, comparison: Any, path: Path) -> None:
-        """The drives side by side."""
-        from detent.methods.print_head.report import comparison_figure
-        from detent.page.plots import plot_comparison
-
-        plot_comparison(comparison_figure(comparison, spec), path)
+        return print_page(spec, result, shown.trace, shown.comparisons, settings)

@@ -61,6 +61,16 @@ class LineRecord:
         """Commanded print speed [m/s]."""
         return self.speed_value * SPEED_STEP
 
+    @property
+    def begin(self) -> float:
+        """`start`, as the records of every run have it."""
+        return self.start
+
+    @property
+    def end(self) -> float:
+        """`stop`, as the records of every run have it."""
+        return self.stop
+
 
 @dataclass(frozen=True, slots=True)
 class Direction:

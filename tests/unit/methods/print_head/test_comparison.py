@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,10 +7,13 @@ from tests.print_head_rig import make_spec
 
 from detent.errors import AxisError, DetentError
 from detent.methods.print_head.comparison import (
+    DriveComparison,
     DriveConstants,
+    DriveStart,
     MeasuringBench,
     compare_drives,
     default_constants,
+    drift_text,
     identified_constants,
     nominal_constants,
 )
@@ -97,3 +101,91 @@ def test_an_obstacle_and_a_push_do_not_disturb_the_bench():
         )
     )
     assert disturbed.open_loop_error(TRUE, 1.0, 1) == plain.open_loop_error(TRUE, 1.0, 1)
+
+
+METHODS = ("power-on default", "nominal table", "identified")
+
+
+@pytest.fixture
+def found():
+    """Three drives; the second gave up on its start, the first never comes within 1 %."""
+    t = np.linspace(0, 1, 1001)
+    starts = [
+        DriveStart(t=t[:rows], velocity=40 * INCH * np.minimum(t[:rows] / end, stop), steady_from=end, mean_error=0.01,
+                   time_to_band=0.0)
+        for end, stop, rows in ((0.5, 0.9, 1001), (0.4, 1.0, 201), (0.07, 1.0, 1001))
+    ]  # fmt: skip
+    errors = [[[-0.457, -0.238], [-0.254, -0.199]], [[-0.274, -0.238], [-0.134, -0.125]], [[0.004, -0.003]] * 2]
+    return DriveComparison(
+        methods=METHODS,
+        constants=(TRUE,) * 3,
+        speeds=(10 * INCH, 40 * INCH),
+        errors=np.array(errors),
+        starts=tuple(starts),
+        target=40 * INCH,
+        machine="K +10 %",
+    )
+
+
+def test_the_table_says_every_error(found):
+    title, heads, rows = found.table
+    assert "K +10 %" in title
+    assert heads == ("speed", *METHODS)
+    assert rows == [
+        ("10 in/s", "-45.7% / -23.8%", "-27.4% / -23.8%", "+0.4% / -0.3%"),
+        ("40 in/s", "-25.4% / -19.9%", "-13.4% / -12.5%", "+0.4% / -0.3%"),
+    ]
+
+
+def test_errors_stand_over_the_commanded_speed_left_negative(found):
+    figure = found.figures()[0]
+    (chart,) = figure.charts
+    drawn = {series["label"]: dict(zip(chart["x"], series["y"], strict=True)) for series in chart["series"]}
+    assert list(drawn) == list(METHODS)
+    assert drawn["power-on default"] == {-44: None, -40: -19.9, -10: -23.8, 10: -45.7, 40: -25.4, 44: None}
+    assert drawn["identified"][40] == 0.4
+    low, high = chart["yRange"]
+    assert low < -45.7
+    assert high > 0.4
+    assert figure.table.rows == found.table.rows
+
+
+def test_speeds_may_come_in_any_order(found):
+    turned = replace(found, speeds=found.speeds[::-1], errors=found.errors[:, ::-1])
+    assert turned.figures()[0].charts == found.figures()[0].charts
+
+
+def test_starts_are_drawn_whole_and_magnified_around_the_target(found):
+    figure = found.figures()[1]
+    whole, near = figure.charts
+    for chart in (whole, near):
+        assert [series["label"] for series in chart["series"]] == list(METHODS)
+        x, default, gave_up = chart["x"], *(series["y"] for series in chart["series"][:2])
+        assert max(default) == pytest.approx(36.0)
+        assert all((y is None) == (t > 0.2005) for t, y in zip(x, gave_up, strict=True))
+    assert near["yRange"] == pytest.approx([38.0, 41.2])
+    assert [level["y"] for level in near["levels"]] == pytest.approx([40.4, 39.6])
+    assert [row[3] for row in figure.table.rows] == ["not reached", "not reached", "0.07"]
+    assert [row[1] for row in figure.table.rows] == ["170 / 170"] * 3
+
+
+@pytest.mark.parametrize(
+    ("velocity", "settled"),
+    [((1.0, 1.0, 1.0, 1.0), 0.0), ((0.0, 1.0, 0.0, 1.0), 3.0), ((0.0, 1.0, 1.0, 0.0), math.inf),
+     ((0.0, math.nan, 1.0, 1.0), 2.0), ((0.0, 0.995, 1.009, 1.0), 1.0)],
+)  # fmt: skip
+def test_settling_counts_from_the_last_time_outside(velocity, settled):
+    start = DriveStart(t=np.arange(4.0), velocity=np.array(velocity), steady_from=0.0, mean_error=0.0, time_to_band=0.0)
+    assert start.settled(1.0) == settled
+
+
+@pytest.mark.parametrize(
+    ("overrides", "text"),
+    [
+        ([], "machine as in its file"),
+        (["disturbance.friction_left=-5 %", "disturbance.motor_constant=2.5 %"], "K +2.5 %, friction left -5 %"),
+        (["disturbance.supply=34 V"], "supply 34 V instead of 38 V"),
+    ],
+)
+def test_drift_is_told_in_a_few_words(overrides, text):
+    assert drift_text(make_spec(overrides=overrides)) == text
