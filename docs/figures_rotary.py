@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import BLUE, GREEN, GREY, ORANGE, draw_stale, label, picture
+from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, picture
 
 PINK = "#CC79A7"
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
@@ -147,32 +147,11 @@ def _name_points(area: Any, t: Any, part: Any, r: Any, m: Any) -> None:
 
 
 def conventional() -> None:
-    """Over the boundary with the angle of one turn and with the endless one: what `detent compare` runs."""
+    """Over the boundary with the angle of one turn and with the endless one: what `detent compare` draws first."""
+    from detent.page.draw import draw_figures
+
     (found,) = table().compare()
-    with picture("conventional.svg", 3, 6.6) as (way, lag, signal):
-        for case, colour in zip(found.crossings, (ORANGE, BLUE), strict=True):
-            keep = case.t < 11
-            t = case.t[keep]
-            way.plot(t, np.degrees(case.angle[keep]) + 100, color=colour, label=case.name)
-            lag.plot(t, np.degrees(case.deviation[keep]), color=colour)
-            signal.plot(t, np.degrees(case.s4[keep]), color=colour)
-        crossed = found.crossings[1].time
-        for area, text in ((way, "table angle [deg]"), (lag, "deviation dR [deg]"), (signal, "signal S4 [deg/s]")):
-            area.axvline(crossed, color=GREY, linestyle="--", linewidth=1)
-            area.set_ylabel(text)
-            area.margins(x=0)
-        way.axhline(540, color=GREEN, linestyle=":", linewidth=1.2)
-        label(way, "target of the conventional unit, 540 deg", (0.1, 540), (0, 14))
-        label(way, "360 deg", (crossed, 360), (-48, 16))
-        for when, place in ((-1, 14), (0, 4)):
-            case = found.crossings[0]
-            k = int(np.searchsorted(case.t, crossed - 1e-6)) + when
-            value = np.degrees(case.deviation[k])
-            label(lag, f"{value:.1f} deg", (crossed, value), (6, place))
-        way.legend(**LEGEND, ncols=2)
-        way.set_ylim(60, 1260)
-        way.set_yticks(range(180, 1261, 180))
-        signal.set_xlabel("time since the start [s]")
+    draw_figures(found.figures()[:1], FOLDER / "conventional.svg")
 
 
 # -- the literal form --------------------------------------------------------------------------------------------------

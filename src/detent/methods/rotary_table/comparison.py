@@ -11,55 +11,23 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from detent.errors import DetentError
-from detent.methods.rotary_table.build import start_turns, ticks
-from detent.methods.rotary_table.host import TableHost
-from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, RotaryTableSpec
-from detent.methods.rotary_table.system import TICK, RotaryTable
-from detent.methods.rotary_table.table_observer import FULL_TURN
-from detent.record.machine import Progress
-from detent.record.recorder import Recorder, make_trace
-from detent.units import format_quantity
+from detent.page.chart import Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.parts import Event, Numbers
+from detent.page.table import Cell, Table, TextTable, offset_cell
+from detent.page.words import GAP, angle, degrees, number
 
-START = math.radians(100)
-"""Where the crossing begins [rad]."""
+USED = "turn counter"
+"""Form of the extension that is recommended, and used unless the axis file says otherwise."""
 
-TARGET = math.radians(540)
-"""Target of the conventional unit [rad]: one and a half turns."""
+COARSE = 0.01
+"""Relative error of a mean speed that is marked."""
 
-WATCHED = 2 * FULL_TURN
-"""Way of a jog while the crossing is watched [rad]."""
+LOOKS = (("left", 1.5), ("speed", 2.5))
+"""Colour and width of the curves, in the order of `AngleComparison.crossings`."""
 
-FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
-"""Speeds of manual feed [rad/s]: those of them that the axis can run at."""
-
-FEED_START, FEED_TIME = 2.0, 10.0
-"""Mean speeds are taken from after the start [s], and the steps of the word, for at least so long [s]."""
-
-FEED_COUNTS, FEED_LONGEST = 1000, 1000.0
-"""And over at least so many counts, though no longer than this [s]."""
-
-FORWARD = math.radians(840)
-"""Way of a jog that starts near the boundary [rad]: two rollovers."""
-
-LAGS = (0.0, 0.25, 0.5, 1.0, 1.5)
-"""Where it starts, in units of the following error: a table that lags more than it started behind fails."""
-
-FORMS: dict[str, dict[str, object]] = {
-    "flag": {"form": "flag", "guarded": False},
-    "guarded flag": {"form": "flag", "guarded": True},
-    "turn counter": {"form": "turn counter", "guarded": False},
-}
-"""Forms of the extension, all judged by the theoretical remaining angle (specification 3.2, 3.5; test 12)."""
-
-MOST_ROWS = 400_000
-
-LONGEST_TURN = 3600.0
-"""A table that takes longer for a turn is not compared: it would take too long to see it go round [s]."""
-
-Numbers = NDArray[np.float64]
+DEG = 180.0 / math.pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +61,7 @@ class Start:
     """A jog that starts just after the boundary, with one form of the extension."""
 
     angle: float  # where it starts [rad]
-    form: str  # a key of `FORMS`
+    form: str  # a key of `comparison_runs.FORMS`
     travel: float  # and asked: way of the table, and of the command, after the same time [rad]
     asked: float  # [rad]
     thrown_back: bool  # the table has lost half a turn or more
@@ -123,6 +91,23 @@ class AngleComparison:
     feeds: tuple[Feed, ...]
     starts: tuple[Start, ...]
 
+    @property
+    def by_place(self) -> dict[float, dict[str, Start]]:
+        """Starts by angle [rad], then by form."""
+        places: dict[float, dict[str, Start]] = {}
+        for start in self.starts:
+            places.setdefault(start.angle, {})[start.form] = start
+        return places
+
+    @property
+    def table(self) -> TextTable:
+        """The method beside what it betters, for the terminal."""
+        return _text_table(self)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """Across the end of the turn, manual feed, and starts near the boundary."""
+        return _crossing_figure(self), _feed_figure(self), _start_figure(self)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
         names = ("name", "time", "deviation_before", "deviation_after", "travel", "speed")
@@ -140,147 +125,138 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) -> AngleComparison:
-    """Take the axis over the end of its turn, feed it by hand, and start it near the boundary, in every form."""
-    speed = crossing_speed(spec)
-    if speed < FULL_TURN / LONGEST_TURN:
-        least = format_quantity(FULL_TURN / LONGEST_TURN, "rad/s")
-        raise DetentError(
-            f"compare: came a table that goes round at {format_quantity(speed, 'rad/s')}; allowed: {least} or more, a "
-            "turn in an hour; do: raise limits.speed, or limits.acceleration where it stops the table too slowly"
-        )
-    speeds = sorted({min(wanted, spec.limits.speed) for wanted in FEED_SPEEDS})
-    lag = speed / spec.method.position_gain / (1 - spec.drive.droop)
-    places = sorted({*(share * lag for share in LAGS), spec.count, START})
-    starts = [(place, form) for place in places for form in FORMS]
-    runs = 2 + len(speeds) + len(starts)
-    done = 0
+# ---- on the page
 
-    def told(what: str, result: Any) -> Any:
-        """Say that one more run is done, and hand it on."""
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done / runs, what)
-        return result
 
-    return AngleComparison(
-        speed=speed,
-        following_error=lag,
-        crossings=(
-            told("conventional crossing", _cross(spec, speed, endless=False)),
-            told("endless crossing", _cross(spec, speed, endless=True)),
-        ),
-        feeds=tuple(told("manual feed", _feed(spec, wanted)) for wanted in speeds),
-        starts=tuple(told(f"start with {form}", _start(spec, speed, place, form)) for place, form in starts),
+def _crossing_figure(found: AngleComparison) -> Figure:
+    conventional, endless = found.crossings
+    caption = (
+        f"Both start at 100 deg and run at {degrees(found.speed)} deg/s. The conventional unit has a target beyond the "
+        "end of the turn and reads its angle as it comes; this method jogs. Look for: the lag at the mark. A unit that "
+        f"believes the table a whole turn back drives it on as fast as it can: after {number(endless.t[-1])}{GAP}s it "
+        f"has turned {degrees(conventional.travel)} deg, and still runs at {degrees(conventional.speed)} deg/s."
     )
+    t, events = conventional.t, _events(found)
+    ways, lags = _curves(found, lambda case: case.angle), _curves(found, lambda case: case.deviation)
+    signals = _curves(found, lambda case: case.s4)
+    return Figure(
+        title="Across the end of the turn, with an endless angle and without",
+        caption=caption,
+        charts=time_charts(Timeline(name="cross", t=t, label="time since the start", unit="s", events=events), [
+            Panel(name="cross-way", label="way [deg]", height=200, zero=True, curves=ways),
+            Panel(name="cross-deviation", label="lag dR [deg]", height=160, zero=True, curves=lags),
+            Panel(name="cross-speed", label="S4 [deg/s]", height=160, zero=True, curves=signals),
+        ]),
+        events=events,
+    )  # fmt: skip
 
 
-def crossing_speed(spec: RotaryTableSpec) -> float:
-    """Speed of the crossings [rad/s]: the axis's largest from which it stops within a quarter turn."""
-    return min(spec.limits.speed, math.sqrt(2 * spec.limits.acceleration * FULL_TURN / 4))
+def _curves(found: AngleComparison, quantity: Callable[[Crossing], Numbers]) -> list[Curve]:
+    """The same quantity [rad, rad/s] of both, at the times of the first."""
+    return [
+        Curve(label=case.name, colour=colour, width=width, digits=2,
+              y=np.interp(found.crossings[0].t, case.t, quantity(case)) * DEG)
+        for case, (colour, width) in zip(found.crossings, LOOKS, strict=True)
+    ]  # fmt: skip
 
 
-def _variant(spec: RotaryTableSpec, place: float, **changes: object) -> RotaryTableSpec:
-    """The axis at a start angle [rad], with the recommended method (specification 3.5) but for the changes."""
-    usual: dict[str, object] = {
-        "form": "turn counter", "judge": "theoretical", "inclusive": False, "guarded": False, "update": "atomic",
-        "signed_remaining": True, "position_control": True,
-    }  # fmt: skip
-    return spec.model_copy(
-        update={
-            "mechanics": spec.mechanics.model_copy(update={"start_angle": place}),
-            "method": spec.method.model_copy(update=usual | changes),
-            "disturbance": DisturbanceTable(),
-        }
+def _events(found: AngleComparison) -> list[Event]:
+    """Moments at which the end of the turn is crossed; both at the same moment are one."""
+    texts: dict[float, list[str]] = {}
+    for case in found.crossings:
+        if not math.isnan(case.time):
+            texts.setdefault(case.time, []).append(_crossing_text(case))
+    what = f"the detected angle jumps back by 360{GAP}deg"
+    return [Event(moment, f"{what}: {'; '.join(texts[moment])}") for moment in sorted(texts)]
+
+
+def _crossing_text(case: Crossing) -> str:
+    before, after = degrees(case.deviation_before), degrees(case.deviation_after)
+    what = f"stays {after}" if before == after else f"goes from {before} to {after}"
+    return f"the {case.name} deviation {what}{GAP}deg"
+
+
+def _feed_figure(found: AngleComparison) -> Figure:
+    heads = [("dial [deg/s]", True), ("with position control, speed off by [%]", True), ("without [%]", True)]
+    caption = (
+        "Manual feed used to run without position control, because the end of the turn stood in its way. Then the "
+        "table turns at what the drive makes of the speed signal: a droop, and steps of the speed word that are coarse "
+        "at low speed. With the loop closed all the time the mean speed is that of the dial."
     )
+    errors = [abs(error) for one in found.feeds for error in (one.closed, one.opened) if not math.isnan(error)]
+    longest = 100 * max(errors, default=0.0) or 1.0
+    rows = [
+        [f"{math.degrees(feed.speed):.4g}",
+         *(offset_cell(percent(off), longest, over=abs(off) > COARSE) for off in (feed.closed, feed.opened))]
+        for feed in found.feeds
+    ]  # fmt: skip
+    return Figure(title="Manual feed: mean speed", caption=caption, table=Table(heads=heads, rows=rows))
 
 
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """Columns of a run, one value per interrupt or less often: time since the start [s], and what their names say."""
-
-    t: Numbers
-    way: Numbers
-    speed: Numbers
-    deviation: Numbers
-    s4: Numbers
-    crossings: Numbers
-
-
-_SIGNALS = (
-    "machine.motor.turns", "machine.motor.angle", "machine.motor.velocity", "positioner.dr", "positioner.s4",
-    "positioner.angle.crossings",
-)  # fmt: skip
-
-
-def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], None]) -> _Seen:
-    """Let the host begin something, and time pass; the table may do what it likes."""
-    strobes = max(1, math.ceil(seconds / spec.method.strobe_period / MOST_ROWS))
-    blocks: list[NDArray[np.void]] = []
-    every = strobes * ticks(spec.method.strobe_period)
-    recorder = Recorder(RotaryTable, _SIGNALS, every=every, period=TICK, sink=blocks.append)
-    host = TableHost(spec, recorder)
-    host.start()
-    start = host.tick
-    begin(host)
-    while host.tick < start + ticks(seconds):
-        host.machine.pass_ticks(start + ticks(seconds) - host.tick)
-        host.acknowledge()
-    host.machine.close()
-    trace = make_trace(recorder, blocks, {})
-    turns = trace["machine.motor.turns"] - math.floor(start_turns(spec))
-    way = (turns + trace["machine.motor.angle"] / FULL_TURN - start_turns(spec) % 1) * (FULL_TURN / spec.ratio)
-    return _Seen(
-        t=trace.time - start * TICK,
-        way=way,
-        speed=trace["machine.motor.velocity"] / spec.ratio,
-        deviation=trace["positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
-        s4=trace["positioner.s4"] * spec.speed_per_word,
-        crossings=trace["positioner.angle.crossings"],
+def _start_figure(found: AngleComparison) -> Figure:
+    forms = list(dict.fromkeys(start.form for start in found.starts))
+    heads = [("start [deg]", True), ("in lags", True), *((f"{form}, way [deg]", True) for form in forms)]
+    caption = (
+        "The original form of the method remembers a crossing by one flag, and rolls over when C has gone one turn. "
+        f"From a start less than the lag, {angle(found.following_error)}, beyond 0 the table has not crossed the end "
+        "of the turn by then: only C goes back, and the table is thrown after it. A guarded flag, which is asked "
+        "before the rollover, and a counter of turns, the default, are safe from every start."
     )
+    lag = found.following_error or math.nan
+    rows = [
+        [f"{math.degrees(place):.3f}", f"{place / lag:.2f}", *(_start_cell(starts[form]) for form in forms)]
+        for place, starts in found.by_place.items()
+    ]
+    title = "Jog from just beyond the end of the turn, for two turns and more"
+    return Figure(title=title, caption=caption, table=Table(heads=heads, rows=rows))
 
 
-def _cross(spec: RotaryTableSpec, speed: float, *, endless: bool) -> Crossing:
-    """Over the end of the turn: by a jog, or conventionally by a positioning beyond it."""
-    target = PositionTable.model_construct(angle=TARGET, speed=speed, direction="as commanded")
-    axis = _variant(spec, START, form="turn counter" if endless else "raw").model_copy(
-        update={"position": {"0": target}}
-    )
-    seconds = WATCHED / speed + speed / spec.limits.acceleration
-    seen = _run(axis, seconds, lambda host: host.press(1, speed) if endless else host.begin(0))
-    after = int(np.argmax(seen.crossings > 0))
-    crossed = bool(seen.crossings[after]) and after > 0
-    return Crossing(
-        name="endless" if endless else "conventional",
-        time=float(seen.t[after]) if crossed else math.nan,
-        deviation_before=float(seen.deviation[after - 1]) if crossed else math.nan,
-        deviation_after=float(seen.deviation[after]) if crossed else math.nan,
-        travel=float(seen.way[-1]),
-        speed=float(seen.speed[-1]),
-        t=seen.t,
-        angle=seen.way,
-        deviation=seen.deviation,
-        s4=seen.s4,
-    )
+def _start_cell(start: Start) -> Cell:
+    thrown = "thrown back: " if start.thrown_back else ""
+    return Cell(text=thrown + degrees(start.travel), over=start.thrown_back)
 
 
-def _feed(spec: RotaryTableSpec, speed: float) -> Feed:
-    """Mean speed of a jog with and without position control."""
-    span = min(max(FEED_TIME, FEED_COUNTS * spec.count / speed), FEED_LONGEST)
-    begin = FEED_START + speed / spec.limits.acceleration
-    errors: list[float] = []
-    for closed in (True, False):
-        seen = _run(_variant(spec, START, position_control=closed), begin + span, lambda host: host.press(1, speed))
-        late = seen.t >= begin
-        errors.append(float(np.polyfit(seen.t[late], seen.way[late], 1)[0]) / speed - 1)
-    return Feed(speed=speed, closed=errors[0], opened=errors[1])
+# ---- in the terminal
 
 
-def _start(spec: RotaryTableSpec, speed: float, place: float, form: str) -> Start:
-    """A jog to larger angles from a place, with one form."""
-    ramp = speed / spec.limits.acceleration
-    seen = _run(_variant(spec, place, **FORMS[form]), FORWARD / speed, lambda host: host.press(1, speed))
-    asked = FORWARD - speed * ramp / 2
-    travel = float(seen.way[-1])
-    return Start(angle=place, form=form, travel=travel, asked=asked, thrown_back=asked - travel > FULL_TURN / 2)
+def _text_table(found: AngleComparison) -> TextTable:
+    conventional, endless = found.crossings
+    rows = [
+        ("deviation across the end of the turn", _change(endless), _change(conventional)),
+        (f"way after {number(endless.t[-1])} s", _way(endless), _way(conventional)),
+    ]
+    rows += [
+        (f"mean speed of manual feed at {math.degrees(feed.speed):.4g} deg/s", _share(feed.closed), _share(feed.opened))
+        for feed in found.feeds
+    ]
+    for place, starts in found.by_place.items():
+        others = "; ".join(f"{form} {_start(start)}" for form, start in starts.items() if form != USED)
+        rows.append((f"jog from {math.degrees(place):.3f} deg", _start(starts[USED]), others))
+    title = f"Endless angle at {degrees(found.speed)} deg/s, beside its alternatives"
+    return TextTable(title, ("", "turn counter, position control", "raw angle; no position control; other forms"), rows)
+
+
+def _change(case: Crossing) -> str:
+    return f"{degrees(case.deviation_before)} to {degrees(case.deviation_after)} deg"
+
+
+def _way(case: Crossing) -> str:
+    return f"{degrees(case.travel)} deg, at {degrees(case.speed)} deg/s"
+
+
+def _share(error: float) -> str:
+    shown = percent(error)
+    return f"{'+' if shown > 0 else ''}{number(shown, 2)} %"
+
+
+def percent(share: float) -> float:
+    """A relative error in percent, to a ten-thousandth: what is less is nothing.
+
+    >>> percent(-0.05014), percent(2e-9)
+    (-5.014, 0.0)
+    """
+    return round(100 * share, 4)
+
+
+def _start(start: Start) -> str:
+    return f"{degrees(start.travel)} deg{' (thrown back)' if start.thrown_back else ''}"

@@ -1,18 +1,17 @@
 """The rotary table as a method: what its package brings."""
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.rotary_table.checks import RULES, find_cautions
 from detent.methods.rotary_table.derive import derive
 from detent.methods.rotary_table.schema import RotaryTableSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -88,7 +87,7 @@ class RotaryTable(Method[RotaryTableSpec]):
 
     def compare(self, spec: RotaryTableSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
         """Beside an angle without extension and a jog without position control."""
-        from detent.methods.rotary_table.comparison import compare_angle
+        from detent.methods.rotary_table.comparison_runs import compare_angle
 
         return (compare_angle(spec, progress=progress),)
 
@@ -105,22 +104,6 @@ class RotaryTable(Method[RotaryTableSpec]):
 
     def page(self, spec: RotaryTableSpec, result: Any, shown: Shown) -> "Page":
         """The report."""
-        from detent.methods.rotary_table.page import make_table_page
-        from detent.methods.rotary_table.report import sequence_report
+        from detent.methods.rotary_table.page import table_page
 
-        found = next(iter(shown.comparisons), None)
-        return make_table_page(sequence_report(spec, result, shown.trace, comparison=found, settings=shown.settings))
-
-    def table(self, spec: RotaryTableSpec, comparison: Any) -> Table:
-        """The ways of reading the angle."""
-        from detent.methods.rotary_table.comparison_section import angle_table
-
-        del spec
-        return angle_table(comparison)
-
-    def plot(self, spec: RotaryTableSpec, comparison: Any, path: Path) -> None:
-        """The ways of reading the angle."""
-        from detent.methods.rotary_table.comparison_section import plot_angle
-
-        del spec
-        plot_angle(comparison, path)
+        return table_page(spec, result, shown.trace, shown.comparisons, shown.settings)

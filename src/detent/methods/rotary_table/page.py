@@ -1,240 +1,295 @@
 """The page about a sequence on a rotary table: was it done, how exactly, and how the table goes on beyond a turn."""
 
 import math
-from html import escape
+from collections.abc import Sequence
+from typing import Any
 
-from detent.methods.rotary_table.charts import KINDS, left_out_signals, line_charts, line_end, turn_charts
-from detent.methods.rotary_table.comparison_section import comparison_charts, comparison_section
-from detent.methods.rotary_table.page_data import StepResult, TableReportData, TurnDetail, WorstStep
-from detent.methods.rotary_table.summary import angle, degrees, kinds_text, times, turns
-from detent.page.chart import Chart
-from detent.page.page import (
-    ZOOM_HINT,
-    Card,
-    Page,
-    cards,
-    chart_slot,
-    event_table,
-    figure,
-    headline,
-    notes,
-    section,
-    small_print,
+import numpy as np
+
+from detent.methods.rotary_table.detail import step_section
+from detent.methods.rotary_table.run import SequenceRun, StepRecord
+from detent.methods.rotary_table.schema import RotaryTableSpec
+from detent.methods.rotary_table.sequence_controller import Change
+from detent.methods.rotary_table.summary import SequenceFigures, rollovers, times, turns
+from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
+from detent.page.lanes import Bar, Lane, lane_chart
+from detent.page.parts import Numbers
+from detent.page.run_page import (
+    Stretch,
+    made_card,
+    page_title,
+    run_headline,
+    stopped_after,
+    stretch,
+    time_card,
+    warnings,
+    whole_or_first,
 )
-from detent.page.words import GAP, CountUnit, count, duration, further, offset_cell, table
+from detent.page.table import Cell, left_out, long_table, offset_cell
+from detent.page.words import CountUnit, angle, count, degrees, duration, further
+from detent.record.trace import Trace
 
-MOST_STEPS = 500
-"""Steps in the table: more than anybody reads."""
+PHASE, VELOCITY = "table", "machine.motor.velocity"
+DETECTED, AHEAD, COMMANDED = "positioner.angle.dar", "positioner.z", "positioner.interpolator.speed"
+
+NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)
+"""Signals that the whole sequence is drawn from."""
+
+PHASE_TURN = float(1 << 32)
+"""Register of the true angle per turn."""
+
+LINE_SECONDS = 120.0
+"""Time that the time line shows: more than this is a grey block on any screen."""
+
+MOST_SIGNALS = 12
+"""Inputs and outputs that the time line shows."""
+
+POINTS = 1500
+"""Rows that are chosen for one curve's sake: the time line is drawn in four plot areas."""
+
+KINDS = (("go", "go to", "right"), ("jog", "jog", "left"), ("wait", "wait", "muted"))
+"""Kinds of steps that last, their lanes and colours; an output is switched in no time."""
 
 COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
-"""Of the kinds of steps, as in the time line."""
+
+LINE = "line"
+"""Name of the time line: its plot areas share their cursor."""
+
+SINCE = "time since the sequence began"
+
+HEADS = (
+    ("step", True), ("what", False), ("begin [s]", True), ("took [s]", True), ("from [deg]", True), ("to [deg]", True),
+    ("way [deg]", True), ("error [count]", True), ("lag [deg]", True), ("crossed", True), ("roll\u00adovers", True),
+)  # fmt: skip
+
+DEG = 180.0 / math.pi
 
 
-def make_table_page(data: TableReportData) -> Page:
-    """What the page is made of."""
-    return {
-        "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
-        "body": [
-            _headline(data), _cards(data), notes(data.notes), _line(data), _turn(data),
-            comparison_section(data.comparison), _steps(data), small_print(data.settings),
+def table_page(
+    spec: RotaryTableSpec,
+    run: SequenceRun,
+    trace: Trace | None,
+    comparisons: Sequence[Comparison] = (),
+    settings: dict[str, str] | None = None,
+) -> Page:
+    """The page of a run; figures whose signals were not recorded are left out."""
+    figures = SequenceFigures(run)
+    return Page(
+        title=page_title(spec.axis.name, run),
+        headline=_headline(spec, figures),
+        cards=_cards(spec, figures),
+        notes=warnings(run.warnings),
+        sections=[
+            Section("What the sequence did", [_line_figure(spec, figures, trace)] if run.steps else []),
+            step_section(spec, run, trace),
+            comparison_section(comparisons),
+            Section("Step by step", [_every_step(spec, run)] if run.steps else []),
         ],
-        "charts": all_charts(data),
-        "version": data.version,
-    }  # fmt: skip
-
-
-def all_charts(data: TableReportData) -> list[Chart]:
-    """Every chart of the page."""
-    drawn = line_charts(data) if data.steps else []
-    if data.detail:
-        drawn += turn_charts(data.detail)
-    return drawn + comparison_charts(data.comparison)
+        settings=settings or {},
+    )
 
 
 # ---- what came out, in one glance
 
 
-def _headline(data: TableReportData) -> str:
-    figures = data.figures
-    kicker = f"Simulated run of the axis {data.axis_name}"
-    if not data.done:
-        done = f"Stopped after {count(figures.made)} of {count(figures.asked, 'step')}, {duration(figures.seconds)} in."
-        lead = f"{done} {data.failure[:1].upper()}{data.failure[1:].rstrip('.')}."
-        return headline("bad", "Not done", data.job_name, kicker=kicker, lead=lead)
-    lead = f"{count(figures.asked, 'step')} in {duration(figures.seconds)}."
+def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
+    run, name, asked = figures.run, spec.axis.name, count(figures.run.job.count, "step")
+    if not run.done:
+        return run_headline(name, run, stopped_after(len(figures.made), asked, figures.seconds))
+    lead = f"{asked} in {duration(figures.seconds)}."
     if figures.deviation:
-        crossed = f" and crossed the end of its turn {times(figures.crossings)}" if figures.crossings else ""
-        lead += f" The table turned {turns(figures.travel)}{crossed}."
-    if not figures.error:
-        return headline("good", "Done", data.job_name, kicker=kicker, lead=lead)
-    off = f"{angle(figures.error.value)} ({_counts(data, figures.error.value)})"
-    if _is_off(data):
-        lead += (
-            f" But in step {count(figures.error.step)} it stood {off} beside its target while the axis said that it was"
-            " in position: the detector cannot see what backlash and eccentricity of the gear do to the table."
-        )
-        return headline("warn", "Done, but beside its targets", data.job_name, kicker=kicker, lead=lead)
-    lead += f" In every positioning it came to within {off} of its target."
-    return headline("good", "Done", data.job_name, kicker=kicker, lead=lead)
+        crossed = f" and crossed the end of its turn {times(run.crossings)}" if run.crossings else ""
+        lead += f" The table turned {turns(run.travel)}{crossed}."
+    error = figures.error
+    if error is None:
+        return run_headline(name, run, lead)
+    off = f"{angle(error.value)} ({CountUnit(spec.count, 'count').counts(error.value)})"
+    if not _is_off(spec, run, error.value):
+        return run_headline(name, run, f"{lead} In every positioning it came to within {off} of its target.")
+    lead += (
+        f" But in {_whose(error.of)} it stood {off} beside its target while the axis said that it was in position: the "
+        "detector cannot see what backlash and eccentricity of the gear do to the table."
+    )
+    return run_headline(name, run, lead, doubt="Done, but beside its targets")
 
 
-def _is_off(data: TableReportData) -> bool:
+def _is_off(spec: RotaryTableSpec, run: SequenceRun, error: float) -> bool:
     """The table stands farther off than window and resolution of the detector allow."""
-    error = data.figures.error
-    return error is not None and error.value > data.in_position + data.count
+    return abs(error) > run.in_position + spec.count
 
 
-def _counts(data: TableReportData, value: float) -> str:
-    return CountUnit(data.count, "count").counts(value)
-
-
-def _cards(data: TableReportData) -> str:
-    figures = data.figures
-    seconds, _, time_unit = duration(figures.seconds).partition(GAP)
+def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
+    run, unit = figures.run, CountUnit(spec.count, "count")
     shown = [
-        Card("Steps", count(figures.made), f"of {count(figures.asked)}", kinds_text(figures),
-             bad=figures.made < figures.asked),
-        Card("Time", seconds, time_unit, "for the sequence" if data.done else "until it stopped"),
-    ]  # fmt: skip
-    if figures.error:
-        value, _, unit = _counts(data, figures.error.value).partition(" ")
-        allowed = _counts(data, data.in_position)
-        below = f"{angle(figures.error.value)}, {_whose(figures.error)}; window {allowed}"
-        shown.append(Card("Worst error at rest", value, unit, below, bad=_is_off(data)))
-    if figures.deviation:
-        value, _, unit = turns(figures.travel).partition(" ")
-        rollovers = f", {count(figures.rollovers, 'rollover')}" if figures.rollovers else ""
-        crossed = f"end of the turn crossed {times(figures.crossings)}" if figures.crossings else "within the turn"
-        shown.append(Card("Turned", value, unit, crossed + rollovers))
-        value, _, unit = angle(figures.deviation.value).partition(GAP)
-        shown.append(Card("Largest lag", value, unit, f"deviation dR, {_whose(figures.deviation)}"))
-    if figures.peak_speed:
-        below = f"{_whose(figures.peak_speed)}, command limited to {degrees(data.max_speed)}"
-        shown.append(Card("Peak speed", degrees(figures.peak_speed.value), "deg/s", below))
-    return cards(shown)
+        made_card("Steps", len(figures.made), run.job.count, figures.kinds),
+        time_card(figures.seconds, "for the sequence" if run.done else "until it stopped"),
+    ]
+    if error := figures.error:
+        value, word = unit.counts(error.value).split(" ")
+        below = f"{angle(error.value)}, {_whose(error.of)}; window {unit.counts(run.in_position)}"
+        shown.append(Card("Worst error at rest", value, word, below, bad=_is_off(spec, run, error.value)))
+    if deviation := figures.deviation:
+        value, word = turns(run.travel).split(" ")
+        crossed = f"end of the turn crossed {times(run.crossings)}" if run.crossings else "within the turn"
+        shown.append(Card("Turned", value, word, crossed + rollovers(run)))
+        shown.append(card("Largest lag", angle(deviation.value), f"deviation dR, {_whose(deviation.of)}"))
+    if fastest := figures.peak_speed:
+        below = f"{_whose(fastest.of)}, command limited to {degrees(spec.limits.speed)}"
+        shown.append(Card("Peak speed", degrees(fastest.value), "deg/s", below))
+    return shown
 
 
-def _whose(worst: WorstStep) -> str:
-    return f"step {count(worst.step)}"
+def _whose(step: StepRecord) -> str:
+    return f"step {count(step.number)}"
 
 
 # ---- time line
 
 
-def _line(data: TableReportData) -> str:
-    if not data.steps:
-        return ""
-    shown, seconds = line_end(data), data.figures.seconds
-    title = "Time line" if shown > 0.99 * seconds else f"The first {duration(shown)} of {duration(seconds)}"
+def _line_figure(spec: RotaryTableSpec, figures: SequenceFigures, trace: Trace | None) -> Figure:
+    run, rows = figures.run, stretch(trace, NEEDED, figures.run.time_ready)
+    recorded = float(rows.t[-1]) if rows else math.inf
+    end = min(figures.seconds, recorded, LINE_SECONDS)
+    signals = _signal_lanes(run)
+    lanes = [*_step_lanes(run), *signals[:MOST_SIGNALS]]
     caption = "What the sequence controller did, and what the table did with it."
-    if any(step.kind == "jog" for step in data.steps) and data.inputs:
+    if run.inputs and any(step.kind == "jog" for step in run.steps):
         caption += " A jog that waits for its signal begins before the table moves."
-    slots = [chart_slot("line-steps", "Steps and signals over time")]
-    if data.path:
+    if rows:
         caption += " D is what the detector says: it starts again at 0 in every turn."
-        if data.done and data.figures.crossings:
-            caption += " Look for: the true angle, which runs on without a step where D jumps."
-        slots += [
-            chart_slot("line-turns", "Turns of the table over time"),
-            chart_slot("line-detected", "Detected angle over time"),
-            chart_slot("line-speed", "Speed over time"),
-        ]
-    left_out = left_out_signals(data)
-    if left_out:
-        caption += f" {further(left_out, 'signal')} not drawn."
-    return section("What the sequence did", figure(title, caption, "".join(slots), ZOOM_HINT))
+    if rows and run.done and run.crossings:
+        caption += " Look for: the true angle, which runs on without a step where D jumps."
+    if len(signals) > MOST_SIGNALS:
+        caption += f" {further(len(signals) - MOST_SIGNALS, 'signal')} not drawn."
+    return Figure(
+        title=whole_or_first(end, figures.seconds, "Time line"),
+        caption=caption,
+        charts=_line_charts(spec, run, rows.between(0.0, end), lanes) if rows else [_lane_chart(lanes, (0.0, end))],
+    )
 
 
-# ---- one step
+def _lane_chart(lanes: list[Lane], span: tuple[float, float], sync: str = "") -> Chart:
+    return lane_chart("line-steps", lanes, span, f"{SINCE} [s]", sync=sync) | {"about": "Steps and signals over time"}
 
 
-def _turn(data: TableReportData) -> str:
-    detail = data.detail
-    if not detail:
-        return ""
-    slots = [
-        ("turn-angles", "Angles of the positioner over time"),
-        ("turn-count", "Turns added and FLG over time"),
-        ("turn-deviation", "Deviation over time"),
-        ("turn-speed", "Speed signal and speed over time"),
+def _step_lanes(run: SequenceRun) -> list[Lane]:
+    lanes = [
+        Lane(label, colour, [_step_bar(run, step) for step in run.steps if step.kind == kind])
+        for kind, label, colour in KINDS
     ]
-    content = "".join(chart_slot(name, label) for name, label in slots)
-    title = f"Step {count(detail.number)}: {detail.text}"
-    caption = f"Shown is {escape(detail.why)}. {_turn_caption(detail)}"
-    heading = "How the table goes on beyond a turn" if detail.crossings else "One step in detail"
-    return section(heading, figure(title, caption, content, ZOOM_HINT + event_table(detail.events, "s")))
+    return [lane for lane in lanes if lane.bars]
 
 
-CARRIED = {
-    "turn counter": "The positioner adds n turns and reckons with the present angle R = D + n turns.",
-    "flag": "The positioner notes the jump in FLG, and adds one turn along the motion to R while that is on.",
-    "raw": "A conventional unit reckons with this angle as it comes: R is D.",
-}
-"""What becomes of the jump, by the form of the axis."""
+def _step_bar(run: SequenceRun, step: StepRecord) -> Bar:
+    # What the name of the lane says already is left out: "go to position 2 (180 deg, positive)" -> "2".
+    short = step.text.removeprefix("go to position ").removeprefix("jog ").removeprefix("wait ")
+    short = short.partition(" ")[0] if step.kind == "go" else short
+    return Bar(step.begin - run.time_ready, step.end - run.time_ready, short, f"{_whose(step)}: {step.text}")
 
 
-def _turn_caption(detail: TurnDetail) -> str:
-    carried = f"The detector knows one turn: at its end D jumps by 360 deg. {CARRIED[detail.form]} "
-    carried += "Shaded: R is not D. " if detail.crossings and detail.form != "raw" else ""
-    if detail.kind == "go":
-        asked = "The commanded angle C runs to the target M, and R follows. "
-        look = "Look for: a deviation that knows nothing of the end of the turn."
-    else:
-        asked = (
-            "The target M of a jog is two turns ahead and never reached: as soon as less than one turn is left, R and "
-            "C go back by a whole turn together (rollover), and everything begins again. "
-        )
-        look = "Look for: a deviation that knows nothing of all this; if one went alone, it would jump by 360 deg."
-    return carried + asked + ("Look for: where the lag leaves its course." if detail.failed else look)
+def _signal_lanes(run: SequenceRun) -> list[Lane]:
+    return [
+        Lane(f"{way} {name}", colour, [Bar(begin, end, "on", f"{way}put {name} is on") for begin, end in spans])
+        for way, colour, changes in (("out", "good", run.outputs), ("in", "drive", run.inputs))
+        for name, spans in _spans(run, changes).items()
+    ]
+
+
+def _spans(run: SequenceRun, changes: Sequence[Change]) -> dict[str, list[tuple[float, float]]]:
+    """Stretches in which each signal was on [s]; what is still on at the end is on up to there."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    since: dict[str, float] = {}
+    for moment, name, on in changes:
+        found = spans.setdefault(name, [])
+        if on:
+            since.setdefault(name, moment - run.time_ready)
+        elif name in since:
+            found.append((since.pop(name), moment - run.time_ready))
+    for name, begin in since.items():
+        spans[name].append((begin, run.time_end - run.time_ready))
+    return spans
+
+
+def _line_charts(spec: RotaryTableSpec, run: SequenceRun, rows: Stretch, lanes: list[Lane]) -> list[Chart]:
+    """Steps and signals as bars, angle and speed of the table below."""
+    speed, demanded = rows[VELOCITY] / spec.ratio, rows[AHEAD] * rows[COMMANDED] / spec.per_interrupt(1.0)
+
+    target, true = _targets(run, rows.t) / math.tau, _endless_turns(rows[PHASE], run.steps[0].start)
+    ways = [
+        Curve(label="target of a positioning", colour="left", dash=(6, 4), y=target, thin=0),
+        Curve(label="true angle", colour="speed", width=2, y=true, digits=5, thin=POINTS),
+    ]
+    degrees_seen = rows[DETECTED] * spec.count * DEG
+    detected = Curve(label="detected angle D", colour="ink", y=degrees_seen, digits=2, thin=POINTS)
+    speeds = [
+        Curve(label="commanded", colour="left", dash=(6, 4), y=demanded * DEG, digits=2, thin=POINTS),
+        Curve(label="true speed", colour="speed", width=2, y=speed * DEG, digits=2, thin=POINTS),
+    ]
+    return [
+        _lane_chart(lanes, (float(rows.t[0]), float(rows.t[-1])), LINE),
+        *time_charts(Timeline(name=LINE, t=rows.t, label=SINCE, unit="s"), [
+            Panel(name="line-turns", label="table [turn]", height=200, zero=True, curves=ways),
+            Panel(name="line-detected", label="D [deg]", height=150, span=(0.0, 360.0), curves=[detected]),
+            Panel(name="line-speed", label="speed [deg/s]", height=180, zero=True, curves=speeds),
+        ]),
+    ]  # fmt: skip
+
+
+def _endless_turns(phase: Numbers, start: float) -> Numbers:
+    """True angle [turn] from the register of one turn; it begins within half a turn of `start` [rad]."""
+    turned: Any = np.unwrap(phase / PHASE_TURN, period=1.0)
+    return turned + round(start / math.tau - float(turned[0]))
+
+
+def _targets(run: SequenceRun, t: Numbers) -> Numbers:
+    """Target of the positioning that is under way at each time since the sequence began [rad]; NaN in other steps."""
+    found = np.full(len(t), np.nan)
+    for step in run.steps:
+        if step.kind == "go":
+            found[slice(*np.searchsorted(t, (step.begin - run.time_ready, step.end - run.time_ready)))] = step.target
+    return found
 
 
 # ---- table
 
 
-def _steps(data: TableReportData) -> str:
-    if not data.steps:
-        return ""
-    heads = [("step", True), ("what", False), ("begin [s]", True), ("took [s]", True),
-             ("from [deg]", True), ("to [deg]", True), ("way [deg]", True), ("off target [count]", True),
-             ("lag [deg]", True), ("crossed", True), ("roll\u00adovers", True)]  # fmt: skip
-    offsets = [abs(step.offset) for step in data.steps if not math.isnan(step.offset)]
-    longest = max(offsets, default=0.0) / data.count or 1.0
-    rows = [_row(data, step, longest) for step in data.steps[:MOST_STEPS]]
+def _every_step(spec: RotaryTableSpec, run: SequenceRun) -> Figure:
+    errors = [abs(_error(run, step)) for step in run.steps]
+    longest = max((error for error in errors if not math.isnan(error)), default=0.0) / spec.count or 1.0
+    rows = [_row(spec, run, step, longest) for step in run.steps]
     caption = (
         "Colours as in the time line. From and to are true angles of the table within its turn; way counts on through "
-        "turns. Off target is true angle less target when the step ends; a count is "
-        f"{angle(data.count)}. Lag is the largest deviation dR; crossed counts ends of the turn."
+        "turns. Error is target less true angle when the step ends; a count is "
+        f"{angle(spec.count)}. Lag is the largest deviation dR; crossed counts ends of the turn."
     )
-    left_out = len(data.steps) - len(rows)
-    if left_out > 0:
-        caption += f" {further(left_out, 'step')} in the JSON summary only."
-    return section("Step by step", figure("Every step", caption, table(heads, rows, tall=True)))
+    return Figure(title="Every step", caption=caption + left_out(len(rows), "step"), table=long_table(HEADS, rows))
 
 
-def _row(data: TableReportData, step: StepResult, longest: float) -> list[str]:
-    mark = f'<span class="bar" style="width:8px;background:var(--{COLOURS[step.kind]})"></span>'
-    what = [count(step.number), f'<td style="min-width:11em">{mark}{escape(step.text)}</td>', f"{step.begin:.3f}"]
-    if step.kind == "output":
-        return [*what, *[""] * 8]
-    rest = [f"{step.seconds:.3f}", _place(step.start), _place(step.stop)]
-    if step.kind == "wait":
-        return [*what, *rest, *[""] * 5]
-    return [
-        *what,
-        *rest,
-        _signed(step.travel),
-        offset_cell(step.offset / data.count, longest, over=abs(step.offset) > data.in_position + data.count),
-        degrees(step.peak_deviation),
-        count(step.crossings) if step.crossings else "",
-        count(step.rollovers) if step.rollovers else "",
-    ]
+def _row(spec: RotaryTableSpec, run: SequenceRun, step: StepRecord, longest: float) -> list[str | Cell]:
+    what = Cell(text=step.text, mark=COLOURS[step.kind])
+    row = [count(step.number), what, f"{step.begin - run.time_ready:.3f}"]
+    if step.kind != "output":
+        row += [f"{step.end - step.begin:.3f}", _place(step.start), _place(step.stop)]
+    if step.kind in {"go", "jog"}:
+        error = _error(run, step)
+        row += [
+            f"{math.degrees(step.travel):+.3f}".replace("-", "\u2212"),
+            offset_cell(error / spec.count, longest, over=_is_off(spec, run, error)),
+            degrees(step.peak_deviation),
+            count(step.crossings) if step.crossings else "",
+            count(step.rollovers) if step.rollovers else "",
+        ]
+    return row + [""] * (len(HEADS) - len(row))
+
+
+def _error(run: SequenceRun, step: StepRecord) -> float:
+    """Target less angle at the end [rad]; a jog that broke off is held on no place of its own."""
+    broken = not run.done and step is run.steps[-1] and step.kind == "jog"
+    return math.nan if broken else step.error
 
 
 def _place(endless: float) -> str:
     """Angle within the turn; 359.9997 deg is 0.000 deg."""
     return f"{round(math.degrees(endless), 3) % 360:.3f}"
-
-
-def _signed(way: float) -> str:
-    text = f"{math.degrees(way):+.3f}"
-    return text.replace("-", "\u2212")

@@ -1,26 +1,30 @@
-"""Made-up sequences of a rotary table, and the report of one: small enough to know every number."""
+"""Made-up sequences of the example's rotary table, and comparisons: small enough to know every number."""
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
+import detent
+from detent.methods.load import load_spec
 from detent.methods.rotary_table.comparison import AngleComparison, Crossing, Feed, Start
-from detent.methods.rotary_table.page_data import (
-    SequenceFigures,
-    Signal,
-    StepResult,
-    TablePath,
-    TableReportData,
-    TurnDetail,
-    WorstStep,
-)
+from detent.methods.rotary_table.page import AHEAD, COMMANDED, DETECTED, PHASE, VELOCITY
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
+from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_job import SequenceJob, Wait
-from detent.page.parts import Event, Note
+from detent.record.trace import Trace
 
-COUNT = math.radians(0.001)
-"""A count of the made-up table [rad]."""
+COUNT = math.tau / (90 * 4096)
+"""A count of the example's table [rad]."""
+
+
+@cache
+def axis() -> RotaryTableSpec:
+    """The example."""
+    spec = load_spec(detent.example("rotary_table.toml"))
+    assert isinstance(spec, RotaryTableSpec)
+    return spec
 
 
 def deg(value: float) -> float:
@@ -54,31 +58,31 @@ def run_of(*records: StepRecord, asked: int | None = None, **changes: object) ->
     return run
 
 
-def result(number: int, kind: str = "go", start: float = 0.0, stop: float = 90.0, **changes: object) -> StepResult:
-    """A step of 2 s, the first from 0 s on; angles in degrees; 0.5 counts beyond its target."""
-    step = StepResult(
-        number=number, kind=kind, text=f"{kind} <{number}>", begin=2.0 * (number - 1), seconds=2.0, start=deg(start),
-        stop=deg(stop), offset=0.5 * COUNT if kind in {"go", "jog"} else math.nan, peak_speed=deg(60),
-        peak_deviation=deg(1), crossings=0, rollovers=0,
+def shop_run(**changes: object) -> SequenceRun:
+    """Five steps in 10 s, all done: a positioning, a wait in a clamp, a jog over the end of the turn on a signal."""
+    still = {"peak_speed": 0.0, "peak_deviation": 0.0}
+    return run_of(
+        record(1, text="go to position 1 (90 deg, <shortest>)"),
+        record(2, "output", 90, 90, begin=2.5, end=2.5, text='set "clamp"', **still),
+        record(3, "wait", 90, 90, begin=2.5, end=6.5, text="wait 4 s", **still),
+        record(4, "output", 90, 90, begin=6.5, end=6.5, text='clear "clamp"', **still),
+        record(5, "jog", 90, 450, begin=6.5, end=10.5, text='jog + at 60 deg/s while "feed"', error=1.2 * COUNT,
+               peak_speed=deg(61.2), peak_deviation=deg(2.17), crossings=1, rollovers=1),
+        outputs=[(2.5, "clamp", True), (6.5, "clamp", False)],
+        inputs=[(8.5, "feed", True), (10.0, "feed", False)],
+        **changes,
     )  # fmt: skip
-    return replace(step, **changes)
 
 
-def turn_detail(**changes: object) -> TurnDetail:
-    """A jog at 60 deg/s from 300 deg: it crosses the end at 1 s, rolls over at 6 s; always 2 deg behind."""
-    t = np.arange(-0.1, 8.0, 0.02)
-    way = np.clip(t, 0, None) * deg(60) + deg(300)
-    present = np.where(t < 6.0, way, way - math.tau)
-    turns = np.where(t < 1.0, 0, np.where(t < 6.0, 1, np.where(t < 7.0, 0, 1)))
-    detail = TurnDetail(
-        number=5, kind="jog", text="jog + at <60> deg/s", why="the jog that crosses the end of the turn most often",
-        form="turn counter", failed=False, t=t, detected=present - turns * math.tau, present=present,
-        command=present + deg(2), target=np.where(t < 0, np.nan, deg(1020)),
-        threshold=np.where(t < 0, np.nan, deg(660)), turns=turns, flag=turns, deviation=np.full(len(t), deg(2)),
-        speed_signal=np.full(len(t), deg(63)), velocity=np.full(len(t), deg(60)), crossings=2, rollovers=1,
-        events=[Event(0.0, "+ <button>"), Event(1.0, "crossed"), Event(6.0, "rollover"), Event(7.0, "crossed")],
-    )  # fmt: skip
-    return replace(detail, **changes)
+def shop_trace(seconds: float = 10.0) -> Trace:
+    """What was recorded of it, every 10 ms: 90 deg in 2 s, 4 s in the clamp, two more, and a turn in the last 2 s."""
+    t = np.arange(0.0, seconds, 0.01)
+    turn = np.interp(t, [0, 2, 8, 10], [0.0, 0.25, 0.25, 1.25]) % 1.0
+    speed = np.where(t < 2, deg(45), np.where(t < 8, 0.0, deg(180)))
+    demanded = np.where(t < 2, round(axis().per_interrupt(deg(45))), 0)
+    columns = {PHASE: turn * 2**32, VELOCITY: speed * axis().ratio, DETECTED: np.floor(turn * axis().period),
+               AHEAD: np.ones(len(t), dtype=np.int8), COMMANDED: demanded}  # fmt: skip
+    return Trace(columns={"t": t + 0.5} | columns)
 
 
 def crossing(name: str, after: float, **changes: object) -> Crossing:
@@ -106,40 +110,3 @@ def angle_comparison(**changes: object) -> AngleComparison:
         starts=tuple(starts),
     )  # fmt: skip
     return replace(found, **changes)
-
-
-def table_report(**changes: object) -> TableReportData:
-    """Five steps in 10 s, all done, with every figure that a report can have."""
-    t = np.arange(0, 10.0, 0.01)
-    angle = np.interp(t, [0, 2, 8, 10], [0.0, deg(90), deg(90), deg(450)])
-    report = TableReportData(
-        axis_name="index & mill",
-        job_name="shop.toml",
-        done=True,
-        figures=SequenceFigures(
-            asked=5, made=5, positionings=1, jogs=1, seconds=10.0, travel=deg(450), turns=1, crossings=1, rollovers=1,
-            error=WorstStep(0.5 * COUNT, 1), deviation=WorstStep(deg(2.17), 5), peak_speed=WorstStep(deg(61.2), 5),
-        ),
-        count=COUNT,
-        in_position=2 * COUNT,
-        max_speed=deg(60),
-        steps=[
-            result(1, text="go to position 1 (90 deg, <shortest>)"),
-            result(2, "output", 90, 90, seconds=0.0, text='set "clamp"'),
-            result(3, "wait", 90, 90, begin=2.0, seconds=4.0, text="wait 4 s"),
-            result(4, "output", 90, 90, begin=6.0, seconds=0.0, text='clear "clamp"'),
-            result(5, "jog", 90, 450, begin=6.0, seconds=4.0, text='jog + at 60 deg/s while "feed"',
-                   offset=-1.2 * COUNT, peak_deviation=deg(2.17), crossings=1, rollovers=1),
-        ],
-        outputs=[Signal("clamp", [(2.0, 6.0)])],
-        inputs=[Signal("feed", [(8.0, 9.5)])],
-        path=TablePath(
-            t=t, angle=angle, target=np.where(t < 2, deg(90), np.nan), detected=angle % math.tau,
-            velocity=np.gradient(angle, t), velocity_ref=np.where(t < 2, deg(45), 0.0),
-        ),
-        detail=turn_detail(),
-        comparison=angle_comparison(),
-        notes=[Note("warning", "signal <late>")],
-        settings={"seed": "7"},
-    )  # fmt: skip
-    return replace(report, **changes)

@@ -1,217 +1,280 @@
+import json
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
+from importlib import resources
 
+import numpy as np
 import pytest
-from tests.page_reader import Reader, charts_of, paper_of
-from tests.unit.methods.rotary_table.samples import COUNT, deg, result, table_report, turn_detail
+from tests.unit.methods.rotary_table.samples import (
+    COUNT,
+    angle_comparison,
+    axis,
+    record,
+    run_of,
+    shop_run,
+    shop_trace,
+)
 
-from detent.methods.rotary_table import charts as table_charts
-from detent.methods.rotary_table import page as table_page
-from detent.methods.rotary_table.page import make_table_page
-from detent.methods.rotary_table.page_data import Signal, TableReportData, WorstStep
-from detent.page.page import render_page, write_page
-from detent.page.parts import Note
-
-
-def read(report: TableReportData) -> str:
-    return Reader(render_page(make_table_page(report))).text
-
-
-def cells_of(html: str) -> list[list[str]]:
-    rows = re.findall(r"<tr>(.*?)</tr>", html, flags=re.DOTALL)
-    return [[Reader(cell).text for cell in re.findall(r"<td.*?</td>", row, flags=re.DOTALL)] for row in rows]
+from detent.methods.rotary_table import page as table_pages
+from detent.methods.rotary_table.page import NEEDED, table_page
+from detent.methods.rotary_table.run import SEQUENCE_SIGNALS, SequenceRun
+from detent.page.frame import Page
+from detent.page.table import Cell
+from detent.record.trace import Trace
 
 
-def figures(**changes: object) -> TableReportData:
-    report = table_report()
-    return replace(report, figures=replace(report.figures, **changes))
+def page_of(run: SequenceRun, trace: Trace | None = None) -> Page:
+    return table_page(axis(), run, trace)
+
+
+def lead_of(run: SequenceRun) -> str:
+    return page_of(run).headline.lead.replace("\u202f", " ")
+
+
+def ids_of(page: Page) -> list[str]:
+    return [chart["id"] for chart in page.charts]
+
+
+def chart_of(page: Page, name: str) -> dict:
+    return next(chart for chart in page.charts if chart["id"] == name)
+
+
+def curves_of(chart: dict) -> dict:
+    return {series["label"]: series["y"] for series in chart["series"]}
+
+
+def lanes_of(page: Page) -> dict:
+    return {lane["label"]: lane["bars"] for lane in chart_of(page, "line-steps")["lanes"]}
+
+
+def cells_of(page: Page) -> list[list[Cell]]:
+    table = page.sections[-1].shown[0].table
+    assert table is not None
+    return [[cell for cell, _ in table.cells(row)] for row in table.rows]
+
+
+def rows_of(page: Page) -> list[list[str]]:
+    return [[cell.text for cell in row] for row in cells_of(page)]
+
+
+# ---- in one glance
 
 
 def test_the_first_lines_say_what_happened() -> None:
-    text = read(table_report())
-    assert "Simulated run of the axis index & mill" in text
-    assert "✔ Done shop.toml" in text
-    assert (
-        "5 steps in 10 s. The table turned 1.25 turns and crossed the end of its turn once. In every positioning it "
-        "came to within 1.8 arcsec (0.50 counts) of its target." in text
-    )
-    assert "The table turned 0.25 turns. In every" in read(figures(travel=deg(90), crossings=0))
+    page = page_of(shop_run())
+    assert (page.headline.level, page.headline.verdict, page.headline.name) == ("good", "Done", "shop.toml")
+    assert axis().axis.name in page.headline.kicker
+    lead = lead_of(shop_run())
+    for told in ("5 steps in 10 s", "1.25 turns", " once", "1.8 arcsec (0.50 counts)"):
+        assert told in lead
+    assert "crossed" not in lead_of(run_of(record(1)))
 
 
 def test_the_cards_carry_the_figures() -> None:
-    html = render_page(make_table_page(table_report()))
-    text = Reader(html).text
-    assert "Steps5 of 51 positioning, 1 jog" in text
-    assert "Time10 sfor the sequence" in text
-    assert "Worst error at rest0.50 counts1.8 arcsec, step 1; window 2 counts" in text
-    assert "Turned1.25 turnsend of the turn crossed once, 1 rollover" in text
-    assert "Largest lag2.17 degdeviation dR, step 5" in text
-    assert "Peak speed61.2 deg/sstep 5, command limited to 60" in text
-    assert 'class="card bad"' not in html
-    assert "Turned1.25 turnswithin the turn" in read(figures(crossings=0, rollovers=0))
+    page = page_of(shop_run())
+    assert [(card.title, card.value, card.unit) for card in page.cards] == [
+        ("Steps", "5", "of 5"), ("Time", "10", "s"), ("Worst error at rest", "0.50", "counts"),
+        ("Turned", "1.25", "turns"), ("Largest lag", "2.17", "deg"), ("Peak speed", "61.2", "deg/s"),
+    ]  # fmt: skip
+    below = {card.title: card.below.replace("\u202f", " ") for card in page.cards}
+    assert below["Steps"] == "1 positioning, 1 jog"
+    assert "step 1; window 2 counts" in below["Worst error at rest"]
+    assert below["Turned"].endswith("once, 1 rollover")
+    assert below["Largest lag"].endswith("step 5")
+    assert below["Peak speed"].startswith("step 5, ")
+    assert below["Peak speed"].endswith(" 60")
+    assert not any(card.bad for card in page.cards)
+    assert page_of(run_of(record(1))).cards[3].below == "within the turn"
 
 
 def test_a_sequence_that_moves_nothing_says_nothing_about_the_table() -> None:
-    text = read(figures(positionings=0, jogs=0, error=None, deviation=None, peak_speed=None))
-    assert "5 steps in 10 s. Steps5 of 5" in text
-    for word in ("Turned", "Largest lag", "Peak speed", "Worst error"):
-        assert word not in text
+    run = run_of(record(1, "wait", 0, 0))
+    assert lead_of(run) == "1 step in 2 s."
+    assert [card.title for card in page_of(run).cards] == ["Steps", "Time"]
 
 
 def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
-    failed = replace(figures(made=1, error=None), done=False, failure="step 2 of 5, <jog>: the table has run away")
-    html = render_page(make_table_page(failed))
-    text = Reader(html).text
-    assert "✘ Not done shop.toml" in text
-    assert "Stopped after 1 of 5 steps, 10 s in. Step 2 of 5, <jog>: the table has run away." in text
-    assert "Time10 suntil it stopped" in text
-    assert "✔" not in text
-    assert html.count('class="card bad"') == 1
-    assert "Look for: the true angle" not in text
+    failure = "step 2 of 5, <jog>: the table has run away"
+    failed = run_of(record(1), record(2, "jog", 90, 540, crossings=1), asked=5, failure=failure)
+    page = page_of(failed)
+    assert (page.headline.level, page.headline.verdict) == ("bad", "Not done")
+    assert page.headline.lead.endswith(" Step 2 of 5, <jog>: the table has run away.")
+    assert "1 of 5 steps" in page.headline.lead
+    assert page.title.endswith("not done")
+    assert [card.title for card in page.cards if card.bad] == ["Steps"]
+    # A jog that broke off is held on no place of its own.
+    assert [row[7] for row in rows_of(page)] == ["−0.50", "–"]
 
 
 def test_a_table_that_stands_beside_its_targets_gets_no_praise() -> None:
-    off = figures(error=WorstStep(20 * COUNT, 1))
-    html = render_page(make_table_page(off))
-    text = Reader(html).text
-    assert "! Done, but beside its targets shop.toml" in text
-    assert "But in step 1 it stood 72 arcsec (20 counts) beside its target while the axis said" in text
-    assert "✔" not in text
-    assert html.count('class="card bad"') == 1
+    page = page_of(run_of(record(1, error=20 * COUNT)))
+    assert (page.headline.level, page.headline.verdict) == ("warn", "Done, but beside its targets")
+    assert "step 1 it stood 70.3 arcsec (20 counts)" in page.headline.lead.replace("\u202f", " ")
+    assert [card.title for card in page.cards if card.bad] == ["Worst error at rest"]
     # The window and one count of the detector are allowed.
-    assert "✔" in read(figures(error=WorstStep(2.99 * COUNT, 1)))
+    assert page_of(run_of(record(1, error=2.99 * COUNT))).headline.level == "good"
 
 
-def test_the_time_line_is_told_as_far_as_it_goes() -> None:
-    text = read(table_report())
-    assert "Time line What" not in text  # title and caption stand apart
-    assert "A jog that waits for its signal begins before the table moves." in text
-    assert "Look for: the true angle, which runs on without a step where D jumps." in text
-    assert "A jog that waits" not in read(table_report(inputs=()))
-    part = figures(seconds=500.0)
-    assert "The first 9.99 s of 8 min 20 s" in read(part)
-    many = table_report(outputs=[Signal(f"o{n}", []) for n in range(table_charts.MOST_SIGNALS)])
-    assert "1 further signal is not drawn." in read(many)
+def test_warnings_comparisons_and_small_print_stand_on_the_page() -> None:
+    run = shop_run(warnings=["signal <late>"])
+    page = table_page(axis(), run, shop_trace(), [angle_comparison()], {"seed": "7"})
+    assert [(note.level, note.text) for note in page.notes] == [("warning", "signal <late>")]
+    assert page.settings == {"seed": "7"}
+    assert [section.title for section in page.sections if section.shown] == [
+        "What the sequence did", "What the method is worth on this axis", "Step by step",
+    ]  # fmt: skip
+    assert ids_of(page)[4:] == ["cross-way", "cross-deviation", "cross-speed"]
+    assert all(figure.caption for figure in page.figures)
 
 
-def test_without_a_trace_the_time_line_shows_steps_and_signals() -> None:
-    html = render_page(make_table_page(table_report(path=None, detail=None, comparison=None)))
-    assert [chart["id"] for chart in charts_of(html)] == ["line-steps"]
-    assert "D is what the detector says" not in html
+def test_a_run_without_a_step_has_no_figures() -> None:
+    page = page_of(run_of(asked=2, failure="Never ready."), shop_trace())
+    assert page.figures == []
+    assert page.headline.level == "bad"
+    assert not any("nan" in card.value for card in page.cards)
 
 
-def test_the_step_is_told_with_its_events_and_why_it_is_shown() -> None:
-    html = render_page(make_table_page(table_report()))
-    text = Reader(html).text
-    assert "How the table goes on beyond a turn" in text
-    assert "Step 5: jog + at <60> deg/s" in text
-    assert "Shown is the jog that crosses the end of the turn most often." in text
-    assert ["1", "0.000", "+ <button>"] in cells_of(html)
-    assert ["3", "6.000", "rollover"] in cells_of(html)
-    assert "R = D + n turns. Shaded: R is not D." in text
-    assert "Look for: a deviation that knows nothing of all this" in text
+# ---- time line
 
 
-@pytest.mark.parametrize(
-    ("changes", "told", "not_told"),
-    [
-        ({"kind": "go"}, "a deviation that knows nothing of the end of the turn", "rollover)"),
-        ({"failed": True}, "Look for: where the lag leaves its course.", "knows nothing"),
-        ({"form": "flag"}, "notes the jump in FLG", "R = D + n turns"),
-        ({"form": "raw"}, "R is D.", "Shaded"),
-        ({"crossings": 0}, "One step in detail", "How the table goes on"),
-    ],
-)
-def test_the_caption_tells_what_is_shown(changes: dict[str, object], told: str, not_told: str) -> None:
-    text = read(table_report(detail=turn_detail(**changes), comparison=None))
-    assert told in text
-    assert not_told not in text
+def test_the_time_line_has_a_lane_per_kind_of_step_and_per_signal() -> None:
+    page = page_of(shop_run())
+    assert lanes_of(page) == {
+        "go to": [[0.0, 2.0, "1", "step 1: go to position 1 (90 deg, <shortest>)"]],
+        "jog": [[6.0, 10.0, '+ at 60 deg/s while "feed"', 'step 5: jog + at 60 deg/s while "feed"']],
+        "wait": [[2.0, 6.0, "4 s", "step 3: wait 4 s"]],
+        "out clamp": [[2.0, 6.0, "on", "output clamp is on"]],
+        "in feed": [[8.0, 9.5, "on", "input feed is on"]],
+    }
+    colours = [lane["colour"] for lane in chart_of(page, "line-steps")["lanes"]]
+    assert colours == ["right", "left", "muted", "good", "drive"]
+
+
+def test_kinds_of_steps_that_do_not_occur_have_no_lane() -> None:
+    assert list(lanes_of(page_of(run_of(record(1))))) == ["go to"]
+
+
+def test_a_signal_that_stays_on_is_on_up_to_the_end() -> None:
+    changes = [(0.6, "a", False), (0.7, "a", True), (0.9, "b", True), (1.0, "b", False), (1.1, "a", True),
+               (1.5, "b", True)]  # fmt: skip
+    lanes = lanes_of(page_of(run_of(record(1), outputs=changes)))
+    assert {name: [bar[:2] for bar in lanes[name]] for name in ("out a", "out b")} == {
+        "out a": [[0.2, 2.0]], "out b": [[0.4, 0.5], [1.0, 2.0]],
+    }  # fmt: skip
+
+
+def test_of_many_signals_the_first_are_drawn_and_the_others_counted() -> None:
+    outputs = [(1.0, f"o{n}", True) for n in range(10)]
+    page = page_of(run_of(record(1), outputs=outputs, inputs=[(1.0, f"i{n}", True) for n in range(5)]))
+    assert sum(name.startswith(("in ", "out ")) for name in lanes_of(page)) == table_pages.MOST_SIGNALS
+    assert "3\u202ffurther" in page.figures[0].caption or "3 further" in page.figures[0].caption
+    assert "further" not in page_of(shop_run()).figures[0].caption
+
+
+def test_angle_and_speed_stand_below_over_the_same_time() -> None:
+    page = page_of(shop_run(), shop_trace())
+    assert ids_of(page) == ["line-steps", "line-turns", "line-detected", "line-speed"]
+    steps, turns, detected, speed = page.charts
+    assert {chart["sync"] for chart in page.charts} == {"line"}
+    assert (steps["x"][0], steps["x"][-1]) == (turns["x"][0], turns["x"][-1]) == (0.0, 9.99)
+    at = turns["x"].index(1.0)
+    assert curves_of(turns)["true angle"][at] == 0.125
+    assert curves_of(turns)["target of a positioning"][at] == pytest.approx(0.25, abs=1e-3)
+    assert curves_of(turns)["target of a positioning"][-1] is None
+    assert curves_of(turns)["true angle"][-1] == pytest.approx(1.245)
+    assert curves_of(detected)["detected angle D"][-1] == pytest.approx(88.2)
+    assert curves_of(speed)["true speed"][at] == 45.0
+    assert curves_of(speed)["commanded"][at] == 45.0
+    assert [chart.get("foot", True) for chart in page.charts] == [False, False, False, True]
+    assert page.figures[0].title == "Time line"
+
+
+def test_without_a_trace_the_lanes_stand_alone() -> None:
+    (steps,) = page_of(shop_run()).charts
+    assert (steps["x"][0], steps["x"][-1]) == (0.0, 10.0)
+    assert "foot" not in steps
+
+
+@pytest.mark.parametrize("left_out", NEEDED)
+def test_a_trace_without_a_needed_signal_draws_the_lanes_alone(left_out: str) -> None:
+    trace = shop_trace()
+    part = Trace(columns={name: trace[name] for name in ("t", *trace.signals) if name != left_out})
+    assert ids_of(page_of(shop_run(), part)) == ["line-steps"]
+
+
+def test_a_long_sequence_shows_its_beginning() -> None:
+    long = page_of(shop_run(time_end=5000.5))
+    assert long.charts[0]["x"][-1] == table_pages.LINE_SECONDS
+    assert long.figures[0].title != "Time line"
+    # What was not recorded cannot be drawn.
+    part = page_of(shop_run(time_end=5000.5), shop_trace())
+    assert part.charts[1]["x"][-1] == 9.99
+    assert part.figures[0].title.startswith("The first 9.99\u202fs")
+
+
+def test_a_long_recording_is_thinned_and_keeps_the_jumps() -> None:
+    t, short = np.linspace(0, 99, 50_000), shop_trace()
+    turn = t / 10 % 1.0
+    columns = {name: np.zeros(len(t)) for name in NEEDED} | {
+        table_pages.PHASE: turn * 2**32, table_pages.DETECTED: turn * axis().period,
+    }  # fmt: skip
+    page = page_of(shop_run(time_end=100.5), Trace(columns={"t": t + short.time[0]} | columns))
+    assert len(chart_of(page, "line-turns")["x"]) <= 5 * (table_pages.POINTS + 2)
+    drawn = np.array(curves_of(chart_of(page, "line-detected"))["detected angle D"])
+    assert np.count_nonzero(np.diff(drawn) < -300) == 9  # nine of ten turns come to their end
+    assert drawn.max() > 359.0
+    assert curves_of(chart_of(page, "line-turns"))["true angle"][-1] == pytest.approx(9.9)
+
+
+def test_charts_are_plain_json_in_colours_that_the_style_has() -> None:
+    drawn = table_page(axis(), shop_run(), shop_trace(), [angle_comparison()]).charts
+    assert json.loads(json.dumps(drawn, allow_nan=False)) == drawn
+    style = resources.files("detent.page").joinpath("template/report.css").read_text(encoding="utf-8")
+    light, dark = re.findall(r":root[^{]*\{(.*?)\}", style, flags=re.DOTALL)[:2]
+    for chart in drawn:
+        for coloured in [*chart["series"], *chart.get("lanes", [])]:
+            assert f"--{coloured['colour']}:" in light
+            assert f"--{coloured['colour']}:" in dark
+
+
+def test_what_is_drawn_is_what_is_recorded() -> None:
+    assert set(NEEDED) <= set(SEQUENCE_SIGNALS)
+
+
+# ---- every step
 
 
 def test_every_step_stands_in_the_table() -> None:
-    cells = cells_of(render_page(make_table_page(table_report())))
     nothing = [""] * 8
-    assert ["1", "go to position 1 (90 deg, <shortest>)", "0.000", "2.000", "0.000", "90.000", "+90.000", "+0.50", "1",
-            "", ""] in cells  # fmt: skip
-    assert ["2", 'set "clamp"', "2.000", *nothing] in cells
-    assert ["3", "wait 4 s", "2.000", "4.000", "90.000", "90.000", *[""] * 5] in cells
-    assert ["5", 'jog + at 60 deg/s while "feed"', "6.000", "4.000", "90.000", "90.000", "+360.000", "−1.2", "2.17",
-            "1", "1"] in cells  # fmt: skip
+    assert rows_of(page_of(shop_run())) == [
+        ["1", "go to position 1 (90 deg, <shortest>)", "0.000", "2.000", "0.000", "90.000", "+90.000", "−0.50", "1", "",
+         ""],
+        ["2", 'set "clamp"', "2.000", *nothing],
+        ["3", "wait 4 s", "2.000", "4.000", "90.000", "90.000", *[""] * 5],
+        ["4", 'clear "clamp"', "6.000", *nothing],
+        ["5", 'jog + at 60 deg/s while "feed"', "6.000", "4.000", "90.000", "90.000", "+360.000", "+1.2", "2.17", "1",
+         "1"],
+    ]  # fmt: skip
+    marks = [row[1].mark for row in cells_of(page_of(shop_run()))]
+    assert marks == ["right", "good", "muted", "good", "left"]
 
 
 def test_angles_of_the_table_stay_within_the_turn() -> None:
-    steps = [result(1, start=-0.0004, stop=-90.0), result(2, start=719.9998, stop=0.0, offset=5 * COUNT)]
-    html = render_page(make_table_page(table_report(steps=steps)))
-    cells = cells_of(html)
-    assert cells[-2][4:7] == ["0.000", "270.000", "−90.000"]
-    assert cells[-1][4:7] == ["0.000", "0.000", "−720.000"]
+    steps = record(1, start=-0.0004, stop=-90.0), record(2, start=719.9998, stop=0.0, error=-5 * COUNT)
+    cells = cells_of(page_of(run_of(*steps)))
+    assert [cell.text for cell in cells[0][4:7]] == ["0.000", "270.000", "−90.000"]
+    assert [cell.text for cell in cells[1][4:7]] == ["0.000", "0.000", "−720.000"]
     # Beyond window and resolution.
-    table = html.partition("Step by step")[2]
-    assert table.count('class="n over"') == 1
+    assert [row[7].over for row in cells] == [False, True]
 
 
 def test_a_step_without_a_target_has_a_dash() -> None:
-    cells = cells_of(render_page(make_table_page(table_report(steps=[result(1, "jog", offset=math.nan)]))))
-    assert cells[-1][7] == "–"
+    assert rows_of(page_of(run_of(record(1, "jog", error=math.nan))))[0][7] == "–"
 
 
-def test_a_long_table_is_cut_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table_page, "MOST_STEPS", 3)
-    html = render_page(make_table_page(table_report()))
-    assert "2 further steps are in the JSON summary only." in Reader(html).text
-    assert sum(len(row) == 11 for row in cells_of(html)) == 3
-
-
-def test_the_page_is_well_formed_and_every_chart_has_its_place() -> None:
-    html = render_page(make_table_page(table_report()))
-    page = Reader(html)
-    ids = {
-        "line-steps", "line-turns", "line-detected", "line-speed", "turn-angles", "turn-count", "turn-deviation",
-        "turn-speed", "cross-way", "cross-deviation", "cross-speed",
-    }  # fmt: skip
-    assert page.open == []
-    assert len(page.ids) == len(set(page.ids))
-    assert {chart["id"] for chart in charts_of(html)} == ids
-    assert ids <= set(page.ids)
-    assert html.count('class="chart"') == len(ids)
-    assert page.fetched == []
-    assert paper_of(html) is None
-    assert "Warningsignal <late>" in page.text
-
-
-def test_parts_that_are_absent_leave_no_trace() -> None:
-    report = table_report()
-    nothing = replace(
-        report.figures, made=0, positionings=0, jogs=0, seconds=0.0, travel=0.0, crossings=0, rollovers=0, error=None,
-        deviation=None, peak_speed=None,
-    )  # fmt: skip
-    bare = replace(
-        report, done=False, failure="Not ready.", figures=nothing, steps=(), outputs=(), inputs=(), path=None,
-        detail=None, comparison=None, notes=(), settings={},
-    )  # fmt: skip
-    html = render_page(make_table_page(bare))
-    assert charts_of(html) == []
-    assert "<h2>" not in html
-    assert "Stopped after 0 of 5 steps, 0 s in. Not ready. " in Reader(html).text
-    assert "nan" not in Reader(html).text.lower()
-
-
-def test_what_names_and_texts_say_cannot_break_the_page() -> None:
-    evil = "</script><b>$data</b>"
-    report = table_report(
-        axis_name=evil, job_name=evil, steps=[result(1, text=evil)], outputs=[Signal(evil, [(0.0, 1.0)])],
-        detail=turn_detail(text=evil, why=evil), notes=[Note("note", evil)], settings={"a": evil},
-    )  # fmt: skip
-    page = Reader(render_page(make_table_page(report)))
-    assert page.open == []
-    # Twice in the title of the window; axis, job, title and reason of the detail, step, note and small print.
-    assert page.text.count(evil) == 9
-
-
-def test_the_report_is_written_as_it_is_rendered(tmp_path: Path) -> None:
-    target = tmp_path / "table.html"
-    write_page(target, make_table_page(table_report(version="9.9")))
-    assert target.read_text(encoding="utf-8") == render_page(make_table_page(table_report(version="9.9")))
-    assert "Written by detent 9.9." in target.read_text(encoding="utf-8")
+def test_a_long_table_is_cut_and_says_so() -> None:
+    waits = [replace(record(1, "wait"), number=n) for n in range(1, 503)]
+    page = page_of(run_of(*waits))
+    assert len(rows_of(page)) == 500
+    assert "2 further steps" in page.sections[-1].shown[0].caption

@@ -2,25 +2,21 @@ import doctest
 import math
 
 import pytest
-from tests.unit.methods.rotary_table.samples import COUNT, deg, record, run_of
+from tests.unit.methods.rotary_table.samples import COUNT, axis, deg, record, run_of
 
-import detent
-from detent.methods.load import load_spec
 from detent.methods.rotary_table import summary as table_summary
-from detent.methods.rotary_table.page_data import WorstStep
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.rotary_table.summary import sequence_figures, sequence_summary_rows
+from detent.methods.rotary_table.summary import SequenceFigures, sequence_summary_rows
+from detent.page.run_page import Worst
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def spec() -> RotaryTableSpec:
-    found = load_spec(detent.example("rotary_table.toml"))
-    assert isinstance(found, RotaryTableSpec)
-    return found
+    return axis()
 
 
 def test_the_examples_in_the_docstrings_hold() -> None:
-    assert doctest.testmod(table_summary, extraglobs={"GAP": table_summary.GAP}).failed == 0
+    assert doctest.testmod(table_summary).failed == 0
 
 
 def test_a_sequence_shows_every_figure_with_its_unit_and_whose_it_is(spec: RotaryTableSpec) -> None:
@@ -61,14 +57,14 @@ def test_of_a_run_that_never_began_only_what_happened_is_shown(spec: RotaryTable
 
 def test_the_step_that_failed_is_not_made_and_has_no_error_at_rest() -> None:
     failed = run_of(record(1), record(2, error=deg(170), peak_deviation=deg(360)), asked=4, failure="step 2")
-    figures = sequence_figures(failed)
-    assert (figures.made, figures.asked, figures.positionings) == (1, 4, 2)
-    assert figures.error == WorstStep(0.5 * COUNT, 1)
-    assert figures.deviation == WorstStep(deg(360), 2)
+    figures = SequenceFigures(failed)
+    assert ([step.number for step in figures.made], figures.kinds) == ([1], "2 positionings")
+    assert figures.error == Worst(0.5 * COUNT, failed.steps[0])
+    assert figures.deviation == Worst(deg(360), failed.steps[1])
 
 
 def test_only_positionings_count_for_the_error_at_rest() -> None:
-    assert sequence_figures(run_of(record(1, "jog"))).error is None
-    assert sequence_figures(run_of(record(1, error=math.nan))).error is None
-    mixed = sequence_figures(run_of(record(1, error=-3 * COUNT), record(2, "jog", error=9 * COUNT)))
-    assert mixed.error == WorstStep(3 * COUNT, 1)
+    assert SequenceFigures(run_of(record(1, "jog"))).error is None
+    assert SequenceFigures(run_of(record(1, error=math.nan))).error is None
+    mixed = run_of(record(1, error=-3 * COUNT), record(2, "jog", error=9 * COUNT))
+    assert SequenceFigures(mixed).error == Worst(3 * COUNT, mixed.steps[0])

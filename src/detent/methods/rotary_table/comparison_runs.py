@@ -1,0 +1,203 @@
+"""Runs an axis over the end of its turn, by hand, and from near the boundary, in every form of its method."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from detent.errors import DetentError
+from detent.methods.rotary_table.build import start_turns, ticks
+from detent.methods.rotary_table.comparison import AngleComparison, Crossing, Feed, Start
+from detent.methods.rotary_table.host import TableHost
+from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, RotaryTableSpec
+from detent.methods.rotary_table.system import TICK, RotaryTable
+from detent.methods.rotary_table.table_observer import FULL_TURN
+from detent.page.parts import Numbers
+from detent.record.machine import Progress
+from detent.record.recorder import Recorder, make_trace
+from detent.units import format_quantity
+
+START = math.radians(100)
+"""Where the crossing begins [rad]."""
+
+TARGET = math.radians(540)
+"""Target of the conventional unit [rad]: one and a half turns."""
+
+WATCHED = 2 * FULL_TURN
+"""Way of a jog while the crossing is watched [rad]."""
+
+FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
+"""Speeds of manual feed [rad/s]: those of them that the axis can run at."""
+
+FEED_START, FEED_TIME = 2.0, 10.0
+"""Mean speeds are taken from after the start [s], and the steps of the word, for at least so long [s]."""
+
+FEED_COUNTS, FEED_LONGEST = 1000, 1000.0
+"""And over at least so many counts, though no longer than this [s]."""
+
+FORWARD = math.radians(840)
+"""Way of a jog that starts near the boundary [rad]: two rollovers."""
+
+LAGS = (0.0, 0.25, 0.5, 1.0, 1.5)
+"""Where it starts, in units of the following error: a table that lags more than it started behind fails."""
+
+FORMS: dict[str, dict[str, object]] = {
+    "flag": {"form": "flag", "guarded": False},
+    "guarded flag": {"form": "flag", "guarded": True},
+    "turn counter": {"form": "turn counter", "guarded": False},
+}
+"""Forms of the extension, all judged by the theoretical remaining angle (specification 3.2, 3.5; test 12)."""
+
+MOST_ROWS = 400_000
+
+LONGEST_TURN = 3600.0
+"""A table that takes longer for a turn is not compared: it would take too long to see it go round [s]."""
+
+
+def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) -> AngleComparison:
+    """Take the axis over the end of its turn, feed it by hand, and start it near the boundary, in every form."""
+    speed = crossing_speed(spec)
+    if speed < FULL_TURN / LONGEST_TURN:
+        least = format_quantity(FULL_TURN / LONGEST_TURN, "rad/s")
+        raise DetentError(
+            f"compare: came a table that goes round at {format_quantity(speed, 'rad/s')}; allowed: {least} or more, a "
+            "turn in an hour; do: raise limits.speed, or limits.acceleration where it stops the table too slowly"
+        )
+    speeds = sorted({min(wanted, spec.limits.speed) for wanted in FEED_SPEEDS})
+    lag = speed / spec.method.position_gain / (1 - spec.drive.droop)
+    places = sorted({*(share * lag for share in LAGS), spec.count, START})
+    starts = [(place, form) for place in places for form in FORMS]
+    runs = 2 + len(speeds) + len(starts)
+    done = 0
+
+    def told(what: str, result: Any) -> Any:
+        """Say that one more run is done, and hand it on."""
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / runs, what)
+        return result
+
+    return AngleComparison(
+        speed=speed,
+        following_error=lag,
+        crossings=(
+            told("conventional crossing", _cross(spec, speed, endless=False)),
+            told("endless crossing", _cross(spec, speed, endless=True)),
+        ),
+        feeds=tuple(told("manual feed", _feed(spec, wanted)) for wanted in speeds),
+        starts=tuple(told(f"start with {form}", _start(spec, speed, place, form)) for place, form in starts),
+    )
+
+
+def crossing_speed(spec: RotaryTableSpec) -> float:
+    """Speed of the crossings [rad/s]: the axis's largest from which it stops within a quarter turn."""
+    return min(spec.limits.speed, math.sqrt(2 * spec.limits.acceleration * FULL_TURN / 4))
+
+
+def _variant(spec: RotaryTableSpec, place: float, **changes: object) -> RotaryTableSpec:
+    """The axis at a start angle [rad], with the recommended method (specification 3.5) but for the changes."""
+    usual: dict[str, object] = {
+        "form": "turn counter", "judge": "theoretical", "inclusive": False, "guarded": False, "update": "atomic",
+        "signed_remaining": True, "position_control": True,
+    }  # fmt: skip
+    return spec.model_copy(
+        update={
+            "mechanics": spec.mechanics.model_copy(update={"start_angle": place}),
+            "method": spec.method.model_copy(update=usual | changes),
+            "disturbance": DisturbanceTable(),
+        }
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Columns of a run, one value per interrupt or less often: time since the start [s], and what their names say."""
+
+    t: Numbers
+    way: Numbers
+    speed: Numbers
+    deviation: Numbers
+    s4: Numbers
+    crossings: Numbers
+
+
+_SIGNALS = (
+    "machine.motor.turns", "machine.motor.angle", "machine.motor.velocity", "positioner.dr", "positioner.s4",
+    "positioner.angle.crossings",
+)  # fmt: skip
+
+
+def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], None]) -> _Seen:
+    """Let the host begin something, and time pass; the table may do what it likes."""
+    strobes = max(1, math.ceil(seconds / spec.method.strobe_period / MOST_ROWS))
+    blocks: list[NDArray[np.void]] = []
+    every = strobes * ticks(spec.method.strobe_period)
+    recorder = Recorder(RotaryTable, _SIGNALS, every=every, period=TICK, sink=blocks.append)
+    host = TableHost(spec, recorder)
+    host.start()
+    start = host.tick
+    begin(host)
+    while host.tick < start + ticks(seconds):
+        host.machine.pass_ticks(start + ticks(seconds) - host.tick)
+        host.acknowledge()
+    host.machine.close()
+    trace = make_trace(recorder, blocks, {})
+    turns = trace["machine.motor.turns"] - math.floor(start_turns(spec))
+    way = (turns + trace["machine.motor.angle"] / FULL_TURN - start_turns(spec) % 1) * (FULL_TURN / spec.ratio)
+    return _Seen(
+        t=trace.time - start * TICK,
+        way=way,
+        speed=trace["machine.motor.velocity"] / spec.ratio,
+        deviation=trace["positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
+        s4=trace["positioner.s4"] * spec.speed_per_word,
+        crossings=trace["positioner.angle.crossings"],
+    )
+
+
+def _cross(spec: RotaryTableSpec, speed: float, *, endless: bool) -> Crossing:
+    """Over the end of the turn: by a jog, or conventionally by a positioning beyond it."""
+    target = PositionTable.model_construct(angle=TARGET, speed=speed, direction="as commanded")
+    axis = _variant(spec, START, form="turn counter" if endless else "raw").model_copy(
+        update={"position": {"0": target}}
+    )
+    seconds = WATCHED / speed + speed / spec.limits.acceleration
+    seen = _run(axis, seconds, lambda host: host.press(1, speed) if endless else host.begin(0))
+    after = int(np.argmax(seen.crossings > 0))
+    crossed = bool(seen.crossings[after]) and after > 0
+    return Crossing(
+        name="endless" if endless else "conventional",
+        time=float(seen.t[after]) if crossed else math.nan,
+        deviation_before=float(seen.deviation[after - 1]) if crossed else math.nan,
+        deviation_after=float(seen.deviation[after]) if crossed else math.nan,
+        travel=float(seen.way[-1]),
+        speed=float(seen.speed[-1]),
+        t=seen.t,
+        angle=seen.way,
+        deviation=seen.deviation,
+        s4=seen.s4,
+    )
+
+
+def _feed(spec: RotaryTableSpec, speed: float) -> Feed:
+    """Mean speed of a jog with and without position control."""
+    span = min(max(FEED_TIME, FEED_COUNTS * spec.count / speed), FEED_LONGEST)
+    begin = FEED_START + speed / spec.limits.acceleration
+    errors: list[float] = []
+    for closed in (True, False):
+        seen = _run(_variant(spec, START, position_control=closed), begin + span, lambda host: host.press(1, speed))
+        late = seen.t >= begin
+        errors.append(float(np.polyfit(seen.t[late], seen.way[late], 1)[0]) / speed - 1)
+    return Feed(speed=speed, closed=errors[0], opened=errors[1])
+
+
+def _start(spec: RotaryTableSpec, speed: float, place: float, form: str) -> Start:
+    """A jog to larger angles from a place, with one form."""
+    ramp = speed / spec.limits.acceleration
+    seen = _run(_variant(spec, place, **FORMS[form]), FORWARD / speed, lambda host: host.press(1, speed))
+    asked = FORWARD - speed * ramp / 2
+    travel = float(seen.way[-1])
+    return Start(angle=place, form=form, travel=travel, asked=asked, thrown_back=asked - travel > FULL_TURN / 2)
