@@ -51,9 +51,11 @@ def feed_forward() -> None:
 
 def profiles() -> None:
     """A move in four ways, as `detent compare` draws it."""
-    from detent.methods.cascade.comparison_section import plot_profiles
+    from detent.page.draw import draw_figures
 
-    plot_profiles(slide().compare()[0], FOLDER / "profiles.svg")
+    # Its table stands in the text, as the terminal prints it.
+    drawn = [figure for figure in slide().compare()[0].figures() if figure.charts]
+    draw_figures(drawn, FOLDER / "profiles.svg")
 
 
 def which_encoder() -> None:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.host import CascadeHost, Rows
+from detent.methods.cascade.panels import POINTS
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
+from detent.methods.cascade.units import Units, milliseconds
+from detent.page.chart import Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.table import Cell, Table, TextTable, bar_cell
+from detent.page.words import GAP, number
 from detent.planning.profile import MotionLimits, plan_move
 from detent.record.machine import Progress
 from detent.sensing.gauge import set_gauge
@@ -29,6 +35,12 @@ REST_TIME = 0.1
 """Time the axis stands before the move [s]."""
 
 SHAPES, FEEDS = ("trapezoid", "limited jerk"), ("no feed-forward", "feed-forward")
+
+COLOURS = dict(zip(SHAPES, ("left", "speed"), strict=True))
+DASHES = dict(zip(FEEDS, ((5, 4), None), strict=True))
+
+SHOWN_SWINGS = 10
+"""Swings of the coupling that are shown after the end of the reference."""
 
 Numbers = NDArray[np.float64]
 
@@ -111,12 +123,126 @@ class ProfileComparison:
     rotary: bool
     cases: tuple[ProfileCase, ...]
 
+    @property
+    def units(self) -> Units:
+        """In which its quantities are written."""
+        return Units(rotary=self.rotary)
+
+    @property
+    def table(self) -> TextTable:
+        """The figures of the four cases."""
+        heads = ("profile", "takes", "largest following error", "settles after", "twist after that", "peak command")
+        rows = [
+            (
+                case.name,
+                milliseconds(case.duration),
+                self.units.error(case.peak_following),
+                "not" if math.isnan(case.settling) else milliseconds(case.settling),
+                "rigid" if math.isnan(case.twist_after) else self.units.error(case.twist_after),
+                f"{number(case.peak_command)} V",
+            )
+            for case in self.cases
+        ]
+        title = f"{_the_move(self)}, in four ways".replace(GAP, " ")
+        return TextTable(title, heads, [tuple(cell.replace(GAP, " ") for cell in row) for row in rows])
+
+    def figures(self) -> tuple[Figure, ...]:
+        """Speed and following error, the twist of a compliant coupling, and a table."""
+        swinging = () if math.isnan(self.frequency) else (_twist_figure(self),)
+        return (_move_figure(self), *swinging, _table_figure(self))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
         curves = {"t", "speed", "following", "twist"}
         names = ("way", "speed", "acceleration", "jerk", "stated", "frequency", "tolerance", "rotary")
         cases = [{key: value for key, value in asdict(case).items() if key not in curves} for case in self.cases]
         return {name: getattr(self, name) for name in names} | {"cases": cases}
+
+
+# ---- what is shown
+
+
+def _the_move(found: ProfileComparison) -> str:
+    scale = found.units.place
+    way = f"{number(round(found.way * scale.factor, 6))}{GAP}{scale.name}"
+    return f"A move of {way} at {found.units.speed_text(found.speed)}"
+
+
+def _move_figure(found: ProfileComparison) -> Figure:
+    """Speed of both references, and the following error of the four cases."""
+    jerk = "the jerk of the axis file" if found.stated else "a jerk chosen for it, as the axis file states none"
+    caption = (
+        f"{_the_move(found)} in four ways: as a trapezoid of the speed and with {jerk}, each without feed-forward "
+        "(dashed) and with it. Look for: without feed-forward the axis lags in proportion to its speed, whatever the "
+        "profile; with it an error is left where the acceleration jumps."
+    )
+    t, scale = found.cases[-1].t, found.units.speed
+    speeds = [
+        Curve(label=case.shape, colour=COLOURS[case.shape], width=2, thin=POINTS,
+              y=np.interp(t, case.t, case.speed) * scale.factor)
+        for case in (found.cases[0], found.cases[2])
+    ]  # fmt: skip
+    following = [np.interp(t, case.t, case.following) for case in found.cases]
+    charts = time_charts(Timeline(name="profiles", t=t, label="time since the move began"), [
+        Panel(name="profile-speed", label=f"speed [{scale.name}]", height=150, zero=True, curves=speeds),
+        _case_panel(found, "profile-following", "following error", following),
+    ])  # fmt: skip
+    title = "What profile and feed-forward are worth: the same move in four ways"
+    return Figure(title=title, caption=caption, charts=charts)
+
+
+def _twist_figure(found: ProfileComparison) -> Figure:
+    """Twist of the coupling, each case from the end of its own reference on."""
+    caption = (
+        f"How far the motor is ahead of the load once the reference has ended. Against a motor that its loop holds the "
+        f"load swings at {number(found.frequency)}{GAP}Hz. Look for: the swing that a jump of the acceleration leaves "
+        "behind, and what a ramp of about a swing's length makes of it. Without feed-forward (dashed) the axis still "
+        "brakes when its reference has ended."
+    )
+    longest = min(float(case.t[-1]) - case.duration for case in found.cases)
+    t = np.linspace(0.0, min(longest, SHOWN_SWINGS / found.frequency), 1200)
+    twists = [np.interp(t + case.duration, case.t, case.twist) for case in found.cases]
+    panel = _case_panel(found, "profile-twist", "twist", twists)
+    charts = time_charts(Timeline(name="twist", t=t, label="time since the reference ended"), [panel])
+    return Figure(title="What is left swinging", caption=caption, charts=charts)
+
+
+def _case_panel(found: ProfileComparison, name: str, label: str, values: list[Numbers]) -> Panel:
+    """One curve [m] for each case: colour by profile, dashes without feed-forward."""
+    scale = found.units.small(max(float(np.abs(one).max(initial=0.0)) for one in values))
+    curves = [
+        Curve(label=case.name, colour=COLOURS[case.shape], dash=DASHES[case.feed], width=1.8, y=one * scale.factor,
+              digits=4, thin=POINTS)
+        for case, one in zip(found.cases, values, strict=True)
+    ]  # fmt: skip
+    return Panel(name=name, label=f"{label} [{scale.name}]", height=200, zero=True, curves=curves)
+
+
+def _table_figure(found: ProfileComparison) -> Figure:
+    longest = max(case.peak_following for case in found.cases)
+    lag = found.units.small(longest)
+    heads = [("profile", False), ("takes [ms]", True), (f"largest following error [{lag.name}]", True),
+             ("settles after [ms]", True), ("twist after it", True), ("peak command [V]", True)]  # fmt: skip
+    rows = [
+        [
+            Cell(text=case.name, nowrap=True),
+            number(round(case.duration * 1e3, 6)),
+            bar_cell(case.peak_following * lag.factor, longest * lag.factor or 1.0),
+            number(round(case.settling * 1e3, 6)),
+            found.units.error(case.twist_after),
+            number(case.peak_command),
+        ]
+        for case in found.cases
+    ]
+    caption = (
+        "Settling counts from the end of the reference until the load stays within "
+        f"{found.units.error(found.tolerance)} of the target. Twist after it is that of the coupling after that end, "
+        "peak to peak."
+    )
+    return Figure(title="In figures", caption=caption, table=Table(heads=heads, rows=rows))
+
+
+# ---- what is compared
 
 
 def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> ProfileComparison:

@@ -1,7 +1,6 @@
 """The cascade axis as a method: what its package brings."""
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
@@ -10,14 +9,14 @@ from detent.files.findings import Caution, Derived
 from detent.methods.cascade.checks import RULES, find_cautions
 from detent.methods.cascade.derive import derive
 from detent.methods.cascade.schema import CascadeSpec, fill_derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.logs.log import Log
     from detent.methods.cascade.replay_job import ReplayJob
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -115,35 +114,18 @@ class Cascade(Method[CascadeSpec]):
 
     def summary(self, spec: CascadeSpec, result: Any) -> list[tuple[str, str]]:
         """Moves, errors, effort; of a replay, how far simulation and recording are apart."""
-        from detent.methods.cascade.report import cascade_summary_rows, replay_summary_rows
+        from detent.methods.cascade.summary import cascade_summary, replay_summary
 
-        rows = replay_summary_rows if result.job.kind == "replay" else cascade_summary_rows
-        return rows(spec, result)
+        return replay_summary(spec, result) if result.job.kind == "replay" else cascade_summary(spec, result)
 
     def page(self, spec: CascadeSpec, result: Any, shown: Shown) -> "Page":
         """The report of moves or of a replay."""
-        from detent.methods.cascade.page import make_cascade_page
-        from detent.methods.cascade.replay_page import make_replay_page
-        from detent.methods.cascade.report import cascade_report, replay_report
+        from detent.methods.cascade.page import cascade_page
+        from detent.methods.cascade.replay_page import replay_page
 
         if result.job.kind == "replay":
-            return make_replay_page(replay_report(spec, result, settings=shown.settings))
-        found = next(iter(shown.comparisons), None)
-        return make_cascade_page(cascade_report(spec, result, shown.trace, comparison=found, settings=shown.settings))
-
-    def table(self, spec: CascadeSpec, comparison: Any) -> Table:
-        """Profiles and feed-forward side by side."""
-        from detent.methods.cascade.comparison_section import profiles_table
-
-        del spec
-        return profiles_table(comparison)
-
-    def plot(self, spec: CascadeSpec, comparison: Any, path: Path) -> None:
-        """Profiles and feed-forward side by side."""
-        from detent.methods.cascade.comparison_section import plot_profiles
-
-        del spec
-        plot_profiles(comparison, path)
+            return replay_page(spec, result, shown.settings)
+        return cascade_page(spec, result, shown.trace, shown.comparisons, shown.settings)
 
     def recording(self, spec: CascadeSpec, log: "Log") -> "ReplayJob":
         """A job that replays a log on this axis."""

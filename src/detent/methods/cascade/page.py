@@ -1,192 +1,252 @@
 """The page about a list of moves on a cascade axis: did it follow, did it arrive, and what it took."""
 
 import math
-from html import escape
+from collections.abc import Sequence
 
-from detent.methods.cascade.charts import detail_charts, job_charts, rest_events
-from detent.methods.cascade.comparison_section import comparison_charts, comparison_section
-from detent.methods.cascade.page_data import CascadeReportData
-from detent.methods.cascade.report import milliseconds
-from detent.methods.cascade.run import CascadeMove
-from detent.page.chart import Chart
-from detent.page.page import (
-    ZOOM_HINT,
-    Card,
-    Page,
-    cards,
-    chart_slot,
-    event_table,
-    figure,
-    headline,
-    notes,
-    section,
-    small_print,
+import numpy as np
+
+from detent.methods.cascade.panels import POINTS, both_sides, command_panel, error_panel, pair_panel
+from detent.methods.cascade.run import CascadeMove, CascadeRun
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.summary import arrived, worst_rest, worst_settling
+from detent.methods.cascade.units import Scale, milliseconds, units_of
+from detent.page.chart import Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
+from detent.page.parts import Event, Numbers
+from detent.page.run_page import (
+    Stretch,
+    happened,
+    page_title,
+    recorded_whole,
+    run_headline,
+    stopped_after,
+    stretch,
+    time_card,
+    warnings,
+    worst,
 )
-from detent.page.words import GAP, bar_cell, count, duration, further, number, offset_cell, table
+from detent.page.table import Cell, bar_cell, left_out, long_table, offset_cell
+from detent.page.words import count, duration, number
+from detent.record.trace import Trace
 
-MOST_MOVES = 500
-"""Moves in the table: more than anybody reads."""
+REFERENCE, REFERENCE_SPEED = "reference.position", "reference.velocity"
+LOAD, LOAD_SPEED = "machine.load.position", "machine.load.velocity"
+FOLLOWING, COMMAND = "law.position_error", "source.command"
+NEEDED = (REFERENCE, REFERENCE_SPEED, LOAD, LOAD_SPEED, FOLLOWING, COMMAND)
+"""Signals that the figures over time are drawn from; of a trace without them these figures are left out."""
+
+REST_WINDOWS = 5
+"""How far from the target the figure of the end of a move begins, in windows."""
+
+AFTERWARDS = 0.02
+"""How long after its last event that figure ends [s]."""
 
 
-def make_cascade_page(data: CascadeReportData) -> Page:
-    """What the page is made of."""
-    drawn = all_charts(data)
-    return {
-        "title": f"{data.run.job.name} on {data.axis_name}: {'done' if data.run.done else 'not done'}",
-        "body": [
-            _headline(data), _cards(data), notes(data.notes), _job(data), _detail(data, drawn),
-            comparison_section(data.comparison), _moves(data), small_print(data.settings),
+def cascade_page(
+    spec: CascadeSpec,
+    run: CascadeRun,
+    trace: Trace | None,
+    comparisons: Sequence[Comparison] = (),
+    settings: dict[str, str] | None = None,
+) -> Page:
+    """The page of a run of moves."""
+    job = _job_figure(spec, run, trace)
+    return Page(
+        title=page_title(spec.axis.name, run),
+        headline=_headline(spec, run),
+        cards=_cards(spec, run),
+        notes=warnings(run.warnings),
+        sections=[
+            Section("The whole job", [job] if job else []),
+            Section("One move in detail", _move_figures(spec, run, trace)),
+            comparison_section(comparisons),
+            Section("Move by move", [_every_move(spec, run)] if run.moves else []),
         ],
-        "charts": drawn,
-        "version": data.version,
-    }  # fmt: skip
-
-
-def all_charts(data: CascadeReportData) -> list[Chart]:
-    """Every chart of the page."""
-    return [*job_charts(data), *detail_charts(data), *comparison_charts(data.comparison)]
+        settings=settings or {},
+    )
 
 
 # ---- what came out, in one glance
 
 
-def _headline(data: CascadeReportData) -> str:
-    run, error = data.run, data.units.error
-    kicker = f"Simulated run of the axis {data.axis_name}"
-    seconds = duration(max(run.time_end - run.time_ready, 0.0))
+def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
+    error, asked = units_of(spec).error, count(run.job.count, "move")
     if not run.done:
-        arrived = count(sum(move.in_position for move in run.moves))
-        lead = f"Stopped after {arrived} of {count(run.job.count, 'move')}, {seconds} in. "
-        lead += f"{run.failure[:1].upper()}{run.failure[1:].rstrip('.')}."
-        return headline("bad", "Not done", run.job.name, kicker=kicker, lead=lead)
-    lead = f"{count(run.job.count, 'move')} in {seconds}. "
-    lead += f"On the way the axis was never more than {error(run.worst_following)} from where it should be"
+        return run_headline(spec.axis.name, run, stopped_after(arrived(run), asked, run.seconds))
+    lead = (
+        f"{asked} in {duration(run.seconds)}. "
+        f"On the way the axis was never more than {error(run.worst_following)} from where it should be"
+    )
+    doubt = ""
     if run.worst_error > run.tolerance:
+        doubt = "Done, but beside its targets"
         lead += f", but the load stood up to {error(run.worst_error)} beside its target while the loop was in position."
-        return headline("warn", "Done, but beside its targets", run.job.name, kicker=kicker, lead=lead)
-    lead += f"; at the end of each move the load stood within {error(run.worst_error)} of its target."
-    return headline("good", "Every move in position", run.job.name, kicker=kicker, lead=lead)
+    else:
+        lead += f"; at the end of each move the load stood within {error(run.worst_error)} of its target."
+    return run_headline(spec.axis.name, run, lead, doubt=doubt, words=("Every move in position", "Not done"))
 
 
-def _cards(data: CascadeReportData) -> str:
-    run = data.run
-    arrived = sum(move.in_position for move in run.moves)
-    seconds, _, unit = duration(max(run.time_end - run.time_ready, 0.0)).partition(GAP)
+def _cards(spec: CascadeSpec, run: CascadeRun) -> list[Card]:
+    error = units_of(spec).error
     shown = [
-        Card("Moves in position", count(arrived), f"of {count(run.job.count)}", "", bad=not run.done),
-        Card("Time", seconds, unit, "dwells included" if run.done else "until it stopped"),
+        # A run can also fail in the dwell of a move that was in position.
+        Card("Moves in position", count(arrived(run)), f"of {count(run.job.count)}", "", bad=not run.done),
+        time_card(run.seconds, "dwells included" if run.done else "until it stopped"),
     ]
-    if not run.moves:
-        return cards(shown)
-    settled = [move for move in run.moves if not math.isnan(move.settling)]
-    if settled:
-        worst = max(settled, key=lambda move: move.settling)
-        value, _, unit = milliseconds(worst.settling).partition(GAP)
-        below = f"after the reference's end, within {data.units.error(run.tolerance)}; {_whose(worst)}"
-        shown.append(Card("Longest settling", value, unit, below))
-    worst = max(run.moves, key=lambda move: move.peak_following)
-    limit = f"{_whose(worst)}; the drive goes off at {data.units.error(data.following_limit)}"
-    beyond = worst.peak_following > data.following_limit
-    shown.append(_error_card(data, "Largest following error", worst.peak_following, limit, bad=beyond))
-    if arrived:
-        worst = max((move for move in run.moves if move.in_position), key=lambda move: abs(move.error))
-        off = abs(worst.error) > run.tolerance
-        shown.append(
-            _error_card(data, "Worst error at rest", abs(worst.error), f"of the load, {_whose(worst)}", bad=off)
-        )
-    worst = max(run.moves, key=lambda move: move.peak_command)
-    limited = sum(move.limited for move in run.moves)
-    below = f"of {number(run.max_command)} V, {_whose(worst)}"
-    below += f"; at its limit for {milliseconds(limited)}" if limited else ""
-    shown.append(Card("Peak command", number(worst.peak_command), "V", below))
-    return cards(shown)
-
-
-def _error_card(data: CascadeReportData, title: str, value: float, below: str, *, bad: bool) -> Card:
-    shown, _, unit = data.units.error(value).partition(GAP)
-    return Card(title, shown, unit, below, bad=bad)
+    if found := worst_settling(run):
+        below = f"after the reference's end, within {error(run.tolerance)}; {_whose(found.of)}"
+        shown.append(card("Longest settling", milliseconds(found.value), below))
+    if found := worst(run.moves, lambda move: move.peak_following):
+        limit = spec.method.following_error
+        below = f"{_whose(found.of)}; the drive goes off at {error(limit)}"
+        shown.append(card("Largest following error", error(found.value), below, bad=found.value > limit))
+    if found := worst_rest(run):
+        below = f"of the load, {_whose(found.of)}"
+        shown.append(card("Worst error at rest", error(found.value), below, bad=found.value > run.tolerance))
+    if found := worst(run.moves, lambda move: move.peak_command):
+        limited = sum(move.limited for move in run.moves)
+        below = f"of {number(run.max_command)} V, {_whose(found.of)}"
+        below += f"; at its limit for {milliseconds(limited)}" if limited else ""
+        shown.append(Card("Peak command", number(found.value), "V", below))
+    return shown
 
 
 def _whose(move: CascadeMove) -> str:
     return f"move {count(move.number)}"
 
 
-# ---- figures
+# ---- figures over time
 
 
-def _job(data: CascadeReportData) -> str:
-    if data.path is None:
-        return ""
-    caption = (
-        "Above: where the axis should be (dashed) and where the load is. Below: the following error, reference less "
-        "what the position loop measures, and the command to the drive. Look for: peaks of the error, and whether the "
-        "command comes near its limit."
+def _job_figure(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> Figure | None:
+    rows = stretch(trace, NEEDED, run.time_ready) if run.moves else None
+    if rows is None:
+        return None
+    position, _, following, command = _panels(spec, run, rows, "job")
+    timeline = Timeline(name="job", t=rows.t, label="time since the axis was ready", unit="s")
+    return Figure(
+        title="Position, following error and command",
+        caption=(
+            "Above: where the axis should be (dashed) and where the load is. Below: the following error, reference "
+            "less what the position loop measures, and the command to the drive. Look for: peaks of the error, and "
+            "whether the command comes near its limit."
+        ),
+        charts=time_charts(timeline, [position, following, command]),
     )
-    content = (
-        chart_slot("job-position", "Reference and position of the load over time")
-        + chart_slot("job-following", "Following error over time")
-        + chart_slot("job-command", "Command over time")
-    )
-    return section("The whole job", figure("Position, following error and command", caption, content, ZOOM_HINT))
 
 
-def _detail(data: CascadeReportData, drawn: list[Chart]) -> str:
-    detail = data.detail
-    if detail is None:
-        return ""
-    caption = f"Shown is {escape(detail.why)}."
-    if data.run.done:
-        caption += " Look for: how soon the load is at rest once its reference is, and the command where it sets off."
-    content = (
-        chart_slot("move-position", "Reference and position of the load over time")
-        + chart_slot("move-speed", "Velocity of the reference and of the load over time")
-        + chart_slot("move-following", "Following error over time")
-        + chart_slot("move-command", "Command over time")
-    )
-    figures = [
-        figure(f"Move {count(detail.number)}", caption, content, ZOOM_HINT + event_table(detail.events)),
+def _panels(spec: CascadeSpec, run: CascadeRun, rows: Stretch, name: str) -> list[Panel]:
+    """Position, velocity, following error, command."""
+    units = units_of(spec)
+    levels = ((spec.method.following_error, "the drive goes off"), (run.tolerance, "in position"))
+    places = ("reference", _while_on(run, rows, REFERENCE)), ("load", rows[LOAD])
+    speeds = ("reference", _while_on(run, rows, REFERENCE_SPEED)), ("load", rows[LOAD_SPEED])
+    following = ("reference less measured position", _while_on(run, rows, FOLLOWING))
+    return [
+        pair_panel(f"{name}-position", "position", units.place, *places),
+        pair_panel(f"{name}-speed", "velocity", units.speed, *speeds),
+        error_panel(f"{name}-following", "following error", following, units, levels),
+        command_panel(f"{name}-command", rows[COMMAND], run.max_command),
     ]
-    if any(chart["id"] == "move-rest" for chart in drawn):
-        caption = (
-            f"The end of the same move, magnified: how far the load is from the target. Between the dashed lines, "
-            f"±{data.units.error(data.run.tolerance)}, it counts as in position."
-        )
-        content = chart_slot("move-rest", "Distance of the load from the target over time")
-        figures.append(figure("Coming to rest", caption, content, ZOOM_HINT + event_table(rest_events(detail))))
-    return section("One move in detail", *figures)
+
+
+def _while_on(run: CascadeRun, rows: Stretch, signal: str) -> Numbers:
+    """A signal of the loops: a drive that is off knows no reference and no error."""
+    return np.where(rows.trace.time[rows.rows] > run.time_off, np.nan, rows[signal])
+
+
+def _move_figures(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> list[Figure]:
+    """The most telling of the moves that were recorded: the one that failed, else the fastest."""
+    whole = recorded_whole(trace, run.moves) if trace is not None else []
+    if not whole:
+        return []
+    failed = not run.done and whole[-1] is run.moves[-1]
+    move = whole[-1] if failed else max(whole, key=lambda one: one.peak_speed)
+    rows = stretch(trace, NEEDED, move.begin, run.time_end if failed else move.end)
+    if rows is None:
+        return []
+    events = _events(move, failed=failed)
+    caption = f"Shown is {'the move that failed' if failed else 'the fastest move'}."
+    if run.done:
+        caption += " Look for: how soon the load is at rest once its reference is, and the command where it sets off."
+    timeline = Timeline(name="move", t=rows.t, label="time since the move began", events=events)
+    charts = time_charts(timeline, _panels(spec, run, rows, "move"))
+    shown = Figure(title=f"Move {count(move.number)}", caption=caption, charts=charts, events=events)
+    rest = None if math.isnan(move.arrived) else _rest_figure(spec, run, move, rows, events)
+    return [shown, rest] if rest else [shown]
+
+
+def _events(move: CascadeMove, *, failed: bool) -> list[Event]:
+    """What happens in a move, on a clock that starts with it."""
+    texts = {
+        "the reference sets off": move.begin,
+        "the reference has come to the target": move.arrived,
+        "the load is within the window for good": move.settled,
+        "in position: the loop's error was within the window for its time": move.ready,
+        "the drive goes off": move.end if failed else math.nan,
+    }
+    return happened({text: moment - move.begin for text, moment in texts.items()}, move.end - move.begin)
+
+
+def _rest_figure(
+    spec: CascadeSpec, run: CascadeRun, move: CascadeMove, rows: Stretch, events: list[Event]
+) -> Figure | None:
+    """The load coming to rest, from a few windows away until it is quiet."""
+    units, window = units_of(spec), run.tolerance
+    far = np.flatnonzero(np.abs(rows[LOAD] - move.target) > REST_WINDOWS * window)
+    begin = min(float(rows.t[far[-1]]) if far.size else 0.0, move.arrived - move.begin)
+    marks = [moment for moment in (move.arrived, move.settled, move.ready) if not math.isnan(moment)]
+    near = rows.between(begin, max(marks) - move.begin + AFTERWARDS)
+    if len(near) < 3:
+        return None
+    seen = [event for event in events if begin <= event.t <= near.t[-1]]
+    off = near[LOAD] - move.target
+    scale = units.small(min(float(np.abs(off).max()), 20 * window))
+    reach = REST_WINDOWS * window * scale.factor
+    asked = (_while_on(run, near, REFERENCE) - move.target) * scale.factor
+    panel = Panel(
+        name="move-rest",
+        label=f"position less target [{scale.name}]",
+        zero=True,
+        span=(-reach, reach),
+        curves=[
+            Curve(label="load", colour="speed", width=2.5, y=off * scale.factor, thin=POINTS),
+            Curve(label="reference", colour="left", dash=(5, 4), y=asked, thin=POINTS),
+        ],
+        levels=both_sides(window * scale.factor, "in position"),
+    )
+    caption = (
+        "The end of the same move, magnified: how far the load is from the target. Between the dashed lines, "
+        f"±{units.error(window)}, it counts as in position."
+    )
+    timeline = Timeline(name="rest", t=near.t, label="time since the move began", events=seen)
+    return Figure(title="Coming to rest", caption=caption, charts=time_charts(timeline, [panel]), events=seen)
 
 
 # ---- table
 
 
-def _moves(data: CascadeReportData) -> str:
-    run, units = data.run, data.units
-    if not run.moves:
-        return ""
-    scale = units.small(max(run.worst_error, run.worst_overshoot))
+def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
+    units = units_of(spec)
+    off = units.small(max(run.worst_error, run.worst_overshoot))
     lag = units.small(run.worst_following)
     place = units.place.name
     heads = [("move", True), ("begin [s]", True), (f"from [{place}]", True), (f"to [{place}]", True),
              ("reference [ms]", True), ("settles after [ms]", True), (f"following error [{lag.name}]", True),
-             (f"overshoot [{scale.name}]", True), (f"off target [{scale.name}]", True), ("peak command [V]", True),
+             (f"overshoot [{off.name}]", True), (f"error [{off.name}]", True), ("peak command [V]", True),
              ("in position", False)]  # fmt: skip
-    rows = [_row(data, move) for move in run.moves[:MOST_MOVES]]
+    rows = [_row(spec, run, move, lag, off) for move in run.moves]
     caption = (
         "The reference takes its time; then the load settles within the window. Following error is the largest of the "
-        "move; off target is position of the load less target at the end of the move."
+        "move; error is target less position of the load at the end of the move."
     )
-    left_out = len(run.moves) - len(rows)
-    if left_out > 0:
-        caption += f" {further(left_out, 'move')} in the JSON summary only."
-    return section("Move by move", figure("Every move", caption, table(heads, rows, tall=True)))
+    return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))
 
 
-def _row(data: CascadeReportData, move: CascadeMove) -> list[str]:
-    run, units = data.run, data.units
-    scale = units.small(max(run.worst_error, run.worst_overshoot)).factor
-    lag = units.small(run.worst_following).factor
-    longest = max(run.worst_following * lag, 1e-12)
-    off = max(run.worst_error * scale, 1e-12)
+def _row(spec: CascadeSpec, run: CascadeRun, move: CascadeMove, lag: Scale, off: Scale) -> list[str | Cell]:
+    units, longest = units_of(spec), max(run.worst_following * lag.factor, 1e-12)
+    beyond = move.peak_following > spec.method.following_error
     return [
         count(move.number),
         f"{move.begin - run.time_ready:.3f}",
@@ -194,9 +254,10 @@ def _row(data: CascadeReportData, move: CascadeMove) -> list[str]:
         units.position(move.target),
         number(round((move.arrived - move.begin) * 1e3, 6)),
         number(round(move.settling * 1e3, 6)),
-        bar_cell(move.peak_following * lag, longest, over=move.peak_following > data.following_limit),
-        number(move.overshoot * scale, 2),
-        offset_cell(-move.error * scale, off, over=abs(move.error) > run.tolerance),
+        bar_cell(move.peak_following * lag.factor, longest, over=beyond),
+        number(move.overshoot * off.factor, 2),
+        offset_cell(move.error * off.factor, max(run.worst_error * off.factor, 1e-12),
+                    over=abs(move.error) > run.tolerance),
         number(move.peak_command),
-        "✔" if move.in_position else '<td class="over">✘ no</td>',
-    ]
+        "✔" if move.in_position else Cell(text="✘ no", over=True),
+    ]  # fmt: skip

@@ -1,82 +1,94 @@
 """The page about a replayed recording: how far simulation and machine are apart."""
 
-from html import escape
+import math
+from dataclasses import replace
 
-from detent.methods.cascade.charts import magnified, replay_charts, shown_signals
-from detent.methods.cascade.page_data import ReplayReportData
-from detent.methods.cascade.replay import Compared
-from detent.methods.cascade.report import figure as in_unit
-from detent.methods.cascade.report import relative
-from detent.methods.cascade.units import percent
-from detent.page.chart import Chart
-from detent.page.page import (
-    ZOOM_HINT,
-    Card,
-    Page,
-    cards,
-    chart_slot,
-    figure,
-    headline,
-    notes,
-    section,
-    small_print,
-)
-from detent.page.words import GAP, bar_cell, count, duration, number, table
+import numpy as np
+
+from detent.methods.cascade.panels import error_panel, pair_panel
+from detent.methods.cascade.replay import Compared, ReplayRun
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.summary import relative
+from detent.methods.cascade.units import percent, units_of
+from detent.page.chart import Chart, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Card, Headline, Page, Section, card
+from detent.page.parts import Note
+from detent.page.run_page import page_title, warnings
+from detent.page.table import Table, bar_cell
+from detent.page.words import GAP, count, duration, number
+
+ZOOM_SHARE, ZOOM_LEAST = 0.04, 0.4
+"""Part of a recording that is shown around its largest difference, and the shortest such stretch [s]."""
 
 
-def make_replay_page(data: ReplayReportData) -> Page:
-    """What the page is made of."""
-    drawn = replay_charts(data.run, data.units)
-    return {
-        "title": f"{data.run.job.name} replayed on {data.axis_name}",
-        "body": [
-            _headline(data), _cards(data), notes(data.notes), _figures(data, drawn), _table(data),
-            small_print(data.settings),
+def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | None = None) -> Page:
+    """The page of a replay."""
+    return Page(
+        title=page_title(spec.axis.name, run, done="replayed"),
+        headline=_headline(spec, run),
+        cards=_cards(spec, run),
+        notes=warnings(run.warnings) + [Note("note", text) for text in run.job.notes],
+        sections=[
+            Section("Recorded and simulated", _curves(spec, run)),
+            Section("In figures", [_table(spec, run)] if run.compared else []),
         ],
-        "charts": drawn,
-        "version": data.version,
-    }  # fmt: skip
-
-
-def _headline(data: ReplayReportData) -> str:
-    run = data.run
-    kicker = f"A recording beside the simulated axis {data.axis_name}"
-    if not run.done:
-        lead = f"{run.failure[:1].upper()}{run.failure[1:]}."
-        return headline("bad", "Not replayed", run.job.name, kicker=kicker, lead=lead)
-    place = run.compared[0]
-    how = f"gets the recorded {run.open_loop}, its loops open," if run.open_loop else "follows the recorded reference"
-    lead = (
-        f"For {duration(run.job.seconds)} the simulated axis {how} and is {data.units.error(place.rms)} from the "
-        f"recorded position on average (rms), {data.units.error(place.peak)} at most."
+        settings=settings or {},
     )
-    efforts = _efforts(data)
-    if efforts:
-        lead += f" Its {efforts[0].name} differs from the recorded one by {percent(efforts[0].relative)}."
-    return headline("good", "Replayed", run.job.name, kicker=kicker, lead=lead)
 
 
-def _efforts(data: ReplayReportData) -> list[Compared]:
-    """What drove both, where that can differ."""
+def _headline(spec: CascadeSpec, run: ReplayRun) -> Headline:
+    return Headline(
+        level="good" if run.done else "bad",
+        verdict="Replayed" if run.done else "Not replayed",
+        name=run.job.name,
+        kicker=f"A recording beside the simulated axis {spec.axis.name}",
+        lead=_apart(spec, run) if run.done else f"{run.failure[:1].upper()}{run.failure[1:]}.",
+    )
+
+
+def _apart(spec: CascadeSpec, run: ReplayRun) -> str:
+    """How far both are apart, in two sentences."""
+    place, error = run.compared[0], units_of(spec).error
+    how = f"gets the recorded {run.open_loop}, its loops open," if run.open_loop else "follows the recorded reference"
+    text = (
+        f"For {duration(run.job.seconds)} the simulated axis {how} and is {error(place.rms)} from the "
+        f"recorded position on average (rms), {error(place.peak)} at most."
+    )
+    # What drove both, where that can differ.
     moved = ("m", "rad")
+    efforts = [one for one in run.compared if one.unit.partition("/")[0] not in moved and one.name != run.open_loop]
+    if efforts:
+        text += f" Its {efforts[0].name} differs from the recorded one by {percent(efforts[0].relative)}."
+    return text
+
+
+def _cards(spec: CascadeSpec, run: ReplayRun) -> list[Card]:
+    written = units_of(spec).written
     return [
-        one for one in data.run.compared if one.unit.partition("/")[0] not in moved and one.name != data.run.open_loop
+        card(
+            f"{one.name}, rms difference".capitalize(),
+            written(one.rms, one.unit),
+            f"largest {written(one.peak, one.unit)}; {relative(one)}",
+        )
+        for one in shown_signals(run)
     ]
 
 
-def _cards(data: ReplayReportData) -> str:
-    shown: list[Card] = []
-    for one in shown_signals(data.run):
-        value, _, unit = in_unit(one, one.rms, data.units).partition(GAP)
-        below = f"largest {in_unit(one, one.peak, data.units)}; {relative(one)}"
-        shown.append(Card(f"{one.name}, rms difference".capitalize(), value, unit, below))
-    return cards(shown) if shown else ""
+def shown_signals(run: ReplayRun) -> list[Compared]:
+    """Signals that are drawn: all but the acceleration, which is noise to the eye."""
+    return [one for one in run.compared if one.name != "acceleration"]
 
 
-def _figures(data: ReplayReportData, drawn: list[Chart]) -> str:
-    if not drawn:
-        return ""
-    begin, end = magnified(data.run)
+# ---- figures
+
+
+def _curves(spec: CascadeSpec, run: ReplayRun) -> list[Figure]:
+    """Both above one another, and the difference of the positions; whole and magnified."""
+    if not run.compared:
+        return []
+    t = run.job.t - run.job.t[0]
+    begin, end = magnified(run)
     caption = (
         "Dashed: the recording. Solid: the simulation, at the same instants. Where both lie on one another the model "
         "does what the machine did; the difference shows what is left."
@@ -86,42 +98,44 @@ def _figures(data: ReplayReportData, drawn: list[Chart]) -> str:
         "whether they part where the axis sets off or turns round (friction), where it accelerates (mass), or at speed "
         "(viscous friction, delay)."
     )
-    parts = [("whole", "The whole recording", caption), ("near", "Where they differ most", near)]
-    return section(
-        "Recorded and simulated",
-        *(
-            figure(title, text, _slots(data, [chart for chart in drawn if chart["id"].startswith(name)]), ZOOM_HINT)
-            for name, title, text in parts
-            if any(chart["id"].startswith(name) for chart in drawn)
-        ),
-    )
+    everything = slice(0, len(t))
+    kept = slice(int(np.searchsorted(t, begin)), int(np.searchsorted(t, end, side="right")))
+    whole = Figure(title="The whole recording", caption=caption, charts=_charts("whole", spec, run, everything))
+    if kept == everything or kept.stop - kept.start < 3:
+        return [whole]
+    return [whole, Figure(title="Where they differ most", caption=near, charts=_charts("near", spec, run, kept))]
 
 
-def _slots(data: ReplayReportData, drawn: list[Chart]) -> str:
-    names = [one.name for one in shown_signals(data.run)]
-    slots: list[str] = []
-    for chart in drawn:
-        _, index, *off = chart["id"].split("-")
-        what = (
-            f"{names[int(index)]}, recorded less simulated" if off else f"{names[int(index)]}, recorded and simulated"
-        )
-        slots.append(chart_slot(chart["id"], f"{what}, over time"))
-    return "".join(slots)
+def magnified(run: ReplayRun) -> tuple[float, float]:
+    """Stretch around the largest difference of the positions [s]."""
+    t = run.job.t - run.job.t[0]
+    half = 0.5 * max(ZOOM_LEAST, ZOOM_SHARE * float(t[-1]))
+    at = float(t[int(np.argmax(np.abs(run.compared[0].difference)))])
+    begin = min(max(at - half, 0.0), max(float(t[-1]) - 2 * half, 0.0))
+    return begin, begin + 2 * half
 
 
-def _table(data: ReplayReportData) -> str:
-    run = data.run
-    if not run.compared:
-        return ""
+def _charts(name: str, spec: CascadeSpec, run: ReplayRun, rows: slice) -> list[Chart]:
+    units, panels = units_of(spec), list[Panel]()
+    for index, one in enumerate(shown_signals(run)):
+        recorded, simulated = ("recorded", one.measured[rows]), ("simulated", one.simulated[rows])
+        pair = pair_panel(f"{name}-{index}", one.name, units.of(one.unit), recorded, simulated)
+        panels.append(replace(pair, about=f"{one.name}, recorded and simulated, over time"))
+        if one.unit in {"m", "rad"}:
+            off = error_panel(
+                f"{name}-{index}-off", "difference", ("recorded less simulated", one.difference[rows]), units
+            )
+            panels.append(replace(off, about=f"{one.name}, recorded less simulated, over time"))
+    t = run.job.t[rows] - run.job.t[0]
+    return time_charts(Timeline(name=name, t=t, label="time since the recording began", unit="s"), panels)
+
+
+def _table(spec: CascadeSpec, run: ReplayRun) -> Figure:
+    written = units_of(spec).written
     heads = [("signal", False), ("rms difference", True), ("largest", True), ("relative [%]", True)]
-    longest = max((100 * one.relative for one in run.compared if one.relative == one.relative), default=0.0) or 1.0
+    longest = max((100 * one.relative for one in run.compared if not math.isnan(one.relative)), default=0.0) or 1.0
     rows = [
-        [
-            escape(one.name),
-            in_unit(one, one.rms, data.units),
-            in_unit(one, one.peak, data.units),
-            bar_cell(100 * one.relative, longest),
-        ]
+        [one.name, written(one.rms, one.unit), written(one.peak, one.unit), bar_cell(100 * one.relative, longest)]
         for one in run.compared
     ]
     caption = (
@@ -129,4 +143,4 @@ def _table(data: ReplayReportData) -> str:
         "What was not recorded (a velocity, the acceleration) comes from both positions alike, low-passed at 100 Hz "
         "forwards and backwards."
     )
-    return section("In figures", figure("Recording less simulation", caption, table(heads, rows)))
+    return Figure(title="Recording less simulation", caption=caption, table=Table(heads=heads, rows=rows))

@@ -131,6 +131,11 @@ class CascadeRun(RunRecord[MoveJob]):
     )  # fmt: skip
 
     @property
+    def seconds(self) -> float:
+        """From the first readiness to the end of the job."""
+        return max(self.time_end - self.time_ready, 0.0)
+
+    @property
     def worst_following(self) -> float:
         """Largest following error."""
         return max((move.peak_following for move in self.moves), default=0.0)

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from detent.methods.rotary_table.summary import ARCSEC, SMALL, angle, degrees
-from detent.page.words import GAP, length, number
+from detent.methods.cascade.schema import CascadeSpec
+from detent.page.words import ARCSEC, GAP, SMALL_ANGLE, angle, degrees, length, number
 
 MICRO = 1e-3
 """Lengths below this are drawn in micrometres [m]."""
@@ -37,7 +37,7 @@ class Units:
     def small(self, peak: float) -> Scale:
         """Of errors, by the largest of them [m]."""
         if self.rotary:
-            return Scale(1 / ARCSEC, "arcsec") if abs(peak) < SMALL else self.place
+            return Scale(1 / ARCSEC, "arcsec") if abs(peak) < SMALL_ANGLE else self.place
         return Scale(1e6, "µm") if abs(peak) < MICRO else self.place
 
     def error(self, value: float) -> str:
@@ -59,6 +59,31 @@ class Units:
         """Write a speed with its unit."""
         text = degrees(value) if self.rotary else number(round(value * 1e3, 6))
         return f"{text}{GAP}{self.speed.name}"
+
+    def of(self, unit: str) -> Scale:
+        """Unit in which a signal of this SI unit is drawn."""
+        scales = {"m": self.place, "rad": self.place, "m/s": self.speed, "rad/s": self.speed}
+        scales["rad/s^2"] = Scale(180 / math.pi, "deg/s²")
+        return scales.get(unit) or Scale(1.0, unit.replace("^2", "²").replace("*", " "))
+
+    def written(self, value: float, unit: str) -> str:
+        """Write a difference of a signal of this SI unit."""
+        if unit in {"m", "rad"}:
+            return self.error(value)
+        if unit in {"m/s", "rad/s"}:
+            return self.speed_text(value)
+        scale = self.of(unit)
+        return f"{number(value * scale.factor)}{GAP}{scale.name}"
+
+
+def units_of(spec: CascadeSpec) -> Units:
+    """Units of an axis."""
+    return Units(rotary=spec.axis.motion == "rotary")
+
+
+def milliseconds(seconds: float) -> str:
+    """Write a time in milliseconds; what is round but for the last bits comes out round."""
+    return f"{number(round(seconds * 1e3, 6))}{GAP}ms"
 
 
 def percent(share: float) -> str:

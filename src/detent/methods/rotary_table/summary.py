@@ -6,12 +6,8 @@ from functools import cached_property
 
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.page import words
 from detent.page.run_page import Worst, worst
 from detent.page.words import GAP, CountUnit, angle, count, degrees, duration
-
-ARCSEC, SMALL = words.ARCSEC, words.SMALL
-"""Taken from here by the cascade axis, until it takes them from `page.words` itself."""
 
 WorstStep = Worst[StepRecord] | None
 

@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 
 from detent.methods.cascade.comparison import FEEDS, SHAPES, ProfileCase, ProfileComparison
-from detent.methods.cascade.page_data import CascadeDetail, CascadePath, CascadeReportData, ReplayReportData
+from detent.methods.cascade.page import COMMAND, FOLLOWING, LOAD, LOAD_SPEED, REFERENCE, REFERENCE_SPEED
 from detent.methods.cascade.replay import Compared, ReplayRun
 from detent.methods.cascade.replay_job import ReplayJob
 from detent.methods.cascade.run import CascadeMove, CascadeRun
-from detent.methods.cascade.units import Units
 from detent.methods.moves.job import Move, MoveJob
-from detent.page.parts import Event, Note
+from detent.record.trace import Trace
 
-LINEAR, ROTARY = Units(rotary=False), Units(rotary=True)
 WINDOW = 50e-6
 
 
@@ -59,23 +57,20 @@ def failed_run() -> CascadeRun:
     )
 
 
-def path(seconds: float = 3.0) -> CascadePath:
-    t = np.linspace(0.0, seconds, 601)
-    reference = 0.1 * np.clip(t / (seconds / 2), 0.0, 1.0)
-    following = 40e-6 * np.sin(40 * t)
-    return CascadePath(
-        t=t, reference=reference, load=reference - following, motor=reference, velocity_ref=np.gradient(reference, t),
-        velocity=np.gradient(reference, t), following=following, command=2.5 * np.sin(40 * t),
-    )  # fmt: skip
-
-
-def detail(**changes: Any) -> CascadeDetail:
-    events = [Event(0.0, "sets <off>"), Event(0.75, "arrived"), Event(0.8, "in position")]
-    usual: dict[str, Any] = {
-        "number": 2, "why": "the fastest <move>", "target": 0.1, "path": path(1.5), "events": events,
-        "rest": (0.7, 0.9),
+def trace_of(run: CascadeRun, *, row: float = 5e-3) -> Trace:
+    """The load 1 mm behind its reference on the way, 40 µm at its end, 4 µm too far from 40 ms after that on."""
+    t = np.arange(0.0, run.time_end + row, row)
+    reference, off = np.zeros(len(t)), np.zeros(len(t))
+    for one in run.moves:
+        since = t - one.begin
+        reference = np.where(since >= 0.0, np.interp(since, (0.0, 1.0), (one.start, one.target)), reference)
+        off = np.select([since < 0.0, since < 1.0, since < 1.04], [off, 1e-3, 40e-6], -4e-6)
+    load = reference - off
+    columns = {
+        "t": t, REFERENCE: reference, REFERENCE_SPEED: np.gradient(reference, t), LOAD: load,
+        LOAD_SPEED: np.gradient(load, t), FOLLOWING: off, COMMAND: 2.5 * np.sin(40 * t),
     }  # fmt: skip
-    return CascadeDetail(**usual | changes)
+    return Trace(columns=columns)
 
 
 def case(shape: str, feed: str, **changes: Any) -> ProfileCase:
@@ -103,15 +98,6 @@ def rigid_comparison() -> ProfileComparison:
     return replace(found, cases=tuple(replace(one, twist_after=math.nan, twist=0 * one.t) for one in found.cases))
 
 
-def cascade_data(**changes: Any) -> CascadeReportData:
-    usual: dict[str, Any] = {
-        "axis_name": "slide <1>", "units": LINEAR, "run": cascade_run(), "following_limit": 0.05, "path": path(),
-        "detail": detail(), "comparison": comparison(), "notes": [Note("warning", "signal <late>")],
-        "settings": {"axis file": "a<b>.toml"},
-    }  # fmt: skip
-    return CascadeReportData(**usual | changes)
-
-
 def compared(name: str, unit: str, scale: float, off: float) -> Compared:
     t = np.linspace(0.0, 20.0, 2001)
     measured = scale * np.sin(t)
@@ -129,11 +115,3 @@ def replay_run(**changes: Any) -> ReplayRun:
         ],
     }  # fmt: skip
     return ReplayRun(job, **usual | changes)
-
-
-def replay_data(**changes: Any) -> ReplayReportData:
-    usual: dict[str, Any] = {
-        "axis_name": "slide <1>", "units": LINEAR, "run": replay_run(), "notes": [Note("note", "guessed: <much>")],
-        "settings": {"axis file": "a<b>.toml"},
-    }  # fmt: skip
-    return ReplayReportData(**usual | changes)

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from detent.methods.cascade.units import Scale, Units, percent
+from detent.methods.cascade.units import Scale, Units, milliseconds, percent
 from detent.page.words import GAP
 
 LINEAR, ROTARY = Units(rotary=False), Units(rotary=True)
@@ -37,3 +37,23 @@ def test_positions_and_speeds_are_written_as_people_read_them() -> None:
 )
 def test_shares_are_written_in_percent(share: float, text: str) -> None:
     assert percent(share).replace(GAP, " ") == text
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "text"),
+    [("m", 5.69e-6, "5.7 µm"), ("rad", 0.1, "5.73 deg"), ("m/s", 0.25, "250 mm/s"), ("rad/s^2", math.pi, "180 deg/s²"),
+     ("m/s^2", 1.5, "1.50 m/s²"), ("N*m", 0.5, "0.500 N m")],
+)  # fmt: skip
+def test_differences_are_written_in_the_units_of_the_trade(unit: str, value: float, text: str) -> None:
+    assert Units(rotary=unit.startswith("rad")).written(value, unit).replace(GAP, " ") == text
+
+
+def test_signals_are_drawn_in_the_units_of_the_trade() -> None:
+    assert LINEAR.of("m") == Scale(1e3, "mm")
+    assert ROTARY.of("rad/s").name == "deg/s"
+    assert LINEAR.of("m/s^2") == Scale(1.0, "m/s²")
+
+
+def test_round_milliseconds_stay_round() -> None:
+    assert milliseconds(1.1 - 1.08).replace(GAP, " ") == "20 ms"
+    assert milliseconds(0.12345).replace(GAP, " ") == "123 ms"
