@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from math import degrees as in_degrees
+from math import degrees as to_degrees
 from math import isnan, pi
 
 from markupsafe import Markup
@@ -12,12 +12,6 @@ from detent.page.parts import INCH
 
 GAP = "\u202f"
 """Narrow space that does not break: between a number and its unit, and between thousands."""
-
-ARCSEC = pi / 180 / 3600
-"""A second of arc [rad]."""
-
-SMALL_ANGLE = 360 * ARCSEC
-"""Angles below this are written in seconds of arc [rad]."""
 
 
 def count(value: int, word: str = "", plural: str = "") -> str:
@@ -90,6 +84,13 @@ def length(value: float) -> str:
     return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
 
 
+ARCSEC = pi / 180 / 3600
+"""A second of arc [rad]."""
+
+SMALL = 360 * ARCSEC
+"""Angles below this are written in seconds of arc [rad]."""
+
+
 def degrees(value: float, digits: int = 3) -> str:
     """Write an angle [rad] or a speed [rad/s] in degrees, without its unit.
 
@@ -97,16 +98,16 @@ def degrees(value: float, digits: int = 3) -> str:
     ('180', '2.00')
     """
     # Radians of a round figure of degrees come back as one.
-    return number(round(in_degrees(value), 9), digits)
+    return number(round(to_degrees(value), 9), digits)
 
 
 def angle(value: float) -> str:
-    """Write a small angle [rad] in seconds of arc, and one that is not small in degrees.
+    """Write a small angle in seconds of arc, and one that is not small in degrees.
 
     >>> [angle(value).replace(GAP, " ") for value in (1.704e-5, 0.0017, 0.0349)]
     ['3.5 arcsec', '351 arcsec', '2.00 deg']
     """
-    if abs(value) >= SMALL_ANGLE:
+    if abs(value) >= SMALL:
         return f"{degrees(value)}{GAP}deg"
     seconds = round(value / ARCSEC, 6)
     return f"{number(seconds, 2 if abs(seconds) < 10 else 3)}{GAP}arcsec"

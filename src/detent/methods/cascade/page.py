@@ -245,8 +245,10 @@ def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
 
 
 def _row(spec: CascadeSpec, run: CascadeRun, move: CascadeMove, lag: Scale, off: Scale) -> list[str | Cell]:
-    units, longest = units_of(spec), max(run.worst_following * lag.factor, 1e-12)
+    units, longest = units_of(spec), run.worst_following * lag.factor or 1.0
     beyond = move.peak_following > spec.method.following_error
+    # A move that failed may have stopped anywhere; its bar is a full one, no longer.
+    furthest = max(run.worst_error, abs(move.error)) * off.factor or 1.0
     return [
         count(move.number),
         f"{move.begin - run.time_ready:.3f}",
@@ -256,8 +258,7 @@ def _row(spec: CascadeSpec, run: CascadeRun, move: CascadeMove, lag: Scale, off:
         number(round(move.settling * 1e3, 6)),
         bar_cell(move.peak_following * lag.factor, longest, over=beyond),
         number(move.overshoot * off.factor, 2),
-        offset_cell(move.error * off.factor, max(run.worst_error * off.factor, 1e-12),
-                    over=abs(move.error) > run.tolerance),
+        offset_cell(move.error * off.factor, furthest, over=abs(move.error) > run.tolerance),
         number(move.peak_command),
         "✔" if move.in_position else Cell(text="✘ no", over=True),
-    ]  # fmt: skip
+    ]

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from detent.methods.cascade.schema import CascadeSpec
-from detent.page.words import ARCSEC, GAP, SMALL_ANGLE, angle, degrees, length, number
+from detent.page.words import ARCSEC, GAP, SMALL, angle, degrees, length, number
 
 MICRO = 1e-3
 """Lengths below this are drawn in micrometres [m]."""
@@ -37,7 +37,7 @@ class Units:
     def small(self, peak: float) -> Scale:
         """Of errors, by the largest of them [m]."""
         if self.rotary:
-            return Scale(1 / ARCSEC, "arcsec") if abs(peak) < SMALL_ANGLE else self.place
+            return Scale(1 / ARCSEC, "arcsec") if abs(peak) < SMALL else self.place
         return Scale(1e6, "µm") if abs(peak) < MICRO else self.place
 
     def error(self, value: float) -> str:

@@ -100,9 +100,12 @@ def test_a_run_that_failed_says_where_and_why(linear: CascadeSpec) -> None:
     assert [card.title for card in page.cards if card.bad] == ["Moves in position", "Largest following error"]
     assert "200\u202fms" in cards_of(page)["Peak command"].below
     assert "move 1" in cards_of(page)["Worst error at rest"].below
-    last = table_of(page).rows[1][-1]
+    error, last = (table_of(page).rows[1][column] for column in (8, -1))
     assert isinstance(last, Cell)
     assert last.over
+    # No bar is longer than its column, wherever the axis stopped.
+    assert isinstance(error, Cell)
+    assert error.bar == 1.0
 
 
 def test_a_load_that_stands_beside_its_target_gets_no_praise(linear: CascadeSpec) -> None:
