@@ -368,7 +368,7 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 def jerk() -> None:
     """Start by the envelope and by a profile of limited jerk, each as a ramp list, on the rotor."""
-    from detent.methods.stepper_envelope.comparison import compare_jerk
+    from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
     from detent.methods.stepper_envelope.system import load_rule
     from detent.planning.step_envelope import StepEnvelope
 
@@ -402,14 +402,14 @@ def jerk() -> None:
 def methods_table() -> None:
     """The comparison with the other methods as a table, for the page."""
     import generate
-    from detent.methods.shown import comparison_table
 
     from detent.methods.stepper_envelope.comparison import compare_steps
 
     spec = zoom().spec
     only = spec.model_copy(update={"stepper": {MOTOR: spec.stepper[MOTOR]}})
-    _, heads, rows = comparison_table(only, compare_steps(only)[0])
-    (FOLDER / "step-methods.md").write_text(generate.table(heads, [tuple(row) for row in rows]), encoding="utf-8")
+    _, heads, rows = compare_steps(only)[0].table
+    text = generate.table(tuple(heads), [tuple(row) for row in rows])
+    (FOLDER / "step-methods.md").write_text(text, encoding="utf-8")
 
 
 FIGURES = (

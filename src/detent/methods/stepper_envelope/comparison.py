@@ -1,28 +1,26 @@
-"""The stepper envelope beside its alternatives, on an axis's own motors: methods per step, and a jerk-limited profile.
+"""The stepper envelope beside methods that decide step by step, on an axis's own motors.
 
 Methods A and B work every step out from the distance to the extremes (stepper-envelope specification 3.7), with one
-constant acceleration; the naive drives know one frequency. The time-optimal profile of limited jerk is what a modern
-motion controller plans for an axis that may start from standstill only; it is worked out by ruckig (MIT licence).
+constant acceleration; the naive drives know one frequency.
 """
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from detent.control.step_comparison import BRAKING_DISTANCE, CONSTANT_FREQUENCY, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import start_move
-from detent.errors import DetentError
-from detent.kernel.loop import advance
-from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
 from detent.methods.stepper_envelope.machine import StageMotor
-from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone, tables
-from detent.planning.step_ramp import natural_frequency, total_inertia
-from detent.record.machine import LONGEST_STRETCH, Progress
-from detent.record.recorder import choose_leaves
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.summary import stated
+from detent.page.figure import Figure
+from detent.page.table import Cell, Table, TextTable
+from detent.page.words import GAP, count, duration, milliseconds, number
+from detent.record.machine import Progress
+from detent.units import format_quantity
 
 Numbers = NDArray[np.float64]
 
@@ -41,6 +39,22 @@ METHODS = {
     "largest frequency": CONSTANT_FREQUENCY,
 }
 """What is compared, and how the control unit names it."""
+
+METHOD_NAMES = {
+    ENVELOPE: "envelope (this method)",
+    "start frequency": "constant start frequency",
+    "largest frequency": "constant largest frequency",
+}
+"""Names of compared methods in full; the others carry theirs."""
+
+METHOD_COSTS = {
+    ENVELOPE: "1 table read, 1 comparison, at most 1 increment",
+    "A: braking distance per step": "1 or 2 square roots, 1 or 2 divisions",
+    "B: speed per step": "1 square root, 1 multiplication",
+    "start frequency": "nothing",
+    "largest frequency": "nothing",
+}
+"""What the control unit works out before every step, compared methods as in stepper-envelope specification 3.7."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +94,28 @@ class StepComparison:
         """Time of each way with a method, shape (ways,) [s]."""
         return np.array([course.seconds for course in self.courses[method]])
 
+    @property
+    def table(self) -> TextTable:
+        """Time of each way and steps lost, for the terminal."""
+        title = f"Motor {self.motor}: time of a way, and steps lost ({format_quantity(self.step, 'm')} a step)"
+        heads = ("method", *(f"{way} steps" for way in self.ways), "worked out per step")
+        rows: list[tuple[str, ...]] = []
+        for method, courses in zip(self.methods, self.courses, strict=True):
+            cells = [
+                format_quantity(one.seconds, "s") + (f", {abs(one.lost)} lost" if one.lost else "") for one in courses
+            ]
+            rows.append((METHOD_NAMES.get(method, method), *cells, METHOD_COSTS.get(method, "")))
+        return TextTable(title, heads, rows)
+
+    def figures(self) -> tuple[Figure, ...]:
+        """The same with bars, and who loses steps."""
+        caption = (
+            "The same motor over several ways from its lower end, with its rotor simulated. A and B reckon from the "
+            "distance to the extremes how fast every step may be; the envelope looks it up, and is as quick as they "
+            f"are where they lose no step. {_worth(self)}{_losers(self)}"
+        )
+        return (Figure(title=f"Motor {self.motor}: time of a way, and steps lost", caption=caption, table=_bars(self)),)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
         runs = {
@@ -89,52 +125,59 @@ class StepComparison:
         return {"motor": self.motor, "step": self.step, "ways": list(self.ways), "methods": runs}
 
 
-@dataclass(frozen=True, slots=True)
-class Profile:
-    """Position and speed over time."""
+def _bars(found: StepComparison) -> Table:
+    heads = [(f"{count(way, 'step')}, {stated(way * found.step * 1e3)}{GAP}mm", True) for way in found.ways]
+    longest = np.max([found.seconds(k) for k in range(len(found.methods))], axis=0)
+    rows = [
+        [
+            Markup("<b>{}</b>").format(METHOD_NAMES.get(method, method)),
+            *(_course_cell(course, float(most)) for course, most in zip(courses, longest, strict=True)),
+            METHOD_COSTS.get(method, ""),
+        ]
+        for method, courses in zip(found.methods, found.courses, strict=True)
+    ]
+    return Table(heads=[("", False), *heads, ("worked out before every step", False)], rows=rows)
 
-    t: Numbers  # and position, speed: [s], [m] from the start, [m/s]
-    position: Numbers
-    speed: Numbers
 
-    @property
-    def seconds(self) -> float:
-        """Duration [s]."""
-        return float(self.t[-1])
+def _course_cell(course: Course, longest: float) -> Cell:
+    """Time with a bar that compares it with the other methods, and the steps lost."""
+    text = time_text(course.seconds)
+    if course.lost:
+        text = Markup("{}, <br>{} lost").format(text, count(abs(course.lost)))
+    return Cell(text=text, bar=course.seconds / longest, over=course.lost != 0)
 
 
-@dataclass(frozen=True, slots=True)
-class JerkComparison:
-    """The envelope's run of one motor beside a time-optimal profile of limited jerk with the same limits.
+def time_text(seconds: float) -> str:
+    """Write a time below 1 s in milliseconds."""
+    return milliseconds(seconds) if seconds < 1 else duration(seconds)
 
-    Attributes
-    ----------
-    motor : str
-        Its name.
-    way : float
-        Length of the run [m].
-    speed, acceleration, jerk : float
-        Limits of the profile: those of the axis, and a jerk that brings the acceleration up within one period of the
-        rotor's natural frequency, which leaves the rotor without a swing [m/s, m/s^2, m/s^3].
-    envelope : Profile
-        What the table gives without the axis's zones; speed is that of each step.
-    smooth : Profile
-        Ruckig's.
-    """
 
-    motor: str
-    way: float
-    speed: float
-    acceleration: float
-    jerk: float
-    envelope: Profile
-    smooth: Profile
+def _worth(found: StepComparison) -> str:
+    """What the envelope saves over the start frequency on the longest way."""
+    if "start frequency" not in found.methods:
+        return ""
+    constant = found.courses[found.methods.index("start frequency")][-1].seconds
+    times = number(constant / found.courses[0][-1].seconds, 2)
+    return f"On the longest way it is {times} times as quick as the constant start frequency. "
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for ``--json``."""
-        names = ("motor", "way", "speed", "acceleration", "jerk")
-        times = {"envelope_seconds": self.envelope.seconds, "smooth_seconds": self.smooth.seconds}
-        return {name: getattr(self, name) for name in names} | times
+
+def _losers(found: StepComparison) -> str:
+    """Which methods lose steps, and why."""
+    lost = {
+        method: max(abs(course.lost) for course in courses)
+        for method, courses in zip(found.methods, found.courses, strict=True)
+    }
+    recomputed = [method[:1] for method in lost if method[:2] in {"A:", "B:"} and lost[method]]
+    text = ""
+    if recomputed:
+        jump = "jump" if len(recomputed) > 1 else "jumps"
+        text += (
+            f"{' and '.join(recomputed)} {jump} from one speed to the other where a zone begins or torque falls, which "
+            "the rotor cannot follow: steps are lost. "
+        )
+    if lost.get("largest frequency"):
+        text += "The largest frequency from rest is quicker on paper only: the rotor is left behind."
+    return text
 
 
 def compare_steps(spec: StepperEnvelopeSpec, progress: Progress | None = None) -> tuple[StepComparison, ...]:
@@ -155,7 +198,7 @@ def _compare_motor(spec: StepperEnvelopeSpec, name: str, progress: Progress | No
 
 def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: int) -> Course:
     """One motor with one method over one way, on its rotor."""
-    motor = _motor_for(spec, name, way)
+    motor = motor_at_start(spec, name, way)
     if code:
         _take_over(motor, code, way, motor.table.max_hz if method == "largest frequency" else None)
     start_move(motor.r.rule, 1)
@@ -164,7 +207,7 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: i
     return Course(motor.rested, motor.lost, float(motor.r.rotor.peak_lag))
 
 
-def _motor_for(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor:
+def motor_at_start(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor:
     """The motor at its lower end, with its tables set for a run of `way` steps."""
     lower = spec.stepper[name].mechanics.lower_end
     mechanics = spec.stepper[name].mechanics.model_copy(update={"start_position": lower})
@@ -182,55 +225,7 @@ def _take_over(motor: StageMotor, code: int, way: int, hz: float | None) -> None
     c.start_hz = float(motor.tables.ramp.hz[0]) if hz is None else hz
     c.acceleration = motor.table.limits.acceleration / motor.table.step
     c.zones = len(zones.numbers)
-    for k, number in enumerate(zones.numbers.tolist()):
-        c.edge[k], c.limit[k] = int(zones.edges[k + 1]), zones.limits[number]
-    _use_frequencies(motor.p)
-
-
-def _use_frequencies(p: StepperParams) -> None:
-    """The compared methods work a frequency out: the timer has to divide."""
-    p.timer.reload = 0
-
-
-def compare_jerk(spec: StepperEnvelopeSpec, name: str | None = None) -> JerkComparison:
-    """Hold the envelope of one motor, over its whole travel upwards, against a profile of limited jerk."""
-    name = next(iter(spec.stepper)) if name is None else name
-    if name not in spec.stepper:
-        raise DetentError(f"motor: came {name!r}; allowed: one of {', '.join(spec.stepper)}; name one of these")
-    table = spec.stepper[name]
-    motor, load = stepper_motor(table), stepper_load(table)
-    swing = natural_frequency(motor.steps_per_turn, motor.holding_torque, total_inertia(motor, load))
-    limits = (table.limits.speed, table.limits.acceleration, table.limits.acceleration * swing)
-    envelope = _envelope_profile(spec, name)
-    return JerkComparison(name, table.steps * table.step, *limits, envelope, _smooth_profile(table, limits))
-
-
-def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:
-    """Every step of a run over the whole travel, without the zones, of which the other profile knows nothing."""
-    open_table = spec.stepper[name].model_copy(update={"zone": {}})
-    spec = spec.model_copy(update={"stepper": spec.stepper | {name: open_table}})
-    motor = _motor_for(spec, name, open_table.steps)
-    start_move(motor.r.rule, 1)
-    (period,) = choose_leaves(Stepper, ["timer.period"])
-    picks = np.arange(period.offset, period.offset + period.width.size)
-    rows = np.zeros((motor.table.steps + 1, len(picks)), np.uint8)
-    feed = tables(motor.tables.up.entries, motor.tables.down.entries)
-    made = advance(alone(motor.p), motor.r, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1, *feed)
-    seconds = np.asarray(rows[1 : made + 1].view("<i8")[:, 0] / motor.p.timer.clock_hz, float)
-    t: Numbers = np.concatenate([[0.0], np.cumsum(seconds)])
-    position = np.linspace(0.0, made * motor.table.step, made + 1)
-    return Profile(t, position, np.append(motor.table.step / seconds, 0.0))
-
-
-def _smooth_profile(table: StepperTable, limits: tuple[float, float, float]) -> Profile:
-    """Ruckig's profile from rest to rest over the whole travel."""
-    ruckig: Any = import_module("ruckig")  # it states no types
-    way = table.steps * table.step
-    asked, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    asked.current_position, asked.target_position = [0.0], [way]
-    asked.max_velocity, asked.max_acceleration, asked.max_jerk = ([limit] for limit in limits)
-    if ruckig.Ruckig(1).calculate(asked, found) != ruckig.Result.Working:
-        raise DetentError(f"no profile of limited jerk over {way:g} m; look at the limits of the axis")
-    t: Numbers = np.linspace(0.0, float(found.duration), 2001)
-    states = np.array([[part[0] for part in found.at_time(float(moment))] for moment in t], float)
-    return Profile(t, states[:, 0], states[:, 1])
+    for k, zone in enumerate(zones.numbers.tolist()):
+        c.edge[k], c.limit[k] = int(zones.edges[k + 1]), zones.limits[zone]
+    # The compared methods work a frequency out: the timer has to divide.
+    motor.p.timer.reload = 0

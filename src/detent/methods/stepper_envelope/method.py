@@ -2,18 +2,17 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import STEPPER_MOTORS
 from detent.files.findings import Caution, Contradiction, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated, Table
+from detent.methods.method import Comparison, Method, Shown, Simulated
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.methods.stepper_envelope.envelope_files import Envelope
-    from detent.page.page import Page
+    from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -102,7 +101,8 @@ class StepperEnvelope(Method[StepperEnvelopeSpec]):
 
     def compare(self, spec: StepperEnvelopeSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
         """Beside speed computed per step, constant speed, and a jerk-limited profile."""
-        from detent.methods.stepper_envelope.comparison import compare_jerk, compare_steps
+        from detent.methods.stepper_envelope.comparison import compare_steps
+        from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
 
         return (*compare_steps(spec, progress=progress), compare_jerk(spec))
 
@@ -119,32 +119,9 @@ class StepperEnvelope(Method[StepperEnvelopeSpec]):
 
     def page(self, spec: StepperEnvelopeSpec, result: Any, shown: Shown) -> "Page":
         """The report."""
-        from detent.methods.stepper_envelope.page import make_stage_page
-        from detent.methods.stepper_envelope.report import stage_report
+        from detent.methods.stepper_envelope.page import stage_page
 
-        *steps, jerk = shown.comparisons or (None,)
-        data = stage_report(spec, result, shown.trace, steps=tuple(steps), jerk=jerk, settings=shown.settings)
-        return make_stage_page(data)
-
-    def table(self, spec: StepperEnvelopeSpec, comparison: Any) -> Table:
-        """Rules beside one another, or profiles."""
-        from detent.methods.stepper_envelope import stage_figures
-        from detent.methods.stepper_envelope.comparison import JerkComparison
-
-        del spec
-        is_jerk = isinstance(comparison, JerkComparison)
-        return stage_figures.jerk_table(comparison) if is_jerk else stage_figures.steps_table(comparison)
-
-    def plot(self, spec: StepperEnvelopeSpec, comparison: Any, path: Path) -> None:
-        """Rules beside one another, or profiles."""
-        from detent.methods.stepper_envelope import stage_figures
-        from detent.methods.stepper_envelope.comparison import JerkComparison
-
-        del spec
-        if isinstance(comparison, JerkComparison):
-            stage_figures.plot_jerk(comparison, path)
-        else:
-            stage_figures.plot_steps(comparison, path)
+        return stage_page(spec, result, shown.trace, shown.comparisons, shown.settings)
 
     def envelopes(self, spec: StepperEnvelopeSpec) -> Mapping[str, "Envelope"]:
         """Tables of permissible frequencies of each motor, between its extremes at power-on."""

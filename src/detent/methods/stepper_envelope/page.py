@@ -1,32 +1,56 @@
 """The page about a job on a stepper stage: did it keep its steps, how fast was it, and how near the limits it ran."""
 
-from html import escape
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 
-from detent.methods.stepper_envelope import charts as stage_charts
-from detent.methods.stepper_envelope.comparison_section import comparison_charts, comparison_section
-from detent.methods.stepper_envelope.page_data import MotorRuns, MoveDetail, StageReportData
-from detent.methods.stepper_envelope.stage_plan import MOST_TILES, plan_drawing, plan_legend
-from detent.methods.stepper_envelope.stage_results import MotionResult, StageMoveResult, WorstMotion
-from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, called, rate, stated
-from detent.page.chart import Chart
-from detent.page.page import (
-    ZOOM_HINT,
-    Card,
-    Page,
-    cards,
-    chart_slot,
-    event_table,
-    figure,
-    headline,
-    notes,
-    section,
-    small_print,
-)
-from detent.page.words import GAP, count, duration, further, number, table
+import numpy as np
+from markupsafe import Markup
 
-MOST_MOTIONS = 500
-"""Rows in the table: more than anybody reads."""
+from detent.methods.stepper_envelope.detail import detail_section
+from detent.methods.stepper_envelope.run import StageMoveRecord, StageRun
+from detent.methods.stepper_envelope.runs_chart import MM, Runs, runs_chart
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.stage_job import StageJog
+from detent.methods.stepper_envelope.stage_plan import plan_figure
+from detent.methods.stepper_envelope.stage_trace import MadeSteps, arc_of, legs_of, made_steps, travel_envelope
+from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, margin_text, stated
+from detent.page.chart import Curve, Panel, Timeline, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
+from detent.page.parts import Note, Numbers
+from detent.page.run_page import (
+    FEWEST_ROWS,
+    LONGEST,
+    Stretch,
+    has,
+    made_card,
+    page_title,
+    run_headline,
+    stopped_after,
+    stretch,
+    time_card,
+    warnings,
+    whole_or_first,
+)
+from detent.page.table import Cell, left_out, long_table
+from detent.page.words import GAP, count, duration, further, number
+from detent.record.trace import Trace
+
+MOST_MOTORS = 6
+"""Motors that are drawn."""
+
+POINTS = 1500
+"""Rows that are chosen for one curve's sake: a page has many of them."""
+
+ARC_POINTS = 4000
+"""Points of all runs of one motor in the figure of frequency against position."""
+
+MOST_MOVES = 400
+"""Moves of one motor in that figure: more lie on one another."""
+
+MOST_ZONES = 4
+"""Zones that are named below a figure."""
 
 ENVELOPE_CAPTION = (
     "Step frequency over position: motion up above zero, motion down below it. The grey ground is what the table "
@@ -35,303 +59,261 @@ ENVELOPE_CAPTION = (
 )
 """Stands at the first motor only."""
 
-MOST_ZONES = 4
-"""Zones that are named below a figure."""
 
-
-def make_stage_page(data: StageReportData) -> Page:
-    """What the page is made of."""
-    return {
-        "title": f"{data.job_name} on {data.axis_name}: {'done' if data.done else 'not done'}",
-        "body": [
-            _headline(data), _cards(data), notes(data.notes), _result(data), _envelopes(data), _detail(data),
-            comparison_section(data), _moves(data), small_print(data.settings),
+def stage_page(
+    spec: StepperEnvelopeSpec,
+    run: StageRun,
+    trace: Trace | None,
+    comparisons: Sequence[Comparison] = (),
+    settings: Mapping[str, str] | None = None,
+) -> Page:
+    """The page of a run; figures whose signals were not recorded are left out."""
+    if trace is not None and len(trace) < FEWEST_ROWS:
+        trace = None
+    figures = StageFigures(spec, run)
+    made = recorded_steps(figures, trace)
+    result = [plan_figure(figures), _path_figure(figures, trace)]
+    return Page(
+        title=page_title(spec.axis.name, run),
+        headline=_headline(figures),
+        cards=_cards(figures),
+        notes=_notes(figures),
+        sections=[
+            Section("What came out", [figure for figure in result if figure]),
+            Section("Speed under the envelope", _runs_figures(figures, made)),
+            detail_section(figures, trace, made),
+            comparison_section(comparisons),
+            Section(f"{figures.word.capitalize()} by {figures.word}", [_every_move(figures)] if run.moves else []),
         ],
-        "charts": all_charts(data),
-        "version": data.version,
-    }  # fmt: skip
+        settings=settings or {},
+    )
 
 
-def all_charts(data: StageReportData) -> list[Chart]:
-    """Every chart of the page."""
-    drawn = stage_charts.path_charts(data.path) if data.path else []
-    shown = data.runs[: stage_charts.MOST_MOTORS]
-    drawn += [stage_charts.runs_chart(runs, f"runs-{k}") for k, runs in enumerate(shown)]
-    if data.detail:
-        drawn += stage_charts.detail_charts(data.detail)
-    return drawn + comparison_charts(data)
+def recorded_steps(figures: StageFigures, trace: Trace | None) -> dict[str, MadeSteps]:
+    """Recorded steps of each motor that made some."""
+    if trace is None:
+        return {}
+    timer = figures.spec.controller.timer
+    found = {name: made_steps(trace, name, timer) for name in figures.moved}
+    return {name: made for name, made in found.items() if made is not None and len(made.t)}
 
 
 # ---- what came out, in one glance
 
 
-def _headline(data: StageReportData) -> str:
-    figures = data.figures
-    kicker = f"Simulated run of the axis {data.axis_name}"
-    asked = count(figures.asked, data.word)
-    if not data.done:
-        told = f"{data.failure[:1].upper()}{data.failure[1:].rstrip('.')}."
-        if figures.made < figures.asked:
-            begun = f"Stopped after {count(figures.made)} of {asked}, {duration(figures.seconds)} into the job."
-        else:
-            begun = f"{count(figures.placed)} of {asked} in place."
-        return headline("bad", "Not done", data.job_name, kicker=kicker, lead=f"{begun} {told}")
-    lead = f"{asked} in {duration(figures.seconds)}, {rate(figures, data.word)}; no step was lost."
+def _headline(figures: StageFigures) -> Headline:
+    run, axis = figures.run, figures.spec.axis.name
+    asked = count(figures.asked, figures.word)
+    if not run.done:
+        if len(run.moves) < figures.asked:
+            return run_headline(axis, run, stopped_after(len(run.moves), asked, figures.seconds))
+        return run_headline(axis, run, f"{count(figures.placed)} of {asked} in place.")
+    lead = f"{asked} in {duration(figures.seconds)}, {figures.rate}; no step was lost."
     if isfinite(figures.faster):
         lead += f" At the constant start frequency the motors would run {number(figures.faster)} times as long."
-    return headline("good", "Done", data.job_name, kicker=kicker, lead=lead)
+    return run_headline(axis, run, lead)
 
 
-def _cards(data: StageReportData) -> str:
-    figures, word = data.figures, data.word
-    seconds, _, unit = duration(figures.seconds).partition(GAP)
+def _cards(figures: StageFigures) -> list[Card]:
+    run, word = figures.run, figures.word
     beside = figures.asked - figures.placed
+    below = f"{count(beside)} not" if beside else "every rotor on its step"
     shown = [
-        Card(f"{word.capitalize()}s in place", count(figures.placed), f"of {count(figures.asked)}",
-             f"{count(beside)} not" if beside else "every rotor on its step", bad=beside > 0),
-        Card("Time", seconds, unit, rate(figures, word) if data.done else "for the whole job"),
-    ]  # fmt: skip
+        made_card(f"{word.capitalize()}s in place", figures.placed, figures.asked, below),
+        time_card(figures.seconds, figures.rate if run.done else "for the whole job"),
+    ]
     if figures.steps:
-        first = figures.first_lost
-        below = f"of {count(figures.steps)} made"
+        first, below = figures.first_lost, f"of {count(figures.steps)} made"
         if first:
-            below = f"in the end; {_whose(data, first)} lost {count(abs(round(first.value)))} first"
+            below = f"in the end; {figures.whose(first)} lost {count(abs(first.motor.lost))} first"
         shown.append(Card("Lost steps", count(figures.all_lost), "", below, bad=first is not None))
-    if figures.lag:
-        below = f"{_whose(data, figures.lag)}; out of step from {number(PULL_OUT_LAG)}"
-        shown.append(
-            Card("Worst rotor lag", number(figures.lag.value), "steps", below, bad=figures.lag.value >= PULL_OUT_LAG)
-        )
-    if figures.margin:
-        below = f"{_whose(data, figures.margin)}; falls behind below 1"
-        least = figures.margin.value
-        shown.append(Card("Least torque margin", f"× {number(least)}", "", below, bad=least < 1))
-    if data.done and isfinite(figures.faster):
-        saved, _, unit = duration(max(figures.naive - figures.moving, 0.0)).partition(GAP)
+    if lag := figures.lag:
+        below = f"{figures.whose(lag.of)}; out of step from {number(PULL_OUT_LAG)}"
+        shown.append(Card("Worst rotor lag", number(lag.value), "steps", below, bad=lag.value >= PULL_OUT_LAG))
+    if margin := figures.margin:
+        below = f"{figures.whose(margin.of)}; falls behind below 1"
+        shown.append(Card("Least torque margin", f"× {number(margin.value)}", "", below, bad=margin.value < 1))
+    if run.done and isfinite(figures.faster):
+        saved = duration(max(figures.naive - figures.moving, 0.0))
         below = f"{number(figures.faster)} times as fast as at the start frequency ({duration(figures.naive)})"
-        shown.append(Card("Time saved", saved, unit, below))
-    return cards(shown)
+        shown.append(card("Time saved", saved, below))
+    return shown
 
 
-def _whose(data: StageReportData, worst: WorstMotion) -> str:
-    label = next((move.label for move in data.moves if move.number == worst.move), "")
-    return f"{called(worst.move, label, data.kind)}, {worst.motor}"
+def _notes(figures: StageFigures) -> list[Note]:
+    job = figures.run.job
+    notes = warnings(figures.run.warnings) + [
+        Note(
+            "warning",
+            f"move {count(move.number)}: the stop of {name} was changed to {stated(motor.target * MM)}{GAP}mm when the "
+            "motor was too fast to stop there; it stopped as soon as it could and came back",
+        )
+        for move, name, motor, _ in figures.motions
+        if motor.overrun
+    ]
+    return [*notes, Note("note", f"how {job.name} was read: {'; '.join(job.notes)}")] if job.notes else notes
 
 
-# ---- what came out
+# ---- places over time
 
 
-def _result(data: StageReportData) -> str:
-    return section("What came out", _plan_figure(data), _path_figure(data))
-
-
-def _plan_figure(data: StageReportData) -> str:
-    plan = data.plan
-    if not plan:
-        return ""
-    caption = (
-        "Every square is a tile, where it was asked for, with its name; the line goes through the places where the "
-        "rotors stood, in the order of the visits, and the ring is the first. Both axes move together: a tile is done "
-        "when both are settled. The squares are as large as the tiles are apart, not as the camera sees. The stage "
-        f"came from {escape(plan.motors[0])} {stated(plan.start[0] * 1e3)}, {escape(plan.motors[1])} "
-        f"{stated(plan.start[1] * 1e3)}{GAP}mm."
-    )
-    left_out = len(plan.tiles) - MOST_TILES
-    if left_out > 0:
-        caption += f" {further(left_out, 'tile')} not drawn."
-    return figure("The tiles from above", caption, plan_legend(plan) + plan_drawing(plan))
-
-
-def _path_figure(data: StageReportData) -> str:
-    path = data.path
-    if not path:
-        return ""
-    shown, seconds = stage_charts.path_end(path), data.figures.seconds
-    whole = shown > 0.99 * seconds
-    title = "Where the motors were" if whole else f"The first {duration(shown)} of {duration(seconds)}"
+def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
+    names = [name for name in figures.moved if has(trace, [f"{name}.rule.position"])]
+    rows = stretch(trace, [f"{name}.rule.position" for name in names], figures.run.time_ready) if names else None
+    if rows is None:
+        return None
+    part = slice(0, int(np.searchsorted(rows.t, LONGEST, side="right")))
+    t = rows.t[part]
+    panels = [
+        Panel(
+            name=f"path-{k}", label=f"{name} [mm]", height=170, curves=_path_curves(figures, rows, name, part),
+            about=f"Position of {name} over time",
+        )
+        for k, name in enumerate(names[:MOST_MOTORS])
+    ]  # fmt: skip
     caption = (
         "Where each motor was and where it had to go. Look for: the line on the dashes at the end of every move; where "
         "the counted position leaves the true one, steps are lost."
     )
-    left_out = len(path.motors) - stage_charts.MOST_MOTORS
-    if left_out > 0:
-        caption += f" {further(left_out, 'motor')} not drawn."
-    slots = "".join(
-        chart_slot(f"path-{k}", f"Position of {motor.motor} over time")
-        for k, motor in enumerate(path.motors[: stage_charts.MOST_MOTORS])
+    if len(names) > MOST_MOTORS:
+        caption += f" {further(len(names) - MOST_MOTORS, 'motor')} not drawn."
+    timeline = Timeline(name="path", t=t, label="time since the job began", unit="s")
+    return Figure(
+        title=whole_or_first(float(t[-1]), figures.seconds, "Where the motors were"),
+        caption=caption,
+        charts=time_charts(timeline, panels),
     )
-    return figure(title, caption, slots, ZOOM_HINT)
+
+
+def _path_curves(figures: StageFigures, rows: Stretch, name: str, part: slice) -> list[Curve]:
+    """Target, and where the rotor was; the counted position if it is not that, or if nothing better was recorded."""
+    table = figures.spec.stepper[name]
+    lower, steps = table.mechanics.lower_end, rows[f"{name}.rule.position"][part]
+    aim = target_of(figures, name, rows.trace.time[rows.rows][part])
+    target = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * MM, thin=0)
+    counted = (lower + steps * table.step) * MM
+    if not has(rows.trace, [f"{name}.rotor.lag"]):
+        return [target, Curve(label="counted position", colour="speed", width=2, y=counted, digits=4, thin=POINTS)]
+    # The field is where the steps are counted: the rotor lags behind it.
+    place = (lower + (steps - rows[f"{name}.rotor.lag"][part]) * table.step) * MM
+    rotor = Curve(label="true position", colour="speed", width=2, y=place, digits=4, thin=POINTS)
+    if not any(motion.motor.lost for motion in figures.motions if motion.name == name):
+        return [target, rotor]
+    return [target, Curve(label="counted position", colour="left", dash=(3, 3), y=counted, digits=4, thin=0), rotor]
+
+
+def target_of(figures: StageFigures, name: str, t: Numbers) -> Numbers:
+    """Where a motor had to go at each moment since power-on [m]; a manual run has no target."""
+    manual = {move.number for move in figures.run.job.moves if isinstance(move, StageJog)}
+    moments, targets = [-np.inf], [figures.spec.stepper[name].mechanics.start_position]
+    for move, who, motor, _ in figures.motions:
+        if who != name:
+            continue
+        if move.number in manual:
+            moments.append(move.begin)
+            targets.append(np.nan)
+        moments.append(motor.arrived if move.number in manual else move.begin)
+        targets.append(motor.target)
+    return np.array(targets)[np.searchsorted(moments, t, side="right") - 1]
 
 
 # ---- frequency against position
 
 
-def _envelopes(data: StageReportData) -> str:
-    shown = data.runs[: stage_charts.MOST_MOTORS]
-    left_out = len(data.runs) - len(shown)
-    more = f'<p class="hint">{further(left_out, "motor")} not drawn.</p>' if left_out > 0 else ""
-    return section("Speed under the envelope", *(_runs_figure(runs, k) for k, runs in enumerate(shown)), more)
+def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[Figure]:
+    runs = [runs for runs in (motor_runs(figures, name, steps) for name, steps in made.items()) if runs.arcs]
+    more = len(runs) - MOST_MOTORS
+    drawn = [_runs_figure(one, k) for k, one in enumerate(runs[:MOST_MOTORS])]
+    return [*drawn[:-1], replace(drawn[-1], hint=f"{further(more, 'motor')} not drawn.")] if more > 0 else drawn
 
 
-def _runs_figure(runs: MotorRuns, k: int) -> str:
+def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
+    """Those runs of a motor that were recorded whole."""
+    table = figures.spec.stepper[name]
+    motions = [motion for motion in figures.motions if motion.name == name]
+    whole = [motion for motion in motions if motion.motor.arrived <= made.t[-1] + 1 / made.hz[-1]][:MOST_MOVES]
+    points = max(ARC_POINTS // max(len(whole), 1), 12)
+    legs = [leg for motion in whole for leg in legs_of(made, table, motion.move, motion.motor)]
+    arcs = [arc_of(leg, table, points) for leg in legs]
+    return Runs(name, table, travel_envelope(table), arcs, left_out=len(motions) - len(whole))
+
+
+def _runs_figure(runs: Runs, k: int) -> Figure:
     caption = "" if k else ENVELOPE_CAPTION
-    caption += f"1{GAP}000{GAP}Hz is {stated(runs.step * 1e6)}{GAP}mm/s.{_zones_text(runs)}"
-    low, high = (stated(place * 1e3) for place in runs.travel)
-    if stage_charts.shown_window(runs) != runs.travel:
+    caption += f"1{GAP}000{GAP}Hz is {stated(runs.table.step * 1e6)}{GAP}mm/s.{_zones_text(runs)}"
+    if runs.window != runs.travel:
+        low, high = (stated(place * MM) for place in runs.travel)
         caption += f" The travel goes from {low} to {high}{GAP}mm; drawn is what was used."
     if runs.left_out:
         caption += f" {further(runs.left_out, 'move')} not drawn."
-    slot = chart_slot(f"runs-{k}", f"Step frequency of {runs.motor} over position, under the envelope")
-    return figure(f"Motor {runs.motor}", caption, slot, ZOOM_HINT)
+    return Figure(title=f"Motor {runs.name}", caption=caption, charts=[runs_chart(runs, f"runs-{k}")])
 
 
-def _zones_text(runs: MotorRuns) -> str:
+def _zones_text(runs: Runs) -> str:
     """Zones by name: in the figure not all have room for theirs."""
-    zones = stage_charts.shown_zones(runs)
-    if not zones:
-        return ""
     named = [
-        f"{escape(zone.name)} ({stated(zone.begin * 1e3)} to {stated(zone.end * 1e3)}{GAP}mm)"
-        for zone in zones[:MOST_ZONES]
+        f"{name} ({stated(zone.begin * MM)} to {stated(zone.end * MM)}{GAP}mm)" for name, zone in runs.zones.items()
     ]
-    more = f" and {count(len(zones) - MOST_ZONES)} more" if len(zones) > MOST_ZONES else ""
-    return f" The shaded zones have a limit of their own: {', '.join(named)}{more}."
-
-
-# ---- one move
-
-
-def _detail(data: StageReportData) -> str:
-    detail = data.detail
-    if not detail:
+    if not named:
         return ""
-    motion = detail.motion
-    name = called(detail.number, detail.label, data.kind).capitalize()
-    name += f" “{detail.label}”" if detail.label and data.kind != "tiles" else ""
-    way = abs(motion.stop - motion.start)
-    side = "up" if motion.stop > motion.start else "down"
-    legs = len(detail.runs.arcs)
-    turned = f", with {count(legs - 1, 'turn')} on the way" if legs > 1 else ""
-    told = f"motor {motion.motor}, {stated(way * 1e3)}{GAP}mm {side}{turned}"
-    return section(
-        f"{name}, step by step", _table_figure(detail, told), _torque_figure(detail), _rotor_figure(detail),
-        _rest_figure(detail),
-    )  # fmt: skip
-
-
-def _table_figure(detail: MoveDetail, told: str) -> str:
-    caption = (
-        f"Shown is {escape(detail.why)}: {escape(told)}. The grey ground is now the table of this very move, which "
-        "ends at its extremes: every step was looked up in it. Look for: the line on the edge of the grey."
-    )
-    slot = chart_slot("detail-runs", "Step frequency over position, under the table of this move")
-    return figure("Frequency against position, under the table of the move", caption, slot, ZOOM_HINT)
-
-
-def _torque_figure(detail: MoveDetail) -> str:
-    if not detail.torques:
-        return ""
-    safety = stated(detail.torques.safety)
-    caption = (
-        "Above: the torque that the motor can give at the frequency of each step, and what the step asks for: friction "
-        "and acceleration; friction helps to brake. Below: their ratio, cut off where it is far above the least. Under "
-        f"1 the rotor cannot follow; the ramp is planned with a reserve of {safety}. Look for: the least margin, "
-        f"×{GAP}{_margin(detail.motion)}, and where it is."
-    )
-    content = chart_slot("detail-torque", "Pull-out torque and torque needed at every step") + chart_slot(
-        "detail-margin", "Torque margin at every step"
-    )
-    return figure("Margin of torque at every step", caption, content, ZOOM_HINT)
-
-
-def _rotor_figure(detail: MoveDetail) -> str:
-    if not detail.rotor:
-        return ""
-    caption = (
-        "Nothing measures the rotor of a stepper; the simulation does. It swings after the field, which jumps by a "
-        f"step at every pulse. Look for: a lag well below {number(PULL_OUT_LAG)} steps, from where on the field pulls "
-        "the rotor the wrong way and steps are lost four at a time."
-    )
-    content = chart_slot("detail-speed", "Speed of field and rotor over time") + chart_slot(
-        "detail-lag", "Lag of the rotor over time"
-    )
-    unit = "ms" if detail.rotor.t[-1] < 1 else "s"
-    return figure("How the rotor followed", caption, content, ZOOM_HINT + event_table(detail.rotor.events, unit))
-
-
-def _rest_figure(detail: MoveDetail) -> str:
-    if not detail.rotor or not stage_charts.rest_charts(detail):
-        return ""
-    caption = (
-        "The end of the same move, magnified. Green is the time that the host waits for the swing to die away. Look "
-        f"for: the line within ±{detail.rotor.tolerance:g} steps (dashed) long before that time is over."
-    )
-    slot = chart_slot("rest-lag", "Lag of the rotor over time after the last step")
-    return figure("Coming to rest", caption, slot, ZOOM_HINT)
+    more = f" and {count(len(named) - MOST_ZONES)} more" if len(named) > MOST_ZONES else ""
+    return f" The shaded zones have a limit of their own: {', '.join(named[:MOST_ZONES])}{more}."
 
 
 # ---- table
 
 
-def _moves(data: StageReportData) -> str:
-    if not data.moves:
-        return ""
-    labelled = any(move.label for move in data.moves)
-    astray = any(motion.off for move in data.moves for motion in move.motions)
-    name = [("tile" if data.kind == "tiles" else "name", False)] if labelled else []
+def _every_move(figures: StageFigures) -> Figure:
+    run = figures.run
+    labelled, astray = any(move.label for move in run.moves), any(motion.off for motion in figures.motions)
+    name = [("tile" if figures.word == "tile" else "name", False)] if labelled else []
     heads = [("move", True), *name, ("start [s]", True), ("motor", False), ("from [mm]", True), ("to [mm]", True),
              ("way [mm]", False), ("time [ms]", True), ("peak [Hz]", True), ("lag [step]", True), ("margin", True),
              ("lost [step]", True), *([("off [step]", True)] if astray else [])]  # fmt: skip
-    rows = [row for move in data.moves for row in _rows(move, labelled=labelled, astray=astray)]
+    rows: list[list[str | Cell]] = []
+    for move, motions in zip(run.moves, figures.by_move, strict=True):
+        cells = [_cells(motion) for motion in motions] or [["none: stays", *[""] * 9]]
+        lead = _lead(run, move, labelled=labelled)
+        # Number and name stand in the first row only.
+        heading = [lead, *([[""] * len(lead)] * (len(cells) - 1))]
+        rows += [[*first, *rest[: len(heads) - len(lead)]] for first, rest in zip(heading, cells, strict=True)]
     caption = (
         "A row per motor that moved. Time goes from the start signal to the end of the last step; margin is pull-out "
         "torque over torque needed in the worst step."
     )
     if astray:
         caption += " Off: how far the rotor stood beside its place in the end, steps of earlier moves included."
-    left_out = len(rows) - MOST_MOTIONS
-    if left_out > 0:
-        caption += f" {further(left_out, 'row')} in the JSON summary only."
-    title = f"Every {data.word}"
-    content = table(heads, rows[:MOST_MOTIONS], tall=True)
-    return section(f"{data.word.capitalize()} by {data.word}", figure(title, caption, content))
+    caption += left_out(len(rows), "row")
+    return Figure(title=f"Every {figures.word}", caption=caption, table=long_table(heads, rows))
 
 
-def _rows(move: StageMoveResult, *, labelled: bool, astray: bool) -> list[list[str]]:
-    """Rows of one move: its number and name stand in the first only."""
-    head = [count(move.number), *([escape(move.label)] if labelled else []), f"{move.begin:.3f}"]
-    if not move.motions:
-        return [[*head, "none: stays", *["" for _ in range(8 + astray)]]]
-    blank = ["" for _ in head]
-    return [[*(blank if k else head), *_cells(motion, astray=astray)] for k, motion in enumerate(move.motions)]
+def _lead(run: StageRun, move: StageMoveRecord, *, labelled: bool) -> list[str]:
+    return [count(move.number), *([move.label] if labelled else []), f"{move.begin - run.time_ready:.3f}"]
 
 
-def _cells(motion: MotionResult, *, astray: bool) -> list[str]:
-    way = motion.stop - motion.start
-    side, sign = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
+def _cells(motion: Motion) -> list[str | Cell]:
+    """Cells of a motion, the last of which is left out where every rotor stands in its place."""
+    motor = motion.motor
     return [
-        escape(motion.motor),
-        _place(motion.start),
-        _place(motion.target),
-        f'<td class="nowrap"><span class="arrow {side}">{sign}</span> {stated(abs(way) * 1e3)}</td>',
+        motion.name,
+        _place(motor.start),
+        _place(motor.target),
+        _way_cell(motor.stop - motor.start),
         number(motion.seconds * 1e3),
-        count(round(motion.peak_hz)),
-        _marked(number(motion.lag), wrong=motion.lag >= PULL_OUT_LAG),
-        _marked(_margin(motion), wrong=motion.margin < 1),
-        _marked(number(motion.lost), wrong=motion.lost != 0),
-        *([_marked(number(motion.off), wrong=motion.off != 0)] if astray else []),
+        count(round(motor.peak_hz)),
+        Cell(text=number(motor.peak_lag), over=motor.peak_lag >= PULL_OUT_LAG),
+        Cell(text=margin_text(motion), over=motor.margin < 1),
+        Cell(text=number(motor.lost), over=motor.lost != 0),
+        Cell(text=number(motion.off), over=motion.off != 0),
     ]
 
 
-def _margin(motion: MotionResult) -> str:
-    """Without friction and acceleration no torque is needed."""
-    return number(motion.margin) if isfinite(motion.margin) else "any"
+def _way_cell(way: float) -> Cell:
+    look, side = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
+    arrow = Markup('<span class="arrow {}">{}</span> {}').format(look, side, stated(abs(way) * MM))
+    return Cell(text=arrow, nowrap=True)
 
 
 def _place(position: float) -> str:
     """In mm; a rounding error below 0 is 0."""
-    return f"{round(position * 1e3, 3) + 0.0:.3f}".replace("-", "\u2212")
-
-
-def _marked(text: str, *, wrong: bool) -> str:
-    return f'<td class="n over">{text}</td>' if wrong else text
+    return f"{round(position * MM, 3) + 0.0:.3f}".replace("-", "\u2212")

@@ -1,13 +1,17 @@
 """Tiles of a job as a drawing from above: which order, how long each took, and where the stage stood."""
 
 from collections.abc import Sequence
-from html import escape
+from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
-from detent.methods.stepper_envelope.page_data import Tile, TilePlan
-from detent.methods.stepper_envelope.summary import stated
-from detent.page.words import GAP, count, duration, number
+from markupsafe import Markup
+
+from detent.methods.stepper_envelope.comparison import time_text
+from detent.methods.stepper_envelope.run import StageMoveRecord
+from detent.methods.stepper_envelope.summary import StageFigures, stated
+from detent.page.figure import Figure
+from detent.page.words import GAP, count, further, number
 
 WIDTH, HEIGHT = 1000.0, 560.0
 """Most room that the drawing takes, in its own units."""
@@ -39,41 +43,105 @@ LONE = 1e-3
 """Side of a tile that stands alone [m]."""
 
 
-def plan_drawing(plan: TilePlan) -> str:
+Place = tuple[float, float]
+"""To the right, and up in the picture [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """One tile, and how the stage came there."""
+
+    move: StageMoveRecord
+    target: Place  # where the stage had to go
+    place: Place  # and where its rotors stood in the end
+    off: bool  # a rotor stood steps beside its place
+
+    @property
+    def lag(self) -> float:
+        """Largest distance of a rotor from its field on the way there [step]."""
+        return max((motor.peak_lag for motor in self.move.motors.values()), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TilePlan:
+    """The tiles as one sees them from above."""
+
+    motors: tuple[str, str]  # what moves the stage to the right, and what moves it up in the picture
+    start: Place  # where the stage stood first
+    tiles: Sequence[Tile]  # in the order of the visits, at least one
+
+
+def plan_figure(figures: StageFigures) -> Figure | None:
+    """The tiles of a list that names two motors."""
+    plan = tile_plan(figures)
+    if plan is None:
+        return None
+    caption = (
+        "Every square is a tile, where it was asked for, with its name; the line goes through the places where the "
+        "rotors stood, in the order of the visits, and the ring is the first. Both axes move together: a tile is done "
+        "when both are settled. The squares are as large as the tiles are apart, not as the camera sees. The stage "
+        f"came from {plan.motors[0]} {stated(plan.start[0] * 1e3)}, {plan.motors[1]} "
+        f"{stated(plan.start[1] * 1e3)}{GAP}mm."
+    )
+    left_out = len(plan.tiles) - MOST_TILES
+    if left_out > 0:
+        caption += f" {further(left_out, 'tile')} not drawn."
+    return Figure(title="The tiles from above", caption=caption, drawing=plan_legend(plan) + plan_drawing(plan))
+
+
+def tile_plan(figures: StageFigures) -> TilePlan | None:
+    """Tiles of a list that names two motors; the first of the axis file goes to the right, the second up."""
+    spec, run = figures.spec, figures.run
+    motors = [name for name in spec.stepper if name in run.job.motors]
+    if run.job.kind != "tiles" or len(motors) != 2 or not run.moves:
+        return None
+    across, up = motors
+    start = {name: spec.stepper[name].mechanics.start_position for name in motors}
+    target, off = dict(start), dict.fromkeys(motors, 0)
+    tiles: list[Tile] = []
+    for move, motions in zip(run.moves, figures.by_move, strict=True):
+        for motion in motions:
+            target[motion.name], off[motion.name] = motion.motor.target, motion.off
+        place = {name: target[name] - off[name] * spec.stepper[name].step for name in motors}
+        tiles.append(Tile(move, (target[across], target[up]), (place[across], place[up]), any(off.values())))
+    return TilePlan((across, up), (start[across], start[up]), tiles)
+
+
+def plan_drawing(plan: TilePlan) -> Markup:
     """Draw the tiles and the path of the stage, to scale."""
     tiles = plan.tiles[:MOST_TILES]
-    view = _View(tiles)
-    usual = median(tile.seconds for tile in tiles) or 1.0
-    squares = "".join(_square(tile, view, usual) for tile in tiles)
-    title = f"Plan of {count(len(tiles), 'tile')} in their order"
-    return (
-        f'<div class="scroll" tabindex="0"><svg viewBox="0 0 {view.width:.0f} {view.height:.0f}" role="img" '
-        f'aria-label="{title}" style="{LOOK}">{_scales(plan, view)}{squares}{_path(plan, tiles, view)}</svg></div>'
-    )
+    view, usual = _View(tiles), _usual(tiles)
+    return Markup(
+        '<div class="scroll" tabindex="0"><svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}" style="{}">'
+        "{}{}{}</svg></div>"
+    ).format(
+        view.width, view.height, f"Plan of {count(len(tiles), 'tile')} in their order", LOOK, _scales(plan, view),
+        Markup().join(_square(tile, view, usual) for tile in tiles), _path(plan, tiles, view),
+    )  # fmt: skip
 
 
-def plan_legend(plan: TilePlan) -> str:
+def plan_legend(plan: TilePlan) -> Markup:
     """Say what the colours of the drawing mean."""
-    usual = median(tile.seconds for tile in plan.tiles[:MOST_TILES]) or 1.0
-    swatches = (
-        (_look(usual, usual), f"{_short(usual)}, the median, or less"),
-        (_look(LONG * usual, usual), f"{_short(LONG * usual)} or more"),
-    )
-    items = "".join(f'<span class="nowrap">{_swatch(look)} {text}</span>' for look, text in swatches)
+    usual = _usual(plan.tiles[:MOST_TILES])
+    swatches = [
+        (_look(usual, usual), f"{time_text(usual)}, the median, or less"),
+        (_look(LONG * usual, usual), f"{time_text(LONG * usual)} or more"),
+    ]
     if any(tile.off for tile in plan.tiles):
-        items += f'<span class="nowrap">{_swatch("fill:var(--bad)")} a rotor stood beside its place</span>'
-    return f'<div class="controls">Time of the way to a tile: {items}</div>'
-
-
-def _swatch(look: str) -> str:
-    return (
-        '<svg width="14" height="14" style="vertical-align:-2px"><rect x="1" y="1" width="12" height="12" '
-        f'style="{look};stroke:var(--speed)"/></svg>'
+        swatches.append(("fill:var(--bad)", "a rotor stood beside its place"))
+    items = Markup().join(
+        Markup(
+            '<span class="nowrap"><svg width="14" height="14" style="vertical-align:-2px"><rect x="1" y="1" width="12" '
+            'height="12" style="{};stroke:var(--speed)"/></svg> {}</span>'
+        ).format(look, text)
+        for look, text in swatches
     )
+    return Markup('<div class="controls">Time of the way to a tile: {}</div>').format(items)
 
 
-def _short(seconds: float) -> str:
-    return f"{number(seconds * 1e3)}{GAP}ms" if seconds < 1 else duration(seconds)
+def _usual(tiles: Sequence[Tile]) -> float:
+    """Median time of the way to a tile [s]."""
+    return median(tile.move.seconds for tile in tiles) or 1.0
 
 
 class _View:
@@ -90,7 +158,7 @@ class _View:
         self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
         self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
 
-    def at(self, place: tuple[float, float]) -> tuple[float, float]:
+    def at(self, place: Place) -> Place:
         """Place in the drawing; up is to larger positions."""
         x = self.width / 2 + (place[0] - self.middle[0]) * self.scale
         return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
@@ -108,48 +176,53 @@ def _look(seconds: float, usual: float) -> str:
     return f"fill:var(--speed);fill-opacity:{PALEST + (0.85 - PALEST) * share:.2f}"
 
 
-def _square(tile: Tile, view: _View, usual: float) -> str:
-    x, y = view.at(tile.target)
-    width, height = view.sides
+def _square(tile: Tile, view: _View, usual: float) -> Markup:
+    (x, y), (width, height), move = view.at(tile.target), view.sides, tile.move
     left, top = x - width / 2, y - height / 2
-    look = "fill:var(--bad);fill-opacity:.8" if tile.off else _look(tile.seconds, usual)
-    told = f"tile {tile.label or tile.move}: {_short(tile.seconds)}, lag up to {number(tile.lag)} steps"
-    text = ""
-    if min(view.sides) >= LABELLED and tile.label:
+    text = Markup()
+    if min(view.sides) >= LABELLED and move.label:
         # Above the path, which goes through the middle.
-        ink = "card" if tile.off or tile.seconds > (1 + LONG) / 2 * usual else "ink"
-        text = f'<text x="{left + 4:.1f}" y="{top + 13:.1f}" style="fill:var(--{ink})">{escape(tile.label[:6])}</text>'
-    return (
-        f'<g><title>{escape(told)}</title><rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" '
-        f'height="{height:.1f}" style="{look};stroke:var(--speed);stroke-width:.7"/>{text}</g>'
-    )
+        ink = "card" if tile.off or move.seconds > (1 + LONG) / 2 * usual else "ink"
+        text = Markup('<text x="{:.1f}" y="{:.1f}" style="fill:var(--{})">{}</text>').format(
+            left + 4, top + 13, ink, move.label[:6]
+        )
+    return Markup(
+        '<g><title>{}</title><rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" '
+        'style="{};stroke:var(--speed);stroke-width:.7"/>{}</g>'
+    ).format(
+        f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(tile.lag)} steps",
+        left, top, width, height,
+        "fill:var(--bad);fill-opacity:.8" if tile.off else _look(move.seconds, usual), text,
+    )  # fmt: skip
 
 
-def _path(plan: TilePlan, tiles: Sequence[Tile], view: _View) -> str:
+def _path(plan: TilePlan, tiles: Sequence[Tile], view: _View) -> Markup:
     """The way of the stage, with a ring where the first tile is taken and a point at every stop."""
     stops = [view.at(tile.place) for tile in tiles]
     places = " ".join(f"{x:.1f},{y:.1f}" for x, y in (view.at(plan.start), *stops))
     radius = min(max(min(view.sides) / 14, 1.5), 4.0)
-    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>' for x, y in stops)
-    (x, y), ring = stops[0], 2.2 * radius
-    return (
-        f'<polyline points="{places}" style="fill:none;stroke:var(--left);stroke-width:{max(radius / 2, 1):.1f};'
-        f'stroke-linejoin:round"/><g style="fill:var(--left)">{dots}</g>'
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}" style="fill:none;stroke:var(--left);stroke-width:2"/>'
+    dot = Markup('<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}"/>')
+    return Markup(
+        '<polyline points="{}" style="fill:none;stroke:var(--left);stroke-width:{:.1f};stroke-linejoin:round"/>'
+        '<g style="fill:var(--left)">{}</g>'
+        '<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}" style="fill:none;stroke:var(--left);stroke-width:2"/>'
+    ).format(
+        places, max(radius / 2, 1), Markup().join(dot.format(*stop, radius) for stop in stops), *stops[0], 2.2 * radius
     )
 
 
-def _scales(plan: TilePlan, view: _View) -> str:
+def _scales(plan: TilePlan, view: _View) -> Markup:
     """A bar for the scale, and the names of the motors along the edges."""
     length = _nice(0.2 * view.width / view.scale)
     x, y, bar = view.width - 12.0, view.height - 12.0, length * view.scale
-    across, up = (escape(name) for name in plan.motors)
-    return (
-        f'<g style="stroke:var(--soft);stroke-width:2"><path d="M{x - bar:.1f} {y:.1f}H{x:.1f}"/></g>'
-        f'<g style="fill:var(--soft)"><text x="{x - bar / 2:.1f}" y="{y - 6:.1f}" text-anchor="middle">'
-        f"{stated(length * 1e3)} mm</text>"
-        f'<text x="12" y="{y:.1f}">{across} \u2192</text><text x="12" y="16">\u2191 {up}</text></g>'
-    )
+    return Markup(
+        '<g style="stroke:var(--soft);stroke-width:2"><path d="M{:.1f} {:.1f}H{:.1f}"/></g>'
+        '<g style="fill:var(--soft)"><text x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>'
+        '<text x="12" y="{:.1f}">{}</text><text x="12" y="16">{}</text></g>'
+    ).format(
+        x - bar, y, x, x - bar / 2, y - 6, f"{stated(length * 1e3)} mm", y, f"{plan.motors[0]} \u2192",
+        f"\u2191 {plan.motors[1]}",
+    )  # fmt: skip
 
 
 def _nice(wanted: float) -> float:

@@ -1,5 +1,6 @@
 """From the trace of a stage to the steps that its motors made, and to the tables they were made under."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,10 +9,10 @@ from numpy.typing import NDArray
 
 from detent.control.step_rule import TURN
 from detent.methods.stepper_envelope.build import make_tables, stepper_load, stepper_motor, zone_maps
-from detent.methods.stepper_envelope.page_data import Arc, Envelope, MotorRuns, StepTorques, ZoneSpan
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
 from detent.methods.stepper_envelope.schema import StepperTable
 from detent.page.parts import Numbers
+from detent.page.run_page import has
 from detent.planning.step_envelope import StepEnvelope, ZoneMap
 from detent.planning.step_ramp import needed_torque, torque_margin
 from detent.record.trace import Trace
@@ -23,9 +24,9 @@ FLAT = 20
 """Steps of one frequency that make a stretch of their own in a curve."""
 
 
-def has(trace: Trace, motor: str, names: tuple[str, ...]) -> bool:
-    """Whether registers of a motor were recorded."""
-    return all(f"{motor}.{name}" in trace for name in names)
+def of(motor: str, names: Sequence[str]) -> list[str]:
+    """Names of a motor's registers in the trace."""
+    return [f"{motor}.{name}" for name in names]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +59,9 @@ class MadeSteps:
 
 def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
     """Steps that a motor made; None if the registers are not in the trace."""
-    if not has(trace, motor, NEEDED_STEPS):
+    if not has(trace, of(motor, NEEDED_STEPS)):
         return None
-    position, direction, period = (trace[f"{motor}.{name}"].astype(np.int64) for name in NEEDED_STEPS)
+    position, direction, period = (trace[name].astype(np.int64) for name in of(motor, NEEDED_STEPS))
     new = (period > 0) & (np.diff(position, prepend=position[:1] - direction[:1]) != 0)
     if f"{motor}.rule.state" in trace:
         new &= trace[f"{motor}.rule.state"] != TURN
@@ -70,6 +71,24 @@ def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
 
 
 # ---- runs under their tables
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Envelope:
+    """Permissible step frequency along the travel; each value holds up to the next place."""
+
+    position: Numbers  # places, rising [m], shape (n,)
+    up: Numbers  # and down: permissible frequency in each direction, 0 where no step is allowed [Hz], shape (n,)
+    down: Numbers  # [Hz]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arc:
+    """Steps of one motor that followed one another in one direction, as a curve."""
+
+    direction: int  # 1 up, -1 down
+    position: Numbers  # middle of each step [m], shape (n,), with the place of rest before the first and after the last
+    hz: Numbers  # frequency of each step [Hz], shape (n,); 0 at both ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +143,7 @@ def travel_envelope(table: StepperTable) -> Envelope:
     return _envelope(table, StepEnvelope(ramp, up, 1), StepEnvelope(ramp, down, -1))
 
 
-def move_envelope(table: StepperTable, legs: list[Leg]) -> Envelope:
+def move_envelope(table: StepperTable, legs: Sequence[Leg]) -> Envelope:
     """Permissible frequency between the extremes of a move."""
     ramp, maps = make_tables(table).ramp, zone_maps(table)
     first = {leg.direction: leg for leg in reversed(legs)}
@@ -155,31 +174,22 @@ def _between_extremes(half: StepEnvelope | None, steps: int) -> Numbers:
     return hz
 
 
-def zone_spans(table: StepperTable) -> list[ZoneSpan]:
-    """Zones of a motor."""
-    return [
-        ZoneSpan(name, zone.begin, zone.end, table.hz(zone.speed), zone.direction) for name, zone in table.zone.items()
-    ]
-
-
-def motor_runs(name: str, table: StepperTable, envelope: Envelope, arcs: list[Arc], *, left_out: int = 0) -> MotorRuns:
-    """Put runs of a motor together with what bounds them."""
-    return MotorRuns(
-        motor=name,
-        step=table.step,
-        travel=(table.mechanics.lower_end, table.upper_end),
-        max_hz=table.max_hz,
-        zones=zone_spans(table),
-        envelope=envelope,
-        arcs=arcs,
-        left_out=left_out,
-    )
-
-
 # ---- torque
 
 
-def step_torques(table: StepperTable, legs: list[Leg]) -> StepTorques | None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepTorques:
+    """What every step of a move asks of its motor."""
+
+    hz: Numbers  # frequency of each step [Hz], shape (n,)
+    # available, needed: pull-out torque at that frequency, torque for friction and acceleration [N m], shape (n,)
+    available: Numbers
+    needed: Numbers  # [N m]
+    margin: Numbers  # the first over the second, shape (n,); infinite where no torque is needed
+    safety: float  # what the ramp divides the pull-out torque by
+
+
+def step_torques(table: StepperTable, legs: Sequence[Leg]) -> StepTorques | None:
     """What every step of a move asks of the motor."""
     motor, load, maps = stepper_motor(table), stepper_load(table), zone_maps(table)
     ramp = make_tables(table).ramp.hz

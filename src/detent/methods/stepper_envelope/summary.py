@@ -1,51 +1,192 @@
-"""The figures of a stage's job that a person wants first, as rows of text for the terminal."""
+"""The figures of a stage's job that a person wants first, and the same as rows of text for the terminal."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.stage_results import StageFigures, WorstMotion
+from detent.page.run_page import Worst, worst
 from detent.page.words import GAP, count, duration, number
 
-Motion = tuple[StageMoveRecord, str, MotorMove]
 PULL_OUT_LAG = 2.0
 """Lag from which on the field pulls the rotor the wrong way: half a period of the torque curve, which has four steps
 (stepper-envelope specification 7.2) [step]."""
 
 
+class Motion(NamedTuple):
+    """How one motor made a move."""
+
+    move: StageMoveRecord
+    name: str  # of the motor
+    motor: MotorMove
+    off: int  # steps that its rotor stands beside its place in the end, those of earlier moves included
+
+    @property
+    def seconds(self) -> float:
+        """From the start signal to the end of the last step [s]."""
+        return self.motor.arrived - self.move.begin
+
+
+WorstMotion = Worst[Motion] | None
+
+
+@dataclass(frozen=True)
+class StageFigures:
+    """Sums and extremes of a run, done or not; None where no motion has the figure."""
+
+    spec: StepperEnvelopeSpec
+    run: StageRun
+
+    @property
+    def word(self) -> str:
+        """What a move of this job is called."""
+        return "tile" if self.run.job.kind == "tiles" else "move"
+
+    @property
+    def asked(self) -> int:
+        """Moves of the job."""
+        return self.run.job.count
+
+    @cached_property
+    def motions(self) -> list[Motion]:
+        """Every motion of every motor, in order."""
+        return [motion for motions in self.by_move for motion in motions]
+
+    @cached_property
+    def by_move(self) -> list[list[Motion]]:
+        """Motions of each move; none of a move in which all stay."""
+        lost = dict.fromkeys(self.spec.stepper, 0)
+        found: list[list[Motion]] = []
+        for move in self.run.moves:
+            for name, motor in move.motors.items():
+                lost[name] += motor.lost
+            found.append([Motion(move, name, made, lost[name] + made.missed) for name, made in move.motors.items()])
+        return found
+
+    @property
+    def moved(self) -> list[str]:
+        """Motors that moved, in the order of the axis file."""
+        names = {motion.name for motion in self.motions}
+        return [name for name in self.spec.stepper if name in names]
+
+    @cached_property
+    def placed(self) -> int:
+        """Moves after which every rotor stood in its place: it had lost no step up to then."""
+        lost, placed = dict.fromkeys(self.spec.stepper, 0), 0
+        for motions in self.by_move:
+            for motion in motions:
+                lost[motion.name] += motion.motor.lost
+            placed += not any(lost.values()) and not any(self.astray(motion) for motion in motions)
+        return placed
+
+    def astray(self, motion: Motion) -> bool:
+        """Whether a motion of its own did not end in its place."""
+        return motion.motor.missed != 0 or abs(motion.motor.rest_lag) > self.spec.controller.tolerance
+
+    @property
+    def seconds(self) -> float:
+        """From the start of the job to its end [s]."""
+        return max(self.run.time_end - self.run.time_ready, 0.0) if self.run.moves else 0.0
+
+    @property
+    def rate(self) -> str:
+        """How many moves are made in a minute, settling and dwells included."""
+        return f"{number(self.run.moves_per_second * 60)} {self.word}s per minute"
+
+    @property
+    def moving(self) -> float:
+        """Time in which a motor ran [s]."""
+        return sum(max((motion.seconds for motion in motions), default=0.0) for motions in self.by_move)
+
+    @property
+    def naive(self) -> float:
+        """The same if every motor had run at its start frequency [s]."""
+        return sum(max((motion.motor.naive for motion in motions), default=0.0) for motions in self.by_move)
+
+    @property
+    def faster(self) -> float:
+        """How many times as long the start frequency would take; NaN if nothing moved."""
+        return self.naive / self.moving if self.moving > 0 else math.nan
+
+    @property
+    def steps(self) -> int:
+        """Steps made by all motors."""
+        return sum(motion.motor.steps for motion in self.motions)
+
+    @property
+    def all_lost(self) -> int:
+        """Steps lost by all motors, of either sign."""
+        return sum(abs(n) for n in self.run.lost.values())
+
+    @property
+    def first_lost(self) -> Motion | None:
+        """The motion that lost steps first."""
+        return next((motion for motion in self.motions if motion.motor.lost), None)
+
+    @property
+    def lag(self) -> WorstMotion:
+        """Largest distance of a rotor from its field on the way [step]."""
+        return largest(self.motions, lambda motion: motion.motor.peak_lag)
+
+    @property
+    def rest(self) -> WorstMotion:
+        """The same when the move was taken for done [step]."""
+        return largest(self.motions, lambda motion: abs(motion.motor.rest_lag))
+
+    @property
+    def margin(self) -> WorstMotion:
+        """Smallest torque margin; None if no motion needed torque."""
+        needy = [motion for motion in self.motions if math.isfinite(motion.motor.margin)]
+        found = largest(needy, lambda motion: -motion.motor.margin)
+        return found and Worst(-found.value, found.of)
+
+    @property
+    def peak_hz(self) -> WorstMotion:
+        """Largest step frequency [Hz]."""
+        return largest(self.motions, lambda motion: motion.motor.peak_hz)
+
+    @property
+    def peak_speed(self) -> WorstMotion:
+        """Largest speed [m/s]."""
+        return largest(self.motions, lambda motion: motion.motor.peak_hz * self.spec.stepper[motion.name].step)
+
+    def whose(self, motion: Motion) -> str:
+        """Whose motion it is: "move 1, x"."""
+        return f"{called(motion.move, self.run.job.kind)}, {motion.name}"
+
+
+def largest(motions: Sequence[Motion], figure: Callable[[Motion], float]) -> WorstMotion:
+    """The first motion with the largest figure; what is equal in three digits is equal."""
+    found = worst(motions, lambda motion: float(f"{figure(motion):.3g}"))
+    return found and Worst(figure(found.of), found.of)
+
+
 def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[str, str]]:
     """Name and text of each figure; what a run did not come to is left out."""
-    figures, word = stage_figures(spec, run), "tile" if run.job.kind == "tiles" else "move"
-    labels = {move.number: move.label for move in run.moves}
-
-    def whose(worst: WorstMotion) -> str:
-        return f"({called(worst.move, labels[worst.move], run.job.kind)}, {worst.motor})"
-
-    rows = [(f"{word}s", f"{count(figures.made)} of {count(figures.asked)}")]
-    if figures.placed < figures.made:
+    figures = StageFigures(spec, run)
+    word, made = figures.word, len(run.moves)
+    rows = [(f"{word}s", f"{count(made)} of {count(figures.asked)}")]
+    if figures.placed < made:
         rows.append(("in their places", count(figures.placed, word)))
     if run.moves:
-        rows.append(("time", f"{duration(figures.seconds)}, {rate(figures, word)}"))
+        rows.append(("time", f"{duration(figures.seconds)}, {figures.rate}"))
     if figures.steps:
         rows += [("moving", _moving(figures)), ("lost steps", lost_text(figures))]
-    if figures.lag:
-        most = f"up to {steps(figures.lag.value)} {whose(figures.lag)}"
+    if lag := figures.lag:
+        most = f"up to {steps(lag.value)} ({figures.whose(lag.of)})"
         rows.append(("rotor lag", f"{most}; falls out of step at {number(PULL_OUT_LAG)}"))
-    if figures.rest:
-        rows.append(("at rest", f"within {number(figures.rest.value, 2)} steps of its place {whose(figures.rest)}"))
-    if figures.margin:
-        least = number(figures.margin.value)
-        rows.append(("torque margin", f"at least {least} {whose(figures.margin)}; falls behind below 1"))
-    if figures.peak_hz and figures.peak_speed:
-        speed = number(figures.peak_speed.value * 1e3)
-        rows.append(("peak", f"{count(round(figures.peak_hz.value))} Hz {whose(figures.peak_hz)}, {speed} mm/s"))
+    if rest := figures.rest:
+        rows.append(("at rest", f"within {number(rest.value, 2)} steps of its place ({figures.whose(rest.of)})"))
+    if margin := figures.margin:
+        least = number(margin.value)
+        rows.append(("torque margin", f"at least {least} ({figures.whose(margin.of)}); falls behind below 1"))
+    if (peak := figures.peak_hz) and (fastest := figures.peak_speed):
+        speed = number(fastest.value * 1e3)
+        rows.append(("peak", f"{count(round(peak.value))} Hz ({figures.whose(peak.of)}), {speed} mm/s"))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
-
-
-def rate(figures: StageFigures, word: str) -> str:
-    """How many moves are made in a minute."""
-    return f"{number(figures.rate * 60)} {word}s per minute"
 
 
 def stated(value: float) -> str:
@@ -57,13 +198,9 @@ def stated(value: float) -> str:
     return f"{float(f'{value:.4g}'):.12g}".replace("-", "−")
 
 
-def called(number_of: int, label: str, kind: str) -> str:
-    """What a move is called in a sentence: a tile goes by its name.
-
-    >>> called(1, "B7", "tiles"), called(1, "zoom in", "moves")
-    ('tile B7', 'move 1')
-    """
-    return f"tile {label}" if kind == "tiles" and label else f"move {count(number_of)}"
+def called(move: StageMoveRecord, kind: str) -> str:
+    """What a move is called in a sentence: a tile goes by its name."""
+    return f"tile {move.label}" if kind == "tiles" and move.label else f"move {count(move.number)}"
 
 
 def steps(value: float) -> str:
@@ -76,13 +213,18 @@ def steps(value: float) -> str:
     return f"{text} {'step' if text == '1' else 'steps'}"
 
 
+def margin_text(motion: Motion) -> str:
+    """Write a torque margin; without friction and acceleration no torque is needed."""
+    return number(motion.motor.margin) if math.isfinite(motion.motor.margin) else "any"
+
+
 def lost_text(figures: StageFigures) -> str:
     """Steps lost, by motor where there are some."""
     made = count(figures.steps)
     if not figures.first_lost:
         return f"0 of {made}"
-    by_motor = ", ".join(f"{name} {number(n)}" for name, n in figures.lost.items() if n) or "0 in the end"
-    return f"{by_motor} (from move {count(figures.first_lost.move)} on), of {made}"
+    by_motor = ", ".join(f"{name} {number(n)}" for name, n in figures.run.lost.items() if n) or "0 in the end"
+    return f"{by_motor} (from move {count(figures.first_lost.move.number)} on), of {made}"
 
 
 def _moving(figures: StageFigures) -> str:
@@ -90,57 +232,3 @@ def _moving(figures: StageFigures) -> str:
         f"{duration(figures.moving)}; at the constant start frequency {duration(figures.naive)}, "
         f"{number(figures.faster)} times as long"
     )
-
-
-# ---- figures
-
-
-def stage_figures(spec: StepperEnvelopeSpec, run: StageRun) -> StageFigures:
-    """Sums and extremes of a run."""
-    made = run.made
-    spans = [[motor.arrived - move.begin for motor in move.motors.values()] for move in run.moves]
-    loses = [motion for motion in made if motion[2].lost]
-    needy = [motion for motion in made if math.isfinite(motion[2].margin)]
-    return StageFigures(
-        asked=run.job.count,
-        made=len(run.moves),
-        placed=sum(_placed(spec, run)),
-        seconds=max(run.time_end - run.time_ready, 0.0) if run.moves else 0.0,
-        rate=run.moves_per_second,
-        moving=sum(max(span, default=0.0) for span in spans),
-        naive=sum(max((motor.naive for motor in move.motors.values()), default=0.0) for move in run.moves),
-        steps=sum(motor.steps for _, _, motor in made),
-        lost=dict(run.lost),
-        first_lost=WorstMotion(loses[0][2].lost, loses[0][0].number, loses[0][1]) if loses else None,
-        lag=_largest(made, lambda _, motor: motor.peak_lag),
-        rest=_largest(made, lambda _, motor: abs(motor.rest_lag)),
-        margin=_negated(_largest(needy, lambda _, motor: -motor.margin)),
-        peak_hz=_largest(made, lambda _, motor: motor.peak_hz),
-        peak_speed=_largest(made, lambda name, motor: motor.peak_hz * spec.stepper[name].step),
-    )
-
-
-def _placed(spec: StepperEnvelopeSpec, run: StageRun) -> list[bool]:
-    """For each move whether every rotor stood in its place after it."""
-    lost = dict.fromkeys(spec.stepper, 0)
-    placed: list[bool] = []
-    for move in run.moves:
-        for name, motor in move.motors.items():
-            lost[name] += motor.lost
-        still = all(
-            not motor.missed and abs(motor.rest_lag) <= spec.controller.tolerance for motor in move.motors.values()
-        )
-        placed.append(still and not any(lost.values()))
-    return placed
-
-
-def _largest(motions: list[Motion], figure: Callable[[str, MotorMove], float]) -> WorstMotion | None:
-    """The first motion with the largest figure; what is equal in three digits is equal."""
-    if not motions:
-        return None
-    move, name, motor = max(motions, key=lambda motion: float(f"{figure(motion[1], motion[2]):.3g}"))
-    return WorstMotion(figure(name, motor), move.number, name)
-
-
-def _negated(worst: WorstMotion | None) -> WorstMotion | None:
-    return WorstMotion(-worst.value, worst.move, worst.motor) if worst else None

@@ -1,29 +1,14 @@
-"""Made-up runs of a stage with two motors, x and y, and a report of one: small enough to know every number."""
+"""Made-up runs of a stage with two motors, tiles and comparisons: small enough to know every number."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
-from detent.methods.stepper_envelope.comparison import Course, JerkComparison, Profile, StepComparison
-from detent.methods.stepper_envelope.page_data import (
-    Arc,
-    Envelope,
-    MotorPath,
-    MotorRuns,
-    MoveDetail,
-    RotorPath,
-    StagePath,
-    StageReportData,
-    StepTorques,
-    Tile,
-    TilePlan,
-    ZoneSpan,
-)
+from detent.methods.stepper_envelope.comparison import METHODS, Course, StepComparison
+from detent.methods.stepper_envelope.jerk_comparison import JerkComparison, Profile
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.stage_job import StageJob, StageMove
-from detent.methods.stepper_envelope.stage_results import MotionResult, StageFigures, StageMoveResult, WorstMotion
-from detent.page.parts import Event, Note
+from detent.methods.stepper_envelope.stage_plan import Tile, TilePlan
 
 STEP = 5e-6
 MM = 1e-3
@@ -60,97 +45,16 @@ def run_of(*records: StageMoveRecord, asked: int | None = None, kind: str = "mov
     return run
 
 
-# ---- a report
+# ---- tiles from above
 
 
-def motion(motor: str = "x", **changes: object) -> MotionResult:
-    """1 mm up in 100 ms."""
-    made = MotionResult(
-        motor=motor, start=0.0, target=1 * MM, stop=1 * MM, seconds=0.1, steps=200, peak_hz=2000.0, lag=1.04,
-        margin=2.5, lost=0, off=0, passed=False,
-    )  # fmt: skip
-    return replace(made, **changes)
-
-
-def figures(**changes: object) -> StageFigures:
-    found = StageFigures(
-        asked=2, made=2, placed=2, seconds=0.4, rate=5.0, moving=0.2, naive=1.0, steps=600, lost={"x": 0, "y": 0},
-        first_lost=None, lag=WorstMotion(1.04, 1, "x"), rest=WorstMotion(0.05, 2, "y"),
-        margin=WorstMotion(2.5, 2, "x"), peak_hz=WorstMotion(2000.0, 1, "x"), peak_speed=WorstMotion(10 * MM, 1, "x"),
-    )  # fmt: skip
-    return replace(found, **changes)
-
-
-def envelope() -> Envelope:
-    """Up to 4 kHz over 40 mm both ways, at both ends a step of 400 Hz; 1 kHz from 10 to 13 mm upwards."""
-    return Envelope(
-        position=np.array([0.0, STEP, 10 * MM, 13 * MM, 40 * MM - STEP, 40 * MM]),
-        up=np.array([400.0, 4000.0, 1000.0, 4000.0, 400.0, 0.0]),
-        down=np.array([400.0, 4000.0, 4000.0, 4000.0, 400.0, 0.0]),
-    )
-
-
-def arc(direction: int = 1, low: float = 0.0, high: float = 30 * MM) -> Arc:
-    """From rest over 2 kHz to rest."""
-    places = np.array([low, low + STEP / 2, high - STEP / 2, high])
-    return Arc(direction=direction, position=places[::direction], hz=np.array([0.0, 2000.0, 2000.0, 0.0]))
-
-
-def motor_runs(motor: str = "x", **changes: object) -> MotorRuns:
-    zones = [ZoneSpan("near", 10 * MM, 13 * MM, 1000.0, "up")]
-    runs = MotorRuns(
-        motor=motor, step=STEP, travel=(0.0, 40 * MM), max_hz=4000.0, zones=zones, envelope=envelope(),
-        arcs=[arc(), arc(-1)], left_out=0,
-    )  # fmt: skip
-    return replace(runs, **changes)
-
-
-def torques(**changes: object) -> StepTorques:
-    """Three steps; the second has the least margin, the third needs nothing."""
-    found = StepTorques(
-        hz=np.array([400.0, 4000.0, 400.0]), available=np.array([40e-3, 15e-3, 40e-3]),
-        needed=np.array([10e-3, 6e-3, 0.0]), margin=np.array([4.0, 2.5, np.inf]), safety=2.0,
-    )  # fmt: skip
-    return replace(found, **changes)
-
-
-def rotor_path(**changes: object) -> RotorPath:
-    """150 ms: at 10 mm/s for 100 ms, then at rest; the lag swings by 1 step, then stays 0.05 steps."""
-    t = np.arange(0, 0.15, 1e-3)
-    path = RotorPath(
-        t=t, velocity=np.where(t < 0.1, 9.9e-3, 0.0), velocity_ref=np.where(t < 0.1, 10e-3, 0.0),
-        lag=np.where(t < 0.1, np.sin(700 * t), 0.05), tolerance=0.5,
-        events=[Event(0.0, "start <signal>"), Event(0.1, "the last step is over")],
-    )  # fmt: skip
-    return replace(path, **changes)
-
-
-def detail(**changes: object) -> MoveDetail:
-    found = MoveDetail(
-        number=2, label="zoom & in", why="the motion with the least torque margin", motion=motion(),
-        runs=motor_runs(arcs=[arc()]), torques=torques(), rotor=rotor_path(),
-    )  # fmt: skip
-    return replace(found, **changes)
-
-
-def stage_path(seconds: float = 0.4) -> StagePath:
-    """x goes 1 mm, and the rotor of y is 4 steps behind its counted position in the end."""
-    t = np.arange(0, seconds, 1e-3)
-    place = np.interp(t, [0, 0.1], [0, 1 * MM])
-    return StagePath(
-        t=t,
-        motors=[
-            MotorPath(motor="x", counted=place, target=np.full(len(t), 1 * MM), rotor=place - STEP, astray=False),
-            MotorPath(motor="y", counted=place, target=place + np.nan, rotor=place - 4 * STEP, astray=True),
-        ],
-    )
-
-
-def tile(move: int, x: float, y: float, **changes: object) -> Tile:
-    found = Tile(
-        move=move, label=str(10 + move), target=(x, y), place=(x, y), seconds=0.1, lag=1.02, off=False
-    )  # fmt: skip
-    return replace(found, **changes)
+def tile(number: int, x: float, y: float, label: str | None = None, seconds: float = 0.1, **changes: object) -> Tile:
+    """A tile that was reached after so many seconds with a lag of 1.02 steps."""
+    begin = 0.2 * (number - 1)
+    made = motor_move(arrived=begin + seconds, settled=begin, peak_lag=1.02)
+    label = str(10 + number) if label is None else label
+    move = StageMoveRecord(number, label, begin, begin + 0.15, begin + 0.2, {"x": made})
+    return replace(Tile(move, (x, y), (x, y), off=False), **changes)
 
 
 def tile_plan(**changes: object) -> TilePlan:
@@ -159,10 +63,10 @@ def tile_plan(**changes: object) -> TilePlan:
         tile(1, 5 * MM, 7 * MM, seconds=0.4), tile(2, 5.4 * MM, 7 * MM), tile(3, 5.4 * MM, 7.3 * MM),
         tile(4, 5 * MM, 7.3 * MM),
     ]  # fmt: skip
-    return replace(TilePlan(motors=("x", "y"), start=(0.0, 0.0), tiles=tiles), **changes)
+    return replace(TilePlan(("x", "y"), (0.0, 0.0), tiles), **changes)
 
 
-METHODS = ("envelope", "A: braking distance per step", "B: speed per step", "start frequency", "largest frequency")
+# ---- comparisons
 
 
 def step_comparison(motor: str = "x", *, zones_lose: int = 0) -> StepComparison:
@@ -174,7 +78,7 @@ def step_comparison(motor: str = "x", *, zones_lose: int = 0) -> StepComparison:
         (Course(0.24, 0, 1.0), Course(5.4, 0, 1.0)),
         (Course(0.025, 36, 40.0), Course(0.5, -460, 461.0)),
     )
-    return StepComparison(motor, STEP, (100, 2000), METHODS, courses)
+    return StepComparison(motor, STEP, (100, 2000), tuple(METHODS), courses)
 
 
 def jerk_comparison() -> JerkComparison:
@@ -183,33 +87,6 @@ def jerk_comparison() -> JerkComparison:
     smooth = np.array([0.0, 0.1, 2.0, 2.1])
     return JerkComparison(
         motor="x", way=40 * MM, speed=20 * MM, acceleration=0.2, jerk=54.8,
-        envelope=Profile(steps, steps * 20 * MM, np.array([2 * MM, 20 * MM, 2 * MM, 0.0])),
+        envelope=Profile(steps, steps * 20 * MM, np.array([2 * MM, 20 * MM, 2 * MM, 0.0]), steps=True),
         smooth=Profile(smooth, smooth * 20 * MM, np.array([0.0, 20 * MM, 20 * MM, 0.0])),
     )  # fmt: skip
-
-
-def stage_data(**changes: object) -> StageReportData:
-    moves = [
-        StageMoveResult(
-            number=1, label="zoom in", begin=0.0, seconds=0.1, motions=[motion(), motion("y", margin=math.inf)]
-        ),
-        StageMoveResult(
-            number=2, label="wide", begin=0.2, seconds=0.1, motions=[motion(start=1 * MM, target=0.0, stop=0.0)]
-        ),
-    ]
-    data = StageReportData(
-        axis_name="micro & scope", job_name="list.csv", kind="moves", done=True, figures=figures(), moves=moves,
-        plan=None, path=stage_path(), runs=[motor_runs(), motor_runs("y")], detail=detail(),
-        steps=[step_comparison(), step_comparison("y")], jerk=jerk_comparison(),
-        notes=[Note("warning", "close <to> it")],
-        settings={"seed": "7"},
-    )  # fmt: skip
-    return replace(data, **changes)
-
-
-def tiles_data(**changes: object) -> StageReportData:
-    moves = [
-        StageMoveResult(number=n, label=str(10 + n), begin=0.1 * n, seconds=0.1, motions=[motion()])
-        for n in (1, 2, 3, 4)
-    ]
-    return replace(stage_data(kind="tiles", plan=tile_plan(), moves=moves), **changes)

@@ -1,10 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from tests.unit.methods.stepper_envelope.samples import step_comparison
 
 from detent import examples
-from detent.errors import DetentError
 from detent.methods.load import read_axis
-from detent.methods.stepper_envelope.comparison import compare_jerk, compare_steps
+from detent.methods.stepper_envelope.comparison import METHOD_COSTS, METHODS, compare_steps
+from detent.page.draw import plain
 
 pytestmark = pytest.mark.compiled
 
@@ -59,29 +62,57 @@ def test_the_largest_frequency_from_rest_loses_steps(found):
     assert all(course.lost > 0 for course in found[0].courses[-1])
 
 
-def test_both_profiles_go_the_same_way_within_the_same_limits(spec):
-    found = compare_jerk(spec)
-    assert found.motor == "group_a"
-    assert found.way == pytest.approx(0.04)
-    for profile in (found.envelope, found.smooth):
-        assert profile.position[-1] == pytest.approx(found.way, rel=1e-9)
-        assert (np.diff(profile.t) > 0).all()
-        assert profile.speed.max() <= found.speed * (1 + 1e-9)
-    # 8000 steps without zones: 2.0839 s (acceptance test 2); the smooth one has to begin at standstill.
-    assert found.envelope.seconds == pytest.approx(2.0837, abs=1e-3)
-    assert found.envelope.seconds < found.smooth.seconds < 1.05 * found.envelope.seconds
-    assert found.to_dict()["jerk"] == found.jerk
+# ---- what is shown of it, made up
 
 
-def test_the_smooth_profile_keeps_to_acceleration_and_jerk(spec):
-    found = compare_jerk(spec, "group_b")
-    t, speed = found.smooth.t, found.smooth.speed
-    acceleration = np.diff(speed) / np.diff(t)
-    assert np.abs(acceleration).max() <= found.acceleration * (1 + 1e-6)
-    jerk = np.diff(acceleration) / np.diff(t)[1:]
-    assert np.abs(jerk).max() <= found.jerk * (1 + 1e-6)
+def cells_of(found) -> list[list[str]]:
+    (figure,) = found.figures()
+    return [[plain(cell.text) for cell, _ in figure.table.cells(row)] for row in figure.table.rows]
 
 
-def test_an_unknown_motor_is_refused(spec):
-    with pytest.raises(DetentError, match="came 'z'; allowed: one of group_a, group_b"):
-        compare_jerk(spec, "z")
+def test_every_method_that_is_compared_has_its_cost() -> None:
+    assert set(METHOD_COSTS) == set(METHODS)
+
+
+def test_every_method_has_its_times_its_lost_steps_and_its_cost() -> None:
+    cells = cells_of(step_comparison())
+    assert cells[0] == ["envelope (this method)", "80 ms", "600 ms", METHOD_COSTS["envelope"]]
+    assert cells[2][1:3] == ["80 ms", "550 ms"]
+    assert cells[3] == ["constant start frequency", "240 ms", "5.40 s", "nothing"]
+    assert cells[4] == ["constant largest frequency", "25 ms, 36 lost", "500 ms, 460 lost", "nothing"]
+    (figure,) = step_comparison().figures()
+    assert [plain(head) for head, _ in figure.table.heads[1:3]] == ["100 steps, 0.5 mm", "2 000 steps, 10 mm"]
+
+
+def test_bars_compare_the_methods_over_one_way_and_lost_steps_are_marked() -> None:
+    (figure,) = step_comparison().figures()
+    bars = [[cell.bar for cell in row[1:3]] for row in figure.table.rows]
+    assert bars[0] == pytest.approx([1 / 3, 1 / 9])
+    assert bars[3] == [1.0, 1.0]
+    assert [[cell.over for cell in row[1:3]] for row in figure.table.rows] == [[False, False]] * 4 + [[True, True]]
+
+
+def test_who_loses_steps_is_told() -> None:
+    def told(found):
+        return found.figures()[0].caption
+
+    found = step_comparison()
+    assert "is 9.0 times as quick" in told(found)
+    assert "jump" not in told(found)
+    assert "on paper only" in told(found)
+    one = step_comparison(zones_lose=960)
+    assert "B jumps" in told(one)
+    both = replace(one, courses=(one.courses[0], one.courses[2], *one.courses[2:]))
+    assert "A and B jump" in told(both)
+    some = replace(found, methods=found.methods[:3], courses=found.courses[:3])
+    assert "start frequency" not in told(some)
+    assert "on paper only" not in told(some)
+
+
+def test_the_table_of_the_terminal_says_the_same() -> None:
+    title, heads, rows = step_comparison(zones_lose=-8).table
+    assert title == "Motor x: time of a way, and steps lost (5 um a step)"
+    assert heads == ("method", "100 steps", "2000 steps", "worked out per step")
+    assert rows[0] == ("envelope (this method)", "80 ms", "600 ms", METHOD_COSTS["envelope"])
+    assert rows[2][1:3] == ("80 ms", "550 ms, 8 lost")
+    assert rows[4] == ("constant largest frequency", "25 ms, 36 lost", "500 ms, 460 lost", "nothing")

@@ -13,13 +13,11 @@ from detent.methods.stepper_envelope.build import make_step_ramp
 from detent.methods.stepper_envelope.stage_trace import (
     Leg,
     arc_of,
-    has,
     legs_of,
     made_steps,
     move_envelope,
     step_torques,
     travel_envelope,
-    zone_spans,
 )
 from detent.record.trace import Trace
 
@@ -79,7 +77,7 @@ def test_registers_that_were_not_recorded_are_missed(played, table) -> None:
     trace = trace_of(there_and_back(make_step_ramp(table).hz))
     without = {name: values for name, values in trace.columns.items() if name != "a.timer.period"}
     assert made_steps(Trace(columns=without), "a", 1e6) is None
-    assert not has(trace, "b", ("rule.position",))
+    assert made_steps(trace, "b", 1e6) is None
     bare = {name: values for name, values in trace.columns.items() if not name.endswith(("index", "state"))}
     made = made_steps(Trace(columns=bare), "a", 1e6)
     assert made is not None
@@ -154,12 +152,6 @@ def test_a_move_one_way_permits_nothing_the_other(played, table) -> None:
     found = move_envelope(table, legs_of(made, table, move, motor)[:1])
     assert found.up.max() > 0
     assert not found.down.any()
-
-
-def test_zones_are_told_in_hertz(table) -> None:
-    near, far = zone_spans(table)
-    assert (near.name, near.begin, near.end, near.hz, near.direction) == ("near", 0.01, 0.013, 1000.0, "both")
-    assert far.name == "far"
 
 
 def test_torques_are_those_of_the_ramp_not_of_its_rounded_periods(played, table) -> None:

@@ -6,8 +6,7 @@ from tests.unit.methods.stepper_envelope.samples import motor_move, record, run_
 import detent
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope.run import StageMoveRecord
-from detent.methods.stepper_envelope.stage_results import WorstMotion
-from detent.methods.stepper_envelope.summary import stage_figures, stage_summary_rows
+from detent.methods.stepper_envelope.summary import StageFigures, stage_summary_rows
 
 
 @pytest.fixture(scope="module")
@@ -66,13 +65,13 @@ def test_steps_lost_both_ways_are_lost_though_they_cancel(spec) -> None:
 
 @pytest.mark.parametrize("changes", [{"missed": 3}, {"rest_lag": 0.6}, {"rest_lag": -0.6}, {"lost": 4}])
 def test_a_motor_beside_its_place_is_not_in_place(spec, changes) -> None:
-    found = stage_figures(spec, run_of(record(1, group_a=motor_move(**changes))))
-    assert (found.made, found.placed) == (1, 0)
-    assert stage_figures(spec, run_of(record(1, group_a=motor_move(rest_lag=0.5)))).placed == 1
+    found = StageFigures(spec, run_of(record(1, group_a=motor_move(**changes))))
+    assert found.placed == 0
+    assert StageFigures(spec, run_of(record(1, group_a=motor_move(rest_lag=0.5)))).placed == 1
 
 
 def test_time_in_motion_is_that_of_the_motor_that_ran_longest(spec) -> None:
-    found = stage_figures(
+    found = StageFigures(
         spec, run_of(record(1, group_a=motor_move(arrived=0.03, naive=0.7), group_b=motor_move(naive=0.2)))
     )
     assert (found.moving, found.naive) == (pytest.approx(0.1), 0.7)
@@ -81,13 +80,14 @@ def test_time_in_motion_is_that_of_the_motor_that_ran_longest(spec) -> None:
 
 def test_of_equal_figures_the_first_is_named(spec) -> None:
     records = [record(n, group_a=motor_move(peak_lag=1.0 + n * 1e-6, margin=2.0 - n * 1e-6)) for n in (1, 2, 3)]
-    found = stage_figures(spec, run_of(*records))
-    assert (found.lag, found.margin) == (WorstMotion(1.000001, 1, "group_a"), WorstMotion(1.999999, 1, "group_a"))
+    found = StageFigures(spec, run_of(*records))
+    assert (found.lag.value, found.lag.of.move.number) == (1.000001, 1)
+    assert (found.margin.value, found.margin.of.move.number) == (1.999999, 1)
 
 
 def test_a_motor_that_needs_no_torque_has_no_margin(spec) -> None:
-    found = stage_figures(spec, run_of(record(1, group_a=motor_move(margin=math.inf), group_b=motor_move(margin=7.0))))
-    assert found.margin == WorstMotion(7.0, 1, "group_b")
+    found = StageFigures(spec, run_of(record(1, group_a=motor_move(margin=math.inf), group_b=motor_move(margin=7.0))))
+    assert (found.margin.value, found.margin.of.name) == (7.0, "group_b")
     rows = rows_of(spec, record(1, group_a=motor_move(margin=math.inf)))
     assert "torque margin" not in rows
 
@@ -95,10 +95,18 @@ def test_a_motor_that_needs_no_torque_has_no_margin(spec) -> None:
 def test_of_a_job_in_which_nothing_moved_only_what_happened_is_told(spec) -> None:
     assert rows_of(spec, record(1)) == {"moves": "1 of 1", "time": "0.200 s, 300 moves per minute"}
     assert rows_of(spec, asked=3) == {"moves": "0 of 3"}
-    assert math.isnan(stage_figures(spec, run_of(record(1))).faster)
+    assert math.isnan(StageFigures(spec, run_of(record(1))).faster)
 
 
 def test_steps_of_all_motors_are_counted_as_lost(spec) -> None:
-    found = stage_figures(spec, run_of(record(1, group_a=motor_move(lost=4), group_b=motor_move(lost=-8))))
-    assert (found.lost, found.all_lost) == ({"group_a": 4, "group_b": -8}, 12)
-    assert found.first_lost == WorstMotion(4, 1, "group_a")
+    found = StageFigures(spec, run_of(record(1, group_a=motor_move(lost=4), group_b=motor_move(lost=-8))))
+    assert found.all_lost == 12
+    assert (found.first_lost.motor.lost, found.first_lost.name) == (4, "group_a")
+
+
+def test_steps_lost_before_are_added_to_those_missed(spec) -> None:
+    found = StageFigures(
+        spec, run_of(record(1, group_a=motor_move(lost=4)), record(2), record(3, group_a=motor_move(missed=1, lost=-8)))
+    )
+    assert [[motion.off for motion in motions] for motions in found.by_move] == [[4], [], [-3]]
+    assert found.moved == ["group_a"]

@@ -1,0 +1,309 @@
+"""The most telling motion of a stage's job, step by step: under its table, its torques, and how the rotor followed."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from detent.methods.stepper_envelope.run import StageMoveRecord
+from detent.methods.stepper_envelope.runs_chart import Runs, runs_chart
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
+from detent.methods.stepper_envelope.stage_job import Change, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_trace import (
+    Leg,
+    MadeSteps,
+    StepTorques,
+    arc_of,
+    legs_of,
+    move_envelope,
+    of,
+    step_torques,
+    travel_envelope,
+)
+from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
+from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, time_charts
+from detent.page.figure import Figure
+from detent.page.frame import Section
+from detent.page.parts import Event, Numbers
+from detent.page.run_page import Stretch, stretch
+from detent.page.thin import thin_indices
+from detent.page.words import GAP, count, number
+from detent.record.trace import Trace
+
+ARC_POINTS = 600
+"""Points of one run in the figure of frequency against position."""
+
+POINTS = 1500
+"""Rows that are chosen for one curve's sake: a page has many of them."""
+
+NEEDED_ROTOR = ("timer.period", "rule.direction", "rotor.velocity", "rotor.lag")
+"""Registers that the rotor is drawn from."""
+
+MM, MILLI = 1e3, 1e3
+
+
+@dataclass(frozen=True, slots=True)
+class ShownMotion:
+    """The motion that is shown in detail, why this one, what was asked for, and its steps, run by run."""
+
+    spec: StepperEnvelopeSpec
+    motion: Motion
+    why: str
+    asked: StageMove | StageJog
+    legs: Sequence[Leg]
+
+    @property
+    def table(self) -> StepperTable:
+        """Table of its motor."""
+        return self.spec.stepper[self.motion.name]
+
+
+def detail_section(figures: StageFigures, trace: Trace | None, made: Mapping[str, MadeSteps]) -> Section:
+    """One motion in detail, of nothing if no motion was recorded whole."""
+    shown = telling(figures, trace, made) if trace is not None else None
+    if shown is None:
+        return Section("Step by step", [])
+    move, kind = shown.motion.move, figures.run.job.kind
+    name = called(move, kind)
+    if move.label and kind != "tiles":
+        name += f" “{move.label}”"
+    drawn = [_table_figure(shown), _torque_figure(shown), *_rotor_figures(shown, trace)]
+    return Section(f"{name[0].upper()}{name[1:]}, step by step", [figure for figure in drawn if figure])
+
+
+def telling(figures: StageFigures, trace: Trace, made: Mapping[str, MadeSteps]) -> ShownMotion | None:
+    """The most telling of the motions that were recorded whole; None if no motion was.
+
+    It is the one that lost steps or missed its place first, else the one that had to pass a stop, else the one with the
+    least torque margin, of several such the longest.
+    """
+    whole = [motion for motion in figures.motions if _recorded(trace, made, motion)]
+    if not whole:
+        return None
+    motion, why = _choose(figures, whole)
+    spec, asked = figures.spec, next(asked for asked in figures.run.job.moves if asked.number == motion.move.number)
+    legs = legs_of(made[motion.name], spec.stepper[motion.name], motion.move, motion.motor)
+    return ShownMotion(spec, motion, why, asked, legs)
+
+
+def _recorded(trace: Trace, made: Mapping[str, MadeSteps], motion: Motion) -> bool:
+    if motion.name not in made or motion.move.ready > trace.time[-1] + (trace.time[1] - trace.time[0]):
+        return False
+    return len(made[motion.name].between(motion.move.begin, motion.motor.arrived).t) > 0
+
+
+def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str]:
+    reasons: tuple[tuple[str, Callable[[Motion], bool]], ...] = (
+        ("the motion that lost steps first", lambda motion: motion.motor.lost != 0),
+        ("the motion that did not end in its place", figures.astray),
+        ("the motion that had to pass its stop", lambda motion: motion.motor.overrun),
+    )
+    for why, applies in reasons:
+        found = next(filter(applies, whole), None)
+        if found:
+            return found, why
+    least = min(map(_margin, whole))
+    tied = [motion for motion in whole if _margin(motion) == least]
+    why = "the motion with the least torque margin" + (", the longest of several" if len(tied) > 1 else "")
+    return max(tied, key=lambda motion: motion.motor.steps), why
+
+
+def _margin(motion: Motion) -> float:
+    """In three digits: what is equal to a reader is equal."""
+    return float(f"{motion.motor.margin:.3g}")
+
+
+# ---- under the table of the move
+
+
+def _table_figure(shown: ShownMotion) -> Figure:
+    motion, table, legs = shown.motion, shown.table, shown.legs
+    way = motion.motor.stop - motion.motor.start
+    turned = f", with {count(len(legs) - 1, 'turn')} on the way" if len(legs) > 1 else ""
+    caption = (
+        f"Shown is {shown.why}: motor {motion.name}, {_mm(abs(way))} {'up' if way > 0 else 'down'}{turned}. The grey "
+        "ground is now the table of this very move, which ends at its extremes: every step was looked up in it. Look "
+        "for: the line on the edge of the grey."
+    )
+    # The extremes of a manual run are the ends of the travel.
+    envelope = travel_envelope(table) if isinstance(shown.asked, StageJog) else move_envelope(table, legs)
+    runs = Runs(motion.name, table, envelope, [arc_of(leg, table, ARC_POINTS) for leg in legs])
+    return Figure(
+        title="Frequency against position, under the table of the move",
+        caption=caption,
+        charts=[runs_chart(runs, "detail-runs", height=260)],
+    )
+
+
+def _mm(length: float) -> str:
+    return f"{stated(length * MM)}{GAP}mm"
+
+
+# ---- torque of every step
+
+
+def _torque_figure(shown: ShownMotion) -> Figure | None:
+    torques = step_torques(shown.table, shown.legs)
+    if torques is None:
+        return None
+    caption = (
+        "Above: the torque that the motor can give at the frequency of each step, and what the step asks for: friction "
+        "and acceleration; friction helps to brake. Below: their ratio, cut off where it is far above the least. Under "
+        f"1 the rotor cannot follow; the ramp is planned with a reserve of {stated(torques.safety)}. Look for: the "
+        f"least margin, ×{GAP}{margin_text(shown.motion)}, and where it is."
+    )
+    return Figure(title="Margin of torque at every step", caption=caption, charts=torque_charts(torques))
+
+
+def torque_charts(torques: StepTorques) -> list[Chart]:
+    """Torque of every step, and its margin."""
+    margin = np.where(np.isfinite(torques.margin), torques.margin, np.nan)
+    kept = np.unique(np.concatenate([thin_indices(y, POINTS) for y in (margin, torques.available, torques.needed)]))
+    available, needed = torques.available[kept] * MILLI, torques.needed[kept] * MILLI
+    planned: list[list[Curve]] = [[], []]
+    if torques.safety > 1:
+        look: dict[str, Any] = {
+            "label": f"planned with a reserve of {stated(torques.safety)}",
+            "colour": "left",
+            "dash": (6, 4),
+        }
+        planned = [[Curve(y=available / torques.safety, **look)], [Curve(y=np.full(len(kept), torques.safety), **look)]]
+    torque = Panel(
+        name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(torques.available * MILLI)),
+        curves=[
+            Curve(label="pull-out torque", colour="muted", width=2, fill=True, y=available),
+            *planned[0],
+            Curve(label="torque needed", colour="speed", width=2, step=True, y=needed),
+        ],
+    )  # fmt: skip
+    # A margin far from 1 says nothing more than that it is far.
+    finite = torques.margin[np.isfinite(torques.margin)]
+    top = _top(finite.clip(0, max(2.5 * float(finite.min(initial=np.inf)), 3 * torques.safety)))
+    ratio = Panel(
+        name="detail-margin", label="margin", height=220, span=(0.0, top), levels=[(1.0, "1: falls behind below")],
+        curves=[
+            *planned[1],
+            Curve(label="pull-out torque / torque needed", colour="drive", width=2, step=True, y=margin[kept]),
+        ],
+    )  # fmt: skip
+    sync = {"sync": "torque"}
+    label = "step of the move, counted from its start [step]"
+    return [
+        line_chart(torque, kept + 1.0, label) | sync | {"foot": False},
+        line_chart(ratio, kept + 1.0, label) | sync,
+    ]
+
+
+def _top(values: Numbers) -> float:
+    """Upper end of an axis from 0, with room for a name above the curve."""
+    return round(1.15 * float(values.max(initial=1e-3)), 3)
+
+
+# ---- how the rotor followed
+
+
+def _rotor_figures(shown: ShownMotion, trace: Trace | None) -> list[Figure]:
+    motion, tolerance = shown.motion, shown.spec.controller.tolerance
+    rows = stretch(trace, of(motion.name, NEEDED_ROTOR), motion.move.begin, motion.move.ready)
+    if rows is None:
+        return []
+    events = motion_events(shown)
+    followed = (
+        "Nothing measures the rotor of a stepper; the simulation does. It swings after the field, which jumps by a "
+        f"step at every pulse. Look for: a lag well below {number(PULL_OUT_LAG)} steps, from where on the field pulls "
+        "the rotor the wrong way and steps are lost four at a time."
+    )
+    rest = (
+        "The end of the same move, magnified. Green is the time that the host waits for the swing to die away. Look "
+        f"for: the line within ±{tolerance:g} steps (dashed) long before that time is over."
+    )
+    return [
+        Figure(
+            title="How the rotor followed", caption=followed, charts=_rotor_charts(shown, rows, events), events=events
+        ),
+        Figure(title="Coming to rest", caption=rest, charts=_rest_charts(motion, rows, tolerance)),
+    ]
+
+
+def _rotor_charts(shown: ShownMotion, rows: Stretch, events: Sequence[Event]) -> list[Chart]:
+    table = shown.table
+    period, direction, velocity, rotor_lag = (rows[name] for name in of(shown.motion.name, NEEDED_ROTOR))
+    # A step per period, 0 at rest.
+    hz = np.divide(shown.spec.controller.timer, period, out=np.zeros(len(period)), where=period > 0)
+    field = table.step * hz * direction
+    rotor = velocity * table.mechanics.travel_per_revolution / (2 * math.pi)
+    unit = "ms" if rows.t[-1] < 1 else "s"
+    timeline = Timeline(name="detail", t=rows.t, label="time since the start signal", unit=unit, events=events)
+    reach = max(float(np.abs(rotor_lag).max()), PULL_OUT_LAG)
+    wrong = "from here on the field pulls the wrong way"
+    out_of_step = reach > 5 * PULL_OUT_LAG  # on this scale the bounds are one line
+    lag = Curve(label="field less rotor", colour="drive", width=2 if out_of_step else 1, y=rotor_lag, thin=POINTS)
+    return time_charts(timeline, [
+        Panel(name="detail-speed", label="speed [mm/s]", height=200, zero=True, curves=[
+            Curve(label="rotor", colour="muted", width=1, y=rotor * MM, thin=POINTS),
+            Curve(label="field: what is commanded", colour="speed", width=2, step=True, y=field * MM, thin=POINTS),
+        ]),
+        Panel(name="detail-lag", label="lag [step]", height=220, zero=True, span=(-1.3 * reach, 1.3 * reach),
+              levels=[] if out_of_step else [(PULL_OUT_LAG, wrong), (-PULL_OUT_LAG, "")], curves=[lag]),
+    ])  # fmt: skip
+
+
+def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
+    """How the rotor comes to rest after the last step; one that lost steps comes to none of its own."""
+    end = float(rows.t[-1])
+    begin = max(motion.seconds - 0.4 * max(end - motion.seconds, 0.01), 0.0)
+    part = slice(int(np.searchsorted(rows.t, begin)), None)
+    lag = rows[f"{motion.name}.rotor.lag"][part]
+    if motion.motor.lost or len(lag) < 2:
+        return []
+    reach = max(float(np.abs(lag).max()), limit)
+    after = Band(label="last step over: time to settle", colour="good", spans=[(motion.seconds, end)])
+    panel = Panel(
+        name="rest-lag", label="lag [step]", height=220, zero=True, span=(-1.3 * reach, 1.3 * reach),
+        levels=[(limit, f"+{limit:g} steps"), (-limit, f"−{limit:g} steps")],
+        curves=[Curve(label="field less rotor", colour="drive", width=2, y=lag, thin=POINTS)],
+    )  # fmt: skip
+    return time_charts(
+        Timeline(name="rest", t=rows.t[part], label="time since the start signal", bands=[after]), [panel]
+    )
+
+
+# ---- what happened, and when
+
+
+def motion_events(shown: ShownMotion) -> list[Event]:
+    """What happened in the move, in order of time since the start signal."""
+    asked, motion, legs = shown.asked, shown.motion, shown.legs
+    begin = motion.move.begin
+    events = [Event(0.0, _start_text(asked, motion.name)), Event(motion.seconds, "the last step is over")]
+    if isinstance(asked, StageJog):
+        events.append(Event(asked.duration, "the joystick is let go"))
+    elif asked.change is not None:
+        events += _change_events(shown.table, asked.change, motion.move, legs)
+    events += [
+        Event(float(leg.made.t[0]) - begin, f"turns, {'up' if leg.direction > 0 else 'down'} from here")
+        for leg in legs[1:]
+    ]
+    settled, tolerance = motion.motor.settled, shown.spec.controller.tolerance
+    if abs(motion.motor.rest_lag) <= tolerance and settled > begin:
+        events.append(Event(settled - begin, f"the rotor is within ±{stated(tolerance)} steps of its place for good"))
+    done = "the time to settle is over: the host takes the move for done"
+    events.append(Event(motion.move.ready - begin, done))
+    return sorted(events, key=lambda event: event.t)
+
+
+def _start_text(asked: StageMove | StageJog, name: str) -> str:
+    if isinstance(asked, StageJog):
+        return f"the joystick asks for {stated(asked.speed * MM)}{GAP}mm/s"
+    others = [other for other in asked.motors if other != name]
+    return "start signal" + (f", at the same time for {', '.join(others)}" if others else "")
+
+
+def _change_events(table: StepperTable, change: Change, move: StageMoveRecord, legs: Sequence[Leg]) -> list[Event]:
+    """When the stop was changed, if the motor came by."""
+    made = legs[0].made
+    passed = np.flatnonzero((made.position - table.step_at(change.at)) * legs[0].direction >= 0)
+    text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
+    return [Event(float(made.t[passed[0]]) - move.begin, text)] if passed.size else []
