@@ -5,7 +5,6 @@ import numpy as np
 from detent.identify.analyse.average_periods import noise_parts
 from detent.identify.analyse.frequency_response import FrequencyResponse, response_deviation
 from detent.identify.analyse.two_mass_response import TwoMassModel, modes_of, respond_sampled
-from detent.identify.write.excitation_signals import Limits, make_multisine
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
 
@@ -62,14 +61,25 @@ def noisy_responses(seed, *, periods=8, lines=60, noise=0.02, kept=8.0):
     return found, truth, hold
 
 
+def multisine(band, step, size, seed):
+    """A second with a line at each whole number of hertz within a band, all alike, with random phases."""
+    rows = round(1.0 / step)
+    numbers = np.arange(round(band[0]), round(band[1]) + 1)
+    spectrum = np.zeros(rows // 2 + 1, dtype=np.complex128)
+    spectrum[numbers] = np.exp(1j * np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(numbers)))
+    once = np.fft.irfft(spectrum, rows)
+    once *= size / np.abs(once).max()
+    return np.roll(once, -int(np.argmin(np.abs(once))))
+
+
 def record_cascade(seed, *, delay=2, coulomb=0.0, resolution=0.0, coupled=True, periods=8, band=(1.0, 200.0)):
     """A multisine of 20 N into a cascade axis without its loops: times, effort, both positions."""
-    made = make_multisine(band, 1.0, T_SAMPLE, Limits(20.0), periods=periods, seed=seed)
+    command = np.tile(multisine(band, T_SAMPLE, 20.0, seed), periods)
     p = make_params(coupled=coupled)
     p.source.delay = delay
     p.motor_sensor.resolution = p.load_sensor.resolution = resolution
     set_friction(p.machine.motor.friction, viscous=3.0)
     set_friction(p.machine.load.friction, viscous=5.0, coulomb=coulomb, static=coulomb)
     names = ["source.command", "motor_sensor.position", "load_sensor.position"]
-    rows = Rig(p).record(len(made.t) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=made.values)
+    rows = Rig(p).record(len(command) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=command)
     return rows["t"], *(rows[name] for name in names)

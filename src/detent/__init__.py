@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from detent.axis import Axis, Run, Timing, load, load_trace
-    from detent.identify.page.identified import identify_axis
+    from detent.identify.identified import identify_axis
 
 __version__ = "0.1.0"
 
@@ -35,7 +35,7 @@ def __getattr__(name: str) -> Any:
 
         return getattr(axis, name)
     if name == "identify_axis":
-        from detent.identify.page.identified import identify_axis
+        from detent.identify.identified import identify_axis
 
         return identify_axis
     raise AttributeError(f"module 'detent' has no attribute {name!r}; it has {', '.join(__all__)}")

@@ -2,11 +2,11 @@
 
 import numpy as np
 from tests.bench.race import Race, timed
+from tests.published_recipe import fit_inverse_dynamics
 
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.equations import make_motion, usable_rows
 from detent.identify.fit.identification import WINDOW, choose_windows, identify
-from detent.identify.fit.inverse_dynamics import fit_inverse_dynamics
 from detent.identify.fit.kernel import make_kernel
 from detent.identify.fit.ladder import RUNGS
 from detent.identify.fit.output_error import fit_output_error

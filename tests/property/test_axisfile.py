@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.bad_files import EXAMPLES as EXAMPLE_OF
 from tests.bad_files import example_text
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.errors import InputError
 from detent.files.source import parse_source
 from detent.methods.check import check_spec

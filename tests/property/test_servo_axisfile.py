@@ -14,9 +14,9 @@ from annotated_types import Ge, Gt, Le, Lt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.bad_files import example_text
+from tests.dump import dump_spec
 from tests.remedies import named_value
 
-from detent.axisfile.dump import dump_spec
 from detent.errors import InputError
 from detent.files.fields import AnyName, is_list, leaf_fields, options_of, unit_of
 from detent.files.nearest import at_least, at_most

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from tests.unit.test_cli import call
+from tests.vcd_reader import load_vcd
 
 import detent
 from detent.methods.rotary_table.run import SEQUENCE_SIGNALS
 from detent.record.trace_files import load_trace
-from detent.record.vcd_file import load_vcd
 
 pytestmark = pytest.mark.compiled
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 from tests.unit.test_cli import call
+from tests.vcd_reader import load_vcd
 
 import detent
 from detent.methods.filtered_servo.method import SIGNALS as FILTERED_SIGNALS
 from detent.methods.phase_servo.method import SIGNALS as PHASE_SIGNALS
 from detent.record.trace_files import load_trace
-from detent.record.vcd_file import load_vcd
 
 pytestmark = pytest.mark.compiled
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from tests.unit.test_cli import call
+from tests.vcd_reader import load_vcd
 
 import detent
 from detent.record.trace_files import load_trace
-from detent.record.vcd_file import load_vcd
 
 pytestmark = pytest.mark.compiled
 

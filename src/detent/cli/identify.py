@@ -13,7 +13,7 @@ from detent.errors import DetentError
 
 if TYPE_CHECKING:
     from detent.identify.fit.identification import Method
-    from detent.identify.page.identified import Identified
+    from detent.identify.identified import Identified
 
 METHODS = {"regression": "regression", "output-error": "output error"}
 """Words of --method, and what the identification calls them."""
@@ -99,7 +99,7 @@ def identify(
     Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 the input
     cannot be read.
     """
-    from detent.identify.page.identified import identify_axis
+    from detent.identify.identified import identify_axis
 
     _check_outputs(axis, write, job, report)
     chosen = cast("Method", _method(method))
@@ -260,7 +260,7 @@ def _print_logs(console: Any, found: Any) -> None:
 
 
 def _print_constants(done: "Identified") -> None:
-    from detent.identify.page.identify_words import is_known, written
+    from detent.identify.page.words import is_known, written
 
     rows: list[tuple[str, ...]] = []
     for one in done.found.estimates:
@@ -290,7 +290,7 @@ def _print_ladder(found: Any) -> None:
 
 def _print_horizons(found: Any) -> None:
     """How far off the simulation is."""
-    from detent.identify.page.identify_words import Ways
+    from detent.identify.page.scales import Ways
 
     ways = Ways(found.runs[0].position_unit)
     rows: list[tuple[str, ...]] = []

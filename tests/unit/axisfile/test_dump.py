@@ -1,8 +1,7 @@
 """From a specification back to an axis file."""
 
 import pytest
-
-from detent.axisfile.dump import dump_spec
+from tests.dump import dump_spec
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """Disturbances of the lines and of the carriage, from the tables of the file to the blocks."""
 
 import pytest
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.axisfile.interference import KINDS, fill_interference, fill_push
 from detent.axisfile.tables import BurstTable, InterferenceTable, PushTable
 from detent.plant.push import Push, push_force

@@ -5,8 +5,8 @@ import math
 import pytest
 from pydantic import Field, ValidationError
 from tests.bad_files import example_text
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.axisfile.motion import ROTARY_UNITS, rotary_model, unit_in
 from detent.errors import InputError
 from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of

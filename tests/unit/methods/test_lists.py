@@ -4,8 +4,8 @@ from typing import Annotated
 
 import pytest
 from annotated_types import Ge, Le
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.errors import InputError
 from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, table_of

@@ -4,9 +4,9 @@ from typing import Annotated
 
 import pytest
 from annotated_types import Ge, Le
+from tests.dump import dump_spec
 
 from detent.axisfile.catalogue import STEPPER_MOTORS
-from detent.axisfile.dump import dump_spec
 from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.errors import InputError
 from detent.files.fields import (

@@ -5,8 +5,8 @@ import sys
 from typing import Literal
 
 import pytest
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.errors import InputError
 from detent.files.fields import leaf_fields, optional, options_of, required

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from tests.vcd_reader import load_vcd
 
 import detent
 from detent.errors import DetentError
 from detent.methods.load import load_spec
 from detent.methods.registry import METHODS
 from detent.record.capture import Stretch, capture
-from detent.record.vcd_file import load_vcd, save_vcd
+from detent.record.vcd_file import save_vcd
 
 pytestmark = pytest.mark.compiled
 

@@ -1,13 +1,13 @@
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.vcd_reader import load_vcd
 
-from detent.errors import DetentError, InputError
-from detent.record.vcd_file import load_vcd, save_vcd
+from detent.errors import DetentError
+from detent.record.vcd_file import save_vcd
 from detent.record.waveforms import Waveform, Waveforms, clock_waveform
 
 T = 250e-9
@@ -196,72 +196,3 @@ def test_a_file_appears_whole_and_leaves_nothing_beside_it(tmp_path):
     save_vcd(make_waveforms(), tmp_path / "run.vcd")
     assert list(tmp_path.iterdir()) == [tmp_path / "run.vcd"]
     assert load_vcd(tmp_path / "run.vcd").signals
-
-
-# -- files of others --------------------------------------------------------------------------------------------------
-HEADER = "$timescale 1ns $end\n$scope module top $end\n$var wire 1 ! clk $end\n$var reg 4 # data[3:0] $end\n"
-END = "$upscope $end\n$enddefinitions $end\n"
-
-
-def write(tmp_path: Path, text: str) -> Path:
-    path = tmp_path / "foreign.vcd"
-    path.write_text(text, encoding="latin-1")
-    return path
-
-
-def test_a_file_of_another_program_is_read(tmp_path):
-    text = (
-        "$date today $end $version other 1.0 $end $comment hello $end\n"
-        + HEADER
-        + "$scope begin inner $end $var integer 32 % count $end $var wire 1 ! alias $end $upscope $end\n"
-        + END
-        + "#0\n$dumpvars 0! b0011 # b11111111111111111111111111111110 % $end\n#10 1! #10 0! #15 1! b0011 # #20 b1 #\n"
-    )
-    read = load_vcd(write(tmp_path, text))
-    assert (read.title, read.begin, read.end) == ("top", 0, 21_000)
-    assert [signal.name for signal in read.signals] == ["clk", "data[3:0]", "inner.count", "inner.alias"]
-    assert read["clk"].times.tolist() == read["inner.alias"].times.tolist() == [0, 10_000, 15_000]
-    assert read["data[3:0]"].values.tolist() == [3, 1]
-    assert read["inner.count"].values.tolist() == [-2]
-
-
-def test_several_outermost_scopes_stay_in_the_names(tmp_path):
-    text = HEADER + "$upscope $end $scope module other $end $var wire 1 % x $end\n" + END + "#0 0! b0 # 1% #5"
-    read = load_vcd(write(tmp_path, text))
-    assert (read.title, [signal.name for signal in read.signals]) == ("", ["top.clk", "top.data[3:0]", "other.x"])
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "came"),
-    [
-        ("", "", r"no \$enddefinitions"),
-        ("t [s],motor.current [A]\n0.0,1.5\n", ":1:1", "confused: t"),
-        ("\x89PNG\r\n\x1a\n", ":1:1", "confused"),
-        (HEADER, "", r"no \$enddefinitions"),
-        (HEADER.replace("1ns", "1 fortnight") + END, ":1:", "Invalid .timescale unit: fortnight"),
-        (HEADER.replace("1ns", "1 fs") + END, ":1:1", "a timescale of 1 fs; allowed: 1 ps or coarser"),
-        (HEADER.replace("$timescale 1ns $end", "") + END + "#0 0! b0 #\n#5", "", r"no \$timescale"),
-        (HEADER + END + "#0 0! b00x0 #\n#5", ":7:", r"the level '00x0' of data\[3:0\]"),
-        (HEADER + END + "#0 z! b0000 #\n#5", ":7:", "the level 'z' of clk"),
-        (HEADER + END + "#0 0! b0000 #\n#5 1?", ":8:", r"a change of '\?'"),
-        (HEADER + END + "#9 0! b0000 #\n#5 1!", ":8:1", "time 5 after 9"),
-        (HEADER + END + "#0 0!\n#5 b0000 #\n#9", "", r"no value of data\[3:0\] at the beginning"),
-        (HEADER + END + "#0 0! b11111 #\n#5", "", r"values from 31 to 31; allowed: 0 to 15"),
-        (HEADER + END + f"#0 0! b0 #\n#{10**19} 1!", "", "too large"),
-        (HEADER + "$var string 1 & text $end\n" + END, ":5:1", r"a string of 1 bits \(text\)"),
-        (HEADER + "$var reg 65 & wide $end\n" + END, ":5:1", r"a reg of 65 bits \(wide\)"),
-        (HEADER + END + "#0 0! b0 #\n#5 shello !", ":8:", "the string 'hello'"),
-        (HEADER + END + "0! b0 #\n$comment no time \xb5 $end", "", "ascii"),
-    ],
-)  # fmt: skip
-def test_a_file_that_is_no_such_vcd_is_refused_with_its_place(tmp_path, text, place, came):
-    path = write(tmp_path, text)
-    with pytest.raises(InputError, match=came) as caught:
-        load_vcd(path)
-    assert str(caught.value).startswith(f"{path}{place}")
-    assert "do: " in str(caught.value)
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        load_vcd(tmp_path / "none.vcd")

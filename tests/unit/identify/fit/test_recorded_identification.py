@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 from tests.places import DATA
+from tests.published_recipe import fit_inverse_dynamics
 
 from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.free_run import Plant, start_velocities
 from detent.identify.fit.identification import choose_windows, identify
-from detent.identify.fit.inverse_dynamics import fit_inverse_dynamics
 from detent.identify.fit.regression import fit_equations
 from detent.logs.mapping import Choice, ColumnMapping
 from detent.logs.read_log import read_log

@@ -14,6 +14,7 @@ from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.fit.verdict import Refusal
+from detent.identify.page.effort import Windows
 from detent.logs.log import Action, Finding, Kind, Severity
 from detent.logs.read_log import read_log
 
@@ -81,3 +82,12 @@ def rigid(lines: int = 40, coherence: float = 1.0, rough: float = 0.0) -> Freque
 def number(value: float, half: float, unit: str = "N", name: str = "coulomb.positive") -> Estimate:
     """A constant with an interval."""
     return replace(estimate(name, value, unit, half / 1.96, "by hand"), low=value - half, high=value + half)
+
+
+def windows(count: int = 400, gap: int = 0) -> Windows:
+    """Rows of a regression, with some of them missing in the middle."""
+    place = np.arange(count)
+    place[count // 2 :] += gap
+    velocity = 0.2 * np.sin(place / 20)
+    residual = np.cos(place * 1.7)
+    return Windows(place * 0.01, 10 + residual, np.full(count, 10.0), residual, velocity, place, 0.01, 0.04)

@@ -4,8 +4,8 @@ import math
 
 import pytest
 from tests.bad_files import added, check_bad_file, edit, params
+from tests.dump import dump_spec
 
-from detent.axisfile.dump import dump_spec
 from detent.files.fields import Table, held_leaves, leaf_fields
 from detent.files.problems import dotted
 from detent.methods.reference import reference_rows

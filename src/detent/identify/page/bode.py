@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from detent.page.parts import Numbers
 
@@ -36,7 +36,7 @@ class Plot:
 LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
 
 
-def frequency_plots(plots: Sequence[Plot]) -> str:
+def frequency_plots(plots: Sequence[Plot]) -> Markup:
     """Draw plots above one another over the same frequencies, the axis logarithmic."""
     low, high = (float(f(plots[0].lines[0].x)) for f in (np.min, np.max))
     named = [line for line in plots[0].lines if line.label]
@@ -46,7 +46,7 @@ def frequency_plots(plots: Sequence[Plot]) -> str:
         for line in named
     )
     drawn = "".join(_plot(plot, low, high, last=plot is plots[-1]) for plot in plots)
-    return f'{drawn}<p class="hint">{legend}</p>'
+    return Markup(f'{drawn}<p class="hint">{legend}</p>')  # noqa: S704 - texts are escaped where they are put in
 
 
 def _stroke(line: Line, width: float) -> str:

@@ -1,11 +1,11 @@
-"""Intervals, bars and the heat map."""
+"""Constants with their intervals, the model, the heat map of correlations."""
 
 import re
 
 import numpy as np
 from tests.unit.identify.page.samples import number
 
-from detent.identify.page.identify_drawings import heat_map, interval_bar, long_bar, reach_of, signed
+from detent.identify.page.constants import heat_map, interval_bar, reach_of, signed
 
 
 def width_of(svg: str) -> float:
@@ -37,22 +37,15 @@ def test_an_unknown_constant_has_no_bar() -> None:
     assert "from nothing to anything" in interval_bar(number(1.0, 1e9), 0.1, trusted=False)
 
 
-def test_bars_are_relative_and_bounded() -> None:
-    assert "width:110px" in long_bar(0.5, "a<b", chosen=False)
-    assert "width:220px" in long_bar(3.0, "", chosen=True)
-    assert "width:1px" in long_bar(0.0, "", chosen=False)
-    assert "a&lt;b" in long_bar(0.5, "a<b", chosen=False)
-
-
-def test_strong_correlations_are_framed() -> None:
-    r = np.array([[1.0, -0.95, 0.2], [-0.95, 1.0, 0.0], [0.2, 0.0, 1.0]])
-    html = heat_map(["a", "b<", "c"], r, limit=0.9)
-    assert html.count("outline:") == 2
-    assert html.count("var(--left) 66%") == 2
-    assert html.count("var(--right) 14%") == 2
-    assert "2 b&lt;" in html
-    assert html.count("<tr>") == 4
-
-
 def test_correlations_have_signs() -> None:
     assert [signed(r) for r in (1.0, -0.917, 0.004, -0.004)] == ["+1.00", "\u22120.92", "0.00", "0.00"]
+
+
+def test_strong_correlations_are_framed_and_shaded_by_their_sign() -> None:
+    r = np.array([[1.0, -0.95, 0.2], [-0.95, 1.0, 0.0], [0.2, 0.0, 1.0]])
+    table = heat_map(["a", "b<", "c"], r, limit=0.9)
+    framed = {(i, j) for i, row in enumerate(table.rows) for j, cell in enumerate(row[1:]) if "outline:" in cell}
+    assert framed == {(0, 1), (1, 0)}
+    assert "var(--left) 66%" in table.rows[0][2]
+    assert "var(--right) 14%" in table.rows[0][3]
+    assert table.rows[1][0] == "2 b<"

@@ -104,9 +104,10 @@ class Identified:
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
-        from detent.identify.page.identify_report import write_identify_report
+        from detent.identify.page.page import identify_page
+        from detent.page.render import write_page
 
-        write_identify_report(self.found, path)
+        write_page(path, identify_page(self.found))
         return Path(path)
 
     def to_dict(self) -> dict[str, Any]:

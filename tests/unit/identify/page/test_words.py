@@ -5,14 +5,11 @@ import math
 import pytest
 from tests.unit.identify.page.samples import number
 
-from detent.identify.page.identify_words import (
-    Ways,
+from detent.identify.page.words import (
     constant_name,
-    digits_for,
-    effort_scale,
     half_of,
     is_known,
-    label_of,
+    long_bar,
     may_be_zero,
     meaning_of,
     relative_half,
@@ -86,23 +83,10 @@ def test_meanings_are_those_of_the_kind() -> None:
 
 def test_units_are_printed_as_people_write_them() -> None:
     assert unit_text("N*m*s/rad").replace(GAP, " ") == "N m s/rad"
-    assert label_of("velocity", "") == "velocity"
-    assert label_of("velocity", "mm/s") == "velocity [mm/s]"
 
 
-def test_places_have_the_unit_of_the_log() -> None:
-    assert (Ways("m").place.name, Ways("rad").speed.name) == ("mm", "deg/s")
-    assert (Ways("count").place.name, Ways("count").speed.name) == ("count", "count/s")
-    assert Ways("m").error(5.69e-6).replace(GAP, " ") == "5.7 µm"
-    assert Ways("count").error(12.5).replace(GAP, " ") == "12.5 count"
-    assert Ways("count").small(1e-9).factor == 1.0
-
-
-def test_small_efforts_are_in_thousandths() -> None:
-    assert effort_scale("N*m", 0.05).name.replace(GAP, " ") == "mN m"
-    assert effort_scale("N*m", 0.5).factor == 1.0
-    assert effort_scale("", 0.05).factor == 1.0
-
-
-def test_charts_keep_digits_by_the_peak() -> None:
-    assert [digits_for(peak) for peak in (1e6, 150.0, 0.02, 0.0, math.nan)] == [0, 2, 6, 3, 3]
+def test_bars_are_relative_and_bounded() -> None:
+    assert "width:110px" in long_bar(0.5, "a<b", chosen=False)
+    assert "width:220px" in long_bar(3.0, "", chosen=True)
+    assert "width:1px" in long_bar(0.0, "", chosen=False)
+    assert "a&lt;b" in long_bar(0.5, "a<b", chosen=False)

@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from math import isfinite
+
+from markupsafe import Markup
 
 from detent.identify.fit.estimate import Estimate
-from detent.methods.cascade.units import Scale, Units
 from detent.page.words import GAP, number
 
 UNKNOWN = 10.0
@@ -13,6 +13,9 @@ UNKNOWN = 10.0
 
 UNKNOWN_DELAY = 0.1
 """The same of a delay [s], which may be 0."""
+
+LONGEST = 220
+"""Longest bar of a table [px]."""
 
 _KINDS = {
     "coulomb": "Coulomb friction",
@@ -37,8 +40,6 @@ _MEANINGS = {
 }
 
 _WAYS = {"positive": "in positive direction", "negative": "in negative direction"}
-
-_SMALL_EFFORTS = {"N": "mN", "N*m": "mN*m", "A": "mA", "V": "mV"}
 
 
 def constant_name(name: str, unit: str = "") -> str:
@@ -139,58 +140,10 @@ def _raised(power: int) -> str:
     return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-# ---- places and efforts
-
-
-@dataclass(frozen=True, slots=True)
-class Ways:
-    """How positions of a log are written."""
-
-    unit: str  # of the log's positions: "m", "rad", or anything else as it is
-
-    @property
-    def _units(self) -> Units | None:
-        return Units(rotary=self.unit == "rad") if self.unit in {"m", "rad"} else None
-
-    @property
-    def place(self) -> Scale:
-        """Of positions."""
-        return self._units.place if self._units else Scale(1.0, unit_text(self.unit))
-
-    @property
-    def speed(self) -> Scale:
-        """Of velocities."""
-        return self._units.speed if self._units else Scale(1.0, f"{unit_text(self.unit)}/s")
-
-    def small(self, peak: float) -> Scale:
-        """Of errors, by the largest of them."""
-        return self._units.small(peak) if self._units else self.place
-
-    def error(self, value: float) -> str:
-        """Write an error with its unit."""
-        return self._units.error(value) if self._units else f"{number(value)}{GAP}{self.place.name}"
-
-
-def effort_scale(unit: str, peak: float) -> Scale:
-    """Unit in which efforts are drawn, by the largest of them.
-
-    >>> effort_scale("N*m", 0.02).factor, effort_scale("N", 80.0).factor
-    (1000.0, 1.0)
-    """
-    if peak < 0.1 and unit in _SMALL_EFFORTS:
-        return Scale(1e3, unit_text(_SMALL_EFFORTS[unit]))
-    return Scale(1.0, unit_text(unit))
-
-
-def digits_for(peak: float) -> int:
-    """Digits after the point that a chart keeps of numbers up to a peak: four significant ones of the largest.
-
-    >>> digits_for(150.0), digits_for(0.02)
-    (2, 6)
-    """
-    return 3 if not (isfinite(peak) and peak > 0.0) else min(max(0, 4 - math.floor(math.log10(peak))), 12)
-
-
-def label_of(words: str, unit: str) -> str:
-    """Label of an axis: words, and the unit in brackets if there is one."""
-    return f"{words} [{unit}]" if unit else words
+def long_bar(share: float, text: str, *, chosen: bool) -> Markup:
+    """A bar, of at most `LONGEST`, with its figure."""
+    width = max(round(LONGEST * min(max(share, 0.0), 1.0)), 1)
+    colour = "good" if chosen else "muted"
+    return Markup(
+        '<span class="bar" style="width:{}px;background:var(--{})"></span><span class="nowrap">{}</span>'
+    ).format(width, colour, text)

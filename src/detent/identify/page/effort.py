@@ -1,0 +1,172 @@
+"""Figures of the report of an identification: what drove the axis, by the model too, and what is left."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from detent.identify.fit.equations import HOPS, Motion
+from detent.identify.fit.identification import Identification, prepare_all
+from detent.identify.fit.regression import Fit
+from detent.identify.fit.run import Run
+from detent.identify.page.scales import SINCE, effort_scale, label_of, peak_of, rms_of, scaled
+from detent.methods.cascade.units import percent
+from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts
+from detent.page.figure import Figure
+from detent.page.parts import Numbers
+from detent.page.thin import thin_indices
+from detent.page.words import number
+
+LAGS = 60
+"""Lags of the autocorrelation, in rows of the regression."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """Rows of the regression of one log, in SI units, arrays of shape (m,)."""
+
+    t: Numbers  # middle of each window since the log's begin [s]
+    effort: Numbers  # and fitted, residual: measured, by the model, and the difference
+    fitted: Numbers
+    residual: Numbers
+    velocity: Numbers  # mean velocity
+    place: Numbers  # number of each window on an even grid; where it jumps, windows in between were not usable
+    hop: float  # and width: distance of two neighbouring windows, and their width [s]
+    width: float
+
+
+def windows_of(found: Identification) -> tuple[Windows, ...]:
+    """Rows of the regression, log by log; none without a fit."""
+    fit = found.fit
+    if fit is None:
+        return ()
+    motions = [p.motion for p in prepare_all(found.runs, fit.instruments)]
+    ends = np.cumsum([len(motion.rows) for motion in motions])
+    return tuple(
+        _windows(fit, run, motion, slice(int(end) - len(motion.rows), int(end)))
+        for run, motion, end in zip(found.runs, motions, ends, strict=True)
+    )
+
+
+def _windows(fit: Fit, run: Run, motion: Motion, part: slice) -> Windows:
+    rows = motion.rows
+    hop = max(motion.kernel.half // HOPS, 1)
+    first = int(rows[0]) if len(rows) else 0
+    return Windows(
+        t=rows * run.step,
+        effort=fit.effort[part],
+        fitted=fit.effort[part] - fit.residual[part],
+        residual=fit.residual[part],
+        velocity=motion.velocity,
+        place=(rows - first) // hop,
+        hop=hop * run.step,
+        width=(2 * motion.kernel.half + 1) * run.step,
+    )
+
+
+def autocorrelation(windows: Sequence[Windows]) -> tuple[Numbers, Numbers]:
+    """Correlation of residuals with those some windows earlier; gaps do not count as neighbours."""
+    most = min(LAGS, max(int(one.place[-1]) for one in windows if len(one.place)))
+    products, pairs = np.zeros(most + 1), np.zeros(most + 1)
+    for one in windows:
+        if not len(one.place):
+            continue
+        size = int(one.place[-1]) + 1
+        values, known = np.zeros(size), np.zeros(size)
+        values[one.place], known[one.place] = one.residual, 1.0
+        for lag in range(min(most, size - 1) + 1):
+            products[lag] += values[lag:] @ values[: size - lag]
+            pairs[lag] += known[lag:] @ known[: size - lag]
+    means = np.divide(products, pairs, out=np.full(most + 1, np.nan), where=pairs > 0)
+    return (means / means[0] if means[0] > 0 else np.zeros(most + 1)), pairs
+
+
+# ---- figures
+
+
+def effort_figures(found: Identification, windows: Sequence[Windows], shown: int) -> list[Figure]:
+    """Effort over time of one log, and residuals of all."""
+    fit = found.fit
+    if fit is None or not windows or not len(windows[shown].t):
+        return []
+    run, one = found.runs[shown], windows[shown]
+    caption = Markup(
+        "The model's effort beside the recorded one, both averaged over windows of {}\u202fms; windows with "
+        "standstill, a reversal or missing samples are left out. <b>{} of the effort (rms) stays "
+        "unexplained.</b> What repeats in the residual is what the model lacks: a force that depends on the "
+        "position, cogging, another friction."
+    ).format(number(one.width * 1e3), percent(rms_of(fit.residual) / rms_of(fit.effort)))
+    told = (
+        "Left: one hump around 0 is as it should be; the outermost bars hold all that is larger. Right: beyond the "
+        "overlap of the windows bars within the dashed lines are noise; bars that stay outside tell of something that "
+        "the model lacks. The limits of the constants count with that."
+    )
+    residuals = [residual_chart(windows, run.effort_unit), memory_chart(windows)]
+    return [
+        Figure(title="Over time", caption=caption, charts=effort_charts(one, run)),
+        Figure(title="Residuals", caption=told, charts=residuals, beside=True),
+    ]
+
+
+def effort_charts(windows: Windows, run: Run) -> list[Chart]:
+    """Draw what drove the axis, measured and by the model, and what is left."""
+    gaps = np.flatnonzero(np.diff(windows.place) > 1) + 1
+    t, (effort, fitted, residual) = _with_gaps(windows.t, gaps, [windows.effort, windows.fitted, windows.residual])
+    scale = effort_scale(run.effort_unit, peak_of(effort))
+    curves = [
+        scaled("by the model", "speed", fitted, scale, width=2.5, thin=len(t)),
+        scaled("recorded", "left", effort, scale, dash=(5, 4), thin=len(t)),
+    ]
+    left = scaled("recorded less model", "current", residual, scale, thin=len(t))
+    return time_charts(Timeline(name="effort", t=t, label=SINCE, unit="s"), [
+        Panel(name="effort-both", label=label_of(run.effort_name, scale.name), curves=curves, zero=True),
+        Panel(name="effort-left", label=label_of("residual", scale.name), curves=[left], zero=True, height=150),
+    ])  # fmt: skip
+
+
+def _with_gaps(t: Numbers, before: Numbers, curves: Sequence[Numbers]) -> tuple[Numbers, list[Numbers]]:
+    """Rows that draw like all of them, with a gap in every curve before some rows.
+
+    Thinning looks for extremes, and would drop the gaps.
+    """
+    kept = np.unique(np.concatenate([before, *(thin_indices(curve, POINTS) for curve in curves)])).astype(np.intp)
+    holes = np.searchsorted(kept, before)
+    times = np.insert(t[kept], holes, 0.5 * (t[before - 1] + t[before]))
+    return times, [np.insert(curve[kept], holes, np.nan) for curve in curves]
+
+
+def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:
+    """Count residuals by their size."""
+    residual = np.concatenate([one.residual for one in windows])
+    # A few far ones must not squeeze all others into one bar; they stand at its end.
+    reach = 4.0 * rms_of(residual) or 1.0
+    scale = effort_scale(unit, reach)
+    at = np.clip(residual, -reach, reach) * scale.factor
+    heap = Heap(label="windows", colour="speed", at=at, counts=np.ones(len(at)))
+    labels = (label_of("recorded less model", scale.name), "windows")
+    chart = histogram_chart("residual-sizes", [heap], labels, finest=1e-3 * reach * scale.factor)
+    return chart | {"title": "How large residuals are"}
+
+
+def memory_chart(windows: Sequence[Windows]) -> Chart:
+    """Draw how much a residual resembles those before it, with the bounds of residuals that do not."""
+    correlation, pairs = autocorrelation(windows)
+    one = windows[0]
+    lag = np.arange(len(correlation)) * one.hop * 1e3
+    bound = 1.96 / math.sqrt(max(pairs[0], 1.0))
+    panel = Panel(
+        name="residual-memory",
+        label="correlation",
+        title="How much they resemble earlier ones",
+        height=260,
+        zero=True,
+        span=(min(-0.4, float(np.nanmin(correlation)) - 0.05), 1.05),
+        curves=[Curve(label="with the residual so much earlier", colour="speed", y=correlation)],
+        levels=[(bound, "95 % of white noise"), (-bound, "")],
+    )
+    chart = line_chart(panel, lag, "earlier by [ms]")
+    chart["series"][0]["bars"] = 0
+    overlap = {"spans": [[0.0, round(one.width * 1e3, 3)]], "colour": "brake", "label": "windows overlap"}
+    return chart | {"bands": [overlap]}

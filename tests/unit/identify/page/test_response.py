@@ -1,0 +1,64 @@
+"""The frequency response: where a log tells one, and what stands beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.unit.identify.page.samples import constants, refused, rigid, trusted
+
+from detent.identify.page import response as response_module
+from detent.identify.page.response import bode_plot, respond, response_figures, told_response
+
+pytestmark = pytest.mark.compiled
+
+
+def test_moves_in_a_closed_loop_tell_no_response() -> None:
+    assert told_response(trusted(), 0) is None
+
+
+@pytest.mark.parametrize(
+    ("response", "told"),
+    [
+        (rigid(), True),
+        (rigid(lines=8), False),
+        (rigid(coherence=0.5), False),
+        (rigid(rough=3.0), False),
+        (rigid().within(10.0, 25.0), False),
+    ],
+)
+def test_a_response_is_told_by_coherent_lines_that_agree(
+    response: object, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(response_module, "response_of", lambda *_: response)
+    assert (told_response(trusted(), 0) is response) is told
+
+
+def test_a_rigid_axis_answers_by_its_mass() -> None:
+    c = constants()
+    (high,) = respond(c, np.array([100.0]))
+    assert abs(high) == pytest.approx(1.0 / (2.0 * (2 * np.pi * 100.0) ** 2), rel=1e-4)
+    late = np.degrees(np.angle(high)) % 360.0
+    assert late == pytest.approx(180.0 - 360.0 * 100.0 * 1e-3 + np.degrees(4.5 / (2.0 * 2 * np.pi * 100.0)), abs=0.01)
+
+
+def test_without_a_mass_there_is_no_response() -> None:
+    c = constants()
+    assert respond(replace(c, values=-c.values), np.array([1.0])) is None
+
+
+def test_the_response_is_drawn_beside_the_rigid_axis_of_the_constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(response_module, "response_of", lambda *_: rigid())
+    (figure,) = response_figures(trusted(), 0)
+    assert "mean of 5 &lt;periods&gt;" in figure.caption
+    assert figure.drawing is not None
+    assert figure.drawing.count("<svg viewBox") == 3
+    assert "magnitude [m/N]" in figure.drawing
+    assert "mass and viscous friction" in figure.drawing
+    assert "mass and viscous friction" not in bode_plot(rigid(), None)
+
+
+def test_without_a_response_it_says_what_would_tell_one() -> None:
+    (figure,) = response_figures(trusted(), 0)
+    assert figure.drawing is not None
+    assert "multisine" in figure.drawing
+    assert response_figures(refused(), 0) == []
