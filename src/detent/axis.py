@@ -10,8 +10,9 @@ from detent.axisfile.tables import AxisSpec
 from detent.errors import DetentError
 from detent.methods.check import CheckReport, check_spec
 from detent.methods.load import AxisFile, read_axis
-from detent.methods.method import Comparison, Job, Method, Result, Shown, Simulated
+from detent.methods.method import Job, Method, Result, Shown, Simulated
 from detent.methods.registry import METHODS, bringing
+from detent.page.frame import Comparison
 from detent.record.capture import Stretch, capture
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves, make_trace
@@ -354,7 +355,7 @@ class Run:
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
-        from detent.page.page import write_page
+        from detent.page.render import write_page
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.simulated.seed)} | self.settings
         shown = Shown(trace=self.trace, comparisons=self.comparisons, settings=settings)

@@ -1,8 +1,7 @@
 """`detent compare`: the method beside its alternatives."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -27,6 +26,7 @@ def compare(
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
+    from detent.page.draw import draw_figures
     from detent.page.frame import comparison_page
     from detent.page.plots import SUFFIXES, check_figure_path
     from detent.page.render import write_page
@@ -37,45 +37,19 @@ def compare(
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "running the axis in several ways")
         found = axis.compare(progress)
-        told = [_told(axis, one) for one in found]
         progress(0.9, "drawing")
         if figure.suffix.lower() == ".html":
             files = [figure]
-            write_page(figure, comparison_page(axis.name, told, {"axis file": axis.file.file}))
+            write_page(figure, comparison_page(axis.name, found, {"axis file": axis.file.file}))
         else:
             files = [figure if k == 1 else figure.with_stem(f"{figure.stem}-{k}") for k in range(1, len(found) + 1)]
             for one, path in zip(found, files, strict=True):
-                _draw(axis, one, path)
+                draw_figures(one.figures(), path)
     if as_json:
-        data = [{"title": one.table.title} | came.to_dict() for one, came in zip(told, found, strict=True)]
+        data = [{"title": one.table.title} | one.to_dict() for one in found]
         print_json({"comparisons": data, "files": [str(path) for path in files]})
         return
-    for one in told:
+    for one in found:
         print_table(*one.table, right=True)
     for path in files:
         print(f"{'page' if path.suffix.lower() == '.html' else 'figure'}: {path}")
-
-
-def _told(axis: Any, one: Any) -> Any:
-    from detent.page.table import TextTable
-
-    return one if hasattr(one, "figures") else _TableOnly(TextTable(*axis.method.table(axis.spec, one)))
-
-
-def _draw(axis: Any, one: Any, path: Path) -> None:
-    from detent.page.draw import draw_figures
-
-    if hasattr(one, "figures"):
-        draw_figures(one.figures(), path)
-    else:
-        axis.method.plot(axis.spec, one, path)
-
-
-@dataclass(frozen=True, slots=True)
-class _TableOnly:
-    """A comparison that does not draw its figures itself yet."""
-
-    table: Any
-
-    def figures(self) -> tuple[Any, ...]:
-        return ()

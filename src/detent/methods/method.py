@@ -17,16 +17,12 @@ from detent.files.findings import Caution, Contradiction, Derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Page as FramePage
-    from detent.page.page import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
     from detent.record.machine import Progress
     from detent.record.trace import Trace
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
-
-Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
-"""Title, heads and rows, for the terminal."""
 
 
 class Job(Protocol):
@@ -60,14 +56,6 @@ class Result(Protocol):
     def warnings(self) -> Sequence[str]:
         """What looks wrong about the run."""
         ...
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, as ``--json`` prints it."""
-        ...
-
-
-class Comparison(Protocol):
-    """The method beside a way that it was made to better."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
@@ -158,7 +146,7 @@ class Method(Protocol[SpecT]):
         """The axis as the simulation takes it."""
         ...
 
-    def compare(self, spec: SpecT, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""
         del spec, progress
         return ()
@@ -174,16 +162,8 @@ class Method(Protocol[SpecT]):
         """The figures of a run that a person wants first."""
         ...
 
-    def page(self, spec: SpecT, result: Any, shown: Shown) -> "Page | FramePage":
+    def page(self, spec: SpecT, result: Any, shown: Shown) -> "Page":
         """The report of a run."""
-        ...
-
-    def table(self, spec: SpecT, comparison: Any) -> Table:
-        """A comparison as a table for the terminal."""
-        ...
-
-    def plot(self, spec: SpecT, comparison: Any, path: Path) -> None:
-        """A comparison as a PNG, SVG or PDF file."""
         ...
 
     # ---- what only some methods bring; the registry tells which (`registry.bringing`)

@@ -108,6 +108,10 @@ class Comparison(Protocol):
         """The same for a page."""
         ...
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as ``--json`` prints it."""
+        ...
+
 
 def comparison_section(found: Sequence[Comparison]) -> Section:
     """Figures of comparisons, as the page of a run shows them."""

@@ -1,8 +1,6 @@
 """How the page writes numbers, directions and tables."""
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from html import escape
 from math import degrees as to_degrees
 from math import isnan, pi
 
@@ -135,11 +133,6 @@ class CountUnit:
         return f"{text} {self.word if text == '1' else self.words}"
 
 
-def micrometres(length: float) -> str:
-    """Write a small length [m] in micrometres, with its unit."""
-    return f"{number(length * 1e6, 2)}{GAP}µm"
-
-
 def inches_per_second(speed: float) -> str:
     """Write a speed [m/s] in in/s, without its unit."""
     return number(round(abs(speed) / INCH, 2))
@@ -149,41 +142,3 @@ def arrow(direction: int) -> Markup:
     """An arrow to the right for +1, to the left for -1, in the colour of the direction."""
     name, sign = ("right", "\u2192") if direction > 0 else ("left", "\u2190")
     return Markup('<span class="arrow {}">{} {}</span>').format(name, sign, name)
-
-
-def bar_cell(value: float, longest: float, *, over: bool = False) -> str:
-    """Make a cell of a table with a bar before its number, so that rows can be compared at a glance."""
-    if isnan(value):
-        return '<td class="n">\u2013</td>'
-    bar = f'<span class="bar" style="width:{48 * value / longest:.0f}px"></span>'
-    return f'<td class="{"n over" if over else "n"}">{bar}{number(value, 2)}</td>'
-
-
-def offset_cell(offset: float, longest: float, *, over: bool = False) -> str:
-    """Make a cell of a table with a bar for a magnitude before the figure with its sign."""
-    cell = bar_cell(abs(offset), longest, over=over)
-    return cell.replace("</span>", f"</span>{'+' if offset > 0 else '−' if offset < 0 else ''}")
-
-
-def table(heads: Sequence[tuple[str, bool]], rows: Iterable[Sequence[str]], *, tall: bool = False) -> str:
-    """Make a table that scrolls within itself on a narrow screen."""
-    head = "".join(f'<th scope="col"{_aligned(numeric)}>{escape(title)}</th>' for title, numeric in heads)
-    numerics = [numeric for _, numeric in heads]
-    body = "\n".join(
-        "<tr>"
-        + "".join(
-            cell if cell.startswith("<td") else f"<td{_aligned(numeric)}>{cell}</td>"
-            for cell, numeric in zip(row, numerics, strict=True)
-        )
-        + "</tr>"
-        for row in rows
-    )
-    # The tab stop lets a keyboard scroll it.
-    return (
-        f'<div class="scroll{" tall" if tall else ""}" tabindex="0">'
-        f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>"
-    )
-
-
-def _aligned(numeric: bool) -> str:  # noqa: FBT001 - one flag, one meaning
-    return ' class="n"' if numeric else ""

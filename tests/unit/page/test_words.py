@@ -6,15 +6,11 @@ from detent.page import words
 from detent.page.words import (
     GAP,
     arrow,
-    bar_cell,
     count,
     duration,
     further,
     inches_per_second,
-    micrometres,
     number,
-    offset_cell,
-    table,
 )
 
 
@@ -57,21 +53,8 @@ def test_durations_change_their_unit_without_a_gap(seconds: float, text: str) ->
 
 
 def test_lengths_and_speeds_come_in_the_units_of_the_trade() -> None:
-    assert plain(micrometres(9.61e-6)) == "9.6 µm"
     assert inches_per_second(-1.016) == "40"
     assert inches_per_second(80 / 6 * 0.0254) == "13.3"
-
-
-def test_a_table_aligns_numbers_and_escapes_its_titles() -> None:
-    html = table([("a < b", False), ("n", True)], [("x", "1"), ("<td>own</td>", "2")])
-    assert '<th scope="col">a &lt; b</th><th scope="col" class="n">n</th>' in html
-    assert '<tr><td>x</td><td class="n">1</td></tr>' in html
-    assert '<tr><td>own</td><td class="n">2</td></tr>' in html
-
-
-def test_a_row_of_the_wrong_length_is_refused() -> None:
-    with pytest.raises(ValueError, match="zip"):
-        table([("a", False)], [("x", "y")])
 
 
 def test_directions_have_their_arrow() -> None:
@@ -82,17 +65,3 @@ def test_directions_have_their_arrow() -> None:
 def test_what_is_left_out_is_counted() -> None:
     assert plain(further(1, "line")) == "1 further line is"
     assert plain(further(1200, "move")) == "1 200 further moves are"
-
-
-def test_a_bar_is_as_long_as_its_number_is_large() -> None:
-    assert bar_cell(3.0, 6.0) == '<td class="n"><span class="bar" style="width:24px"></span>3</td>'
-    assert bar_cell(6.0, 6.0, over=True) == '<td class="n over"><span class="bar" style="width:48px"></span>6</td>'
-    assert bar_cell(float("nan"), 6.0) == '<td class="n">–</td>'
-
-
-def test_an_offset_has_a_bar_for_its_magnitude_and_a_sign() -> None:
-    assert plain(offset_cell(3.0, 6.0)) == '<td class="n"><span class="bar" style="width:24px"></span>+3</td>'
-    over = '<td class="n over"><span class="bar" style="width:48px"></span>−6</td>'
-    assert offset_cell(-6.0, 6.0, over=True) == over
-    assert offset_cell(0.0, 6.0) == '<td class="n"><span class="bar" style="width:0px"></span>0</td>'
-    assert offset_cell(float("nan"), 6.0) == '<td class="n">–</td>'

@@ -9,14 +9,14 @@ from detent.files.findings import Caution, Derived
 from detent.methods.cascade.checks import RULES, find_cautions
 from detent.methods.cascade.derive import derive
 from detent.methods.cascade.schema import CascadeSpec, fill_derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.logs.log import Log
     from detent.methods.cascade.replay_job import ReplayJob
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -28,7 +28,7 @@ TIMING = (
 ROTARY: type[CascadeSpec] = rotary_model(CascadeSpec)
 
 
-class Cascade(Method[CascadeSpec]):
+class CascadeMethod(Method[CascadeSpec]):
     """Position over velocity loop, the usual servo of today."""
 
     name = "cascade"
@@ -54,9 +54,9 @@ class Cascade(Method[CascadeSpec]):
 
     def registers(self) -> "type[Registers]":
         """State of the axis."""
-        from detent.methods.cascade.system import Cascade as State
+        from detent.methods.cascade.system import Cascade
 
-        return State
+        return Cascade
 
     def parameters(self) -> "type[Registers]":
         """Constants of the axis."""
@@ -99,7 +99,7 @@ class Cascade(Method[CascadeSpec]):
             sample_job=lambda: one_move("one move", way if spec.mechanics.start_position < middle else -way, 0.05),
         )
 
-    def compare(self, spec: CascadeSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: CascadeSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """With and without feed-forward and limited jerk."""
         from detent.methods.cascade.comparison import compare_profiles
 

@@ -8,12 +8,12 @@ from detent.files.findings import Caution, Derived
 from detent.methods.filtered_servo.checks import RULES, find_cautions
 from detent.methods.filtered_servo.derive import derive
 from detent.methods.filtered_servo.schema import FilteredServoSpec, fill_derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
@@ -27,7 +27,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class FilteredServo(Method[FilteredServoSpec]):
+class FilteredServoMethod(Method[FilteredServoSpec]):
     """Command pulses, counted speed behind a digital filter."""
 
     name = "filtered_servo"
@@ -52,9 +52,9 @@ class FilteredServo(Method[FilteredServoSpec]):
 
     def registers(self) -> "type[Registers]":
         """State of the axis."""
-        from detent.methods.filtered_servo.system import FilteredServo as State
+        from detent.methods.filtered_servo.system import FilteredServo
 
-        return State
+        return FilteredServo
 
     def parameters(self) -> "type[Registers]":
         """Constants of the axis."""
@@ -87,7 +87,7 @@ class FilteredServo(Method[FilteredServoSpec]):
             sample_job=lambda: one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2),
         )
 
-    def compare(self, spec: FilteredServoSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: FilteredServoSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside no filter, a longer window, a smaller multiplier."""
         from detent.methods.filtered_servo.comparison import compare_feedback
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 from detent.methods.phase_servo.checks import RULES, find_cautions
 from detent.methods.phase_servo.derive import derive
@@ -14,7 +14,7 @@ from detent.methods.phase_servo.schema import PhaseServoSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
@@ -31,7 +31,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class PhaseServo(Method[PhaseServoSpec]):
+class PhaseServoMethod(Method[PhaseServoSpec]):
     """Resolver phase: pulses for speed, an absolute word for the stop."""
 
     name = "phase_servo"
@@ -56,9 +56,9 @@ class PhaseServo(Method[PhaseServoSpec]):
 
     def registers(self) -> "type[Registers]":
         """State of the axis."""
-        from detent.methods.phase_servo.system import PhaseServo as State
+        from detent.methods.phase_servo.system import PhaseServo
 
-        return State
+        return PhaseServo
 
     def parameters(self) -> "type[Registers]":
         """Constants of the axis."""
@@ -97,7 +97,7 @@ class PhaseServo(Method[PhaseServoSpec]):
             sample_job=lambda: one_move("one move of 6 pitches", 6 * spec.pitch, 0.05),
         )
 
-    def compare(self, spec: PhaseServoSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: PhaseServoSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside a servo that stops by counted pulses: noise, rest, load."""
         from detent.methods.phase_servo.hold_comparison import compare_hold
         from detent.methods.phase_servo.noise_comparison import compare_noise

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.print_head.checks import RULES, find_cautions
 from detent.methods.print_head.derive import derive
 from detent.methods.print_head.schema import PrintHeadSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -21,7 +21,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class PrintHead(Method[PrintHeadSpec]):
+class PrintHeadMethod(Method[PrintHeadSpec]):
     """Brush DC carriage that measures itself at power-up, then prints."""
 
     name = "print_head"
@@ -81,7 +81,7 @@ class PrintHead(Method[PrintHeadSpec]):
             sample_job=lambda: parse_text("detent", "one word"),
         )
 
-    def compare(self, spec: PrintHeadSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: PrintHeadSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Three drives on a machine that has drifted."""
         from detent.methods.print_head.comparison import compare_drives
 

@@ -4,14 +4,14 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from detent.files.findings import Caution, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.rotary_table.checks import RULES, find_cautions
 from detent.methods.rotary_table.derive import derive
 from detent.methods.rotary_table.schema import RotaryTableSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -21,7 +21,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class RotaryTable(Method[RotaryTableSpec]):
+class RotaryTableMethod(Method[RotaryTableSpec]):
     """Absolute angle of one turn, servo-controlled jog for any number of turns."""
 
     name = "rotary_table"
@@ -45,9 +45,9 @@ class RotaryTable(Method[RotaryTableSpec]):
 
     def registers(self) -> "type[Registers]":
         """State of the axis."""
-        from detent.methods.rotary_table.system import RotaryTable as State
+        from detent.methods.rotary_table.system import RotaryTable
 
-        return State
+        return RotaryTable
 
     def parameters(self) -> "type[Registers]":
         """Constants of the axis."""
@@ -85,7 +85,7 @@ class RotaryTable(Method[RotaryTableSpec]):
             sample_job=sample_job,
         )
 
-    def compare(self, spec: RotaryTableSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: RotaryTableSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside an angle without extension and a jog without position control."""
         from detent.methods.rotary_table.comparison_runs import compare_angle
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.catalogue import STEPPER_MOTORS
 from detent.files.findings import Caution, Contradiction, Derived
-from detent.methods.method import Comparison, Method, Shown, Simulated
+from detent.methods.method import Method, Shown, Simulated
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, fill_derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.methods.stepper_envelope.envelope_files import Envelope
-    from detent.page.frame import Page
+    from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
@@ -20,7 +20,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class StepperEnvelope(Method[StepperEnvelopeSpec]):
+class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     """Several steppers, the permissible speed of every step as a table."""
 
     name = "stepper_envelope"
@@ -99,7 +99,7 @@ class StepperEnvelope(Method[StepperEnvelopeSpec]):
             sample_job=sample_job,
         )
 
-    def compare(self, spec: StepperEnvelopeSpec, progress: "Progress | None" = None) -> tuple[Comparison, ...]:
+    def compare(self, spec: StepperEnvelopeSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside speed computed per step, constant speed, and a jerk-limited profile."""
         from detent.methods.stepper_envelope.comparison import compare_steps
         from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
