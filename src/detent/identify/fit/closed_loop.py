@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import plant_registers, start_velocities
 from detent.identify.fit.loop_fit import Loops, fit_loops
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 from detent.kernel.loop import advance
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, switch_on
 from detent.planning.profile import profile_of_recording

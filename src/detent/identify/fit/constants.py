@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import Estimate, estimate, significant
+from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit, Instruments
-from detent.identify.fit.run import Run
 
 Numbers = NDArray[np.float64]
 

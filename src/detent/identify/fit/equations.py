@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.kernel import Kernel, Rows, make_kernel
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
+from detent.identify.fit.weights import Kernel, Rows, make_kernel
 
 Numbers = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from detent.identify.fit.constants import Constants, hanging_position
 from detent.identify.fit.equations import fine_kernel
-from detent.identify.fit.kernel import make_kernel
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
+from detent.identify.fit.weights import make_kernel
 from detent.kernel.loop import advance
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, driven, fill_clocks, switch_on
 from detent.plant.two_mass import fastest_rate

@@ -13,13 +13,13 @@ from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS
 from detent.identify.fit.estimate import Estimate, quantiles
 from detent.identify.fit.free_run import Horizon, simulate_horizons
-from detent.identify.fit.kernel import make_kernel
 from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
 from detent.identify.fit.output_error import STRETCH, fit_output_error
+from detent.identify.fit.prepare import Run, make_run
 from detent.identify.fit.regression import Fit, Instruments, Prepared, prepare
 from detent.identify.fit.residuals import Residuals, residuals_of
-from detent.identify.fit.run import Run, make_run
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
+from detent.identify.fit.weights import make_kernel
 from detent.logs.log import Log
 
 Numbers = NDArray[np.float64]

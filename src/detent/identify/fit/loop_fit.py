@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import significant
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 
 Numbers = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import Plant, start_velocities
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 
 Numbers = NDArray[np.float64]
 Report = Callable[[float], None]

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance
 from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
-from detent.identify.fit.kernel import Kernel, make_kernel
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
+from detent.identify.fit.weights import Kernel, make_kernel
 
 Numbers = NDArray[np.float64]
 Instruments = Literal["reference", "position", "none"]

@@ -12,8 +12,8 @@ from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb
+from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Prepared
-from detent.identify.fit.run import Run
 from detent.logs.log import Kind, Log, Severity
 
 Numbers = NDArray[np.float64]

@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from detent.identify.fit.equations import HOPS, Motion
 from detent.identify.fit.identification import Identification, prepare_all
+from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit
-from detent.identify.fit.run import Run
 from detent.identify.page.scales import SINCE, effort_scale, label_of, peak_of, rms_of, scaled
 from detent.methods.cascade.units import percent
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from detent.identify.fit.identification import Identification
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 from detent.identify.page.scales import SINCE, Ways, effort_scale, label_of, peak_of, scaled
 from detent.identify.page.words import constant_name, unit_text
 from detent.logs.log import Action, Finding, Log, Severity, tell_rows

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
 from detent.identify.fit.identification import HELD_OUT, Identification
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 from detent.identify.page.scales import SINCE, Ways, label_of, peak_of, rms_of, scaled
 from detent.identify.page.words import long_bar
 from detent.methods.cascade.units import Scale, percent

@@ -15,7 +15,7 @@ from detent.errors import AxisError, DetentError
 from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 from detent.identify.write.axis_patch import patch
 from detent.identify.write.file_numbers import NATIVE, FileNumbers, Number, plain
 from detent.identify.write.seen import Seen, outwards, see

@@ -14,7 +14,7 @@ from detent.errors import DetentError
 from detent.identify.fit.constants import hanging_position
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, FrictionTable
 from detent.units import format_quantity
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from detent.errors import DetentError
-from detent.identify.fit.kernel import make_kernel
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
+from detent.identify.fit.weights import make_kernel
 
 WINDOW = 0.02
 """Half of the window of velocities and accelerations [s]."""

@@ -6,7 +6,7 @@ from tests.trust.plants import make_axis, make_case
 
 from detent.identify.fit.closed_loop import simulate_closed_loop
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 
 pytestmark = pytest.mark.compiled
 

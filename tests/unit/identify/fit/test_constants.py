@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from detent.identify.fit.constants import Constants, constants_of, hanging_position
+from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit
-from detent.identify.fit.run import Run
 
 RNG = np.random.default_rng(1)
 

@@ -17,7 +17,7 @@ from detent.identify.fit.equations import (
     terms_of,
     usable_rows,
 )
-from detent.identify.fit.kernel import make_kernel
+from detent.identify.fit.weights import make_kernel
 
 KERNEL = make_kernel(10, 2e-3)
 

@@ -8,7 +8,7 @@ from detent.errors import DetentError
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import Plant
 from detent.identify.fit.output_error import cut_stretches, fit_output_error
-from detent.identify.fit.run import Run
+from detent.identify.fit.prepare import Run
 
 pytestmark = pytest.mark.compiled
 

@@ -7,10 +7,10 @@ import pytest
 from tests.identify_rig import TRUTH, Recorder
 
 from detent.identify.fit.equations import LOSS
-from detent.identify.fit.kernel import make_kernel
 from detent.identify.fit.ladder import best_bend
+from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import WIDER, fit_equations, lag_of, make_columns, prepare, solve
-from detent.identify.fit.run import Run
+from detent.identify.fit.weights import make_kernel
 
 NAMES = tuple(TRUTH)
 HALF = 10

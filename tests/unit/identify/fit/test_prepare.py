@@ -5,7 +5,7 @@ import pytest
 from tests.identify_rig import make_log
 
 from detent.errors import InputError
-from detent.identify.fit.run import EFFORTS, find_count, make_run, noise_of
+from detent.identify.fit.prepare import EFFORTS, find_count, make_run, noise_of
 from detent.logs.log import Action, Finding, Kind
 
 T = np.arange(1000) * 1e-3
