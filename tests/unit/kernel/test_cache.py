@@ -142,7 +142,7 @@ def test_steps_outside_the_package_are_compiled_but_not_cached(package, tmp_path
             return 2 * x
     """
     (tmp_path / "lib" / "elsewhere.py").write_text(textwrap.dedent(outside))
-    package.write("simulation/elsewhere.py", outside)  # a room whose edits do not change the hash
+    package.write("record/elsewhere.py", outside)  # a room whose edits do not change the hash
     program = """
         import elsewhere
         from detent.record import elsewhere as above
