@@ -224,6 +224,6 @@ def test_plain_python_gives_the_same_bits(golden):
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        print(json.dumps(all_bits(whole=sys.argv[1] == "whole")))
+        sys.stdout.write(json.dumps(all_bits(whole=sys.argv[1] == "whole")))
     else:
         GOLDEN.write_text(json.dumps(all_bits(whole=True), indent=2) + "\n")

@@ -96,7 +96,7 @@ def take_reference(r: Cascade, position: HostArray, velocity: HostArray, acceler
 
 
 @step
-def serve(  # noqa: PLR0913 - an axis, its plant, and what the host has laid ready
+def serve(
     p: CascadeParams,
     r: Cascade,
     machine: TwoMass,
@@ -131,7 +131,7 @@ def move(p: CascadeParams, r: Cascade, machine: TwoMass) -> None:
 
 @ticks(CascadeParams, local="machine")
 @hot_step
-def tick(  # noqa: PLR0913 - an axis, its plant, and what the host has laid ready
+def tick(
     p: CascadeParams,
     r: Cascade,
     machine: TwoMass,
