@@ -65,6 +65,9 @@ class _PackageCache(FunctionCache):
     """
 
     _impl_class = _PackageCacheImpl
+    _impl: Any  # numba states no types
+    _cache_path: Any
+    _cache_file: Any
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these types; None if nothing was, or if it is not kept."""
@@ -85,9 +88,8 @@ class _PackageCache(FunctionCache):
             return False
         names = " ".join(f"{one.__module__}.{one.__qualname__}" for one in files)
         mark = hashlib.sha256(names.encode()).hexdigest()[:8]
-        self._cache_file: Any = IndexDataCacheFile(
-            self._cache_path, f"{self._impl.filename_base}-{mark}", self._impl.locator.get_source_stamp()
-        )
+        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
+        self._cache_file = IndexDataCacheFile(self._cache_path, f"{base}-{mark}", stamp)
         return True
 
 
