@@ -89,7 +89,7 @@ def test_the_page_of_the_tick_names_functions_of_every_block_of_the_loop():
         for module in modules().get(text.split(".")[0], [])
         if is_code(text)
     }
-    assert {"systems", "control", "drive", "plant", "sensing", "simulation", "planning"} <= rooms
+    assert {"kernel", "methods", "control", "drive", "plant", "sensing", "record"} <= rooms
 
 
 @pytest.mark.parametrize("name", ["head_motion.put_drives", "h_bridge.Bridge.pulses", "no_module.step", "head.outs"])

@@ -101,7 +101,7 @@ class Tables:
 
 def tables_of(rig: Rig) -> Tables:
     """The tables as they are now."""
-    up, down = (np.where(table < 0, -1, table & INDEX_MASK) for table in rig.tables)
+    up, down = (np.where(table < 0, -1, table & INDEX_MASK) for table in map(np.asarray, rig.tables))
     return Tables(rig.r.timer.pulses, up, down)
 
 

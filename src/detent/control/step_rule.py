@@ -174,11 +174,7 @@ def come_to_rest(r: StepRule, permissible: int, moved: bool) -> int:
 
 @hot_step
 def next_entry(r: StepRule, up: Entries, down: Entries) -> int:
-    """Entry of the next step, read while the present one runs.
-
-    No other step of the loop takes the tables: handing an array on counts its references up and down, and four counts
-    cost more than a whole decision.
-    """
+    """Entry of the next step, read while the present one runs; no other step of the rule takes the tables."""
     if not 0 <= r.position < len(up):
         return OUTSIDE
     direction = r.heading if r.index < 0 else r.direction

@@ -9,7 +9,7 @@ W. J. Cody, W. Waite: Software Manual for the Elementary Functions (1980): reduc
 FDLIBM 5.3 (Sun Microsystems, 1993; e_exp.c, k_sin.c, k_cos.c, e_rem_pio2.c): the constants, and the order of the sums.
 """
 
-from math import floor, inf
+from math import floor, inf, sqrt
 
 from detent.kernel.compiled import power_of_two
 from detent.kernel.step import step
@@ -103,3 +103,33 @@ def less_whole_turns(x: float) -> float:
             x -= turn
         turn *= 0.5
     return x
+
+
+SERIES_UP_TO = 0.5
+"""Beyond it, `one_less_exp` is its difference: less than a bit and a half is lost there."""
+
+
+def one_less_exp(x: float) -> float:
+    """``1 - exp(-x)`` of x, 0 or more, by its series where the difference would cancel. For parameters: no step."""
+    if x > SERIES_UP_TO:
+        return 1.0 - exp(-x)
+    term, total, n = x, 0.0, 1
+    while total + term != total:
+        total += term
+        n += 1
+        term *= -x / n
+    return total
+
+
+def angle_of(y: float, x: float) -> float:
+    """Angle of a vector from -pi to pi [rad], halved until its series is short. For parameters: no step."""
+    if y == 0.0:
+        return 0.0 if x >= 0.0 else 0.5 * FULL_TURN
+    length = sqrt(x * x + y * y)
+    tangent = y / (length + x) if x > 0.0 else (length - x) / y  # of half the angle
+    for _ in range(3):
+        tangent /= 1.0 + sqrt(1.0 + tangent * tangent)
+    square, total = tangent * tangent, 0.0
+    for n in range(25, 0, -2):
+        total = 1.0 / n - square * total
+    return 16.0 * tangent * total

@@ -4,6 +4,7 @@ A step reads its Params, writes its own Registers, allocates nothing and never r
 same functions run as plain Python on the same memory and give the same bits.
 """
 
+import hashlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any, TypeVar, cast
 import numba as untyped_numba
 from numba.core import config as untyped_config
 from numba.core import types as untyped_types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 
 import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
 from detent.kernel.cache import compiled_folder, is_step_source, source_hash
@@ -58,28 +59,38 @@ class _PackageCacheImpl(CompileResultCacheImpl):
 class _PackageCache(FunctionCache):
     """Keeps what is compiled for registers of the package.
 
-    An index names the types of all it holds, and cannot be read at all where one of them cannot be imported: machine
-    code for the registers of somebody's own script stays with the process that made it.
+    An index names the types of all it holds: reading it imports them, and fails where one cannot be imported. So each
+    set of registers has an index of its own, and `advance` of one method imports no other method; machine code for the
+    registers of somebody's own script stays with the process that made it.
     """
 
     _impl_class = _PackageCacheImpl
+    _impl: Any  # numba states no types
+    _cache_path: Any
+    _cache_file: Any
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these types; None if nothing was, or if it is not kept."""
         kept: Any = super()
-        return kept.load_overload(sig, target_context) if _is_of_the_package(sig) else None
+        return kept.load_overload(sig, target_context) if self._choose_index(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for these types."""
         kept: Any = super()
-        if _is_of_the_package(sig):
+        if self._choose_index(sig):
             kept.save_overload(sig, data)
 
-
-def _is_of_the_package(signature: Any) -> bool:
-    """True when all registers among the types of a call are declared by the package."""
-    kinds = getattr(signature, "args", signature)
-    return all(kind.registers.__module__.startswith("detent.") for kind in kinds if hasattr(kind, "registers"))
+    def _choose_index(self, signature: Any) -> bool:
+        """Turn to the index of the registers among the types of a call; False where not all are the package's."""
+        kinds = getattr(signature, "args", signature)
+        files = [kind.registers for kind in kinds if hasattr(kind, "registers")]
+        if not all(one.__module__.startswith("detent.") for one in files):
+            return False
+        names = " ".join(f"{one.__module__}.{one.__qualname__}" for one in files)
+        mark = hashlib.sha256(names.encode()).hexdigest()[:8]
+        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
+        self._cache_file = IndexDataCacheFile(self._cache_path, f"{base}-{mark}", stamp)
+        return True
 
 
 def step(function: F) -> F:

@@ -6,6 +6,7 @@ then on. Backlash is kept as the output's place relative to the motor: it never 
 
 import math
 
+from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import hot_step, step
 from detent.kernel.turn_table import FRACTION, TURN, TurnTable, at_phase, fill_table
@@ -45,4 +46,4 @@ def output_phase(p: GearParams, slack: float, turns: int, angle: float) -> int:
 
 def fill_eccentricity(p: GearParams, amplitude: float, angle: float) -> None:
     """Let the output lead by ``amplitude * sin(output - angle)``, both in radians; the output is right at `angle`."""
-    fill_table(p.eccentricity, lambda turns: amplitude * math.sin(2 * math.pi * turns - angle) / (2 * math.pi))
+    fill_table(p.eccentricity, lambda turns: amplitude * sin(2 * math.pi * turns - angle) / (2 * math.pi))

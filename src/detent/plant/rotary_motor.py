@@ -11,6 +11,7 @@ The angle is kept as whole turns and a rest within one turn, so that it stays ex
 
 import math
 
+from detent.kernel.elementary import exp, one_less_exp
 from detent.kernel.registers import Registers, block, f8, i1, i8, register
 from detent.kernel.step import hot_step
 
@@ -97,10 +98,10 @@ def fill_response(p: RotaryMotorParams, target: Response, stiffness: float) -> N
     h = p.period
     k = (p.viscous + stiffness) / p.inertia
     lag = k * h
-    first = -math.expm1(-lag) / lag if lag > 0.0 else 1.0
+    first = one_less_exp(lag) / lag if lag > 0.0 else 1.0
     # (1 - first) / lag cancels for a small lag: its series there is exact to rounding.
     second = (1.0 - first) / lag if lag > 1e-2 else _second(lag)
-    target.v_v = math.exp(-lag)
+    target.v_v = exp(-lag)
     target.v_t = h / p.inertia * first
     target.x_v = h * first
     target.x_t = h * h / p.inertia * second

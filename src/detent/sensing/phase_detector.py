@@ -8,6 +8,7 @@ that depend on position only; a table per pitch holds them (`fill_errors`).
 
 import math
 
+from detent.kernel.elementary import angle_of, sin
 from detent.kernel.noise import NoiseSource, bell
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
@@ -76,12 +77,14 @@ def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float
     ``sin(wt + atan2(b, a)) = offset / sqrt(a^2 + b^2)``.
     """
     p.rise.used = p.fall.used = 1 if gain or quadrature or offset else 0
+    quarter = 0.5 * math.pi
     for k in range(POINTS + 1):
         x = 2 * math.pi * k / POINTS
-        a = (1 + gain) * math.cos(x) - math.sin(quadrature) * math.sin(x)
-        b = math.cos(quadrature) * math.sin(x)
-        lead = math.remainder(math.atan2(b, a) - x, 2 * math.pi)
-        late = math.asin(max(-1.0, min(1.0, offset / math.hypot(a, b))))
+        a = (1 + gain) * sin(x + quarter) - sin(quadrature) * sin(x)
+        b = sin(quadrature + quarter) * sin(x)
+        lead = math.remainder(angle_of(b, a) - x, 2 * math.pi)
+        share = max(-1.0, min(1.0, offset / math.sqrt(a * a + b * b)))
+        late = angle_of(share, math.sqrt(1.0 - share * share))
         # PS is high where the voltage is below the offset: it then rises earlier and falls later.
         p.rise.value[k] = round((lead + late) / (2 * math.pi) * TURN)
         p.fall.value[k] = round((lead - late) / (2 * math.pi) * TURN)

@@ -132,6 +132,47 @@ def test_equal_names_in_two_rooms_do_not_meet(package):
     assert package.run(program) == "2 3"
 
 
+def test_a_step_of_one_axis_imports_no_registers_of_another(package):
+    for name in ("here", "there"):
+        package.write(
+            f"control/{name}.py",
+            """
+            from detent.kernel.registers import Registers, i8, register
+
+
+            class File(Registers):
+                value: i8 = register("a value")
+            """,
+        )
+    package.write(
+        "control/shared.py",
+        """
+        from typing import Any
+
+        from detent.kernel.step import step
+
+
+        @step
+        def value_of(r: Any) -> int:
+            return r.value
+        """,
+    )
+    program = """
+        import sys
+        from importlib import import_module
+        from detent.control.shared import value_of
+
+        for name in {names}:
+            print(value_of(import_module(f"detent.control.{{name}}").File(value=7)))
+        print([name for name in sys.modules if name in ("detent.control.here", "detent.control.there")])
+    """
+    both = package.run(program.format(names=("here", "there")))
+    compiled = package.compiled
+    assert both.splitlines()[:2] == ["7", "7"]
+    assert package.run(program.format(names=("here",))) == "7\n['detent.control.here']"
+    assert package.compiled == compiled
+
+
 def test_steps_outside_the_package_are_compiled_but_not_cached(package, tmp_path):
     outside = """
         from detent.kernel.step import step
@@ -142,7 +183,7 @@ def test_steps_outside_the_package_are_compiled_but_not_cached(package, tmp_path
             return 2 * x
     """
     (tmp_path / "lib" / "elsewhere.py").write_text(textwrap.dedent(outside))
-    package.write("simulation/elsewhere.py", outside)  # a room whose edits do not change the hash
+    package.write("record/elsewhere.py", outside)  # a room whose edits do not change the hash
     program = """
         import elsewhere
         from detent.record import elsewhere as above

@@ -9,14 +9,13 @@ sample is: sample, decide, actuate, move. Reference, sensors and law rest betwee
 holds.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference, control
 from detent.drive.effort_source import MEMORY as SOURCE_MEMORY
 from detent.drive.effort_source import EffortSource, EffortSourceParams, take_command
+from detent.kernel.elementary import one_less_exp
 from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register, u1
 from detent.kernel.step import hot_step, step
@@ -69,10 +68,10 @@ class Cascade(Registers):
 
 
 @step
-def sample(p: CascadeParams, r: Cascade) -> None:
+def sample(p: CascadeParams, r: Cascade, machine: TwoMass) -> None:
     """Read both encoders."""
-    read_position(p.motor_sensor, r.motor_sensor, r.machine.motor.position)
-    read_position(p.load_sensor, r.load_sensor, r.machine.load.position)
+    read_position(p.motor_sensor, r.motor_sensor, machine.motor.position)
+    read_position(p.load_sensor, r.load_sensor, machine.load.position)
 
 
 @step
@@ -98,10 +97,16 @@ def take_reference(r: Cascade, position: HostArray, velocity: HostArray, acceler
 
 @step
 def serve(
-    p: CascadeParams, r: Cascade, position: HostArray, velocity: HostArray, acceleration: HostArray, command: HostArray
+    p: CascadeParams,
+    r: Cascade,
+    machine: TwoMass,
+    position: HostArray,
+    velocity: HostArray,
+    acceleration: HostArray,
+    command: HostArray,
 ) -> None:
     """Sample, decide, actuate; where there are commands, the loops are open, and 0 comes behind the last one."""
-    sample(p, r)
+    sample(p, r, machine)
     entries = len(command)
     if entries > 0:
         output = command[r.entry] if r.entry < entries else 0.0
@@ -111,29 +116,34 @@ def serve(
         decide(p, r)
         output = r.law.command
     take_command(p.source, r.source, output)
+    machine.effort = r.source.output
     r.wake += p.sample_ticks
 
 
 @hot_step
-def move(p: CascadeParams, r: Cascade) -> None:
+def move(p: CascadeParams, r: Cascade, machine: TwoMass) -> None:
     """The mechanics through a tick."""
-    machine = r.machine
-    machine.effort = r.source.output
     machine.external = push_force(p.push, r.tick)
     move_masses(p.machine, machine)
     r.tick += 1
     read_gauge(r.gauge, r.tick, machine.load.position, machine.load.velocity)
 
 
-@ticks(CascadeParams)
+@ticks(CascadeParams, local="machine")
 @hot_step
 def tick(
-    p: CascadeParams, r: Cascade, position: HostArray, velocity: HostArray, acceleration: HostArray, command: HostArray
+    p: CascadeParams,
+    r: Cascade,
+    machine: TwoMass,
+    position: HostArray,
+    velocity: HostArray,
+    acceleration: HostArray,
+    command: HostArray,
 ) -> bool:
-    """One substep of the mechanics; see `along` and `driven` for what the host has laid ready."""
+    """One substep of the mechanics, on `machine` of `r`; see `along` and `driven` for what the host has laid ready."""
     if r.tick == r.wake:
-        serve(p, r, position, velocity, acceleration, command)
-    move(p, r)
+        serve(p, r, machine, position, velocity, acceleration, command)
+    move(p, r, machine)
     return True
 
 
@@ -157,7 +167,7 @@ def driven(command: Numbers) -> Feed:
 
 def smoothing(time_constant: float, period: float) -> float:
     """Part of a new value that a first-order filter takes over at a sample; 1 for a time constant of 0 [s]."""
-    return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
+    return one_less_exp(period / time_constant) if time_constant > 0.0 else 1.0
 
 
 def fill_clocks(p: CascadeParams, tick: float, sample_ticks: int) -> None:

@@ -1,0 +1,229 @@
+"""The same bits everywhere: what every register of every method is, through a standard job, as a hash.
+
+It holds for both makers' processors, for every kernel of the linear algebra and width of numpy's loops, and for plain
+Python (``NUMBA_DISABLE_JIT=1``, a shorter job). Where a block was changed on purpose, or a register renamed, the golden
+hashes change with it; make them again with
+
+    python -m tests.acceptance.test_golden_bits
+
+and say in the commit why they did.
+"""
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from tests.places import ROOT
+
+import detent
+from detent.kernel.registers import Registers
+
+EXAMPLES = Path(detent.__file__).parent / "examples"
+GOLDEN = Path(__file__).with_name("golden_bits.json")
+
+NARROW = {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX2 FMA3 AVX512F AVX512_SKX"}
+"""Numpy's loops without wide vectors and fused products, by the names of its versions."""
+
+KERNELS = ({"OPENBLAS_CORETYPE": "Prescott"} | NARROW, {"OPENBLAS_CORETYPE": "Haswell"})
+"""Of the linear algebra; another one where the processor has its instructions."""
+
+FIRST = 4000
+"""Ticks of the shorter job, from the first command on."""
+
+SAMPLES, TICKS = 25, 2000
+"""Of each of the commands, sampled every so many ticks."""
+
+
+@dataclass
+class Job:
+    """An axis at power-on, and how it is told to move."""
+
+    params: Mapping[str, Registers]
+    state: Mapping[str, Registers]
+    commands: tuple[Callable[[], object], ...]
+    run: Callable[[int], object]  # lets ticks pass, whatever the axis says
+
+
+def print_head() -> Job:
+    """Two lines, one each way, its encoder shaking."""
+    from tests.print_head_rig import Rig
+
+    rig = Rig(overrides=["encoder.jitter=3 deg", "encoder.missing_edges=0.0005"]).pretend_identified()
+
+    def run(ticks: int) -> None:
+        while ticks > 0:
+            ticks -= rig.run(ticks)
+            rig.head.status.latch.flag = 0
+
+    lines = (lambda: rig.send_print(1040.5, 1900), lambda: rig.send_print(1800, 1100))
+    return Job({"": rig.p}, {"": rig.r}, lines, run)
+
+
+def phase_servo() -> Job:
+    """A pitch there and back, with noise on its detector."""
+    from tests.phase_servo_rig import Rig
+
+    rig = Rig("detector.jitter=0.5 us", "detector.gain_error=2 %", "detector.offset_error=1 %", locked=True)
+    return Job({"": rig.p}, {"": rig.r}, (lambda: rig.command(1), lambda: rig.command(-1)), rig.run_ticks)
+
+
+def filtered_servo() -> Job:
+    """Command pulses there and back."""
+    from tests.filtered_servo_rig import Rig
+
+    rig = Rig(plant=("encoder.jitter=5 deg", "disturbance.lines.inserted=20 Hz"))
+    return Job({"": rig.p}, {"": rig.r}, (lambda: rig.go(9000), lambda: rig.go(-9000, 12_345.0)), rig.run_ticks)
+
+
+def rotary_table() -> Job:
+    """Two stations."""
+    from detent.methods.load import load_spec
+    from detent.methods.rotary_table.host import TableHost
+
+    host = TableHost(load_spec(EXAMPLES / "rotary_table.toml", ()))
+    host.start()
+
+    def run(ticks: int) -> None:
+        while ticks > 0:
+            ticks -= host.machine.pass_ticks(ticks)
+            host.acknowledge()
+
+    machine = host.machine
+    return Job({"": machine.params}, {"": machine.state}, (lambda: host.begin(1), lambda: host.begin(2)), run)
+
+
+def stepper_envelope() -> Job:
+    """Both motors of a stage at once."""
+    from detent.methods.load import load_spec
+    from detent.methods.stepper_envelope.host import Leg, StageHost
+
+    host = StageHost(load_spec(EXAMPLES / "zoom.toml", ()))
+    motors = host.stage.motors
+
+    def by(steps: int) -> Callable[[], object]:
+        return lambda: host.start({n: Leg(m.position, m.position + steps) for n, m in motors.items()})
+
+    def run(ticks: int) -> None:
+        host.stage.pass_time(ticks * host.stage.tick)
+
+    params = {name: motor.p for name, motor in motors.items()}
+    return Job(params, {name: motor.r for name, motor in motors.items()}, (by(200), by(-150)), run)
+
+
+def cascade() -> Job:
+    """A screw with a load on its coupling, Stribeck friction and backlash, there and back."""
+    from detent.methods.cascade.build import motion_limits
+    from detent.methods.cascade.host import CascadeHost
+    from detent.methods.load import load_spec
+    from detent.planning.profile import plan_move
+
+    changes = ("mechanics.coupling.backlash=20 um", "encoder.velocity_filter=2 ms", "method.derivative_filter=1 ms")
+    host = CascadeHost(load_spec(EXAMPLES / "cascade.toml", changes))
+    limits, start = motion_limits(host.spec), host.position
+
+    def to(begin: float, end: float) -> Callable[[], object]:
+        return lambda: host.follow(plan_move(start + begin, start + end, limits, host.period))
+
+    machine = host.machine
+    commands = (to(0.0, 0.02), to(0.02, 0.005))
+    return Job({"": machine.params}, {"": machine.state}, commands, machine.pass_ticks)
+
+
+JOBS = (print_head, phase_servo, filtered_servo, rotary_table, stepper_envelope, cascade)
+
+
+def leaves(files: Mapping[str, Registers]) -> Iterator[tuple[str, bytes]]:
+    """Path and bytes of every stored quantity, in the order of the paths."""
+    for name, registers in sorted(files.items()):
+        memory = bytes(registers)
+        for leaf in sorted(type(registers).leaves(), key=lambda one: one.path):
+            size = leaf.width.size * max(leaf.length, 1)
+            yield f"{name}.{leaf.path}", memory[leaf.offset : leaf.offset + size]
+
+
+def bits(job: Job, *, whole: bool) -> dict[str, str]:
+    """Hash of the parameters, of all registers behind the shorter job, and of the samples of the whole one."""
+    digest = hashlib.sha256()
+
+    def add(files: Mapping[str, Registers]) -> str:
+        """Take these registers in; the hash so far."""
+        for path, value in leaves(files):
+            digest.update(path.encode() + b"\0" + value)
+        return digest.hexdigest()[:16]
+
+    found = {"parameters": add(job.params)}
+    job.commands[0]()
+    job.run(FIRST)
+    found["first"] = add(job.state)
+    for command in job.commands if whole else ():
+        for _ in range(SAMPLES):
+            job.run(TICKS)
+            found["whole"] = add(job.state)
+        command()
+    return found
+
+
+def all_bits(*, whole: bool) -> dict[str, dict[str, str]]:
+    """Of every method."""
+    return {job.__name__: bits(job(), whole=whole) for job in JOBS}
+
+
+def told(kernel: Mapping[str, str], how: str) -> dict[str, dict[str, str]]:
+    """The same from a process of its own that is told to take a kernel."""
+    unset = {"OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NUMBA_DISABLE_JIT"}
+    environment = {name: value for name, value in os.environ.items() if name not in unset}
+    made = subprocess.run(
+        [sys.executable, "-W", "ignore", "-m", "tests.acceptance.test_golden_bits", how],
+        env=environment | {"OPENBLAS_NUM_THREADS": "1"} | kernel,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert made.returncode == 0, made.stderr[-2000:]
+    return json.loads(made.stdout)
+
+
+def kernels() -> tuple[dict[str, str], ...]:
+    """What each process is told."""
+    from numpy._core._multiarray_umath import __cpu_features__ as features
+
+    return (*KERNELS, {"OPENBLAS_CORETYPE": "SkylakeX"}) if features.get("AVX512F", False) else KERNELS
+
+
+@pytest.fixture(scope="module")
+def golden() -> dict[str, dict[str, str]]:
+    return json.loads(GOLDEN.read_text())
+
+
+@pytest.mark.compiled
+def test_every_register_has_its_golden_bits(golden):
+    assert all_bits(whole=True) == golden
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="the names are those of x86 kernels")
+def test_no_kernel_and_no_width_changes_a_bit(golden):
+    with ThreadPoolExecutor(2) as pool:
+        for kernel, found in zip(kernels(), pool.map(lambda kernel: told(kernel, "whole"), kernels()), strict=True):
+            assert found == golden, kernel
+
+
+def test_plain_python_gives_the_same_bits(golden):
+    found = told({"NUMBA_DISABLE_JIT": "1"}, "first")
+    assert found == {name: {k: v for k, v in parts.items() if k != "whole"} for name, parts in golden.items()}
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        sys.stdout.write(json.dumps(all_bits(whole=sys.argv[1] == "whole")))
+    else:
+        GOLDEN.write_text(json.dumps(all_bits(whole=True), indent=2) + "\n")
