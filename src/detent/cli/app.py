@@ -44,7 +44,8 @@ class ListsMethods(TyperCommand):
         """Add the methods, which load only here."""
         from detent.methods.registry import METHODS
 
-        self.epilog = "Jobs and base ticks: " + " ".join(f"{m.name}: {m.jobs}; {m.pace}." for m in METHODS.values())
+        told = [f"{m.name}: {m.jobs}; {m.pace}." for m in METHODS.usable()]
+        self.epilog = " ".join(["Jobs and base ticks:", *told, *(f"Warning: {text}." for text in METHODS.refused)])
         super().format_help(ctx, formatter)
 
 

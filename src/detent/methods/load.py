@@ -92,7 +92,7 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
     """Method the file names, for its motion; without a name the likeliest, so that the rest is checked too."""
     name, stated = _stated(source, overrides, METHOD_KEY)
     if not isinstance(name, str):
-        likeliest = copy.copy(max(METHODS.values(), key=lambda method: _known_keys(source, method)))
+        likeliest = copy.copy(max(METHODS.usable(), key=lambda method: _known_keys(source, method)))
         likeliest.rules = ()  # what does not go together depends on the method, which is only guessed
         return likeliest
     if name in METHODS:

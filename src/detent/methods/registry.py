@@ -4,6 +4,7 @@ from collections.abc import Iterator, MutableMapping
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from detent.errors import DetentError
 from detent.methods.method import Method
 
 GROUP = "detent.methods"
@@ -14,6 +15,7 @@ class Methods(MutableMapping[str, Method[Any]]):
 
     def __init__(self) -> None:
         self._known: dict[str, EntryPoint | Method[Any]] | None = None
+        self.refused: tuple[str, ...] = ()
 
     def _all(self) -> dict[str, EntryPoint | Method[Any]]:
         if self._known is None:
@@ -24,7 +26,18 @@ class Methods(MutableMapping[str, Method[Any]]):
         known = self._all()
         found = known[name]
         if isinstance(found, EntryPoint):
-            found = known[name] = found.load()()
+            found = known[name] = _loaded(found)
+        return found
+
+    def usable(self) -> list[Method[Any]]:
+        """Those that can be loaded; what keeps the others from it is in `refused`."""
+        found: list[Method[Any]] = []
+        self.refused = ()
+        for name in self:
+            try:
+                found.append(self[name])
+            except DetentError as error:
+                self.refused += (str(error),)
         return found
 
     def __setitem__(self, name: str, method: Method[Any]) -> None:
@@ -40,9 +53,21 @@ class Methods(MutableMapping[str, Method[Any]]):
         return len(self._all())
 
 
+def _loaded(entry: EntryPoint) -> Method[Any]:
+    """The method of an entry point; whatever another distribution does wrong while it loads is said in a sentence."""
+    try:
+        return entry.load()()
+    except Exception as error:
+        owner = entry.dist.name if entry.dist else entry.value
+        raise DetentError(
+            f"method {entry.name}: {owner}, which brings it, cannot be loaded ({type(error).__name__}: {error}); "
+            f"reinstall {owner}, or remove it"
+        ) from error
+
+
 METHODS = Methods()
 
 
 def bringing(word: str) -> list[str]:
     """Names of the methods that bring what not all do, such as "envelopes"."""
-    return [name for name, method in METHODS.items() if getattr(type(method), word) is not getattr(Method, word)]
+    return [method.name for method in METHODS.usable() if getattr(type(method), word) is not getattr(Method, word)]

@@ -113,6 +113,21 @@ class Comparison(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class TableComparison:
+    """A comparison that is a table and no more."""
+
+    table: TextTable
+
+    def figures(self) -> tuple[Figure, ...]:
+        """The table."""
+        return (Figure(title=self.table.title, table=self.table.on_page),)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"rows": [dict(zip(self.table.heads, row, strict=True)) for row in self.table.rows]}
+
+
 def comparison_section(found: Sequence[Comparison]) -> Section:
     """Figures of comparisons, as the page of a run shows them."""
     return Section("What the method is worth on this axis", [figure for one in found for figure in one.figures()])

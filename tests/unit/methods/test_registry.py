@@ -2,13 +2,14 @@
 
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 from typing import Literal
 
 import pytest
 from tests.dump import dump_spec
 
 from detent.axisfile.tables import AxisSpec, AxisTable
-from detent.errors import InputError
+from detent.errors import DetentError, InputError
 from detent.files.fields import leaf_fields, optional, options_of, required
 from detent.files.findings import Caution, Contradiction, count_figure, quantity_figure
 from detent.files.problems import dotted, field_at
@@ -139,6 +140,27 @@ def test_the_registry_loads_no_compiled_blocks():
     blocks = "{'numba', 'detent.methods.cascade.system'}"
     program = f"import sys; import detent.methods.registry; assert not {blocks} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+@pytest.fixture
+def lost(monkeypatch):
+    monkeypatch.setitem(METHODS, "lost", EntryPoint("lost", "nowhere.to_be_found:Lost", "detent.methods"))
+
+
+@pytest.mark.usefixtures("lost")
+def test_a_method_that_cannot_be_loaded_breaks_no_other(load_text, good_text):
+    assert {method.name for method in METHODS.usable()} == set(METHODS) - {"lost"}
+    (sentence,) = METHODS.refused
+    assert sentence.startswith("method lost: nowhere.to_be_found:Lost")
+    assert load_text(good_text).spec.axis.method == "print_head"
+    assert problem_of(load_text, "axis.method", SLED_TEXT.replace('method = "sled"', "")).line
+
+
+@pytest.mark.usefixtures("lost")
+def test_a_method_that_cannot_be_loaded_is_refused_where_it_is_asked_for(load_text):
+    with pytest.raises(DetentError, match="nowhere") as caught:
+        load_text(SLED_TEXT.replace('"sled"', '"lost"'))
+    assert caught.value.exit_status == 2
 
 
 def test_figures_are_written_for_people():

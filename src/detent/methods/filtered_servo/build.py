@@ -2,15 +2,12 @@
 
 import math
 
+from detent.axisfile.drive_train import fill_drive_train
 from detent.axisfile.interference import fill_interference, fill_push
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
-from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
-
-SUBSTEP_SHARE = 0.25
-"""Longest substep of the power series, as a share of the fastest time constant."""
 
 
 def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
@@ -34,7 +31,10 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     p.encoder.origin = -spec.pulse / 2
     p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
     p.encoder.missing = spec.encoder.missing_edges
-    _fill_drive_train(p.train, spec)
+    fill_drive_train(
+        p.train, spec.motor, spec.mechanics.friction, radius=spec.radius, mass=spec.mass, travel=spec.limits.travel,
+        period=TICK, bridge_resistance=spec.drive.bridge_resistance,
+    )  # fmt: skip
     fill_interference(p.interference, spec.disturbance.lines, TICK)
     fill_push(p.push, spec.disturbance.push, TICK)
     p.window = method.in_position
@@ -53,28 +53,3 @@ def _fill_filter(f: SpeedFilterParams, spec: FilteredServoSpec) -> None:
     f.scale, f.coefficient = method.scale, method.coefficient
     f.shift = round(-math.log2(method.coefficient))
     f.fraction_bits = method.fraction_bits
-
-
-def _fill_drive_train(t: DriveTrainParams, spec: FilteredServoSpec) -> None:
-    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
-    t.inductance = spec.motor.inductance
-    t.force_constant = spec.motor.torque_constant / spec.radius
-    t.emf_constant = spec.motor.back_emf_constant / spec.radius
-    t.mass = spec.mass
-    for side in ("right", "left"):
-        friction = getattr(spec.mechanics.friction, side)
-        for kind in ("coulomb", "static", "viscous"):
-            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind))
-    t.left_end, t.right_end = 0.0, spec.limits.travel
-    t.period = TICK
-    t.substep = SUBSTEP_SHARE / _fastest_rate(t)
-    fill_period(t)
-
-
-def _fastest_rate(t: DriveTrainParams) -> float:
-    """Bound of the system matrix [1/s], in scaled coordinates."""
-    viscous = max(t.friction.viscous_right, t.friction.viscous_left) / t.mass
-    damping = t.force_constant * t.emf_constant / (t.resistance * t.mass)
-    if t.inductance == 0.0:
-        return 1.0 + viscous + damping
-    return t.resistance / t.inductance + viscous + math.sqrt(damping * t.resistance / t.inductance)

@@ -1,6 +1,5 @@
 """The host of a filtered servo: command pulses, in position, fault."""
 
-import math
 from typing import Any
 
 from detent.control.deviation_counter import FAULT
@@ -10,7 +9,7 @@ from detent.kernel.loop import advance
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.host import Destination, Problem
+from detent.methods.moves.host import Destination, Host, Problem, line_faults
 from detent.methods.moves.job import Move
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
@@ -26,7 +25,7 @@ def filtered_servo_machine(
     return Machine(p, r, loop, recorder)
 
 
-class FilteredHost:
+class FilteredHost(Host):
     """Host of a filtered servo: command pulses, in position, fault."""
 
     def __init__(self, spec: FilteredServoSpec, recorder: AnyRecorder | None = None) -> None:
@@ -36,15 +35,6 @@ class FilteredHost:
         self.tolerance = (spec.method.in_position + 1) * spec.pulse
         self.state: Any = self.machine.state
         self.home = spec.mechanics.start_position
-
-    def start(self) -> None:
-        """Leave the reset."""
-        self.machine.pass_ticks(1)
-
-    def place(self, move: Move, position: float) -> Destination:
-        """Where a move to `position` [m] ends."""
-        pulses = round((position - self.home) / self.spec.pulse)
-        return Destination(move, self.home + pulses * self.spec.pulse, pulses)
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""
@@ -87,10 +77,6 @@ class FilteredHost:
             found.append(problem("sample_period", came, allowed, "shorten it, lower the speed, or widen the counter"))
         return found
 
-    def in_counts(self, error: float) -> str:
-        """How far off that is, in pulses."""
-        return f"{abs(error) / self.grid:.1f} pulses"
-
     @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it runs."""
@@ -98,9 +84,9 @@ class FilteredHost:
         return SERVO_FAULT_TEXT[d.cause] if d.state == FAULT else ""
 
     @property
-    def switched(self) -> float:
-        """A filtered servo has one mode."""
-        return math.nan
+    def faults(self) -> dict[str, int]:
+        """What interference has done."""
+        return line_faults(self.state.interference)
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand; that it comes into position again after a disturbance is no news."""

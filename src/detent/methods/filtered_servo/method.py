@@ -1,19 +1,22 @@
 """The filtered servo as a method: what its package brings."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from detent.axisfile.catalogue import DC_MOTORS
 from detent.files.findings import Caution, Derived
 from detent.methods.filtered_servo.checks import RULES, find_cautions
 from detent.methods.filtered_servo.derive import derive
 from detent.methods.filtered_servo.schema import FilteredServoSpec, fill_derived
-from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
+from detent.methods.moves.method import MoveMethod
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
-    from detent.page.frame import Comparison, Page
+    from detent.methods.filtered_servo.host import FilteredHost
+    from detent.methods.filtered_servo.page import FilteredView
+    from detent.page.frame import Comparison
+    from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
@@ -27,16 +30,17 @@ TIMING = (
 )  # fmt: skip
 
 
-class FilteredServoMethod(Method[FilteredServoSpec]):
+class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     """Command pulses, counted speed behind a digital filter."""
 
     name = "filtered_servo"
     title = "filtered servo: command pulses, counted speed with a low-pass"
-    jobs = "a list of moves (.csv, .toml)"
     pace = "10 us, every 10th"
     spec = FilteredServoSpec
     rules = RULES
     catalogue = DC_MOTORS
+    every = 10
+    signals, timing = SIGNALS, TIMING
 
     def fill(self, spec: FilteredServoSpec) -> FilteredServoSpec:
         """The defaults that depend on another table."""
@@ -62,45 +66,42 @@ class FilteredServoMethod(Method[FilteredServoSpec]):
 
         return FilteredServoParams
 
-    def simulated(self, spec: FilteredServoSpec) -> Simulated:
-        """A filtered servo that makes moves."""
-        from detent.methods.filtered_servo import system
+    def tick(self, spec: FilteredServoSpec) -> float:
+        """Ten clocks."""
+        from detent.methods.filtered_servo.system import TICK
+
+        del spec
+        return TICK
+
+    def host(self, spec: FilteredServoSpec, recorder: "AnyRecorder | None") -> "FilteredHost":
+        """The axis at power-on."""
         from detent.methods.filtered_servo.host import FilteredHost
-        from detent.methods.moves.move_file import load_moves
-        from detent.methods.moves.run import MoveRun, run_moves
+
+        return FilteredHost(spec, recorder)
+
+    def view(self, spec: FilteredServoSpec) -> "FilteredView":
+        """What it shows of a move."""
+        from detent.methods.filtered_servo.page import FilteredView
+
+        return FilteredView(spec)
+
+    def seed(self, spec: FilteredServoSpec) -> int:
+        """The encoder's."""
+        return spec.encoder.seed
+
+    def clocking(self) -> "Clocking":
+        """Ten clocks in a tick."""
+        from detent.methods.filtered_servo.system import CLOCKS
         from detent.record.capture import Clocking
 
-        def run(job: MoveJob, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None) -> MoveRun:
-            return run_moves(FilteredHost(spec, recorder), job, progress=progress)
+        return Clocking(CLOCKS, clocks={"clock.C": ((0.0, 0.5), "decoder clock, 1 MHz")})
 
-        return Simulated(
-            registers=system.FilteredServo,
-            tick=system.TICK,
-            every=10,
-            seed=spec.encoder.seed,
-            signals=SIGNALS,
-            timing=TIMING,
-            clocking=Clocking(system.CLOCKS, clocks={"clock.C": ((0.0, 0.5), "decoder clock, 1 MHz")}),
-            load=load_moves,
-            job=MoveJob,
-            run=run,
-            sample_job=lambda: one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2),
-        )
+    def sample_move(self, spec: FilteredServoSpec) -> MoveJob:
+        """A move for looking at signals."""
+        return one_move("one move of 1000 pulses", 1000 * spec.pulse, 0.2)
 
     def compare(self, spec: FilteredServoSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside no filter, a longer window, a smaller multiplier."""
         from detent.methods.filtered_servo.comparison import compare_feedback
 
         return (compare_feedback(spec, progress=progress),)
-
-    def summary(self, spec: FilteredServoSpec, result: Any) -> list[tuple[str, str]]:
-        """Moves, times, worst errors."""
-        from detent.methods.filtered_servo.page import filtered_summary
-
-        return filtered_summary(spec, result)
-
-    def page(self, spec: FilteredServoSpec, result: Any, shown: Shown) -> "Page":
-        """The report."""
-        from detent.methods.filtered_servo.page import filtered_page
-
-        return filtered_page(spec, result, shown.trace, shown.comparisons, shown.settings)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.page import MM, ShownMove, drive_curve, moves_page, true_speed
+from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, moves_page, true_speed
 from detent.methods.moves.run import MoveRun
 from detent.methods.moves.summary import move_summary
-from detent.page.chart import Band, Curve, Panel
+from detent.page.chart import Curve, Panel
 from detent.page.frame import Comparison, Page
 from detent.page.parts import Numbers
 from detent.page.run_page import Stretch
@@ -49,7 +49,7 @@ def filtered_summary(spec: FilteredServoSpec, run: MoveRun) -> list[tuple[str, s
 
 
 @dataclass(frozen=True, slots=True)
-class FilteredView:
+class FilteredView(MoveView):
     """What this method shows of itself, see `moves.page.MoveView`."""
 
     spec: FilteredServoSpec
@@ -93,10 +93,6 @@ class FilteredView:
             Panel(name="move-drive", label="drive [count]", height=160, zero=True, curves=[drive_curve(rows[WORD])]),
         ]
 
-    def bands(self, _shown: ShownMove) -> list[Band]:
-        """It has one mode."""
-        return []
-
     def words(self, rows: Stretch) -> list[Curve]:
         """What makes the drive word."""
         return [
@@ -117,10 +113,6 @@ class FilteredView:
             f"within ±{within} pulses of the target for good": shown.settled,
             f"in position: {window}": move.ready - move.begin,
         }
-
-    def text_figure(self, _run: MoveRun) -> None:
-        """It prints no text."""
-        return
 
 
 def command_speed(t: Numbers, command: Numbers, window: Numbers) -> Numbers:

@@ -3,6 +3,7 @@
 The place the axis stands at after power-on is known to the host (a home sensor tells it in a machine).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -10,6 +11,7 @@ from typing import Any, Protocol
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.moves.job import Move, MoveJob
 from detent.record.machine import Machine
+from detent.sensing.interference import Interference
 from detent.units import format_quantity
 
 Problem = Callable[[str, str, str, str], FileProblem]
@@ -26,7 +28,7 @@ class Destination:
 
 
 class Host(Protocol):
-    """What each servo brings; the frame makes the moves of a job with it."""
+    """What each servo brings; the frame makes the moves of a job with it. What it leaves out has the default here."""
 
     machine: Machine[Any, Any]
     state: Any
@@ -37,15 +39,17 @@ class Host(Protocol):
 
     def start(self) -> None:
         """Wait until the axis takes commands."""
-        ...
+        self.machine.pass_ticks(1)
 
     def place(self, move: Move, position: float) -> Destination:
         """Where a move to `position` [m] ends."""
-        ...
+        counts = round((position - self.home) / self.grid)
+        return Destination(move, self.home + counts * self.grid, counts)
 
     def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
         """What this axis cannot do of a move, beside leaving its travel."""
-        ...
+        del to, asked
+        return refused_words(move, problem, "this axis has one of its own")
 
     def command(self, to: Destination) -> None:
         """Begin the move."""
@@ -61,21 +65,46 @@ class Host(Protocol):
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand [s]."""
-        ...
+        self.machine.pass_time(dwell)
 
     def in_counts(self, error: float) -> str:
         """An error [m] in the unit of the axis."""
-        ...
+        return f"{abs(error) / self.grid:.1f} pulses"
 
     @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it has not."""
-        ...
+        return ""
 
     @property
     def switched(self) -> float:
         """When position mode was entered [s]; NaN for an axis of one mode."""
-        ...
+        return math.nan
+
+    @property
+    def plant(self) -> Any:
+        """Registers with the `train` and the `gauge` that an observer looks at."""
+        return self.state
+
+    @property
+    def faults(self) -> dict[str, int]:
+        """What interference has done to its lines, by kind."""
+        return {}
+
+
+def line_faults(lines: Interference) -> dict[str, int]:
+    """Pulses put in and taken away, samples lost and corrupted."""
+    names = ("inserted", "removed", "lost", "corrupted")
+    return {{"lost": "lost samples"}.get(name, name): getattr(lines, name) for name in names}
+
+
+def refused_words(move: Move, problem: Problem, why: str) -> list[FileProblem]:
+    """Problems of a move with a speed or a sample period, on an axis that takes neither."""
+    words = {"speed": move.speed, "sample_period": move.sample_period}
+    remedy = "leave it out, or change the axis file"
+    return [
+        problem(word, str(value), f"no {word}: {why}", remedy) for word, value in words.items() if value is not None
+    ]
 
 
 def check_job(host: Host, job: MoveJob) -> list[Destination]:

@@ -6,7 +6,7 @@ It knows no method: what one shows of itself comes as a `MoveView`.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -59,6 +59,7 @@ class ShownMove:
     move: MoveRecord
     why: str
     rows: Stretch
+    plant: str = ""  # see `MoveView.plant`
 
     @property
     def settled(self) -> float:
@@ -68,11 +69,18 @@ class ShownMove:
     @property
     def to_go(self) -> Numbers:
         """Target less true position [m]."""
-        return self.move.target - self.rows[POSITION]
+        return self.move.target - self.rows[self.plant + POSITION]
 
 
 class MoveView(Protocol):
-    """What a method shows of itself on the page of a list of moves."""
+    """What a method shows of itself on the page of a list of moves. What it leaves out has the default here."""
+
+    signals: ClassVar[Sequence[str]] = ()
+    """Signals that a move is drawn from beside position, velocity and target."""
+    captions: ClassVar[tuple[str, str]] = ("", "")
+    """What to look for in the whole move, and in the words at its end."""
+    plant: ClassVar[str] = ""
+    """Where `train` and `gauge` stand among the registers, with a dot behind."""
 
     @property
     def name(self) -> str:
@@ -89,23 +97,14 @@ class MoveView(Protocol):
         """Limit of the axis [m/s]."""
         ...
 
-    @property
-    def signals(self) -> Sequence[str]:
-        """Signals that a move is drawn from beside position, velocity and target."""
-        ...
-
-    @property
-    def captions(self) -> tuple[str, str]:
-        """What to look for in the whole move, and in the words at its end."""
-        ...
-
     def panels(self, shown: ShownMove) -> list[Panel]:
         """Plot areas of the whole move, ids "move-...", from top to bottom."""
         ...
 
     def bands(self, shown: ShownMove, /) -> list[Band]:
         """Stretches of the move with a ground of their own."""
-        ...
+        del shown
+        return []
 
     def words(self, rows: Stretch) -> list[Curve]:
         """Words of the control [count] while it comes to rest."""
@@ -117,7 +116,8 @@ class MoveView(Protocol):
 
     def text_figure(self, run: MoveRun, /) -> Figure | None:
         """The text on paper, of an axis that prints."""
-        ...
+        del run
+        return None
 
 
 def moves_page(
@@ -130,7 +130,7 @@ def moves_page(
     """The page of a run of moves; figures whose signals were not recorded are left out."""
     figures = MoveFigures(run)
     text = view.text_figure(run) if run.job.kind == "text" and run.moves else None
-    result = [text, _job_figure(figures, trace), _rest_figure(view, figures)]
+    result = [text, _job_figure(view, figures, trace), _rest_figure(view, figures)]
     return Page(
         title=page_title(view.name, run),
         headline=_headline(view, figures),
@@ -209,14 +209,15 @@ def _notes(figures: MoveFigures) -> list[Note]:
 # ---- the whole job
 
 
-def _job_figure(figures: MoveFigures, trace: Trace | None) -> Figure | None:
-    rows = stretch(trace, (POSITION, TARGET), figures.run.time_ready) if figures.run.moves else None
+def _job_figure(view: MoveView, figures: MoveFigures, trace: Trace | None) -> Figure | None:
+    position, target = view.plant + POSITION, view.plant + TARGET
+    rows = stretch(trace, (position, target), figures.run.time_ready) if figures.run.moves else None
     if rows is None:
         return None
     end = int(np.searchsorted(rows.t, float(rows.t[0]) + LONGEST, side="right"))
     curves = [
-        Curve(label="target", colour="muted", dash=(6, 4), step=True, y=rows[TARGET][:end] * MM, digits=4),
-        Curve(label="true position", colour="speed", width=2, y=rows[POSITION][:end] * MM, digits=4),
+        Curve(label="target", colour="muted", dash=(6, 4), step=True, y=rows[target][:end] * MM, digits=4),
+        Curve(label="true position", colour="speed", width=2, y=rows[position][:end] * MM, digits=4),
     ]
     timeline = Timeline(name="job", t=rows.t[:end], label="time since the axis was ready", unit="s")
     return Figure(
@@ -254,14 +255,14 @@ def _rest_chart(run: MoveRun) -> Chart:
 
 
 def _move_figures(view: MoveView, figures: MoveFigures, trace: Trace | None) -> list[Figure]:
-    needed = (POSITION, VELOCITY, TARGET, *view.signals)
+    needed = (*(view.plant + name for name in (POSITION, VELOCITY, TARGET)), *view.signals)
     if trace is None or not has(trace, needed):
         return []
     move, why = _telling(figures, trace)
     rows = stretch(trace, needed, move.begin, move.end) if move else None
     if move is None or rows is None:
         return []
-    shown = ShownMove(figures.run, move, why, rows)
+    shown = ShownMove(figures.run, move, why, rows, view.plant)
     return [_whole_figure(view, shown), *_approach_figures(view, shown)]
 
 
@@ -309,7 +310,34 @@ def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
 
 def true_speed(shown: ShownMove) -> Curve:
     """The curve that every picture of a move has."""
-    return Curve(label="true speed", colour="speed", width=2, y=shown.rows[VELOCITY] * MM)
+    return Curve(label="true speed", colour="speed", width=2, y=shown.rows[shown.plant + VELOCITY] * MM)
+
+
+@dataclass(frozen=True)
+class PlainView:
+    """What a method shows that has no more to say than its words: the speed, and when the move began and ended."""
+
+    name: str
+    unit: CountUnit
+    max_speed: float
+    signals: ClassVar[Sequence[str]] = ()
+    captions: ClassVar[tuple[str, str]] = ("", "")
+    plant: ClassVar[str] = ""
+    bands, text_figure = MoveView.bands, MoveView.text_figure
+
+    def panels(self, shown: ShownMove) -> list[Panel]:
+        """The speed."""
+        return [Panel(name="move-speed", label="speed [mm/s]", zero=True, curves=[true_speed(shown)])]
+
+    def words(self, rows: Stretch) -> list[Curve]:
+        """None."""
+        del rows
+        return []
+
+    def events(self, shown: ShownMove) -> dict[str, float]:
+        """From the request to the arrival."""
+        ready = shown.move.ready - shown.move.begin
+        return {"the host asks for the move": 0.0, "within the tolerance for good": shown.settled, "arrived": ready}
 
 
 def drive_curve(words: Numbers) -> Curve:
@@ -336,7 +364,8 @@ def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
     begin = shown.rows.first(np.abs(shown.to_go) <= max(CLOSE * shown.run.tolerance, 1.5 * abs(float(shown.to_go[-1]))))
     last = events[-1].t
     rows = shown.rows.between(begin, min(last + 0.15 * (last - begin), float(t[-1])))
-    place, limit = (rows[POSITION] - shown.move.target) / view.unit.size, shown.run.tolerance / view.unit.size
+    limit = shown.run.tolerance / view.unit.size
+    place = (rows[shown.plant + POSITION] - shown.move.target) / view.unit.size
     within = [(shown.settled, float(t[-1]))] if shown.settled < t[-1] else []
     timeline = Timeline(
         name="approach",

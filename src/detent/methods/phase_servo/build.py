@@ -2,13 +2,13 @@
 
 import math
 
+from detent.axisfile.drive_train import fill_drive_train
 from detent.axisfile.interference import fill_interference, fill_push
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import ConverterParams, PhaseServoParams
-from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.sensing.phase_detector import DetectorParams, fill_errors
 
 SUBSTEP = 1e-5
@@ -27,7 +27,12 @@ def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
     p.speed.half = 1 << (spec.method.speed_bits - 1)
     p.pwm.half = 1 << (spec.drive.pwm_bits - 1)
     p.bridge.supply, p.bridge.limit = spec.drive.supply, spec.limits.effort
-    _fill_drive_train(p.train, spec)
+    radius, mechanics = spec.mechanics.pulley_circumference / (2 * math.pi), spec.mechanics
+    fill_drive_train(
+        p.train, spec.motor, mechanics.friction, radius=radius, travel=spec.limits.travel, period=spec.tick,
+        mass=mechanics.carriage_mass + (spec.motor.rotor_inertia + mechanics.pulley_inertia) / radius**2,
+        bridge_resistance=spec.drive.bridge_resistance, substep=SUBSTEP,
+    )  # fmt: skip
     fill_interference(p.interference, spec.disturbance.lines, spec.tick)
     fill_push(p.push, spec.disturbance.push, spec.tick)
     return p
@@ -81,19 +86,3 @@ def _fill_law(law: LawParams, spec: PhaseServoSpec) -> None:
     law.dead_band, law.integral_limit = method.dead_band, method.integral_limit
     law.corrector, law.integrator = method.corrector, method.integrator
     law.word_limit = 1 << (spec.drive.pwm_bits - 1)
-
-
-def _fill_drive_train(t: DriveTrainParams, spec: PhaseServoSpec) -> None:
-    radius = spec.mechanics.pulley_circumference / (2 * math.pi)
-    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
-    t.inductance = spec.motor.inductance
-    t.force_constant = spec.motor.torque_constant / radius
-    t.emf_constant = spec.motor.back_emf_constant / radius
-    t.mass = spec.mechanics.carriage_mass + (spec.motor.rotor_inertia + spec.mechanics.pulley_inertia) / radius**2
-    for side in ("right", "left"):
-        friction = getattr(spec.mechanics.friction, side)
-        for kind in ("coulomb", "static", "viscous"):
-            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind))
-    t.left_end, t.right_end = 0.0, spec.limits.travel
-    t.period, t.substep = spec.tick, SUBSTEP
-    fill_period(t)

@@ -5,7 +5,7 @@ from typing import Any
 
 from detent.errors import AxisError, FileProblem
 from detent.kernel.loop import advance
-from detent.methods.moves.host import Destination, Problem
+from detent.methods.moves.host import Destination, Host, Problem, line_faults, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
@@ -29,7 +29,7 @@ def phase_servo_machine(
     return Machine(p, r, Loop(spec.tick, advance), recorder)
 
 
-class PhaseHost:
+class PhaseHost(Host):
     """Host of a phase servo: set strobe with direction and distance, ready, stop."""
 
     def __init__(self, spec: PhaseServoSpec, recorder: AnyRecorder | None = None) -> None:
@@ -83,11 +83,7 @@ class PhaseHost:
             grid = f"a multiple of the detector's pitch, {format_quantity(self.grid, 'm', 6)}"
             key = "target" if move.by is None else "by"
             found.append(problem(key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"))
-        for word, value in (("speed", move.speed), ("sample_period", move.sample_period)):
-            if value is not None:
-                allowed = f"no {word}: this axis takes its speed from the velocity table"
-                found.append(problem(word, str(value), allowed, "leave it out, or change the axis file"))
-        return found
+        return found + refused_words(move, problem, "this axis takes its speed from the velocity table")
 
     def in_counts(self, error: float) -> str:
         """How far off that is, in steps, and whether it is on another positioning point."""
@@ -98,15 +94,11 @@ class PhaseHost:
         return f"{text}, on the positioning point {wrong} {name} off" if on_another else text
 
     @property
-    def failure(self) -> str:
-        """Why the axis has given up; a phase servo never does."""
-        return ""
-
-    @property
     def switched(self) -> float:
         """When position mode was entered [s]."""
         return self.state.sequencer.switched * self.machine.tick
 
-    def stands(self, dwell: float) -> None:
-        """Let the axis stand."""
-        self.machine.pass_time(dwell)
+    @property
+    def faults(self) -> dict[str, int]:
+        """What interference has done."""
+        return line_faults(self.state.interference)

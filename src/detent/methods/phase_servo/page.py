@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from detent.control.phase_sequencer import POSITION_MODE
-from detent.methods.moves.page import MM, ShownMove, drive_curve, moves_page, true_speed
+from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, moves_page, true_speed
 from detent.methods.moves.run import MoveRun
 from detent.methods.moves.summary import move_summary
 from detent.methods.phase_servo.schema import PhaseServoSpec
@@ -55,7 +55,7 @@ def phase_summary(spec: PhaseServoSpec, run: MoveRun) -> list[tuple[str, str]]:
 
 
 @dataclass(frozen=True, slots=True)
-class PhaseView:
+class PhaseView(MoveView):
     """What this method shows of itself, see `moves.page.MoveView`."""
 
     spec: PhaseServoSpec

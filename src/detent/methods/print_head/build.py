@@ -1,7 +1,10 @@
 """From a checked specification to the parameters of the axis: SI values to counts, emitters and microseconds."""
 
 import math
+from typing import TypeVar
 
+from detent.axisfile.drive_train import fill_drive_train
+from detent.files.fields import Table
 from detent.methods.print_head.schema import (
     COLUMN,
     EMITTER,
@@ -11,7 +14,7 @@ from detent.methods.print_head.schema import (
     speed_value,
 )
 from detent.methods.print_head.system import AVERAGED, PERIOD_US, SWITCH_LEVEL, PrintHeadParams
-from detent.plant.drive_train import DriveTrainParams, fill_period
+from detent.plant.drive_train import DriveTrainParams
 from detent.plant.switched_motor import fill_pulse_table
 
 CALIBRATION_MARGIN = 400
@@ -22,8 +25,9 @@ SLOW_PASS = 60
 """Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
 speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit."""
 
-SUBSTEP_SHARE = 0.25
-"""Longest substep of the power series, as a share of the fastest time constant."""
+FRICTION = ("coulomb", "static", "viscous")
+
+TableT = TypeVar("TableT", bound=Table)
 
 
 def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
@@ -50,34 +54,28 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
 
 
 def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
-    radius = spec.mechanics.pulley_circumference / (2 * math.pi)
-    drift = 1 + spec.disturbance.motor_constant
-    t.resistance = spec.motor.resistance + spec.drive.bridge_resistance
-    t.inductance = spec.motor.inductance
-    t.force_constant = spec.motor.torque_constant * drift / radius
-    t.emf_constant = spec.motor.back_emf_constant * drift / radius
-    t.mass = spec.mechanics.carriage_mass + spec.mechanics.belt_mass + spec.motor.rotor_inertia / radius**2
-    for side, change in (("right", spec.disturbance.friction_right), ("left", spec.disturbance.friction_left)):
-        friction = getattr(spec.mechanics.friction, side)
-        for kind in ("coulomb", "static", "viscous"):
-            # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
-            setattr(t.friction, f"{kind}_{side}", getattr(friction, kind) * (1 + change) * drift)
-    t.left_end, t.right_end = 0.0, spec.limits.travel
+    mechanics, friction = spec.mechanics, spec.mechanics.friction
+    radius, drift = mechanics.pulley_circumference / (2 * math.pi), 1 + spec.disturbance.motor_constant
+    # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
+    right = _times(friction.right, FRICTION, 1 + spec.disturbance.friction_right, drift)
+    left = _times(friction.left, FRICTION, 1 + spec.disturbance.friction_left, drift)
+    start, end = 0.0, spec.limits.travel
     obstacle = spec.disturbance.obstacle
-    if obstacle is not None and spec.mechanics.start_position < obstacle.position:
-        t.right_end = obstacle.position
+    if obstacle is not None and mechanics.start_position < obstacle.position:
+        end = obstacle.position
     elif obstacle is not None:
-        t.left_end = obstacle.position
-    t.period = PERIOD_US * 1e-6
-    t.substep = SUBSTEP_SHARE / _fastest_rate(t)
-    fill_period(t)
+        start = obstacle.position
+    fill_drive_train(
+        t, _times(spec.motor, ("torque_constant", "back_emf_constant"), drift),
+        friction.model_copy(update={"right": right, "left": left}), radius=radius,
+        mass=mechanics.carriage_mass + mechanics.belt_mass + spec.motor.rotor_inertia / radius**2,
+        travel=end, start=start, period=PERIOD_US * 1e-6, bridge_resistance=spec.drive.bridge_resistance,
+    )  # fmt: skip
 
 
-def _fastest_rate(t: DriveTrainParams) -> float:
-    """Bound of the system matrix [1/s], in scaled coordinates."""
-    viscous = max(t.friction.viscous_right, t.friction.viscous_left)
-    coupling = math.sqrt(t.force_constant * t.emf_constant / (t.mass * t.inductance))
-    return t.resistance / t.inductance + viscous / t.mass + coupling
+def _times(table: TableT, keys: tuple[str, ...], *factors: float) -> TableT:
+    """A table with some of its values multiplied."""
+    return table.model_copy(update={key: math.prod((getattr(table, key), *factors)) for key in keys})
 
 
 def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:

@@ -47,6 +47,7 @@ def run_of(*records: MoveRecord, asked: int | None = None, kind: str = "moves", 
 class View:
     """A method with one word, which speaks when it is asked to."""
 
+    plant = ""
     name = "wire & pulley"
     unit = CountUnit(STEP, "step")
     max_speed = 0.35

@@ -1,0 +1,1 @@
+"""A bang-bang positioner for detent."""

@@ -1,0 +1,120 @@
+"""A control method of another distribution: installed into an environment of its own, it works by its entry point."""
+
+import json
+import re
+import site
+import subprocess
+import sys
+import tomllib
+import zipfile
+
+import pytest
+from tests.docs.pages import blocks_of
+from tests.page_reader import Reader
+from tests.places import ROOT
+
+PROJECT = ROOT / "tests" / "distribution" / "detent-bang-bang"
+FILE, JOB = str(PROJECT / "bang_bang.toml"), str(PROJECT / "moves.csv")
+PIPED = {"capture_output": True, "encoding": "utf-8"}
+
+
+def wheel_of(project, folder):
+    """The wheel of a distribution without anything to build; no build backend needs to be installed for it."""
+    about = tomllib.loads((project / "pyproject.toml").read_text())["project"]
+    stem = f"{about['name'].replace('-', '_')}-{about['version']}"
+    methods = "\n".join(f"{k} = {v}" for k, v in about["entry-points"]["detent.methods"].items())
+    info = {
+        "METADATA": f"Metadata-Version: 2.1\nName: {about['name']}\nVersion: {about['version']}\n",
+        "WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        "entry_points.txt": f"[detent.methods]\n{methods}\n",
+        "RECORD": "",
+    }
+    path = folder / f"{stem}-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as wheel:
+        for source in project.rglob("*.py"):
+            wheel.write(source, source.relative_to(project))
+        for name, text in info.items():
+            wheel.writestr(f"{stem}.dist-info/{name}", text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory):
+    """Python of a fresh environment that sees detent, and in which the distribution is installed."""
+    folder = tmp_path_factory.mktemp("outside")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "env"], check=True, timeout=60)
+    python = folder / "env" / "bin" / "python"
+    found = subprocess.run(
+        [python, "-c", "import site; print(site.getsitepackages()[0])"], check=False, **PIPED, timeout=60
+    )
+    seen = [str(ROOT / "src"), *site.getsitepackages()]
+    with open(f"{found.stdout.strip()}/seen.pth", "w", encoding="utf-8") as file:  # noqa: PTH123
+        file.write("\n".join(seen))
+    wheel = wheel_of(PROJECT, folder)
+    options = ["--python", python, "install", "--no-index", "--no-deps", "--quiet", wheel]
+    subprocess.run([sys.executable, "-m", "pip", *options], check=True, timeout=60)
+    return python
+
+
+def detent(python, *words, status=0):
+    done = subprocess.run([python, "-m", "detent", *words], check=False, **PIPED, timeout=120)
+    assert done.returncode == status, done.stderr
+    return done
+
+
+def test_check_and_registers_know_the_method(python):
+    found = json.loads(detent(python, "check", FILE, "--json").stdout)
+    assert (found["method"], found["warnings"]) == ("bang_bang", [])
+    names = {row["name"] for row in json.loads(detent(python, "registers", "bang_bang", "--json").stdout)}
+    assert {"controller.speed", "lines.drive", "plant.train.position"} <= names
+    assert "bang_bang: a list of moves" in " ".join(detent(python, "run", "--help").stdout.split())
+
+
+def test_a_run_has_a_report_with_a_section_of_its_own_and_a_trace(python, tmp_path):
+    done = detent(python, "run", FILE, "--job", JOB, "--trace", "csv", "--output", tmp_path, "--json")
+    found = json.loads(done.stdout)
+    assert found["done"]
+    assert [move["number"] for move in found["moves"]] == [1, 2, 3, 4]
+    assert all(abs(move["error"]) <= found["tolerance"] for move in found["moves"])
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    words = " ".join(Reader(text).words)
+    assert "How the axis did it" in words
+    assert "Braking ahead of the target" in words
+    assert all(f'"{chart}"' in text for chart in ("job", "move-speed", "move-drive", "approach-place"))
+    heads = (tmp_path / "trace.csv").read_text(encoding="utf-8")
+    assert "lines.drive" in heads[:2000]
+
+
+def test_compare_holds_it_beside_itself_without_the_braking_rule(python, tmp_path):
+    done = detent(python, "compare", FILE, "--figure", tmp_path / "page.html", "--json")
+    ((with_braking, without),) = (one["rows"] for one in json.loads(done.stdout)["comparisons"])
+    assert (with_braking["way"], without["way"]) == ("with braking", "without")
+    assert float(without["overshoot"].split()[0]) > 0
+    assert with_braking["overshoot"] != without["overshoot"]
+
+
+def test_timing_shows_its_lines(python, tmp_path):
+    files = ("--figure", tmp_path / "timing.png", "--vcd", tmp_path / "timing.vcd")
+    done = detent(python, "timing", FILE, "--at", "5 ms", *files, "--json")
+    assert json.loads(done.stdout)["signals"][0] == "lines.a"
+    assert "controller" in (tmp_path / "timing.vcd").read_text(encoding="utf-8")
+
+
+def test_no_line_of_detent_names_it():
+    for source in (ROOT / "src").rglob("*.py"):
+        text = source.read_text(encoding="utf-8").lower()
+        assert not re.search("bang.?bang", text), source
+
+
+def test_it_is_a_small_distribution():
+    lines = [line.strip() for path in PROJECT.rglob("*.py") for line in path.read_text().splitlines()]
+    lines += (PROJECT / "bang_bang.toml").read_text().splitlines()
+    assert sum(bool(line) and not line.startswith(('"""', "#")) for line in lines) < 240
+
+
+def test_the_how_to_shows_the_distribution_as_it_is():
+    blocks = blocks_of(ROOT / "docs" / "how-to" / "add-a-control-method.md")
+    shown = {block.marks["file"]: block.text for block in blocks if "file" in block.marks}
+    del shown["detent_bang_bang-1.0.dist-info/entry_points.txt"]  # what pip writes
+    files = [path for path in PROJECT.rglob("*") if path.suffix in {".py", ".toml", ".csv"}]
+    assert shown == {path.relative_to(PROJECT).as_posix(): path.read_text(encoding="utf-8") for path in files}
