@@ -106,7 +106,7 @@ def phase_move() -> None:
     """A move of six pitches: speed, distance, the last steps, and the lines to the host."""
     axis = phase_axis()
     spec = axis.spec
-    done = axis.run(axis.method.sample_job(), signals=MOVE_SIGNALS, every=32)
+    done = axis.run(axis.simulated.sample_job(), signals=MOVE_SIGNALS, every=32)
     move = done.result.moves[0]
     part = done.trace.between(move.begin + 2 * spec.tick, move.begin + 45e-3)
     t = (part.time - move.begin) * 1e3
@@ -170,7 +170,7 @@ def clock_order() -> None:
     with picture("clock-order.svg", 1, 3.4) as (area,):
         for text, colour, overrides in cases:
             axis = phase_axis(*push, *overrides)
-            sample = axis.method.sample_job().moves[0]
+            sample = axis.simulated.sample_job().moves[0]
             job = MoveJob("pushed", "moves", (replace(sample, dwell=0.25),))
             done = axis.run(job, signals=("train.position",), every=64)
             displacement = (done.trace["train.position"] - done.result.moves[0].target) / axis.spec.step
