@@ -165,7 +165,7 @@ BAD = {
     "another method": (["run", str(detent.example("filtered_servo.toml")), "--replay", "log.csv"], "allowed: cascade"),
     "no log": (["run", CASCADE, "--replay", "none.csv"], "none.csv"),
     "angles on a slide": (["run", CASCADE, "--replay", "turn.csv"], "came reference in rad; allowed: m, as the axis"),
-    "lengths on a table": (["run", TURNTABLE, "--job", SLIDE], 'came the unit "mm"'),
+    "lengths on a table": (["run", TURNTABLE, "--job", SLIDE], "allowed: an angle such as"),
     "beyond the end": (["run", CASCADE, "--job", "far.csv"], r"far\.csv:2:1 target: came 700 mm; allowed: a position"),
     "a bad column": (["run", CASCADE, "--replay", "log.csv", "--column", "robot=x"], "robot"),
     "nothing that drives": (["run", CASCADE, "--replay", "bare.csv"], "came neither a reference nor a force"),

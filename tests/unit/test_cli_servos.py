@@ -123,7 +123,7 @@ BAD = {
     "timing: too long": (["timing", PHASE, "--at", "1 ms", "--for", "1 s"], "up to 50 ms"),
     "timing: no picture": (["timing", PHASE, "--at", "1 ms", "--figure", "a.txt"], "cannot be saved as '.txt'"),
     "timing: no signal": (["timing", PHASE, "--at", "1 ms", "--signals", "law.wrod"], "did you mean 'law.word'"),
-    "registers: no method": (["registers", "robot"], "rotary_table, stepper_envelope, cascade, or an axis"),
+    "registers: no method": (["registers", "robot"], "rotary_table, stepper_envelope, or an axis"),
 }
 
 
