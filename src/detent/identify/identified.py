@@ -122,6 +122,10 @@ class Identified:
         return cascade_spec(self.axis, self.axis_name) if self.axis else None
 
 
+def _untold(_share: float, _text: str) -> None:
+    """Progress that nobody asked for."""
+
+
 def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     logs: str | Path | Sequence[str | Path],
     *,
@@ -167,11 +171,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
         The axis file is of another method.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
-
-    def tell(share: float, text: str) -> None:
-        if progress is not None:
-            progress(share, text)
-
+    tell = progress or _untold
     text = "" if axis is None else read_axis_text(axis)
     if axis is not None:
         cascade_spec(text, str(axis))

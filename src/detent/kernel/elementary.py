@@ -123,10 +123,11 @@ def one_less_exp(x: float) -> float:
 
 def angle_of(y: float, x: float) -> float:
     """Angle of a vector from -pi to pi [rad], halved until its series is short. For parameters: no step."""
+    if x < 0.0:
+        return (0.5 * FULL_TURN if y >= 0.0 else -0.5 * FULL_TURN) - angle_of(y, -x)
     if y == 0.0:
-        return 0.0 if x >= 0.0 else 0.5 * FULL_TURN
-    length = sqrt(x * x + y * y)
-    tangent = y / (length + x) if x > 0.0 else (length - x) / y  # of half the angle
+        return 0.0
+    tangent = y / (sqrt(x * x + y * y) + x)  # of half the angle
     for _ in range(3):
         tangent /= 1.0 + sqrt(1.0 + tangent * tangent)
     square, total = tangent * tangent, 0.0

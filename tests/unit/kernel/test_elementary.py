@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detent.kernel.elementary import FARTHEST, HIGHEST, LOWEST, exp, sin
+from detent.kernel.elementary import FARTHEST, HIGHEST, LOWEST, angle_of, exp, one_less_exp, sin
 from detent.kernel.step import step
 
 DIGITS = 60
@@ -124,3 +124,19 @@ def plain_functions(monkeypatch):
         if hasattr(made, "py_func"):
             monkeypatch.setattr(module, name, made.py_func)
     return {name: getattr(module, name) for name in ("exp", "sin")}
+
+
+@given(st.floats(1e-12, 700.0))
+def test_what_an_exponential_lacks_to_one_is_exact_where_the_difference_would_cancel(x):
+    with localcontext(prec=DIGITS):
+        true = 1 - Decimal(-x).exp()
+        error = abs(Decimal(one_less_exp(x)) - true)
+    assert error <= 4 * Decimal(math.ulp(float(true)))
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_an_angle_is_that_of_the_library_within_its_last_digits(y, x):
+    true = math.atan2(y, x) if y else (0.0 if x >= 0.0 else math.pi)
+    # Squares of shorter vectors are no longer normal numbers.
+    if math.hypot(x, y) > 1e-150 or not y:
+        assert abs(angle_of(y, x) - true) <= 8 * math.ulp(true)
