@@ -56,11 +56,13 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage, so the steps run as plain Python here; what simulates minutes of an axis is
-# added with the steps compiled.
+# added with the steps compiled, at the same time.
 coverage: venv-test ## which lines and branches the unit and property tests reach
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run -m pytest tests/unit tests/property \
-		-m "not long and not bench and not compiled" $(PYTEST_ARGS)
-	$(BIN)/python -m coverage run --append -m pytest tests/unit tests/property -m "compiled and not long" $(PYTEST_ARGS)
+	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.plain $(BIN)/python -m coverage run -m pytest tests/unit tests/property \
+		-m "not long and not bench and not compiled" $(PYTEST_ARGS) & plain=$$!; \
+	COVERAGE_FILE=.coverage.compiled $(BIN)/python -m coverage run -m pytest tests/unit tests/property \
+		-m "compiled and not long" $(PYTEST_ARGS); compiled=$$?; wait $$plain && exit $$compiled
+	$(BIN)/python -m coverage combine .coverage.plain .coverage.compiled
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout

@@ -13,6 +13,8 @@ from tests.docs.pages import blocks_of
 from tests.page_reader import Reader
 from tests.places import ROOT
 
+pytestmark = pytest.mark.compiled
+
 PROJECT = ROOT / "tests" / "distribution" / "detent-bang-bang"
 FILE, JOB = str(PROJECT / "bang_bang.toml"), str(PROJECT / "moves.csv")
 PIPED = {"capture_output": True, "encoding": "utf-8"}
