@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.places import ROOT
@@ -50,6 +51,8 @@ class Job:
     state: Mapping[str, Registers]
     commands: tuple[Callable[[], object], ...]
     run: Callable[[int], object]  # lets ticks pass, whatever the axis says
+    acknowledge: Callable[[], object] = lambda: None  # the host's answer to an event
+    feed: Callable[[str], tuple[Any, ...]] = lambda _: ()  # what the host has laid ready for `advance`, by motor
 
 
 def print_head() -> Job:

@@ -66,7 +66,7 @@ def registers_command(
 ) -> None:
     """List every register of an axis: what --signals can record."""
     rows = [
-        {"name": leaf.path, "width": leaf.width.code, "unit": leaf.unit, "doc": leaf.doc}
+        {"name": leaf.path, "width": leaf.width.code, "unit": leaf.unit, "doc": leaf.doc, "by": leaf.by}
         for leaf in _registers_of(method).leaves()
         if not leaf.length
     ]
@@ -74,7 +74,8 @@ def registers_command(
         print_json(rows)
         return
     for row in rows:
-        print(f"{row['name']:<36} {row['width']:<3} {row['unit']:<14} {row['doc']}")
+        writer = f" (written by the {row['by']})" if row["by"] else ""
+        print(f"{row['name']:<36} {row['width']:<3} {row['unit']:<14} {row['doc']}{writer}")
 
 
 def _registers_of(method: str) -> Any:

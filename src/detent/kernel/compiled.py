@@ -296,6 +296,18 @@ def read_byte(_typingctx: Any, registers: Any, _offset: Any) -> Any:
 
 
 @extending.intrinsic
+def write_byte(_typingctx: Any, registers: Any, _offset: Any, _value: Any) -> Any:
+    """Store one byte."""
+
+    def codegen(context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+        place = builder.gep(args[0], [args[1]], source_etype=BYTE)
+        builder.store(builder.trunc(args[2], BYTE), place)
+        return context.get_dummy_value()
+
+    return types.none(registers, types.int64, types.int64), codegen
+
+
+@extending.intrinsic
 def shifted_one(_typingctx: Any, _exponent: Any) -> Any:
     """The float whose exponent this is: its bits alone, no call."""
 
@@ -335,6 +347,11 @@ def byte_at(registers: Any, offset: int) -> int:
     return ctypes.c_uint8.from_buffer(registers, offset).value
 
 
+def put_byte(registers: Any, offset: int, value: int) -> None:
+    """Set a raw byte of the register memory: what a replay copies."""
+    ctypes.c_uint8.from_buffer(registers, offset).value = value
+
+
 @extending.overload(local_copy, inline="always")
 def _local_copy(registers: Any) -> Any:
     def compiled(registers: Any) -> Any:
@@ -355,5 +372,13 @@ def _copy_back(target: Any, source: Any) -> Any:
 def _byte_at_overload(registers: Any, offset: Any) -> Any:
     def compiled(registers: Any, offset: Any) -> Any:
         return read_byte(registers, offset)
+
+    return compiled
+
+
+@extending.overload(put_byte, inline="always")
+def _put_byte_overload(registers: Any, offset: Any, value: Any) -> Any:
+    def compiled(registers: Any, offset: Any, value: Any) -> None:
+        write_byte(registers, offset, value)
 
     return compiled

@@ -2,39 +2,43 @@
 
 A system states its tick by `ticks`, under the class of its parameters, where `advance` finds it: numba when it compiles
 the loop for these parameters, plain Python at each call. A tick handed over as an argument, or kept in a closure, would
-never be found in the compiled cache.
+never be found in the compiled cache. In the same way a controller states by `controls` what it does in a tick, and
+`replay` runs it alone, on wires that were recorded.
 """
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numba.extending
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.kernel.compiled import byte_at, copy_back, local_copy
+from detent.kernel.compiled import byte_at, copy_back, local_copy, put_byte
 from detent.kernel.registers import Registers
 from detent.kernel.step import hot_step, step
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
-F = TypeVar("F", bound=Callable[..., bool])
+F = TypeVar("F", bound=Callable[..., object])
 
 extending: Any = numba.extending  # it publishes no types
 
 HostArray = Any
 """A ctypes array; compiled code reads ``array[k]`` and ``len(array)``."""
 
-_TICKS: dict[type[Registers], tuple[Callable[..., bool], str]] = {}
+_TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
+
+_CONTROLS: dict[type[Registers], Callable[..., Any]] = {}
 
 
 def ticks(params: type[Registers], local: str = "") -> Callable[[F], F]:
     """State the tick of a system: ``tick(params, state, *feed)``.
 
     It counts the state's field ``tick`` up and gives True; False where nothing happens before the host has looked.
-    Where a benchmark shows a gain, `local` names the block of the plant: a stretch of ticks works on a copy of it in a
-    stack slot, so that it stays in machine registers. The tick is then ``tick(params, state, block, *feed)``, and does
-    not touch the one in the state.
+    Where a benchmark shows a gain, `local` names a block, "plant" or "plant.train": a stretch of ticks works on a copy
+    of it in a stack slot, so that it stays in machine registers. The tick is then
+    ``tick(params, state, block, *feed)``, and does not touch the one in the state.
     """
 
     def register(function: F) -> F:
@@ -45,10 +49,39 @@ def ticks(params: type[Registers], local: str = "") -> Callable[[F], F]:
     return register
 
 
+def controls(params: type[Registers]) -> Callable[[F], F]:
+    """State what a controller with these parameters does in a tick: ``control(params, controller, lines, *feed)``.
+
+    It reads the wires that the plant writes, and writes the others; it knows no plant, and keeps its own time.
+    """
+
+    def register(function: F) -> F:
+        """Keep it for this class of parameters."""
+        _CONTROLS[params] = function
+        return function
+
+    return register
+
+
+def run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
+    """One tick of the controller whose parameters these are."""
+    _CONTROLS[type(p)](p, controller, lines, *feed)
+
+
+@extending.overload(run_controller, jit_options={"forceinline": True})
+def _run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over all types
+    control = _CONTROLS[p.registers]
+
+    def compiled(p: Any, controller: Any, lines: Any, *feed: Any) -> None:
+        control(p, controller, lines, *feed)
+
+    return compiled
+
+
 def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
     """Up to `most` ticks of the system whose parameters these are, without a row; returns how many."""
     tick, local = _TICKS[type(p)]
-    blocks = (getattr(r, local),) if local else ()
+    blocks = (attrgetter(local)(r),) if local else ()
     n = 0
     while n < most and tick(p, r, *blocks, *feed):
         n += 1
@@ -58,6 +91,7 @@ def run_stretch(p: Any, r: Any, most: int, *feed: Any) -> int:
 @extending.overload(run_stretch, jit_options={"forceinline": True})
 def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 - numba hands over the types of all
     tick, local = _TICKS[p.registers]
+    outer, _, inner = local.partition(".")
 
     def plain(p: Any, r: Any, most: Any, *feed: Any) -> int:
         n = 0
@@ -66,14 +100,22 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
         return n
 
     def on_a_copy(p: Any, r: Any, most: Any, *feed: Any) -> int:
-        block = local_copy(getattr(r, local))
+        block = local_copy(getattr(r, outer))
         n = 0
         while n < most and tick(p, r, block, *feed):
             n += 1
-        copy_back(getattr(r, local), block)
+        copy_back(getattr(r, outer), block)
         return n
 
-    return on_a_copy if local else plain
+    def on_a_copy_within(p: Any, r: Any, most: Any, *feed: Any) -> int:
+        block = local_copy(getattr(getattr(r, outer), inner))
+        n = 0
+        while n < most and tick(p, r, block, *feed):
+            n += 1
+        copy_back(getattr(getattr(r, outer), inner), block)
+        return n
+
+    return on_a_copy_within if inner else on_a_copy if local else plain
 
 
 def lay_ready(values: NDArray[Any]) -> HostArray:
@@ -111,3 +153,12 @@ def advance(  # noqa: PLR0913 - an axis, how long, and where its rows go
         if n < stretch:
             break
     return done
+
+
+@step
+def replay(p: Any, controller: Any, lines: Any, rows: Bytes, picks: Offsets, *feed: Any) -> None:
+    """Run a controller alone, a tick per row of `rows`: the bytes at `picks` of the lines, as the plant wrote them."""
+    for row in range(rows.shape[0]):
+        for k in range(picks.shape[0]):
+            put_byte(lines, picks[k], rows[row, k])
+        run_controller(p, controller, lines, *feed)

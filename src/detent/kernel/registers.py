@@ -69,6 +69,7 @@ class _Declaration:
     doc: str
     unit: str
     length: int
+    by: str
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ class Field:
     """One declared field of a register file.
 
     `width` is None for a nested block, whose class is then `block`; `length` is 0 for a single value, else the number
-    of elements of an array. `offset` counts bytes from the start of the structure.
+    of elements of an array. `offset` counts bytes from the start of the structure. `by` names who writes a wire between
+    controller and plant; it is empty elsewhere.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Field:
     width: Width | None
     block: "type[Registers] | None"
     length: int
+    by: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,16 +101,21 @@ class Leaf:
     offset: int
     width: Width
     length: int
+    by: str = ""
 
 
-def register(doc: str, *, unit: str = "", length: int = 0) -> Any:
-    """Declare a register."""
-    return _Declaration(doc, unit, length)
+PLANT, CONTROLLER = "plant", "controller"
+"""Who writes a wire: sensor words and switches come from the plant, actuator words and enables from the controller."""
 
 
-def block(doc: str) -> Any:
-    """Declare a nested register file."""
-    return _Declaration(doc, "", 0)
+def register(doc: str, *, unit: str = "", length: int = 0, by: str = "") -> Any:
+    """Declare a register; a wire says by whom it is written, `PLANT` or `CONTROLLER`."""
+    return _Declaration(doc, unit, length, by)
+
+
+def block(doc: str, *, by: str = "") -> Any:
+    """Declare a nested register file; of wires, by whom all of it is written."""
+    return _Declaration(doc, "", 0, by)
 
 
 def _ctypes_field(name: str, hint: Any, declared: _Declaration) -> tuple[str, Any, Width | None]:
@@ -143,6 +151,7 @@ class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIss
                 width=width,
                 block=None if width else ctype,
                 length=declared[key].length,
+                by=declared[key].by,
             )
             for key, ctype, width in rows
         }
@@ -162,14 +171,14 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     __fields__: "dict[str, Field]" = {}  # noqa: RUF012 - replaced per class by the metaclass
 
     @classmethod
-    def leaves(cls, prefix: str = "", offset: int = 0) -> Iterator[Leaf]:
+    def leaves(cls, prefix: str = "", offset: int = 0, by: str = "") -> Iterator[Leaf]:
         """Every stored quantity with its dotted path, in order of memory."""
         for field in cls.__fields__.values():
-            path, place = prefix + field.name, offset + field.offset
+            path, place, writer = prefix + field.name, offset + field.offset, field.by or by
             if field.block is not None:
-                yield from field.block.leaves(path + ".", place)
+                yield from field.block.leaves(path + ".", place, writer)
             elif field.width is not None:
-                yield Leaf(path, field.doc, field.unit, place, field.width, field.length)
+                yield Leaf(path, field.doc, field.unit, place, field.width, field.length, writer)
 
     @classmethod
     def dtype(cls) -> "np.dtype[Any]":
@@ -240,7 +249,8 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
         rows = ["| register | width | unit | meaning |", "|---|---|---|---|"]
         for leaf in cls.leaves():
             width = leaf.width.code + (f" x {leaf.length}" if leaf.length else "")
-            rows.append(f"| `{leaf.path}` | {width} | {leaf.unit} | {leaf.doc} |")
+            writer = f"; written by the {leaf.by}" if leaf.by else ""
+            rows.append(f"| `{leaf.path}` | {width} | {leaf.unit} | {leaf.doc}{writer} |")
         return "\n".join(rows) + "\n"
 
 

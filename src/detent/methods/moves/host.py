@@ -31,7 +31,6 @@ class Host(Protocol):
     """What each servo brings; the frame makes the moves of a job with it. What it leaves out has the default here."""
 
     machine: Machine[Any, Any]
-    state: Any
     spec: Any
     grid: float  # distance of two places at which it can stand [m]
     tolerance: float  # error that counts as arrived [m]
@@ -80,11 +79,6 @@ class Host(Protocol):
     def switched(self) -> float:
         """When position mode was entered [s]; NaN for an axis of one mode."""
         return math.nan
-
-    @property
-    def plant(self) -> Any:
-        """Registers with the `train` and the `gauge` that an observer looks at."""
-        return self.state
 
     @property
     def faults(self) -> dict[str, int]:

@@ -36,7 +36,7 @@ from detent.page.table import Cell, left_out, long_table, offset_cell, way_cell
 from detent.page.words import CountUnit, count, duration, length, milliseconds, number
 from detent.record.trace import Trace
 
-POSITION, VELOCITY, TARGET = "train.position", "train.velocity", "gauge.target"
+POSITION, VELOCITY, TARGET = "plant.train.position", "plant.train.velocity", "plant.gauge.target"
 """Signals that every axis of moves records."""
 
 FEWEST_MOVES = 5
@@ -59,7 +59,6 @@ class ShownMove:
     move: MoveRecord
     why: str
     rows: Stretch
-    plant: str = ""  # see `MoveView.plant`
 
     @property
     def settled(self) -> float:
@@ -69,7 +68,7 @@ class ShownMove:
     @property
     def to_go(self) -> Numbers:
         """Target less true position [m]."""
-        return self.move.target - self.rows[self.plant + POSITION]
+        return self.move.target - self.rows[POSITION]
 
 
 class MoveView(Protocol):
@@ -79,8 +78,6 @@ class MoveView(Protocol):
     """Signals that a move is drawn from beside position, velocity and target."""
     captions: ClassVar[tuple[str, str]] = ("", "")
     """What to look for in the whole move, and in the words at its end."""
-    plant: ClassVar[str] = ""
-    """Where `train` and `gauge` stand among the registers, with a dot behind."""
 
     @property
     def name(self) -> str:
@@ -130,7 +127,7 @@ def moves_page(
     """The page of a run of moves; figures whose signals were not recorded are left out."""
     figures = MoveFigures(run)
     text = view.text_figure(run) if run.job.kind == "text" and run.moves else None
-    result = [text, _job_figure(view, figures, trace), _rest_figure(view, figures)]
+    result = [text, _job_figure(figures, trace), _rest_figure(view, figures)]
     return Page(
         title=page_title(view.name, run),
         headline=_headline(view, figures),
@@ -209,15 +206,14 @@ def _notes(figures: MoveFigures) -> list[Note]:
 # ---- the whole job
 
 
-def _job_figure(view: MoveView, figures: MoveFigures, trace: Trace | None) -> Figure | None:
-    position, target = view.plant + POSITION, view.plant + TARGET
-    rows = stretch(trace, (position, target), figures.run.time_ready) if figures.run.moves else None
+def _job_figure(figures: MoveFigures, trace: Trace | None) -> Figure | None:
+    rows = stretch(trace, (POSITION, TARGET), figures.run.time_ready) if figures.run.moves else None
     if rows is None:
         return None
     end = int(np.searchsorted(rows.t, float(rows.t[0]) + LONGEST, side="right"))
     curves = [
-        Curve(label="target", colour="muted", dash=(6, 4), step=True, y=rows[target][:end] * MM, digits=4),
-        Curve(label="true position", colour="speed", width=2, y=rows[position][:end] * MM, digits=4),
+        Curve(label="target", colour="muted", dash=(6, 4), step=True, y=rows[TARGET][:end] * MM, digits=4),
+        Curve(label="true position", colour="speed", width=2, y=rows[POSITION][:end] * MM, digits=4),
     ]
     timeline = Timeline(name="job", t=rows.t[:end], label="time since the axis was ready", unit="s")
     return Figure(
@@ -255,14 +251,14 @@ def _rest_chart(run: MoveRun) -> Chart:
 
 
 def _move_figures(view: MoveView, figures: MoveFigures, trace: Trace | None) -> list[Figure]:
-    needed = (*(view.plant + name for name in (POSITION, VELOCITY, TARGET)), *view.signals)
+    needed = (POSITION, VELOCITY, TARGET, *view.signals)
     if trace is None or not has(trace, needed):
         return []
     move, why = _telling(figures, trace)
     rows = stretch(trace, needed, move.begin, move.end) if move else None
     if move is None or rows is None:
         return []
-    shown = ShownMove(figures.run, move, why, rows, view.plant)
+    shown = ShownMove(figures.run, move, why, rows)
     return [_whole_figure(view, shown), *_approach_figures(view, shown)]
 
 
@@ -310,7 +306,7 @@ def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
 
 def true_speed(shown: ShownMove) -> Curve:
     """The curve that every picture of a move has."""
-    return Curve(label="true speed", colour="speed", width=2, y=shown.rows[shown.plant + VELOCITY] * MM)
+    return Curve(label="true speed", colour="speed", width=2, y=shown.rows[VELOCITY] * MM)
 
 
 @dataclass(frozen=True)
@@ -322,7 +318,6 @@ class PlainView:
     max_speed: float
     signals: ClassVar[Sequence[str]] = ()
     captions: ClassVar[tuple[str, str]] = ("", "")
-    plant: ClassVar[str] = ""
     bands, text_figure = MoveView.bands, MoveView.text_figure
 
     def panels(self, shown: ShownMove) -> list[Panel]:
@@ -365,7 +360,7 @@ def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
     last = events[-1].t
     rows = shown.rows.between(begin, min(last + 0.15 * (last - begin), float(t[-1])))
     limit = shown.run.tolerance / view.unit.size
-    place = (rows[shown.plant + POSITION] - shown.move.target) / view.unit.size
+    place = (rows[POSITION] - shown.move.target) / view.unit.size
     within = [(shown.settled, float(t[-1]))] if shown.settled < t[-1] else []
     timeline = Timeline(
         name="approach",

@@ -137,15 +137,15 @@ def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> 
 
 def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
     """One move and its dwell; what went wrong, or nothing."""
-    train, gauge, begin = host.plant.train, host.plant.gauge, host.machine.time
-    start = float(train.position)
-    set_gauge(gauge, host.state.tick, start, to.position, host.tolerance)
+    plant, begin = host.machine.state.plant, host.machine.time
+    start = float(plant.train.position)
+    set_gauge(plant.gauge, host.machine.state.tick, start, to.position, host.tolerance)
     host.command(to)
     arrived = host.wait(host.time_limit(to))
     ready = host.machine.time if arrived else math.nan
     if arrived and to.move.dwell > 0:
         host.stands(to.move.dwell)
-    error = to.position - float(train.position)
+    error = to.position - float(plant.train.position)
     result.moves.append(
         MoveRecord(
             number=to.move.number,
@@ -155,11 +155,11 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
             target=to.position,
             switched=host.switched,
             ready=ready,
-            settled=gauge.outside * host.machine.tick,
+            settled=plant.gauge.outside * host.machine.tick,
             end=host.machine.time,
-            overshoot=max(float(gauge.beyond), 0.0),
+            overshoot=max(float(plant.gauge.beyond), 0.0),
             error=error,
-            peak_speed=float(gauge.peak_speed),
+            peak_speed=float(plant.gauge.peak_speed),
         )
     )
     return _verdict(host, to, error, arrived=arrived)
@@ -190,7 +190,7 @@ def _away(host: Host, error: float) -> str:
 
 def _finish(host: Host, result: MoveRun) -> None:
     """Totals."""
-    train = host.plant.train
+    train = host.machine.state.plant.train
     result.time_end = host.machine.time
     result.peak_current, result.energy = float(train.peak_current), float(train.energy)
     result.faults = host.faults

@@ -20,9 +20,9 @@ def build(spec: BangBangSpec) -> BangBangParams:
     p, c, method = BangBangParams(), spec.mechanics, spec.method
     mass = c.mass + spec.motor.rotor_inertia / spec.radius**2
     fill_drive_train(
-        p.train, spec.motor, c.friction, radius=spec.radius, mass=mass, travel=spec.limits.travel, period=TICK
+        p.plant.train, spec.motor, c.friction, radius=spec.radius, mass=mass, travel=spec.limits.travel, period=TICK
     )
-    p.supply, p.encoder.edge_pitch, p.encoder.origin = method.supply, spec.pulse, -spec.pulse / 2
+    p.plant.supply, p.plant.encoder.edge_pitch, p.plant.encoder.origin = method.supply, spec.pulse, -spec.pulse / 2
     p.controller.band, p.controller.window = method.dead_band, round(method.window / TICK)
     p.controller.settling = round(method.settling / TICK)
     if method.braking:
@@ -32,31 +32,29 @@ def build(spec: BangBangSpec) -> BangBangParams:
 
 class BangBangHost(Host):
     def __init__(self, spec, recorder=None):
-        self.spec, self.state, self.home, self.grid = spec, BangBangState(), 0.0, spec.pulse
-        self.machine = Machine(build(spec), self.state, Loop(TICK, advance), recorder)
+        p, r = build(spec), BangBangState()
+        self.spec, self.controller, self.home, self.grid = spec, r.controller, 0.0, spec.pulse
+        self.machine = Machine(p, r, Loop(TICK, advance), recorder)
         self.tolerance = (spec.method.dead_band + 1) * spec.pulse
-        c, disc = self.state.controller.decoder, self.plant.encoder
-        stand_at(self.machine.params.encoder, disc, 0.0, spec.encoder.seed)
-        c.channel_a, c.channel_b = disc.channel_a, disc.channel_b
-
-    @property
-    def plant(self):
-        return self.state.plant
+        stand_at(p.plant.encoder, r.plant.encoder, 0.0, spec.encoder.seed)
+        decoder, disc = r.controller.decoder, r.plant.encoder
+        decoder.channel_a, decoder.channel_b = disc.channel_a, disc.channel_b
 
     def command(self, to):
-        self.state.controller.target, self.state.controller.rest, self.state.event = to.counts, 0, 0
+        c = self.controller
+        c.target, c.rest, c.event = to.counts, 0, 0
 
     def time_limit(self, to):
-        return 2.0 + 10 * abs(to.position - self.plant.train.position) / self.spec.top_speed
+        return 2.0 + 10 * self.spec.limits.travel / self.spec.top_speed
 
     def wait(self, seconds):
         self.machine.pass_time(seconds)
-        arrived, self.state.event = bool(self.state.event), 0
+        arrived, self.controller.event = bool(self.controller.event), 0
         return arrived
 
 
 class BangBangView(PlainView):
-    signals, plant = ("controller.error", "controller.speed", "lines.drive"), "plant."
+    signals = ("controller.error", "controller.speed", "lines.drive")
     captions = ("Look for: full drive, full brake, then off.", "Below: what is left of the way when it has braked.")
 
     def panels(self, shown):

@@ -1,7 +1,7 @@
 """Controller, lines and plant: three register blocks, and the tick that joins them."""
 
-from detent.kernel.loop import ticks
-from detent.kernel.registers import Registers, block, f8, i1, i8, register, u1
+from detent.kernel.loop import controls, ticks
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1
 from detent.kernel.step import hot_step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
@@ -16,11 +16,15 @@ class ControllerParams(Registers):
     settling: i8 = register("ticks at rest until the axis has arrived", unit="tick")
 
 
-class BangBangParams(Registers):
-    controller: ControllerParams = block("constants of the law")
+class PlantParams(Registers):
     supply: f8 = register("voltage of full drive", unit="V")
     encoder: EncoderParams = block("encoder")
     train: DriveTrainParams = block("motor and mechanics")
+
+
+class BangBangParams(Registers):
+    controller: ControllerParams = block("constants of the law")
+    plant: PlantParams = block("constants of the machine")
 
 
 class Controller(Registers):
@@ -31,12 +35,13 @@ class Controller(Registers):
     speed: i8 = register("pulses of the last window", unit="count")
     error: f8 = register("way that is left when it has braked", unit="count")
     rest: i8 = register("ticks inside the dead band", unit="tick")
+    event: u1 = register("1 when the axis has arrived; the host clears it")
 
 
 class Lines(Registers):
-    a: u1 = register("channel A")
-    b: u1 = register("channel B")
-    drive: i1 = register("1 full drive to the right, -1 to the left, 0 off")
+    a: u1 = register("channel A", by=PLANT)
+    b: u1 = register("channel B", by=PLANT)
+    drive: i1 = register("1 full drive to the right, -1 to the left, 0 off", by=CONTROLLER)
 
 
 class Plant(Registers):
@@ -50,11 +55,11 @@ class BangBangState(Registers):
     controller: Controller = block("controller")
     lines: Lines = block("wires between controller and plant")
     plant: Plant = block("plant")
-    event: u1 = register("1 when the axis has arrived; the host clears it")
 
 
+@controls(ControllerParams)
 @hot_step
-def control(p: ControllerParams, c: Controller, lines: Lines) -> int:
+def control(p: ControllerParams, c: Controller, lines: Lines) -> None:
     count_edge(c.decoder, lines.a, lines.b)
     c.left -= 1
     if c.left <= 0:
@@ -63,11 +68,11 @@ def control(p: ControllerParams, c: Controller, lines: Lines) -> int:
     c.error = away - p.braking * c.speed * abs(c.speed)
     lines.drive = 0 if abs(away) <= p.band else 1 if c.error > 0.0 else -1
     c.rest = c.rest + 1 if abs(away) <= p.band else 0
-    return 1 if c.rest == p.settling else 0
+    c.event = 1 if c.rest == p.settling else 0
 
 
 @hot_step
-def move(p: BangBangParams, tick: int, lines: Lines, plant: Plant) -> None:
+def move(p: PlantParams, tick: int, lines: Lines, plant: Plant) -> None:
     move_averaged(p.train, plant.train, lines.drive * p.supply, lines.drive * p.supply)
     while plant.train.position >= plant.encoder.next_right:
         pass_right(p.encoder, plant.encoder)
@@ -79,10 +84,10 @@ def move(p: BangBangParams, tick: int, lines: Lines, plant: Plant) -> None:
 @ticks(BangBangParams)
 @hot_step
 def tick(p: BangBangParams, r: BangBangState) -> bool:
-    if r.event:
+    if r.controller.event:
         return False
     r.lines.a, r.lines.b = r.plant.encoder.channel_a, r.plant.encoder.channel_b
-    r.event = control(p.controller, r.controller, r.lines)
-    move(p, r.tick, r.lines, r.plant)
+    control(p.controller, r.controller, r.lines)
+    move(p.plant, r.tick, r.lines, r.plant)
     r.tick += 1
     return True

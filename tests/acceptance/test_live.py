@@ -1,0 +1,106 @@
+"""Live specification, section 8. The first ones are about the cut: what a controller is, and that it is whole."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.acceptance.test_golden_bits import JOBS, Job
+
+from detent.kernel.loop import advance, replay
+from detent.kernel.registers import CONTROLLER, PLANT, Registers
+from detent.methods.registry import METHODS
+
+TICKS = 100_000
+
+MACHINE = ("detent.plant", "detent.drive", "detent.sensing.encoder", "detent.sensing.interference")
+"""What no controller may know."""
+
+
+@dataclass
+class Stretch:
+    """Ticks without a word of the host: what it had written before, and what then came along the lines."""
+
+    written: dict[int, int]  # bytes of the controller that the host has written, by place
+    rows: NDArray[np.uint8]  # a row per tick: bytes of the lines as the plant wrote them
+    feed: tuple[Any, ...]  # what the host has laid ready
+    controller: bytes  # as it was after the last tick
+    out: bytes  # what it had written on the lines by then
+
+
+def places(registers: type[Registers], by: str) -> NDArray[np.int64]:
+    """Places of all bytes of lines that are written by one side."""
+    leaves = [leaf for leaf in registers.leaves() if leaf.by == by]
+    parts = [np.arange(leaf.offset, leaf.offset + leaf.width.size * max(leaf.length, 1)) for leaf in leaves]
+    return np.concatenate(parts).astype(np.int64) if parts else np.zeros(0, np.int64)
+
+
+def out_of(lines: Registers) -> bytes:
+    """What the controller has written on the lines."""
+    return np.frombuffer(bytes(lines), np.uint8)[places(type(lines), CONTROLLER)].tobytes()
+
+
+def stretches(job: Job, name: str, ticks: int) -> Iterator[Stretch]:
+    """Run the standard job of one motor with its plant, and take down what the host and the plant said."""
+    p, r = job.params[name], job.state[name]
+    axis: Any = r
+    picks = places(type(axis.lines), PLANT) + type(r).__fields__["lines"].offset
+    known = bytes(axis.controller)
+    for command in job.commands:
+        command()
+        left, idle = ticks // len(job.commands), 0
+        while left > 0:
+            said, first = bytes(axis.controller), axis.tick
+            rows, feed = np.zeros((left, len(picks)), np.uint8), job.feed(name)
+            done = advance(p, r, left, rows, picks, 1, *feed)
+            rows = rows[np.arange(first + 1, first + done + 1) % left]
+            written = {k: new for k, (old, new) in enumerate(zip(known, said, strict=True)) if old != new}
+            known = bytes(axis.controller)
+            yield Stretch(written, rows, feed, known, out_of(axis.lines))
+            left, idle = left - done, 0 if done else idle + 1
+            assert idle < 3, "the axis waits for a host that does not answer"
+            job.acknowledge()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("make", JOBS, ids=lambda make: make.__name__)
+def test_01_a_controller_does_the_same_on_recorded_lines(make):
+    job = make()
+    for name, p in job.params.items():
+        axis: Any = job.state[name]
+        controller, lines = axis.controller.copy(), axis.lines.copy()
+        picks, passed = places(type(lines), PLANT), 0
+        for one in stretches(job, name, TICKS):
+            memory = bytearray(bytes(controller))
+            for k, value in one.written.items():
+                memory[k] = value
+            controller.restore(bytes(memory))
+            replay(p.controller, controller, lines, one.rows, picks, *one.feed)
+            assert controller.diff(one.controller) == {}
+            assert out_of(lines) == one.out
+            passed += len(one.rows)
+        assert passed >= TICKS
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_02_a_controller_knows_no_machine(name):
+    package = type(METHODS[name]).__module__.rpartition(".")[0]
+    script = f"import sys, {package}.controller; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert [module for module in loaded if module.startswith(MACHINE)] == []
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_02_an_axis_is_controller_lines_and_plant(name):
+    method = METHODS[name]
+    assert list(method.registers().__fields__) == ["tick", "controller", "lines", "plant"]
+    assert list(method.parameters().__fields__) == ["controller", "plant"]
+    wires = [leaf for leaf in method.registers().leaves() if leaf.path.startswith("lines.")]
+    assert wires
+    assert [leaf.path for leaf in wires if leaf.by not in {PLANT, CONTROLLER}] == []
+    told = [leaf.path for leaf in method.registers().leaves() if leaf.by and not leaf.path.startswith("lines.")]
+    assert told == []
