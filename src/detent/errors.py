@@ -119,6 +119,27 @@ SERVO_FAULT_TEXT: dict[int, str] = {
 """Causes of a fault of the filtered servo (control.deviation_counter)."""
 
 
+GUARD_TEXT: dict[int, str] = {
+    2: "the sensor stood while an effort that breaks the axis loose lasted for {stuck}, and the drive is off; "
+    "look for a blocked axis, a loose coupling or a broken sensor lead (protection.stuck_time, "
+    "protection.stuck_effort)",
+    3: "the sensor jumped farther than any motion can go, twice, and the drive is off; look at its lead, its "
+    "shield and its supply (protection.jump)",
+    4: "the axis sped up against its own effort for {reversed}, and the drive is off; look for a sensor or a "
+    "motor with its leads exchanged, or a force beyond the effort (protection.reversed_time)",
+    10: "the following error went beyond {following}, and the drive is off; look for what blocks the axis, lower "
+    "speed or acceleration, or correct the gains",
+    11: "the command stayed at its limit for {saturated}, and the drive is off; lower the acceleration, take a "
+    "stronger drive, or look for an unstable loop (protection.saturation_time)",
+    12: "the axis ran faster than {speed}, and the drive is off; look for a force that drives it, a sensor that "
+    "counts wrong, or an unstable loop (protection.overspeed)",
+    13: "the axis did not arrive within {arrival}; look for a force it cannot hold, or allow more time",
+    32: "the axis ran over the {side} end of its way, {end}, and the drive is off; keep the moves farther from "
+    "the ends, or damp the overshoot",
+}
+"""Faults that a controller's guard tells (control.guard), by their numbers; in all of them the first cause stays."""
+
+
 STEP_FAULT_TEXT: dict[int, str] = {
     1: "the table of permissible speeds fell by more than one ramp step, which the motor cannot follow; it came down "
     "its ramp and stands; build the table anew from its extremes, or edit it with move_stop",

@@ -1,0 +1,139 @@
+"""Protection: what a controller watches of its own axis, at every sample of its own.
+
+It knows what the controller knows: the count of its sensor, its own error and command. Each watch counts the samples in
+a row in which something is wrong, and the first one that lasts too long is the fault; its code stays until the axis is
+enabled anew. A watch that has no samples is off. The faults are numbered as in `errors.GUARD_TEXT`.
+
+An axis cannot speed up against its own effort, unless the sensor counts the wrong way round or a force beyond the
+effort drives it; and it cannot stand under an effort that breaks it loose, unless the sensor is stuck.
+"""
+
+from detent.kernel.registers import Registers, i1, i4, i8, register, u1
+from detent.kernel.step import hot_step, step
+
+STUCK, JUMPED, REVERSED = 2, 3, 4
+FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL = 10, 11, 12, 13
+TRAVEL = 32
+
+JUMPS = 2
+"""Jumps of the sensor that are a fault: one alone may be a disturbance of its line."""
+
+FAST = 2
+"""Samples in a row beyond the largest speed that are a fault."""
+
+NEVER = 1 << 62
+
+
+class GuardParams(Registers):
+    """Windows and times; a time of 0 switches its watch off."""
+
+    speed: i8 = register("largest movement in a sample; 0: any", unit="count")
+    jump: i8 = register("movement in one sample that no motion can make; 0: any", unit="count")
+    following: i4 = register("samples beyond the largest following error until that is a fault", unit="count")
+    travel: u1 = register("1 watches the ends of the travel")
+    saturated: i4 = register("samples with the command at its limit until that is a fault", unit="count")
+    stuck: i4 = register(
+        "samples at rest under an effort that breaks the axis loose until that is a fault", unit="count"
+    )
+    reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
+
+
+class Guard(Registers):
+    """What is wrong, and for how many samples in a row."""
+
+    code: u1 = register("first fault since the axis was enabled, by its number; 0 none", unit="code")
+    side: i1 = register("of a fault of the travel: the end that was passed, -1 lower, 1 upper")
+    following: i4 = register("samples with too large a following error", unit="count")
+    saturated: i4 = register("samples with the command at its limit", unit="count")
+    stuck: i4 = register("samples at rest under effort", unit="count")
+    fast: i4 = register("samples beyond the largest speed", unit="count")
+    jumps: i4 = register("jumps of the sensor since the axis was enabled", unit="count")
+    pushed: i4 = register("samples of effort in one direction in the running window", unit="count")
+    push: i1 = register("direction of that effort")
+    began: i8 = register("movement in the first sample of the window", unit="count")
+    deadline: i8 = register("time at which the axis must have arrived, on the controller's own clock", unit="tick")
+
+
+def enable_guard(g: Guard) -> None:
+    """Host action: forget the last fault and what led to it."""
+    deadline = g.deadline
+    g.restore(bytes(len(bytes(g))))
+    g.deadline = deadline
+
+
+def await_arrival(g: Guard, deadline: int) -> None:
+    """Host action: the axis must arrive by this tick of the controller's own clock; `NEVER` lifts it."""
+    g.deadline = deadline
+
+
+@hot_step
+def lasting(wrong: bool, before: int) -> int:
+    """Samples in a row in which something is wrong."""
+    return before + 1 if wrong else 0
+
+
+@hot_step
+def trip(g: Guard, code: int) -> None:
+    """A fault: the first one stays, what follows it is its consequence."""
+    if g.code == 0:
+        g.code = code
+
+
+@step
+def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
+    """Sensor stuck or the wrong way round, by what the effort makes of the movement."""
+    g.stuck = lasting(pushing != 0 and moved == 0, g.stuck)
+    if 0 < p.stuck <= g.stuck:
+        trip(g, STUCK)
+    if pushing == 0 or pushing != g.push or g.pushed == 0:
+        g.push = pushing
+        g.pushed = 1 if pushing else 0
+        g.began = moved
+        return
+    g.pushed += 1
+    if 0 < p.reversed <= g.pushed:
+        if pushing * moved < 0 and pushing * moved < pushing * g.began - 1:
+            trip(g, REVERSED)
+        g.pushed = 0
+
+
+@step
+def watch_speed(p: GuardParams, g: Guard, moved: int) -> None:
+    """A speed that no command asks for, and a count that no motion can make."""
+    fast = 0 < p.speed < abs(moved)
+    g.fast = lasting(fast, g.fast)
+    if g.fast >= FAST:
+        trip(g, OVERSPEED)
+    elif 0 < p.jump < abs(moved):
+        g.jumps += 1
+        if g.jumps >= JUMPS:
+            trip(g, JUMPED)
+
+
+@step
+def watch(p: GuardParams, g: Guard, late: bool, side: int, limited: bool, pushing: int, moved: int) -> int:
+    """One sample; returns the code of the fault, 0 while there is none.
+
+    `late`: the following error is beyond its largest; `side`: -1 or 1 beyond the lower or upper end of the travel;
+    `limited`: the command is at its limit; `pushing`: direction of an effort that breaks the axis loose, else 0;
+    `moved`: counts since the last sample.
+    """
+    g.following = lasting(late, g.following)
+    if 0 < p.following <= g.following:
+        trip(g, FOLLOWING)
+    if p.travel and side and g.code == 0:
+        g.side = side
+        g.code = TRAVEL
+    g.saturated = lasting(limited, g.saturated)
+    if 0 < p.saturated <= g.saturated:
+        trip(g, SATURATED)
+    watch_effort(p, g, pushing, moved)
+    watch_speed(p, g, moved)
+    return g.code
+
+
+@step
+def miss_arrival(g: Guard) -> None:
+    """The time for the move is over and the axis has not arrived: told, and the drive goes on holding."""
+    g.deadline = NEVER
+    trip(g, NO_ARRIVAL)
