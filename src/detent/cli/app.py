@@ -36,6 +36,12 @@ class Commands(TyperGroup):
             discard_output()
         raise typer.Exit(status)
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click hands it over
+        """The list of verbs, each with its whole first sentence."""
+        rows = [(name, verb.get_short_help_str(limit=1000)) for name, verb in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
 
 class ListsMethods(TyperCommand):
     """A verb whose help ends in what each installed method takes as a job, and how fast it ticks."""
@@ -57,6 +63,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # its imports take longer than the help
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
