@@ -8,6 +8,7 @@ are imported inside the functions that need them, so that `detent check` stays q
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
 
@@ -107,6 +108,10 @@ class Method(Protocol[SpecT]):
     """What must hold between keys; each gives the contradictions it finds."""
     catalogue: Catalogue | None = None
     """Motors that ``motor.catalogue`` may name."""
+    state: ClassVar[str]
+    """Where its package has the class of the axis's state, or of a part of which it has several: "system:Name"."""
+    params: ClassVar[str]
+    """The same of what does not change while it runs."""
     reports_comparisons: bool = True
     """Whether the report of a run shows the comparisons unless told otherwise."""
 
@@ -136,11 +141,16 @@ class Method(Protocol[SpecT]):
 
     def registers(self) -> "type[Registers]":
         """Class of the axis's state, or of a part of which it has several."""
-        ...
+        return self.brought(self.state)
 
     def parameters(self) -> "type[Registers]":
         """Class of what does not change while it runs."""
-        ...
+        return self.brought(self.params)
+
+    def brought(self, place: str) -> Any:
+        """What stands at ``module:name`` of the method's package; it loads only here."""
+        module, _, name = place.partition(":")
+        return getattr(import_module(f"{type(self).__module__.rpartition('.')[0]}.{module}"), name)
 
     def simulated(self, spec: SpecT) -> Simulated:
         """The axis as the simulation takes it."""

@@ -27,18 +27,22 @@ class MoveMethod(Method[SpecT], Protocol[SpecT]):
     """Registers that a run records unless told otherwise."""
     timing: ClassVar[tuple[str, ...]]
     """The same for a timing diagram."""
+    commands: ClassVar[str]
+    """Where its package has the host: "host:Name", made of a specification and a recorder."""
+    shows: ClassVar[str]
+    """Where it has the view of a run: "page:Name", made of a specification."""
 
     def tick(self, spec: SpecT) -> float:
         """Base tick [s]."""
         ...
 
-    def host(self, spec: SpecT, recorder: "AnyRecorder | None") -> "Host":
+    def host(self, spec: SpecT, recorder: "AnyRecorder | None" = None) -> "Host":
         """The simulated axis at power-on, and what commands it."""
-        ...
+        return self.brought(self.commands)(spec, recorder)
 
     def view(self, spec: SpecT) -> "MoveView":
         """What the method shows of itself on the page of a run."""
-        ...
+        return self.brought(self.shows)(spec)
 
     def sample_move(self, spec: SpecT) -> MoveJob:
         """A short job for looking at signals: a hundredth of the travel, from where the axis stands."""
