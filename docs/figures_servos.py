@@ -227,7 +227,7 @@ def filter_answer() -> None:
     from detent.sensing.speed_filter import SpeedFilter, filter_speed
 
     spec = slide().spec
-    p, r, method = build_filtered_servo(spec).filter, SpeedFilter(), spec.method
+    p, r, method = build_filtered_servo(spec).controller.filter, SpeedFilter(), spec.method
     mean = round(RATE * method.sample_period)
     r.output = float(method.scale * mean)
     counts = [mean, mean, mean + 1] + [mean] * 11
@@ -272,9 +272,9 @@ def run_and_stop(seconds: float, rest: float, overrides: tuple[str, ...]) -> tup
     axis = slide(*IDEAL, *overrides)
     speed = RATE * axis.spec.pulse
     job = MoveJob("worked example", "moves", (Move(number=1, row=0, by=speed * seconds, speed=speed, dwell=rest),))
-    done = axis.run(job, signals=("deviation.deviation",), every=10)
+    done = axis.run(job, signals=("controller.deviation.deviation",), every=10)
     begin = done.result.moves[0].begin
-    return done.trace.time - begin - seconds, done.trace["deviation.deviation"]
+    return done.trace.time - begin - seconds, done.trace["controller.deviation.deviation"]
 
 
 def sample_clock() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from detent.control.pulse_generator import PER_PULSE
 from detent.kernel.loop import advance
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.controller import acknowledge, go_to
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams, switch_on
 from detent.methods.load import load_spec
@@ -75,6 +76,7 @@ class Rig:
         self.spec = spec
         self.p: FilteredServoParams = build_filtered_servo(spec)
         self.r = FilteredServo()
+        self.c, self.lines, self.plant = self.r.controller, self.r.lines, self.r.plant
         switch_on(self.p, self.r, START, sample_microseconds(spec), spec.encoder.seed)
         self.run_ticks(1)
 
@@ -85,21 +87,22 @@ class Rig:
 
     def command_rate(self, rate: float) -> None:
         """Command pulses for ever at a signed rate [pulses/s]; 0 stops where the command stands."""
-        g = self.r.generator
-        g.rate = round(abs(rate) * PER_PULSE)
-        g.goal = int(g.command + np.sign(rate) * ENDLESS) if rate else g.command
+        go_to(self.c, int(self.c.generator.command + np.sign(rate) * ENDLESS), round(abs(rate) * PER_PULSE))
 
     def go(self, pulses: int, rate: float = 20_000.0) -> None:
         """Command so many pulses more, at a rate [pulses/s]."""
-        g = self.r.generator
-        g.goal, g.rate = g.command + pulses, round(rate * PER_PULSE)
+        go_to(self.c, self.c.generator.command + pulses, round(rate * PER_PULSE))
+
+    def acknowledge(self) -> None:
+        """The host has looked."""
+        acknowledge(self.c)
 
     def run_ticks(self, ticks: int) -> None:
         """Let ticks pass, whatever the axis says."""
         left = ticks
         while left > 0:
             left -= advance(self.p, self.r, left, *NO_TRACE)
-            self.r.event = 0
+            self.acknowledge()
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -116,7 +119,7 @@ class Rig:
         left = ticks
         while left > 0:
             left -= advance(self.p, self.r, left, rows, picks, every)
-            self.r.event = 0
+            self.acknowledge()
         index = np.arange(first // every + 1, self.r.tick // every + 1)
         table = rows[index % len(rows)].view(dtype)[:, 0]
         return {name: table[name].copy() for name in names} | {"t": index * every * TICK}

@@ -26,8 +26,9 @@ from detent.analysis.transfer_function import ServoTransfer
 from detent.control.deviation_counter import RUN, Deviation, count_deviation
 from detent.control.pulse_generator import FULL, PER_PULSE, PulseGenerator, clock_generator
 from detent.control.sample_clock import SampleClock, count_clock
+from detent.methods.filtered_servo.controller import CLOCKS
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.filtered_servo.system import CLOCKS, TICK, FilteredServo, FilteredServoParams
+from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, preset_decoder
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
@@ -80,11 +81,13 @@ def test_01_every_transition_gives_the_pulse_of_table_3_1_for_one_clock(before, 
 
 def test_01_the_counters_take_the_pulse_at_the_clock_after_the_first_flip_flop():
     rig = Rig()
-    rig.r.train.position = rig.r.encoder.next_right  # one edge forward, at once: seen in the last clock of the tick
+    rig.plant.train.position = (
+        rig.plant.encoder.next_right
+    )  # one edge forward, at once: seen in the last clock of the tick
     rig.run_ticks(1)
-    assert (rig.r.decoder.forward, rig.r.deviation.position) == (1, 0)
+    assert (rig.c.decoder.forward, rig.c.deviation.position) == (1, 0)
     rig.run_ticks(1)
-    assert (rig.r.decoder.forward, rig.r.deviation.position) == (0, 1)
+    assert (rig.c.decoder.forward, rig.c.deviation.position) == (0, 1)
 
 
 @pytest.mark.parametrize("clocks_per_edge", [2, 3])
@@ -155,13 +158,13 @@ def test_05_a_pulse_that_comes_with_the_strobe_counts_in_the_new_window():
     # An inserted pulse shows in the first clock of its tick; the strobe of that clock is put there too.
     rig = Rig("disturbance.lines.burst.kind=+", "disturbance.lines.burst.ticks=[3]")
     rig.run_ticks(3 - rig.r.tick)
-    assert rig.r.interference.next_tick == rig.r.tick
-    rig.r.clock.left = 1
+    assert rig.plant.interference.next_tick == rig.r.tick
+    rig.c.clock.left = 1
     rig.run_ticks(1)
-    assert rig.r.clock.left == rig.r.clock.period - CLOCKS + 1, "the strobe has come in the first clock"
-    assert (rig.r.speed.word, rig.r.speed.count, rig.r.deviation.position) == (0, 1, 1)
+    assert rig.c.clock.left == rig.c.clock.period - CLOCKS + 1, "the strobe has come in the first clock"
+    assert (rig.c.speed.word, rig.c.speed.count, rig.c.deviation.position) == (0, 1, 1)
     rig.run(5e-3)
-    assert (rig.r.speed.word, rig.r.speed.count) == (1, 0)
+    assert (rig.c.speed.word, rig.c.speed.count) == (1, 0)
 
 
 @pytest.mark.parametrize(("pulses", "word"), [(127, 127), (128, -128), (130, -126), (-128, -128), (-129, 127)])
@@ -316,11 +319,11 @@ def test_13_eight_fraction_bits_leave_a_mean_error_below_0_02(rate):
 
 
 SHORT = {
-    "deviation.deviation": "P",
-    "filter.output": "y",
-    "deviation.error": "E",
-    "deviation.word": "word",
-    "train.velocity": "v",
+    "controller.deviation.deviation": "P",
+    "controller.filter.output": "y",
+    "controller.deviation.error": "E",
+    "lines.word": "word",
+    "plant.train.velocity": "v",
 }
 
 CONTINUOUS_PWM = "drive.pwm_frequency=100 kHz"
@@ -335,7 +338,7 @@ def steady(rate: float, *overrides: str, plant: tuple[str, ...] | None = None) -
     rig.command_rate(rate)
     rig.run(half)
     found = rig.record(half, list(SHORT))
-    assert rig.r.deviation.state == RUN
+    assert rig.c.deviation.state == RUN
     return {short: found[name] for name, short in SHORT.items()}
 
 
@@ -354,9 +357,9 @@ def test_14_a_pwm_of_20_khz_shifts_the_mean_by_what_comes_between_two_of_its_per
     rig = Rig()
     rig.command_rate(1000)
     rig.run(4.0)
-    run = rig.record(4.0, ["deviation.deviation", "amplifier.word"])
-    assert run["deviation.deviation"].mean() == pytest.approx(20, abs=0.05)
-    assert run["amplifier.word"].mean() == pytest.approx(0, abs=5e-3)
+    run = rig.record(4.0, ["controller.deviation.deviation", "plant.amplifier.word"])
+    assert run["controller.deviation.deviation"].mean() == pytest.approx(20, abs=0.05)
+    assert run["plant.amplifier.word"].mean() == pytest.approx(0, abs=5e-3)
 
 
 @pytest.mark.parametrize(("rate", "mean"), [(200, 4.0), (1037, 20.74)])
@@ -412,21 +415,32 @@ def test_19_one_strobe_drives_the_counter_and_the_filter():
     rig.run(0.2)
     periods, rows = [5000], []
     for demanded in (3000, 10_000, 1000, 2500, 5000):
-        rows.append(rig.record(0.0437, ["clock.left", "clock.period", "speed.word", "filter.input", "filter.output"]))
-        rig.r.clock.demanded = demanded
+        rows.append(
+            rig.record(
+                0.0437,
+                [
+                    "controller.clock.left",
+                    "controller.clock.period",
+                    "controller.speed.word",
+                    "controller.filter.input",
+                    "controller.filter.output",
+                ],
+            )
+        )
+        rig.c.clock.demanded = demanded
         periods.append(demanded)
     rows.append(rig.record(0.05, list(rows[0])[:-1]))
     run = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-    strobes = np.flatnonzero(np.diff(run["clock.left"]) > 0) + 1
+    strobes = np.flatnonzero(np.diff(run["controller.clock.left"]) > 0) + 1
     # The window and the filter have the same beginning and the same length, whatever the generator is set to ...
-    assert list(dict.fromkeys(run["clock.period"].tolist())) == list(dict.fromkeys(periods))
-    assert np.array_equal(np.diff(strobes) * 10, run["clock.period"][strobes[:-1]])
+    assert list(dict.fromkeys(run["controller.clock.period"].tolist())) == list(dict.fromkeys(periods))
+    assert np.array_equal(np.diff(strobes) * 10, run["controller.clock.period"][strobes[:-1]])
     # ... because neither moves but at the strobe, and then both do.
-    for name in ("speed.word", "filter.input", "filter.output"):
+    for name in ("controller.speed.word", "controller.filter.input", "controller.filter.output"):
         assert set(np.flatnonzero(np.diff(run[name])) + 1) <= set(strobes)
-    before, after = run["filter.output"][strobes - 1], run["filter.output"][strobes]
-    assert np.array_equal(run["filter.input"][strobes], 4 * run["speed.word"][strobes])
-    assert np.array_equal(after, 0.25 * run["filter.input"][strobes] + 0.75 * before)
+    before, after = run["controller.filter.output"][strobes - 1], run["controller.filter.output"][strobes]
+    assert np.array_equal(run["controller.filter.input"][strobes], 4 * run["controller.speed.word"][strobes])
+    assert np.array_equal(after, 0.25 * run["controller.filter.input"][strobes] + 0.75 * before)
 
 
 def test_19_no_setting_changes_only_one_of_window_and_filter():
@@ -436,7 +450,7 @@ def test_19_no_setting_changes_only_one_of_window_and_filter():
         assert len(clocked) >= 4
         assert [leaf.path for leaf in clocked if leaf.unit in times] == []
     clock = [leaf.path for leaf in FilteredServo.leaves() if leaf.path.startswith("clock.")]
-    assert clock == ["clock.demanded", "clock.period", "clock.left"]
+    assert clock == ["controller.clock.demanded", "controller.clock.period", "controller.clock.left"]
     keys = FilteredServoSpec.model_fields["method"].annotation.model_fields
     assert [key for key in keys if "sample" in key or "window" in key or "filter" in key] == ["filter", "sample_period"]
 
@@ -485,7 +499,7 @@ def test_20_range_of_the_filtered_error(delay):
     rig.run_ticks(delay)
     rig.command_rate(1037)
     rig.run(4.0)
-    error = rig.record(4.0, ["deviation.error"])["deviation.error"]
+    error = rig.record(4.0, ["controller.deviation.error"])["controller.deviation.error"]
     lowest, highest = np.quantile(error, [5e-4, 1 - 5e-4])
     assert lowest == pytest.approx(-1.4, rel=0.1)
     assert highest == pytest.approx(0.8, rel=0.1)
@@ -509,8 +523,8 @@ def stopped(*overrides: str) -> dict[str, np.ndarray]:
     rig.command_rate(1000)
     rig.run_ticks(round(2 / TICK) - rig.r.tick)
     rig.command_rate(0)
-    found = rig.record(1.5, ["deviation.deviation"])
-    return {"P": found["deviation.deviation"], "t": found["t"] - 2}
+    found = rig.record(1.5, ["controller.deviation.deviation"])
+    return {"P": found["controller.deviation.deviation"], "t": found["t"] - 2}
 
 
 @pytest.mark.parametrize(
@@ -592,7 +606,7 @@ def model_of(case: str, gain: float, tau_m: float) -> SampledLoop:
 def fine_rig(case: str, gain: float, *, damped: bool) -> tuple[Rig, SampledLoop]:
     """A servo with the fine encoder, at time 0 just after a strobe, and the model of it."""
     rig = Rig(*MODELS[case][0], *FINE, plant=fine_plant(gain, damped=damped))
-    rig.r.clock.left = rig.r.clock.period
+    rig.c.clock.left = rig.c.clock.period
     rig.r.tick = 0
     assert rig.spec.gain == pytest.approx(gain, rel=1e-9)
     return rig, model_of(case, gain, rig.spec.motor_time_constant)
@@ -600,8 +614,8 @@ def fine_rig(case: str, gain: float, *, damped: bool) -> tuple[Rig, SampledLoop]
 
 def jump(rig: Rig, pulses: int) -> None:
     """The command jumps: from the generator, pulse by pulse, it would take its time."""
-    rig.r.deviation.deviation += pulses
-    rig.r.busy = 1  # the logic takes the new deviation over in the next tick
+    rig.c.deviation.deviation += pulses
+    rig.c.busy = 1  # the logic takes the new deviation over in the next tick
 
 
 @PLANTS
@@ -611,7 +625,7 @@ def test_22_model_agrees_with_the_simulation_step_response(case, command, damped
     rig, model = fine_rig(case, MODELS[case][2][damped], damped=damped)
     windows, points = 40, 10
     duration, every = windows * model.sample_period, round(model.sample_period / points / TICK)
-    names = ["deviation.deviation", "filter.output", "train.velocity"]
+    names = ["controller.deviation.deviation", "controller.filter.output", "plant.train.velocity"]
     if command == "step":
         answer = model.respond([0.0] * 2 * windows, step=1500, points=points)
         jump(rig, 1500)
@@ -637,8 +651,10 @@ def growth_per_window(rig: Rig, model: SampledLoop) -> float:
     jump(rig, 90 if growing else 1300)
     windows = min(round(math.log(12) / abs(math.log(model.spectral_radius()))), 600)
     every, block = 20, 6
-    error = rig.record(windows * model.sample_period, ["deviation.deviation"], every)["deviation.deviation"]
-    assert rig.r.deviation.state == RUN
+    error = rig.record(windows * model.sample_period, ["controller.deviation.deviation"], every)[
+        "controller.deviation.deviation"
+    ]
+    assert rig.c.deviation.state == RUN
     # Without the first windows, in which the modes decay that do not last.
     blocks = error[round(10 * model.sample_period / (every * TICK)) :].astype(float)
     size = round(block * model.sample_period / (every * TICK))
@@ -698,10 +714,10 @@ def continuous_rig(servo: ServoTransfer) -> Rig:
     """The axis with the fine encoder, a sample in every tick, and the servo's K, K2 and Tf."""
     rig = Rig(*(() if servo.filter_time else CONVENTIONAL), *FINE, plant=fine_plant(servo.gain))
     # Such constants are no axis file's: its B is 256 at most.
-    rig.p.filter.scale = round(servo.speed_gain / TICK)
-    rig.p.filter.coefficient = TICK / servo.filter_time if servo.filter_time else 1.0
-    rig.p.deviation.word_limit = 1e9
-    rig.r.clock.demanded = rig.r.clock.period = rig.r.clock.left = CLOCKS
+    rig.p.controller.filter.scale = round(servo.speed_gain / TICK)
+    rig.p.controller.filter.coefficient = TICK / servo.filter_time if servo.filter_time else 1.0
+    rig.p.controller.deviation.word_limit = 1e9
+    rig.c.clock.demanded = rig.c.clock.period = rig.c.clock.left = CLOCKS
     rig.r.tick = 0
     return rig
 
@@ -709,16 +725,16 @@ def continuous_rig(servo: ServoTransfer) -> Rig:
 def released(servo: ServoTransfer, state: np.ndarray, interval: float, samples: int) -> np.ndarray:
     """P, x'/sqrt(K) and y [count] at each interval [s] after the axis has been let go in a state."""
     rig, unit = continuous_rig(servo), PULSE / FINENESS
-    origin = rig.r.train.position
-    rig.r.train.velocity = state[1] * math.sqrt(servo.gain) * unit
-    rig.r.filter.output = state[2]
+    origin = rig.plant.train.position
+    rig.plant.train.velocity = state[1] * math.sqrt(servo.gain) * unit
+    rig.c.filter.output = state[2]
     jump(rig, round(state[0]))
-    names = ["train.position", "train.velocity", "filter.output"]
+    names = ["plant.train.position", "plant.train.velocity", "controller.filter.output"]
     run = rig.record(samples * interval, names, round(interval / TICK))
-    assert rig.r.deviation.state == RUN
-    moved = (run["train.position"] - origin) / unit
+    assert rig.c.deviation.state == RUN
+    moved = (run["plant.train.position"] - origin) / unit
     return np.column_stack(
-        [state[0] - moved, run["train.velocity"] / unit / math.sqrt(servo.gain), run["filter.output"]]
+        [state[0] - moved, run["plant.train.velocity"] / unit / math.sqrt(servo.gain), run["controller.filter.output"]]
     )
 
 

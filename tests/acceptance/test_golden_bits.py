@@ -83,7 +83,8 @@ def filtered_servo() -> Job:
     from tests.filtered_servo_rig import Rig
 
     rig = Rig(plant=("encoder.jitter=5 deg", "disturbance.lines.inserted=20 Hz"))
-    return Job({"": rig.p}, {"": rig.r}, (lambda: rig.go(9000), lambda: rig.go(-9000, 12_345.0)), rig.run_ticks)
+    commands = (lambda: rig.go(9000), lambda: rig.go(-9000, 12_345.0))
+    return Job({"": rig.p}, {"": rig.r}, commands, rig.run_ticks, rig.acknowledge)
 
 
 def rotary_table() -> Job:

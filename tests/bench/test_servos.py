@@ -13,7 +13,8 @@ from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import advance
 from detent.kernel.step import step
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.system import RUN, TICK, FilteredServo, switch_on
+from detent.methods.filtered_servo.controller import RUN, go_to
+from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.system import run_converters
 from detent.plant.drive_train import move_averaged
@@ -62,7 +63,7 @@ class Slide:
         self.p, self.r = build_filtered_servo(spec), FilteredServo()
         switch_on(self.p, self.r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
         self.advance(1)
-        self.r.generator.rate, self.r.generator.goal = rate * PER_PULSE, 1_000_000
+        go_to(self.r.controller, 1_000_000, rate * PER_PULSE)
         self.advance(round(0.5 / TICK))
         self.begin, self.rate = self.r.snapshot(), rate
 
@@ -73,10 +74,10 @@ class Slide:
     def run(self):
         """The next second; returns the ticks."""
         self.r.restore(self.begin)
-        before, ticks = self.r.deviation.position, round(1 / TICK)
+        before, ticks = self.r.controller.deviation.position, round(1 / TICK)
         self.advance(ticks)
-        assert self.r.deviation.state == RUN
-        assert self.r.deviation.position - before == pytest.approx(self.rate, rel=0.02, abs=3)
+        assert self.r.controller.deviation.state == RUN
+        assert self.r.controller.deviation.position - before == pytest.approx(self.rate, rel=0.02, abs=3)
         return ticks
 
 

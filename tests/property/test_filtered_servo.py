@@ -9,14 +9,15 @@ from hypothesis import strategies as st
 from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
-from detent.methods.filtered_servo.system import CLOCKS
+from detent.methods.filtered_servo.controller import CLOCKS
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
 
 RECORDED = (
-    "generator.command", "deviation.position", "deviation.deviation", "deviation.error", "deviation.word",
-    "deviation.state", "amplifier.word", "speed.word", "speed.count", "filter.output", "clock.left",
-    "interference.lost", "encoder.edge", "busy", "train.current",
+    "controller.generator.command", "controller.deviation.position", "controller.deviation.deviation",
+    "controller.deviation.error", "controller.deviation.state", "lines.word", "plant.amplifier.word",
+    "controller.speed.word", "controller.speed.count", "controller.filter.output", "controller.clock.left",
+    "plant.interference.lost", "plant.encoder.edge", "controller.busy", "plant.train.current",
 )  # fmt: skip
 
 # ------------------------------------------------------------------------------------------------------ blocks alone
@@ -109,13 +110,13 @@ def play(rig, script):
         if what == "rate":
             rig.command_rate(value)
         elif what == "goal":
-            rig.r.generator.goal = rig.r.generator.command + value
+            rig.c.generator.goal = rig.c.generator.command + value
         elif what == "period":
-            rig.r.clock.demanded = value
+            rig.c.clock.demanded = value
         columns.append(rig.record(ticks * 1e-5, RECORDED))
     run = {name: np.concatenate([column[name] for column in columns]) for name in RECORDED}
     # After a fault nothing is promised but that the drive is off.
-    running = run["deviation.state"] == RUN
+    running = run["controller.deviation.state"] == RUN
     alive = int(np.argmin(running)) if not running.all() else len(running)
     return run, alive
 
@@ -128,15 +129,15 @@ whole_axis = settings(max_examples=60, suppress_health_check=[HealthCheck.too_sl
 @given(servo=servos, lines=line_noise, disc=discs, script=st.lists(actions, min_size=1, max_size=8))
 def test_pulses_are_conserved(servo, lines, disc, script):
     run, alive = play(make_rig(servo, *noisy(lines, disc)), script)
-    command, position = run["generator.command"], run["deviation.position"]
+    command, position = run["controller.generator.command"], run["controller.deviation.position"]
     # Noise puts pulses in and takes them away on the line; what is counted is counted in both counters.
-    assert np.array_equal((command - position)[:alive], run["deviation.deviation"][:alive])
-    left, lost = run["clock.left"][:alive], run["interference.lost"][:alive]
+    assert np.array_equal((command - position)[:alive], run["controller.deviation.deviation"][:alive])
+    left, lost = run["controller.clock.left"][:alive], run["plant.interference.lost"][:alive]
     strobes = np.flatnonzero(np.diff(left) != -CLOCKS) + 1
     read = strobes[np.diff(lost)[strobes - 1] == 0]
     words = np.zeros(alive, int)
-    words[read] = run["speed.word"][read]
-    assert np.array_equal(np.cumsum(words) + run["speed.count"][:alive], position[:alive])
+    words[read] = run["controller.speed.word"][read]
+    assert np.array_equal(np.cumsum(words) + run["controller.speed.count"][:alive], position[:alive])
 
 
 @pytest.mark.compiled
@@ -149,14 +150,16 @@ def test_pulses_are_conserved(servo, lines, disc, script):
 )
 def test_without_noise_every_edge_of_the_disc_is_counted_once(servo, jitter, seed, script):
     rig = make_rig(servo, *noisy((0, 0, 0, 0), (jitter, 0.0, seed)))
-    before = rig.r.encoder.edge
+    before = rig.plant.encoder.edge
     run, alive = play(rig, script)
-    assert before == math.floor((START - rig.p.encoder.origin) / rig.p.encoder.edge_pitch)
-    settled = run["busy"][:alive] == 0
+    assert before == math.floor((START - rig.p.plant.encoder.origin) / rig.p.plant.encoder.edge_pitch)
+    settled = run["controller.busy"][:alive] == 0
     assert settled.any()
-    assert np.array_equal(run["deviation.position"][:alive][settled], (run["encoder.edge"][:alive] - before)[settled])
+    assert np.array_equal(
+        run["controller.deviation.position"][:alive][settled], (run["plant.encoder.edge"][:alive] - before)[settled]
+    )
     # Before it has settled the decoder owes an edge, or at high speed one in each of its two stages.
-    assert np.abs(run["deviation.position"] - run["encoder.edge"] + before)[:alive].max() <= 2
+    assert np.abs(run["controller.deviation.position"] - run["plant.encoder.edge"] + before)[:alive].max() <= 2
 
 
 @pytest.mark.compiled
@@ -174,18 +177,18 @@ def test_the_drive_keeps_its_limits_and_no_number_is_lost(servo, effort, lines, 
     most = min((1 << (rig.spec.drive.word_bits - 1)) - 1, effort / rig.spec.force_per_count)
     if rig.spec.drive.whole_words:
         most = math.floor(most)
-    assert rig.p.deviation.word_limit == pytest.approx(most)
-    for name in ("deviation.word", "amplifier.word"):
+    assert rig.p.controller.deviation.word_limit == pytest.approx(most)
+    for name in ("lines.word", "plant.amplifier.word"):
         assert np.abs(run[name]).max() <= most
         assert not run[name][alive:].any()
-    assert not run["train.current"][alive:].any()
-    word, error = run["deviation.word"][:alive], run["deviation.error"][:alive]
+    assert not run["plant.train.current"][alive:].any()
+    word, error = run["lines.word"][:alive], run["controller.deviation.error"][:alive]
     if rig.spec.drive.whole_words:
         assert np.array_equal(word, np.round(word))
         assert np.abs(word - np.clip(error, -most, most)).max() <= 0.5
     else:
         assert np.array_equal(word, np.clip(error, -most, most))
-    assert set(run["deviation.state"][alive:]) <= {FAULT}
+    assert set(run["controller.deviation.state"][alive:]) <= {FAULT}
     numbers = [value for value in rig.r.values().values() if isinstance(value, float)]
     assert len(numbers) > 20
     assert all(math.isfinite(value) for value in numbers)

@@ -18,7 +18,7 @@ class DeviationParams(Registers):
 
 
 class Deviation(Registers):
-    """Following error and drive word."""
+    """Following error, and whether it drives."""
 
     state: u1 = register("0 reset, 1 run, 2 fault", unit="code")
     cause: u1 = register("of the last fault: 1 deviation out of range, 2 speed counter about to wrap", unit="code")
@@ -26,7 +26,6 @@ class Deviation(Registers):
     deviation: i4 = register("P: command pulses less movement pulses", unit="count")
     position: i8 = register("movement pulses since reset, forward less backward", unit="count")
     error: f8 = register("E = K1 P - y", unit="count")
-    word: f8 = register("drive word: E, saturated", unit="count")
 
 
 @step
@@ -53,13 +52,13 @@ def watch_ranges(p: DeviationParams, r: Deviation, speed_count: int, half: int) 
 
 
 @step
-def drive_word(p: DeviationParams, r: Deviation, speed: float) -> None:
-    """E and the drive word; no drive but in RUN."""
+def drive_word(p: DeviationParams, r: Deviation, speed: float) -> float:
+    """E, and the drive word that it makes; no drive but in RUN."""
     r.error = p.gain * r.deviation - speed
     word = min(max(r.error, -p.word_limit), p.word_limit)
     if p.whole_words:
         word = round_half_away(word)
-    r.word = word if r.state == RUN else 0.0
+    return word if r.state == RUN else 0.0
 
 
 @step

@@ -103,12 +103,12 @@ def test_the_request_of_the_pwm_follows_sawtooth_and_word_in_both_halves_of_a_ti
 
 def test_each_clock_of_the_decoder_shows_and_a_pulse_is_one_clock_long():
     found = captured("filtered_servo.toml", duration=2e-3)
-    forward, a1, a2 = (found[f"decoder.{name}"] for name in ("forward", "a1", "a2"))
+    forward, a1, a2 = (found[f"controller.decoder.{name}"] for name in ("forward", "a1", "a2"))
     rises, falls = forward.times[forward.values == 1], forward.times[forward.values == 0][1:]
     assert len(rises) >= 3
     np.testing.assert_array_equal(falls - rises, np.full(len(rises), 1_000_000))
     np.testing.assert_array_equal(a2.times[1:], a1.times[1:] + 1_000_000)
-    count = found["deviation.deviation"]
+    count = found["controller.deviation.deviation"]
     assert all(int(t) in count.times for t in falls)  # the counter takes the pulse at the next clock
 
 

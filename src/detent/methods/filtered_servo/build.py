@@ -13,32 +13,33 @@ from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
 def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     """Parameters of the filtered servo."""
     p = FilteredServoParams()
+    c, m = p.controller, p.plant
     method, drive = spec.method, spec.drive
-    p.generator.ticks_per_second = 1 / TICK
-    p.generator.acceleration = method.command_acceleration / spec.pulse * TICK * PER_PULSE
-    p.deviation.gain = method.position_gain
-    p.deviation.range = (1 << (method.position_bits - 1)) - 1
+    c.generator.ticks_per_second = 1 / TICK
+    c.generator.acceleration = method.command_acceleration / spec.pulse * TICK * PER_PULSE
+    c.deviation.gain = method.position_gain
+    c.deviation.range = (1 << (method.position_bits - 1)) - 1
     full = 1 << (drive.word_bits - 1)
-    p.deviation.word_limit = spec.word_limit
-    p.deviation.whole_words = drive.whole_words
-    p.speed.half = 1 << (method.counter_bits - 1)
-    _fill_filter(p.filter, spec)
-    p.amplifier.voltage_drive = drive.amplifier == "voltage"
-    p.amplifier.per_count = drive.supply / full if p.amplifier.voltage_drive else drive.current_per_count
-    p.amplifier.carrier_ticks = round(1 / (drive.pwm_frequency * TICK))
-    p.encoder.edge_pitch = spec.pulse
+    c.deviation.word_limit = spec.word_limit
+    c.deviation.whole_words = drive.whole_words
+    c.speed.half = 1 << (method.counter_bits - 1)
+    _fill_filter(c.filter, spec)
+    m.amplifier.voltage_drive = drive.amplifier == "voltage"
+    m.amplifier.per_count = drive.supply / full if m.amplifier.voltage_drive else drive.current_per_count
+    m.amplifier.carrier_ticks = round(1 / (drive.pwm_frequency * TICK))
+    m.encoder.edge_pitch = spec.pulse
     # Zero lies between two edges: on one, rounding alone would make a pulse at power-on.
-    p.encoder.origin = -spec.pulse / 2
-    p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
-    p.encoder.missing = spec.encoder.missing_edges
+    m.encoder.origin = -spec.pulse / 2
+    m.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
+    m.encoder.missing = spec.encoder.missing_edges
     fill_drive_train(
-        p.train, spec.motor, spec.mechanics.friction, radius=spec.radius, mass=spec.mass, travel=spec.limits.travel,
+        m.train, spec.motor, spec.mechanics.friction, radius=spec.radius, mass=spec.mass, travel=spec.limits.travel,
         period=TICK, bridge_resistance=spec.drive.bridge_resistance,
     )  # fmt: skip
-    fill_interference(p.interference, spec.disturbance.lines, TICK)
-    fill_push(p.push, spec.disturbance.push, TICK)
-    p.window = method.in_position
-    p.window_ticks = round(method.in_position_time / TICK)
+    fill_interference(m.interference, spec.disturbance.lines, TICK)
+    fill_push(m.push, spec.disturbance.push, TICK)
+    c.window = method.in_position
+    c.window_ticks = round(method.in_position_time / TICK)
     return p
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from detent.analysis.arguments import require_positive
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
+from detent.methods.filtered_servo.controller import acknowledge, go_to
 from detent.methods.filtered_servo.derive import Machine as Figures
 from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
@@ -295,8 +296,8 @@ def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) ->
     failed = not len(trace) or math.isnan(overshoot)
     model = Figures(spec).loop
     limit = model.stability_limit()
-    error, speed = trace["deviation.error"], trace["filter.output"]
-    force = trace["train.current"] * (spec.motor.torque_constant / spec.radius)
+    error, speed = trace["controller.deviation.error"], trace["controller.filter.output"]
+    force = trace["plant.train.current"] * (spec.motor.torque_constant / spec.radius)
     shown = trace.time >= STEADY_TIME * stretch - SHOWN * WINDOW * stretch
     return FeedbackCase(
         name=name,
@@ -337,17 +338,22 @@ class _Bench:
         self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(
             spec.model_copy(update=update), recorder
         )
-        self.state = self.machine.state
+        self.controller = self.machine.state.controller
         self.machine.pass_ticks(1)  # leaves the reset
-        self.state.generator.rate, self.state.generator.goal = round(rate * PER_PULSE), ENDLESS
+        go_to(self.controller, ENDLESS, round(rate * PER_PULSE))
+
+    def stop(self) -> None:
+        """The command stops where it is."""
+        g = self.controller.generator
+        go_to(self.controller, g.command, g.rate)
 
     def run(self, seconds: float) -> bool:
         """Let time pass, up to a fault; False when there was one."""
         left = round(seconds / TICK)
-        while left > 0 and self.state.deviation.state != FAULT:
+        while left > 0 and self.controller.deviation.state != FAULT:
             left -= self.machine.pass_ticks(left)
-            self.state.event = 0
-        return self.state.deviation.state != FAULT
+            acknowledge(self.controller)
+        return self.controller.deviation.state != FAULT
 
 
 def _run_steadily(spec: FilteredServoSpec, rate: float, seconds: float) -> Trace:
@@ -359,7 +365,7 @@ def _run_steadily(spec: FilteredServoSpec, rate: float, seconds: float) -> Trace
         blocks.append(block[late])
 
     every = max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS))
-    signals = ("deviation.error", "filter.output", "train.current")
+    signals = ("controller.deviation.error", "controller.filter.output", "plant.train.current")
     recorder = Recorder(FilteredServo, signals, every=every, period=TICK, sink=keep)
     bench = _Bench(spec, rate, seconds, recorder)
     done = bench.run(seconds)
@@ -371,14 +377,16 @@ def _stop(spec: FilteredServoSpec, rate: float, stretch: float) -> float:
     """Overshoot after a stop from constant rate [count]; NaN for an axis that does not settle."""
     blocks: list[NDArray[np.void]] = []
     every = max(1, math.ceil(stretch))
-    recorder = Recorder(FilteredServo, ("deviation.deviation",), every=every, period=TICK, sink=blocks.append)
+    recorder = Recorder(
+        FilteredServo, ("controller.deviation.deviation",), every=every, period=TICK, sink=blocks.append
+    )
     bench = _Bench(spec, rate, STOP_AFTER * stretch, recorder)
     bench.run(STOP_AFTER * stretch)
-    bench.state.generator.goal = bench.state.generator.command
+    bench.stop()
     settled = bench.run(STOP_TIME * stretch)
     bench.machine.close()
     trace = make_trace(recorder, blocks, {})
-    after = trace["deviation.deviation"][trace.time > STOP_AFTER * stretch]
+    after = trace["controller.deviation.deviation"][trace.time > STOP_AFTER * stretch]
     if not settled or np.ptp(after[-len(after) // 4 :]) > SETTLED:
         return math.nan
     return float(max(0, -int(after.min())))

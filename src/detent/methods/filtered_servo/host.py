@@ -1,15 +1,14 @@
 """The host of a filtered servo: command pulses, in position, fault."""
 
-from typing import Any
-
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT, FileProblem
 from detent.kernel.loop import advance
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.controller import acknowledge, go_to, set_period
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.host import Destination, Host, Problem, line_faults
+from detent.methods.moves.host import Destination, Host, Problem
 from detent.methods.moves.job import Move
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
@@ -33,28 +32,26 @@ class FilteredHost(Host):
         self.machine = filtered_servo_machine(spec, recorder)
         self.grid = spec.pulse
         self.tolerance = (spec.method.in_position + 1) * spec.pulse
-        self.state: Any = self.machine.state
+        self.controller = self.machine.state.controller
         self.home = spec.mechanics.start_position
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""
-        g, move = self.state.generator, to.move
-        g.rate = round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE)
-        g.goal = to.counts
-        self.state.clock.demanded = round((move.sample_period or self.spec.method.sample_period) * 1e6)
-        self.state.away, self.state.busy, self.state.event = 1, 1, 0
+        move = to.move
+        set_period(self.controller, round((move.sample_period or self.spec.method.sample_period) * 1e6))
+        go_to(self.controller, to.counts, round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE))
 
     def time_limit(self, to: Destination) -> float:
         """Time after which a move that is not in position has failed [s]."""
         speed = to.move.speed or self.spec.limits.speed
-        way, a = abs(to.position - self.state.train.position), self.spec.method.command_acceleration
+        way, a = abs(to.counts - self.controller.deviation.position) * self.grid, self.spec.method.command_acceleration
         return way / speed + (2 * speed / a if a > 0 else 0.0) + self.spec.method.timeout
 
     def wait(self, seconds: float) -> bool:
         """Wait until in position; False on a fault, or when it is not within `seconds`."""
         self.machine.pass_time(seconds)
-        arrived = bool(self.state.event) and self.state.deviation.state != FAULT
-        self.state.event = 0
+        arrived = bool(self.controller.event) and self.controller.deviation.state != FAULT
+        acknowledge(self.controller)
         return arrived
 
     def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
@@ -80,17 +77,12 @@ class FilteredHost(Host):
     @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it runs."""
-        d = self.state.deviation
+        d = self.controller.deviation
         return SERVO_FAULT_TEXT[d.cause] if d.state == FAULT else ""
-
-    @property
-    def faults(self) -> dict[str, int]:
-        """What interference has done."""
-        return line_faults(self.state.interference)
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand; that it comes into position again after a disturbance is no news."""
         left = round(dwell / self.machine.tick)
         while left > 0:
             left -= self.machine.pass_ticks(left)
-            self.state.event = 0
+            acknowledge(self.controller)

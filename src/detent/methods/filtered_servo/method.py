@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
-    "train.position", "train.velocity", "train.current", "generator.command", "deviation.deviation", "deviation.error",
-    "deviation.word", "speed.word", "filter.output", "clock.period", "gauge.target",
+    "plant.train.position", "plant.train.velocity", "plant.train.current", "controller.generator.command",
+    "controller.deviation.deviation", "controller.deviation.error", "lines.word", "controller.speed.word",
+    "controller.filter.output", "controller.clock.period", "plant.gauge.target",
 )  # fmt: skip
 TIMING = (
-    "encoder.channel_a", "encoder.channel_b", "decoder.a1", "decoder.a2", "decoder.b1", "decoder.b2",
-    "decoder.forward", "decoder.reverse", "generator.command", "deviation.deviation", "speed.count", "speed.word",
-    "clock.left", "filter.output", "deviation.word",
+    "controller.channel_a", "controller.channel_b", "controller.decoder.a1", "controller.decoder.a2",
+    "controller.decoder.b1", "controller.decoder.b2", "controller.decoder.forward", "controller.decoder.reverse",
+    "controller.generator.command", "controller.deviation.deviation", "controller.speed.count",
+    "controller.speed.word", "controller.clock.left", "controller.filter.output", "lines.word",
 )  # fmt: skip
 
 
@@ -91,7 +93,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
 
     def clocking(self) -> "Clocking":
         """Ten clocks in a tick."""
-        from detent.methods.filtered_servo.system import CLOCKS
+        from detent.methods.filtered_servo.controller import CLOCKS
         from detent.record.capture import Clocking
 
         return Clocking(CLOCKS, clocks={"clock.C": ((0.0, 0.5), "decoder clock, 1 MHz")})

@@ -17,8 +17,8 @@ from detent.page.run_page import Stretch
 from detent.page.words import CountUnit, count, number
 from detent.record.trace import Trace
 
-COMMAND, DEVIATION, WORD = "generator.command", "deviation.deviation", "deviation.word"
-COUNTED, FILTERED, WINDOW = "speed.word", "filter.output", "clock.period"
+COMMAND, DEVIATION, WORD = "controller.generator.command", "controller.deviation.deviation", "lines.word"
+COUNTED, FILTERED, WINDOW = "controller.speed.word", "controller.filter.output", "controller.clock.period"
 
 IN_THE_MOVE = (
     "The slide follows the command pulses at a distance that grows with speed: the following error less the speed "

@@ -80,11 +80,6 @@ class Host(Protocol):
         """When position mode was entered [s]; NaN for an axis of one mode."""
         return math.nan
 
-    @property
-    def faults(self) -> dict[str, int]:
-        """What interference has done to its lines, by kind."""
-        return {}
-
 
 def line_faults(lines: Interference) -> dict[str, int]:
     """Pulses put in and taken away, samples lost and corrupted."""

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from detent.errors import AxisError
-from detent.methods.moves.host import Destination, Host, check_job
+from detent.methods.moves.host import Destination, Host, check_job, line_faults
 from detent.methods.moves.job import MoveJob
 from detent.record.machine import Progress
 from detent.record.run import RunRecord
@@ -190,8 +190,8 @@ def _away(host: Host, error: float) -> str:
 
 def _finish(host: Host, result: MoveRun) -> None:
     """Totals."""
-    train = host.machine.state.plant.train
+    plant = host.machine.state.plant
     result.time_end = host.machine.time
-    result.peak_current, result.energy = float(train.peak_current), float(train.energy)
-    result.faults = host.faults
+    result.peak_current, result.energy = float(plant.train.peak_current), float(plant.train.energy)
+    result.faults = line_faults(plant.interference) if "interference" in plant.__fields__ else {}
     result.done = not result.failure and len(result.moves) == len(result.job.moves)

@@ -104,12 +104,15 @@ def registers_after(overrides: tuple[str, ...]) -> tuple[bytes, ...]:
     machine = filtered_servo_machine(spec)
     machine.pass_ticks(10)
     r, states, moves = machine.state, [], [4000, 0]
-    r.event = 1
+    r.controller.event = 1
     while machine.time < 1.2:
-        if r.event:
-            r.event = 0
+        if r.controller.event:
+            r.controller.event = 0
             if moves:
-                r.generator.rate, r.generator.goal = round(spec.limits.speed / spec.pulse * PER_PULSE), moves.pop(0)
+                r.controller.generator.rate, r.controller.generator.goal = (
+                    round(spec.limits.speed / spec.pulse * PER_PULSE),
+                    moves.pop(0),
+                )
         machine.pass_time(5e-3)
         states.append(bytes(r))
     return tuple(states)
@@ -131,16 +134,30 @@ def test_the_parameters_of_the_default_axis() -> None:
     spec = load_spec(EXAMPLE)
     p = build_filtered_servo(spec)
     assert sample_microseconds(spec) == 5000
-    assert (p.deviation.gain, p.deviation.range, p.deviation.whole_words, p.speed.half) == (1.0, 2047, 0, 128)
-    assert p.deviation.word_limit == pytest.approx(280 / (0.0352 * 0.05 * 2 * math.pi / 5e-3))
-    assert (p.filter.kind, p.filter.scale, p.filter.coefficient, p.filter.shift) == (FLOAT, 4, 0.25, 2)
-    assert (p.amplifier.voltage_drive, p.amplifier.per_count, p.amplifier.carrier_ticks) == (0, 0.0352, 5)
-    assert p.encoder.edge_pitch == pytest.approx(5e-6)
-    assert p.encoder.origin == pytest.approx(-2.5e-6)
-    assert (p.window, p.window_ticks) == (2, round(spec.method.in_position_time / 1e-5))
+    assert (
+        p.controller.deviation.gain,
+        p.controller.deviation.range,
+        p.controller.deviation.whole_words,
+        p.controller.speed.half,
+    ) == (1.0, 2047, 0, 128)
+    assert p.controller.deviation.word_limit == pytest.approx(280 / (0.0352 * 0.05 * 2 * math.pi / 5e-3))
+    assert (
+        p.controller.filter.kind,
+        p.controller.filter.scale,
+        p.controller.filter.coefficient,
+        p.controller.filter.shift,
+    ) == (FLOAT, 4, 0.25, 2)
+    assert (p.plant.amplifier.voltage_drive, p.plant.amplifier.per_count, p.plant.amplifier.carrier_ticks) == (
+        0,
+        0.0352,
+        5,
+    )
+    assert p.plant.encoder.edge_pitch == pytest.approx(5e-6)
+    assert p.plant.encoder.origin == pytest.approx(-2.5e-6)
+    assert (p.controller.window, p.controller.window_ticks) == (2, round(spec.method.in_position_time / 1e-5))
     # 1 m/s^2 are 200 000 pulses/s^2: 2 pulses/s a tick.
-    assert p.generator.acceleration == pytest.approx(2 * PER_PULSE)
-    assert p.generator.ticks_per_second == pytest.approx(1e5)
+    assert p.controller.generator.acceleration == pytest.approx(2 * PER_PULSE)
+    assert p.controller.generator.ticks_per_second == pytest.approx(1e5)
 
 
 def test_the_plant_is_seen_from_the_slide() -> None:
@@ -154,10 +171,10 @@ def test_the_plant_is_seen_from_the_slide() -> None:
 
 def test_a_voltage_amplifier_gives_its_supply_at_a_full_word() -> None:
     p = build_filtered_servo(load_spec(EXAMPLE, [*VOLTAGE, "limits.effort=1 kN"]))
-    assert (p.amplifier.voltage_drive, p.amplifier.per_count) == (1, 12 / 128)
-    assert p.deviation.word_limit == 127
+    assert (p.plant.amplifier.voltage_drive, p.plant.amplifier.per_count) == (1, 12 / 128)
+    assert p.controller.deviation.word_limit == 127
     p = build_filtered_servo(load_spec(EXAMPLE, [*VOLTAGE, "drive.word_bits=10", "limits.effort=1 kN"]))
-    assert (p.amplifier.per_count, p.deviation.word_limit) == (12 / 512, 511)
+    assert (p.plant.amplifier.per_count, p.controller.deviation.word_limit) == (12 / 512, 511)
 
 
 @pytest.mark.parametrize(
@@ -179,11 +196,11 @@ def test_a_substep_is_short_against_the_fastest_time_constant() -> None:
 
 def test_noise_and_push_count_in_base_ticks() -> None:
     p = build_filtered_servo(load_spec(EXAMPLE, [*PUSH, *BURST]))
-    assert (p.push.begin, p.push.end) == (5000, 105_000)
-    assert [p.interference.tick[k] for k in range(2)] == [4000, 4002]
+    assert (p.plant.push.begin, p.plant.push.end) == (5000, 105_000)
+    assert [p.plant.interference.tick[k] for k in range(2)] == [4000, 4002]
 
 
 def test_the_widest_counters_fit_their_registers() -> None:
     widest = ["method.counter_bits=12", "method.position_bits=15", "drive.word_bits=16", "method.in_position=1000"]
     p = build_filtered_servo(load_spec(EXAMPLE, widest))
-    assert (p.speed.half, p.deviation.range) == (2048, 16383)
+    assert (p.controller.speed.half, p.controller.deviation.range) == (2048, 16383)

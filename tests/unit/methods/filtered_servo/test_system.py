@@ -6,15 +6,16 @@ from tests.filtered_servo_rig import NO_TRACE, PLANT_B, PULSE, START, Rig, plant
 
 from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, RESET, RUN, SPEED_RANGE
 from detent.kernel.loop import advance
-from detent.methods.filtered_servo.system import CLOCKS, NEVER, TICK, FilteredServo, switch_on
+from detent.methods.filtered_servo.controller import CLOCKS, NEVER
+from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 
 RAMP = "method.command_acceleration=1 m/s^2"
 
 
 def at_rest(rig):
     """What the logic holds when nothing has happened since reset."""
-    d = rig.r.deviation
-    return (d.deviation, d.error, d.word, rig.r.speed.count, rig.r.speed.word, rig.r.filter.output) == (0,) * 6
+    d = rig.c.deviation
+    return (d.deviation, d.error, d.word, rig.c.speed.count, rig.c.speed.word, rig.c.filter.output) == (0,) * 6
 
 
 # --------------------------------------------------------------------------------------------------------------- reset
@@ -29,17 +30,17 @@ def test_reset_makes_no_false_pulse_from_any_state_of_the_encoder(quarter, place
         position = START + (quarter + place) * PULSE
         switch_on(rig.p, rig.r, position, 5000, 1)
         # Whatever the flip-flops come up with:
-        decoder = rig.r.decoder
+        decoder = rig.c.decoder
         decoder.a1, decoder.a2, decoder.b1, decoder.b2 = (flip_flops >> k & 1 for k in range(4))
         decoder.forward = flip_flops & 1
-        assert (rig.r.deviation.state, rig.r.deviation.reset) == (RESET, 1)
+        assert (rig.c.deviation.state, rig.c.deviation.reset) == (RESET, 1)
         rig.run_ticks(600)
-        assert rig.r.deviation.state == RUN
+        assert rig.c.deviation.state == RUN
         assert at_rest(rig)
-        assert rig.r.deviation.position == 0
-        assert (rig.r.train.position, rig.r.train.energy) == (position, 0.0)
-    edges = (rig.r.encoder.channel_a, rig.r.encoder.channel_b)
-    assert edges == [(1, 0), (1, 1), (0, 1), (0, 0)][rig.r.encoder.edge & 3]
+        assert rig.c.deviation.position == 0
+        assert (rig.plant.train.position, rig.plant.train.energy) == (position, 0.0)
+    edges = (rig.plant.encoder.channel_a, rig.plant.encoder.channel_b)
+    assert edges == [(1, 0), (1, 1), (0, 1), (0, 0)][rig.plant.encoder.edge & 3]
 
 
 def test_reset_makes_no_false_pulse_where_a_mark_of_the_disc_is_missing():
@@ -49,13 +50,13 @@ def test_reset_makes_no_false_pulse_where_a_mark_of_the_disc_is_missing():
         switch_on(rig.p, rig.r, START, 5000, seed)
         rig.run_ticks(600)
         assert at_rest(rig)
-        assert rig.r.deviation.position == 0
+        assert rig.c.deviation.position == 0
 
 
 def test_at_power_on_the_first_tick_already_runs():
     rig = Rig()
-    assert (rig.r.tick, rig.r.deviation.state, rig.r.deviation.reset) == (1, RUN, 0)
-    assert rig.r.clock.left == 5000 - CLOCKS
+    assert (rig.r.tick, rig.c.deviation.state, rig.c.deviation.reset) == (1, RUN, 0)
+    assert rig.c.clock.left == 5000 - CLOCKS
 
 
 # ------------------------------------------------------------------------------------------------------ a tick's order
@@ -65,72 +66,74 @@ def test_a_command_pulse_reaches_the_motor_in_its_own_tick():
     rig = Rig("drive.pwm_frequency=100 kHz")
     rig.go(1, rate=100_000)  # due in the tenth clock of the first tick
     rig.run_ticks(1)
-    assert (rig.r.generator.command, rig.r.deviation.deviation, rig.r.deviation.word) == (1, 1, 1.0)
-    assert rig.r.amplifier.word == 1.0
-    assert rig.r.train.current == rig.spec.drive.current_per_count
-    assert rig.r.train.velocity == pytest.approx(4000 * TICK * PULSE, rel=1e-9)
+    assert (rig.c.generator.command, rig.c.deviation.deviation, rig.lines.word) == (1, 1, 1.0)
+    assert rig.plant.amplifier.word == 1.0
+    assert rig.plant.train.current == rig.spec.drive.current_per_count
+    assert rig.plant.train.velocity == pytest.approx(4000 * TICK * PULSE, rel=1e-9)
 
 
 def test_the_pwm_takes_the_word_over_once_in_its_period():
     rig = Rig()
     rig.run_ticks(-rig.r.tick % 5)
-    beginning = (rig.r.amplifier.left - 1) % 5
-    rig.r.deviation.word = 7.0
+    beginning = (rig.plant.amplifier.left - 1) % 5
+    rig.lines.word = 7.0
     taken = []
     for _ in range(12):
         rig.run_ticks(1)
-        taken.append(rig.r.amplifier.word)
-        rig.r.deviation.word = taken[-1] + 7.0
+        taken.append(rig.plant.amplifier.word)
+        rig.lines.word = taken[-1] + 7.0
     assert [k for k in range(1, 12) if taken[k] != taken[k - 1]] == [k for k in range(1, 12) if k % 5 == beginning]
 
 
 def test_an_edge_reaches_the_counters_two_clocks_after_the_slide():
     """Into the first flip-flop in the clock of the edge, counted in the next one."""
     rig = Rig()
-    x = rig.r.train.position
-    rig.r.train.position = rig.r.sampled = rig.r.encoder.next_right - 0.45 * PULSE
-    rig.r.train.velocity = PULSE / TICK  # 45 % of the way: the edge is passed in the fifth clock
+    x = rig.plant.train.position
+    rig.plant.train.position = rig.plant.sampled = rig.plant.encoder.next_right - 0.45 * PULSE
+    rig.plant.train.velocity = PULSE / TICK  # 45 % of the way: the edge is passed in the fifth clock
     rig.run_ticks(1)  # the plant moves
-    assert rig.r.train.position - rig.r.sampled == pytest.approx(PULSE, rel=1e-6)
-    assert rig.r.deviation.position == 0
+    assert rig.plant.train.position - rig.plant.sampled == pytest.approx(PULSE, rel=1e-6)
+    assert rig.c.deviation.position == 0
     rig.run_ticks(1)  # the logic sees it
-    assert (rig.r.deviation.position, rig.r.deviation.deviation, rig.r.speed.count) == (1, -1, 1)
-    assert rig.r.train.position > x
+    assert (rig.c.deviation.position, rig.c.deviation.deviation, rig.c.speed.count) == (1, -1, 1)
+    assert rig.plant.train.position > x
 
 
 def test_an_edge_in_the_last_clock_is_counted_in_the_next_tick():
     rig = Rig()
-    rig.r.train.position = rig.r.encoder.next_right
+    rig.plant.train.position = rig.plant.encoder.next_right
     rig.run_ticks(1)
-    assert (rig.r.busy, rig.r.decoder.a1, rig.r.decoder.forward, rig.r.deviation.position) == (1, 1, 1, 0)
+    assert (rig.c.busy, rig.c.decoder.a1, rig.c.decoder.forward, rig.c.deviation.position) == (1, 1, 1, 0)
     rig.run_ticks(1)
-    assert (rig.r.busy, rig.r.decoder.forward, rig.r.deviation.position) == (0, 0, 1)
+    assert (rig.c.busy, rig.c.decoder.forward, rig.c.deviation.position) == (0, 0, 1)
 
 
 @pytest.mark.parametrize("motion", [1, -1])
 def test_edges_a_clock_apart_are_all_counted(motion):
     rig = Rig("method.position_bits=16", "method.counter_bits=12")
-    rig.r.train.velocity = motion * 9.9e5 * PULSE  # just below an edge per clock
-    rig.p.amplifier.per_count = 0.0
-    before = rig.r.encoder.edge
+    rig.plant.train.velocity = motion * 9.9e5 * PULSE  # just below an edge per clock
+    rig.p.plant.amplifier.per_count = 0.0
+    before = rig.plant.encoder.edge
     rig.run_ticks(100)
-    assert rig.r.encoder.edge - before == pytest.approx(motion * 990, abs=15)
-    rig.r.train.velocity = 0.0
+    assert rig.plant.encoder.edge - before == pytest.approx(motion * 990, abs=15)
+    rig.plant.train.velocity = 0.0
     rig.run_ticks(2)
-    assert rig.r.deviation.position == rig.r.encoder.edge - before
-    assert rig.r.deviation.deviation == -rig.r.deviation.position
+    assert rig.c.deviation.position == rig.plant.encoder.edge - before
+    assert rig.c.deviation.deviation == -rig.c.deviation.position
 
 
 def test_the_strobe_comes_before_the_pulse_of_its_clock():
     rig = Rig("method.filter=none")
-    rig.r.train.position = rig.r.encoder.next_right  # in the last clock of the tick; counted in the first of the next
+    rig.plant.train.position = (
+        rig.plant.encoder.next_right
+    )  # in the last clock of the tick; counted in the first of the next
     rig.run_ticks(1)
-    rig.r.clock.left = 1
+    rig.c.clock.left = 1
     rig.run_ticks(1)
-    assert (rig.r.speed.word, rig.r.speed.count, rig.r.filter.output) == (0, 1, 0.0)
-    rig.r.clock.left = 1
+    assert (rig.c.speed.word, rig.c.speed.count, rig.c.filter.output) == (0, 1, 0.0)
+    rig.c.clock.left = 1
     rig.run_ticks(1)
-    assert (rig.r.speed.word, rig.r.speed.count, rig.r.filter.output) == (1, 0, 4.0)
+    assert (rig.c.speed.word, rig.c.speed.count, rig.c.filter.output) == (1, 0, 4.0)
 
 
 @pytest.mark.compiled
@@ -141,13 +144,13 @@ def test_a_push_is_held_by_the_following_error_it_causes():
         "mechanics.friction.right.viscous=3000 kg/s", "mechanics.friction.left.viscous=3000 kg/s",
     )  # fmt: skip
     rig.run(0.1)
-    assert rig.r.deviation.deviation == 0
+    assert rig.c.deviation.deviation == 0
     rig.run(1.5)
-    held = rig.record(0.5, ["deviation.deviation"])["deviation.deviation"]
+    held = rig.record(0.5, ["controller.deviation.deviation"])["controller.deviation.deviation"]
     assert held.mean() == pytest.approx(-3, abs=0.1)
     rig.run(1.0)
-    assert abs(rig.r.deviation.deviation) <= 1
-    assert rig.r.train.force == 0.0
+    assert abs(rig.c.deviation.deviation) <= 1
+    assert rig.plant.train.force == 0.0
 
 
 # --------------------------------------------------------------------------------------------------------- in position
@@ -159,13 +162,13 @@ def test_the_axis_says_so_when_it_has_been_in_position_for_its_time():
     rig.go(400)
     assert advance(rig.p, rig.r, 10**6, *NO_TRACE) < 10**6
     r = rig.r
-    assert (r.event, r.failed, r.deviation.state) == (1, 0, RUN)
-    assert (r.generator.command, r.away) == (400, 0)
-    assert abs(r.deviation.deviation) <= rig.p.window
-    assert r.tick - 1 - r.arrived == rig.p.window_ticks == 2000
-    assert r.wake == NEVER
+    assert (r.controller.event, r.controller.failed, r.controller.deviation.state) == (1, 0, RUN)
+    assert (r.controller.generator.command, r.controller.away) == (400, 0)
+    assert abs(r.controller.deviation.deviation) <= rig.p.controller.window
+    assert r.tick - 1 - r.controller.arrived == rig.p.controller.window_ticks == 2000
+    assert r.controller.wake == NEVER
     assert advance(rig.p, r, 100, *NO_TRACE) == 0, "the loop waits for its host"
-    r.event = 0
+    r.controller.event = 0
     rig.run_ticks(10)
     assert advance(rig.p, r, 50_000, *NO_TRACE) == 50_000, "it says so once"
 
@@ -175,16 +178,16 @@ def test_the_axis_says_so_when_it_has_been_in_position_for_its_time():
 def test_what_counts_as_in_position_is_the_window_and_the_end_of_the_command(window):
     rig = Rig(RAMP, f"method.in_position={window}", "method.in_position_time=1 ms")
     rig.go(400)
-    run = rig.record(0.6, ["generator.command", "deviation.deviation", "away", "tick"])
-    away = (run["generator.command"] != 400) | (np.abs(run["deviation.deviation"]) > window)
-    first = np.flatnonzero(run["away"])[0]
+    run = rig.record(0.6, ["controller.generator.command", "controller.deviation.deviation", "controller.away", "tick"])
+    away = (run["controller.generator.command"] != 400) | (np.abs(run["controller.deviation.deviation"]) > window)
+    first = np.flatnonzero(run["controller.away"])[0]
     assert first <= 10_000 / 20  # at the latest with the first command pulse
-    assert np.array_equal(away[first:], run["away"][first:] == 1)
+    assert np.array_equal(away[first:], run["controller.away"][first:] == 1)
     back = np.flatnonzero(np.diff(away.astype(int)) == -1) + 1
-    assert rig.r.arrived == run["tick"][back[-1]] - 1
+    assert rig.c.arrived == run["tick"][back[-1]] - 1
     assert not away[-1]
     # It may come and go: only the last time counts, and then it says so once.
-    assert rig.r.wake == NEVER
+    assert rig.c.wake == NEVER
 
 
 # --------------------------------------------------------------------------------------------------------------- fault
@@ -193,14 +196,14 @@ def test_what_counts_as_in_position_is_the_window_and_the_end_of_the_command(win
 def overrun(rig):
     """A command that no slide can follow."""
     rig.go(10**6, rate=200_000)
-    rig.r.event = 0
+    rig.c.event = 0
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
 def spin(rig):
     """A slide that moves more pulses in a sample than the counter holds, though nobody asks it to."""
-    rig.r.train.velocity = 40_000 * PULSE
-    rig.r.event = 0
+    rig.plant.train.velocity = 40_000 * PULSE
+    rig.c.event = 0
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
@@ -210,39 +213,44 @@ def test_a_fault_drives_to_zero_current_and_says_why(make, cause, plant):
     rig = Rig(plant=plant)
     assert make(rig) < 10**5, "the loop stops for its host"
     r = rig.r
-    assert (r.deviation.state, r.deviation.cause, r.event, r.failed) == (FAULT, cause, 1, 1)
-    assert (r.deviation.word, r.amplifier.word, r.train.current) == (0.0, 0.0, 0.0)
-    velocity = r.train.velocity
-    r.event = 0
-    run = rig.record(0.01, ["deviation.word", "amplifier.word", "train.current", "train.velocity"])
-    assert not run["deviation.word"].any()
-    assert not run["amplifier.word"].any()
-    assert not run["train.current"].any()
+    assert (r.controller.deviation.state, r.controller.deviation.cause, r.controller.event, r.controller.failed) == (
+        FAULT,
+        cause,
+        1,
+        1,
+    )
+    assert (r.lines.word, r.plant.amplifier.word, r.plant.train.current) == (0.0, 0.0, 0.0)
+    velocity = r.plant.train.velocity
+    r.controller.event = 0
+    run = rig.record(0.01, ["lines.word", "plant.amplifier.word", "plant.train.current", "plant.train.velocity"])
+    assert not run["lines.word"].any()
+    assert not run["plant.amplifier.word"].any()
+    assert not run["plant.train.current"].any()
     # Without friction it coasts, with a voltage amplifier too: switched off, it does not brake.
-    assert run["train.velocity"] == pytest.approx(np.full(1000, velocity), rel=1e-9)
+    assert run["plant.train.velocity"] == pytest.approx(np.full(1000, velocity), rel=1e-9)
     assert velocity != 0.0
 
 
 def test_a_fault_is_told_once():
     rig = Rig()
     overrun(rig)
-    rig.r.event = 0
+    rig.c.event = 0
     assert advance(rig.p, rig.r, 1000, *NO_TRACE) == 1000
-    assert (rig.r.event, rig.r.deviation.state) == (0, FAULT)
+    assert (rig.c.event, rig.c.deviation.state) == (0, FAULT)
 
 
 @pytest.mark.parametrize("bits", [8, 12])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_range_of_the_position_counter_is_that_of_its_bits(bits, sign):
     rig = Rig(f"method.position_bits={bits}", "limits.speed=25 mm/s")
-    rig.p.amplifier.per_count = 0.0  # the slide stands
+    rig.p.plant.amplifier.per_count = 0.0  # the slide stands
     most = (1 << (bits - 1)) - 1
     rig.go(sign * most, rate=100_000)
     rig.run_ticks(most + 100)
-    assert (rig.r.deviation.deviation, rig.r.deviation.state) == (sign * most, RUN)
+    assert (rig.c.deviation.deviation, rig.c.deviation.state) == (sign * most, RUN)
     rig.go(sign)
     rig.run_ticks(100)
-    assert (rig.r.deviation.state, rig.r.deviation.cause) == (FAULT, DEVIATION_RANGE)
+    assert (rig.c.deviation.state, rig.c.deviation.cause) == (FAULT, DEVIATION_RANGE)
 
 
 @pytest.mark.compiled
@@ -250,16 +258,16 @@ def test_the_range_of_the_position_counter_is_that_of_its_bits(bits, sign):
 def test_a_reset_by_the_host_leaves_the_fault(make):
     rig = Rig()
     make(rig)
-    rig.r.train.velocity = 0.0  # somebody has stopped the slide
+    rig.plant.train.velocity = 0.0  # somebody has stopped the slide
     rig.run_ticks(10)
-    assert rig.r.deviation.state == FAULT
-    rig.r.deviation.reset = 1
-    before = rig.r.deviation.position
+    assert rig.c.deviation.state == FAULT
+    rig.c.deviation.reset = 1
+    before = rig.c.deviation.position
     rig.run_ticks(1)
-    d, g = rig.r.deviation, rig.r.generator
-    assert (d.state, d.reset, rig.r.failed, rig.r.event) == (RUN, 0, 0, 0)
+    d, g = rig.c.deviation, rig.c.generator
+    assert (d.state, d.reset, rig.c.failed, rig.c.event) == (RUN, 0, 0, 0)
     assert at_rest(rig)
-    assert (rig.r.filter.accumulator, rig.r.filter.input, g.present, g.phase) == (0, 0, 0, 0)
+    assert (rig.c.filter.accumulator, rig.c.filter.input, g.present, g.phase) == (0, 0, 0, 0)
     assert g.command == g.goal == d.position == before
     rig.run(0.02)
     assert at_rest(rig)
@@ -272,20 +280,20 @@ def test_a_reset_by_the_host_leaves_the_fault(make):
 def test_a_reset_while_the_slide_coasts_counts_on_without_a_false_pulse():
     rig = Rig("method.counter_bits=12")
     overrun(rig)
-    rig.p.amplifier.per_count = 0.0
-    rig.r.train.velocity = 3000 * PULSE
+    rig.p.plant.amplifier.per_count = 0.0
+    rig.plant.train.velocity = 3000 * PULSE
     for ticks in (50, 51, 53, 57):
         rig.run_ticks(ticks)
-        rig.r.deviation.reset = 1
+        rig.c.deviation.reset = 1
         rig.run_ticks(1)
-        position, edge = rig.r.deviation.position, rig.r.encoder.edge
-        assert rig.r.deviation.state == RUN
+        position, edge = rig.c.deviation.position, rig.plant.encoder.edge
+        assert rig.c.deviation.state == RUN
         rig.run_ticks(400)
-        rig.r.train.velocity, velocity = 0.0, rig.r.train.velocity
+        rig.plant.train.velocity, velocity = 0.0, rig.plant.train.velocity
         rig.run_ticks(2)
-        assert rig.r.deviation.position - position == rig.r.encoder.edge - edge
-        assert rig.r.deviation.deviation == -(rig.r.encoder.edge - edge)
-        rig.r.train.velocity = velocity
+        assert rig.c.deviation.position - position == rig.plant.encoder.edge - edge
+        assert rig.c.deviation.deviation == -(rig.plant.encoder.edge - edge)
+        rig.plant.train.velocity = velocity
 
 
 # ---------------------------------------------------------------------------------------------- sample clock and lines
@@ -293,7 +301,7 @@ def test_a_reset_while_the_slide_coasts_counts_on_without_a_false_pulse():
 
 def strobes(run):
     """Rows of the ticks with a strobe."""
-    return np.flatnonzero(np.diff(run["clock.left"]) > 0) + 1
+    return np.flatnonzero(np.diff(run["controller.clock.left"]) > 0) + 1
 
 
 @pytest.mark.compiled
@@ -302,25 +310,29 @@ def test_a_retune_takes_effect_at_the_next_window():
     rig.command_rate(1000)
     rig.run(1.0)
     rig.run_ticks(-rig.r.tick % 500 + 123)
-    rig.r.clock.demanded = 2500
-    level = rig.r.filter.output
-    run = rig.record(0.0333, ["clock.left", "clock.period", "filter.output", "speed.word"])
+    rig.c.clock.demanded = 2500
+    level = rig.c.filter.output
+    run = rig.record(
+        0.0333,
+        ["controller.clock.left", "controller.clock.period", "controller.filter.output", "controller.speed.word"],
+    )
     begin = strobes(run)
     assert begin[0] == 500 - 123 - 1  # the running window keeps its length
     assert np.array_equal(np.diff(begin), np.full(len(begin) - 1, 250))
-    assert set(run["clock.period"][: begin[0]]) == {5000}
-    assert set(run["clock.period"][begin[0] :]) == {2500}
+    assert set(run["controller.clock.period"][: begin[0]]) == {5000}
+    assert set(run["controller.clock.period"][begin[0] :]) == {2500}
     # y is not rescaled: it leaves its level with the filter.
-    assert run["filter.output"][begin[0]] == pytest.approx(level, abs=2)
+    assert run["controller.filter.output"][begin[0]] == pytest.approx(level, abs=2)
     assert (
-        run["filter.output"][begin[1]] == 0.25 * 4 * run["speed.word"][begin[1]] + 0.75 * run["filter.output"][begin[0]]
+        run["controller.filter.output"][begin[1]]
+        == 0.25 * 4 * run["controller.speed.word"][begin[1]] + 0.75 * run["controller.filter.output"][begin[0]]
     )
 
 
 @pytest.mark.parametrize("period", [100, 1003, 5005, 10_000])
 def test_a_period_need_not_be_whole_ticks(period):
     rig = Rig(f"method.sample_period={period} us", "limits.speed=25 mm/s", "method.counter_bits=12")
-    run = rig.record(5 * period * 1e-6 + 0.01, ["clock.left", "tick"])
+    run = rig.record(5 * period * 1e-6 + 0.01, ["controller.clock.left", "tick"])
     # The strobe of clock k p falls into the tick that ends with it or after it.
     expected = [-(-k * period // CLOCKS) for k in range(1, 6)]
     assert run["tick"][strobes(run)][:5].tolist() == expected
@@ -331,15 +343,24 @@ def test_a_lost_sample_lets_the_window_go_on():
     rig = Rig("disturbance.lines.burst.kind=lose sample", "disturbance.lines.burst.at=1 s", plant=plant_a(1500))
     rig.command_rate(1037)
     rig.run(0.9)
-    run = rig.record(0.2, ["clock.left", "speed.word", "speed.count", "filter.output", "deviation.position"])
+    run = rig.record(
+        0.2,
+        [
+            "controller.clock.left",
+            "controller.speed.word",
+            "controller.speed.count",
+            "controller.filter.output",
+            "controller.deviation.position",
+        ],
+    )
     at = strobes(run)
-    lost = [k for k in at if run["speed.count"][k] > 0]
+    lost = [k for k in at if run["controller.speed.count"][k] > 0]
     assert len(lost) == 1
-    assert rig.r.interference.lost == 1
-    before, after = run["filter.output"][lost[0] - 1], run["filter.output"][lost[0]]
+    assert rig.plant.interference.lost == 1
+    before, after = run["controller.filter.output"][lost[0] - 1], run["controller.filter.output"][lost[0]]
     assert before == after
     following = at[list(at).index(lost[0]) + 1]
-    assert 9 <= run["speed.word"][following] <= 12  # of two windows
+    assert 9 <= run["controller.speed.word"][following] <= 12  # of two windows
 
 
 @pytest.mark.compiled
@@ -347,25 +368,25 @@ def test_pulses_put_in_and_taken_away_shift_the_slide_for_good():
     rig = Rig("disturbance.lines.burst.kind=+", "disturbance.lines.burst.at=0.2 s", "disturbance.lines.burst.count=5")
     rig.go(200, rate=1000)
     rig.run(2.5)
-    d = rig.r.deviation
+    d = rig.c.deviation
     assert abs(d.deviation) <= 1
-    assert rig.r.interference.inserted == 5
-    assert d.position - (rig.r.encoder.edge - round(START / PULSE)) == 5
+    assert rig.plant.interference.inserted == 5
+    assert d.position - (rig.plant.encoder.edge - round(START / PULSE)) == 5
 
     rig = Rig(
         "disturbance.lines.burst.kind=remove", "disturbance.lines.burst.at=0.1 s", "disturbance.lines.burst.count=5"
     )
     rig.go(200, rate=1000)
     rig.run(2.5)
-    assert rig.r.interference.removed == 5
-    assert rig.r.deviation.position - (rig.r.encoder.edge - round(START / PULSE)) == -5
+    assert rig.plant.interference.removed == 5
+    assert rig.c.deviation.position - (rig.plant.encoder.edge - round(START / PULSE)) == -5
 
 
 def test_a_sample_inverted_for_a_clock_makes_a_pulse_and_takes_it_back():
     rig = Rig("disturbance.lines.burst.kind=corrupt", "disturbance.lines.burst.ticks=[7]")
     rig.run_ticks(7 - rig.r.tick)
     rig.run_ticks(1)
-    assert rig.r.interference.corrupted == 1
-    assert (rig.r.deviation.position, rig.r.speed.count, rig.r.busy) == (0, 0, 0)
+    assert rig.plant.interference.corrupted == 1
+    assert (rig.c.deviation.position, rig.c.speed.count, rig.c.busy) == (0, 0, 0)
     rig.run_ticks(2000)
     assert at_rest(rig)

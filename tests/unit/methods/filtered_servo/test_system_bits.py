@@ -12,7 +12,8 @@ from tests.filtered_servo_rig import PLANT_B, PULSE, Rig, plant_a
 from tests.places import ROOT
 
 from detent.control.deviation_counter import FAULT
-from detent.methods.filtered_servo.system import CLOCKS, TICK, FilteredServo, advance_by_clocks
+from detent.methods.filtered_servo.controller import CLOCKS
+from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks
 
 RAMP = "method.command_acceleration=1 m/s^2"
 NOISE = (
@@ -24,7 +25,7 @@ NOISE = (
 def scenario(*, noise):
     """A rig with a ramped command, and what its host does on the way: (ticks, action)."""
     rig = Rig(RAMP, *(NOISE if noise else ()))
-    g, c = rig.r.generator, rig.r.clock
+    g, c = rig.c.generator, rig.c.clock
     actions = [
         (400, lambda: rig.go(300, rate=9000)),
         (900, lambda: setattr(c, "demanded", 2770)),
@@ -44,27 +45,34 @@ def test_ticks_without_events_skip_their_clocks_and_change_no_bit(noise):
         act_too()
         skipping.run_ticks(ticks)
         for _ in range(ticks):
-            clocking.r.busy = 1
+            clocking.c.busy = 1
             clocking.run_ticks(1)
         assert skipping.r.diff(clocking.r) == {}
     assert skipping.r.snapshot() == clocking.r.snapshot()
-    assert skipping.r.gauge.peak_speed > 500 * PULSE
-    assert (skipping.r.interference.inserted > 0) == noise
+    assert skipping.plant.gauge.peak_speed > 500 * PULSE
+    assert (skipping.plant.interference.inserted > 0) == noise
 
 
 def test_a_quiet_tick_does_skip_its_clocks():
     """Otherwise the comparison above would compare a thing with itself."""
     rig = Rig()
-    rig.r.generator.goal, rig.r.generator.rate = 1, 1_000_000
-    rig.r.deviation.error = 0.125  # the logic would put it right
+    rig.c.generator.goal, rig.c.generator.rate = 1, 1_000_000
+    rig.c.deviation.error = 0.125  # the logic would put it right
     rig.run_ticks(10)
-    assert rig.r.deviation.error == 0.125
-    rig.r.busy = 1
+    assert rig.c.deviation.error == 0.125
+    rig.c.busy = 1
     rig.run_ticks(1)
-    assert rig.r.deviation.error == 0.0
+    assert rig.c.deviation.error == 0.0
 
 
-CLOCKED = ("clock.left", "decoder.forward", "decoder.reverse", "deviation.position", "speed.count", "tick")
+CLOCKED = (
+    "controller.clock.left",
+    "controller.decoder.forward",
+    "controller.decoder.reverse",
+    "controller.deviation.position",
+    "controller.speed.count",
+    "tick",
+)
 
 
 def record_clocks(rig, ticks):
@@ -94,19 +102,19 @@ def test_clock_by_clock_the_axis_comes_to_the_same_bits(noise):
 def test_clock_by_clock_each_pulse_lasts_a_clock_and_is_counted_in_the_next():
     rig = Rig()
     rig.go(300, rate=9000)
-    rig.r.train.velocity = 4000 * PULSE
+    rig.plant.train.velocity = 4000 * PULSE
     rows = record_clocks(rig, 1600)
     assert rows["tick"].tolist() == list(np.repeat(np.arange(1, 1601), CLOCKS))
-    pulses = rows["decoder.forward"].astype(int) - rows["decoder.reverse"]
+    pulses = rows["controller.decoder.forward"].astype(int) - rows["controller.decoder.reverse"]
     assert np.count_nonzero(pulses) > 40
     assert not (pulses[1:] * pulses[:-1]).any()
-    assert np.array_equal(np.diff(rows["deviation.position"]), pulses[:-1])
-    left = np.diff(rows["clock.left"])
+    assert np.array_equal(np.diff(rows["controller.deviation.position"]), pulses[:-1])
+    left = np.diff(rows["controller.clock.left"])
     assert set(left) == {-1, 4999}
     strobes = np.flatnonzero(left == 4999) + 1
     assert np.array_equal(np.diff(strobes), np.full(len(strobes) - 1, 5000))
     # What is counted in the clock of the strobe belongs to the new window.
-    assert np.array_equal(rows["speed.count"][strobes], pulses[strobes - 1])
+    assert np.array_equal(rows["controller.speed.count"][strobes], pulses[strobes - 1])
 
 
 def test_time_may_be_cut_anywhere():
@@ -121,13 +129,13 @@ def test_time_may_be_cut_anywhere():
 
 def test_recorded_registers_equal_stepping():
     names = [
-        "deviation.deviation",
-        "filter.output",
-        "train.velocity",
-        "clock.left",
-        "generator.command",
+        "controller.deviation.deviation",
+        "controller.filter.output",
+        "plant.train.velocity",
+        "controller.clock.left",
+        "controller.generator.command",
         "tick",
-        "busy",
+        "controller.busy",
     ]
     recorded, stepped = Rig(RAMP, *NOISE), Rig(RAMP, *NOISE)
     for rig in (recorded, stepped):
@@ -145,7 +153,7 @@ def test_recorded_registers_equal_stepping():
         assert run[name].tolist() == [row[k] for row in rows]
     assert run["t"] == pytest.approx([row[names.index("tick")] * TICK for row in rows], rel=1e-12)
     assert recorded.r.snapshot() == stepped.r.snapshot(), "recording changes nothing"
-    assert len(set(run["deviation.deviation"])) > 5
+    assert len(set(run["controller.deviation.deviation"])) > 5
 
 
 SERVOS = {
@@ -167,17 +175,17 @@ def run_hash(servo: str) -> str:
     digest = hashlib.sha256(rig.p.snapshot())
     rig.go(400, rate=12_000)
     for demanded in (5000, 1330, 7000):
-        rig.r.clock.demanded = demanded
+        rig.c.clock.demanded = demanded
         rig.run_ticks(2500)
         digest.update(rig.r.snapshot())
-    assert rig.r.deviation.position > 100
-    assert min(rig.r.interference.inserted, rig.r.interference.removed, rig.r.interference.corrupted) > 0
-    rig.r.train.velocity = 40_000 * PULSE  # more pulses in a sample than the counter holds
+    assert rig.c.deviation.position > 100
+    assert min(rig.plant.interference.inserted, rig.plant.interference.removed, rig.plant.interference.corrupted) > 0
+    rig.plant.train.velocity = 40_000 * PULSE  # more pulses in a sample than the counter holds
     rig.run_ticks(500)
-    assert rig.r.deviation.state == FAULT
+    assert rig.c.deviation.state == FAULT
     digest.update(rig.r.snapshot())
     rig.run_ticks(200)
-    rig.r.deviation.reset = 1
+    rig.c.deviation.reset = 1
     rig.run_ticks(500)
     digest.update(rig.r.snapshot())
     return digest.hexdigest()

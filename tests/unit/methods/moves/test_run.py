@@ -182,7 +182,7 @@ def test_a_retune_takes_effect_with_the_move_and_the_next_one_goes_back():
         to = host.place(move, host.home + (1e-3 if period else 2e-3))
         host.command(to)
         assert host.wait(host.time_limit(to))
-        assert host.state.clock.period == (2000 if period else 5000)
+        assert host.controller.clock.period == (2000 if period else 5000)
 
 
 def test_progress_counts_the_moves():

@@ -1,0 +1,292 @@
+"""The controller of a filtered servo: what counts, filters and subtracts, and the host's words to it.
+
+It sees the encoder as a synchronous circuit does: ten clocks in a tick of 10 us, the levels of each on the lines.
+Clocks in which nothing happens, or nothing whose moment matters, are skipped.
+"""
+
+from detent.control.deviation_counter import (
+    FAULT,
+    RESET,
+    RUN,
+    Deviation,
+    DeviationParams,
+    count_deviation,
+    drive_word,
+    watch_ranges,
+)
+from detent.control.pulse_generator import (
+    PulseGenerator,
+    PulseGeneratorParams,
+    clock_generator,
+    keeps_rate,
+    ramp_rate,
+)
+from detent.control.sample_clock import SampleClock, count_clock
+from detent.kernel.loop import controls
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1, u2
+from detent.kernel.step import hot_step, step
+from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.quadrature import ClockedDecoder, clock_decoder, is_settled, preset_decoder
+from detent.sensing.speed_filter import SpeedFilter, SpeedFilterParams, filter_speed
+
+CLOCKS = 10
+"""Decoder clocks of 1 us in a tick."""
+
+LEVELS = (1 << CLOCKS) - 1
+"""A channel that is high in all clocks of a tick."""
+
+NEVER = 1 << 62
+
+
+class FilteredLines(Registers):
+    """Wires between controller and plant; levels lie clock by clock, the first of the tick in bit 0."""
+
+    a: u2 = register("levels of channel A in the ten clocks of the tick, the first in bit 0", by=PLANT)
+    b: u2 = register("levels of channel B in the ten clocks of the tick, the first in bit 0", by=PLANT)
+    plus: u1 = register("forward pulses that noise puts on the counting line in the first clock", by=PLANT)
+    minus: u1 = register("backward pulses that noise puts on the counting line in the first clock", by=PLANT)
+    swallow: u1 = register("how many of the next pulses the counting line swallows in the tick", by=PLANT)
+    mask: u1 = register("how many of the next strobes the strobe line loses in the tick", by=PLANT)
+    swallowed: u1 = register("pulses that were swallowed in the tick", by=CONTROLLER)
+    missed: u1 = register("strobes that were lost in the tick", by=CONTROLLER)
+    word: f8 = register("drive word: E, saturated", unit="count", by=CONTROLLER)
+    run: u1 = register("1 enables the amplifier", by=CONTROLLER)
+
+
+class FilteredControllerParams(Registers):
+    """Constants of the controller."""
+
+    generator: PulseGeneratorParams = block("command pulses")
+    deviation: DeviationParams = block("position counter and error")
+    speed: PulseCounterParams = block("speed counter")
+    filter: SpeedFilterParams = block("scale and filter")
+    window: i8 = register("deviation that counts as in position", unit="count")
+    window_ticks: i8 = register("time inside it until the axis says so", unit="tick")
+
+
+class FilteredController(Registers):
+    """State of the controller."""
+
+    tick: i8 = register("periods of 10 us since power-on", unit="tick")
+    generator: PulseGenerator = block("command pulses")
+    channel_a: u1 = register("channel A as the running clock takes it")
+    channel_b: u1 = register("channel B as the running clock takes it")
+    decoder: ClockedDecoder = block("quadrature decoder")
+    busy: u1 = register("1 while the decoder has not settled, or the host has written a command")
+    deviation: Deviation = block("position counter and error")
+    speed: PulseCounter = block("speed counter")
+    clock: SampleClock = block("sample clock")
+    filter: SpeedFilter = block("scale and filter")
+    failed: u1 = register("1 when the host has been told of a fault")
+    away: u1 = register("1 while commanded or out of position")
+    arrived: i8 = register("tick in which the axis last came into position", unit="tick")
+    wake: i8 = register("tick at which the axis will be in position", unit="tick")
+    event: u1 = register("1 when the axis has come into position or failed; the host clears it")
+
+
+# ---- host actions
+
+
+@step
+def power_on(c: FilteredController, lines: FilteredLines, sample_us: int) -> None:
+    """The lines show where the disc stands; the first tick leaves the reset."""
+    c.channel_a, c.channel_b = lines.a & 1, lines.b & 1
+    c.clock.demanded = c.clock.period = c.clock.left = sample_us
+    c.wake = NEVER
+    c.deviation.state = RESET
+    c.deviation.reset = 1
+
+
+@step
+def go_to(c: FilteredController, goal: int, rate: int) -> None:
+    """Command pulses up to `goal`, at `rate` [uHz]; where the command is: stop at once."""
+    c.generator.goal, c.generator.rate = goal, rate
+    c.away = c.busy = 1
+    c.event = 0
+
+
+@step
+def set_period(c: FilteredController, sample_us: int) -> None:
+    """Sample period of the next window."""
+    c.clock.demanded = sample_us
+
+
+@step
+def reset(c: FilteredController) -> None:
+    """Leave a fault."""
+    c.deviation.reset = 1
+    c.event = 0
+
+
+@step
+def acknowledge(c: FilteredController) -> None:
+    """The host has looked."""
+    c.event = 0
+
+
+# ---- a clock of the decoder
+
+
+@hot_step
+def count_movement(p: FilteredControllerParams, c: FilteredController, commanded: int, moved: int) -> None:
+    """Pulses of one clock on the counting lines."""
+    if commanded or moved:
+        count_deviation(c.deviation, commanded, moved)
+        add_pulses(p.speed, c.speed, moved)
+        watch_ranges(p.deviation, c.deviation, c.speed.count, p.speed.half)
+
+
+@hot_step
+def sample_speed(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """Strobe CS: counter to register and filter, in one event."""
+    if lines.missed < lines.mask:
+        lines.missed += 1
+    else:
+        close_window(c.speed)
+        filter_speed(p.filter, c.filter, c.speed.word)
+
+
+@hot_step
+def one_clock(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> None:
+    """Decoder clock `k` of a tick.
+
+    The strobe comes first, so that a pulse that comes with it belongs to the new window; then what the pulse lines
+    show; then the flip-flops.
+    """
+    c.channel_a, c.channel_b = lines.a >> k & 1, lines.b >> k & 1
+    if count_clock(c.clock):
+        sample_speed(p, c, lines)
+    moved = c.decoder.forward - c.decoder.reverse
+    if moved and lines.swallowed < lines.swallow:
+        lines.swallowed += 1
+        moved = 0
+    if k == 0:
+        moved += lines.plus - lines.minus
+    count_movement(p, c, clock_generator(c.generator, 1), moved)
+    clock_decoder(c.decoder, c.channel_a, c.channel_b)
+
+
+# ---- a tick
+
+
+@hot_step
+def skip_clocks(p: FilteredControllerParams, c: FilteredController, clocks: int) -> int:
+    """Clocks in which nothing but command pulses can come, which count alike wherever they do; returns them, signed."""
+    c.clock.left -= clocks
+    commanded = clock_generator(c.generator, clocks)
+    count_movement(p, c, commanded, 0)
+    return commanded
+
+
+@hot_step
+def is_calm(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> bool:
+    """True when the order of events from clock `k` of the tick on does not matter.
+
+    The decoder is at rest, no strobe is due, the levels change once at most, and the deviation is far from its limit.
+    """
+    clocks = CLOCKS - k
+    if not is_settled(c.decoder, c.channel_a, c.channel_b) or c.clock.left <= clocks:
+        return False
+    a, b = lines.a >> k, lines.b >> k
+    changes = ((a ^ (a << 1 | c.channel_a)) & LEVELS >> k) << CLOCKS | (b ^ (b << 1 | c.channel_b)) & LEVELS >> k
+    return changes & (changes - 1) == 0 and abs(c.deviation.deviation) + clocks < p.deviation.range
+
+
+@step
+def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """Ten decoder clocks in which something happens, and what follows from them.
+
+    From where the tick is calm only its last two clocks are run: an edge is counted in the tick in which it comes,
+    unless it comes in the last clock. Noise puts its pulses into the first.
+    """
+    lines.swallowed = lines.missed = 0
+    k = 0
+    while k < CLOCKS:
+        stray = k == 0 and lines.plus + lines.minus > 0
+        if k < CLOCKS - 2 and not stray and is_calm(p, c, lines, k):
+            skip_clocks(p, c, CLOCKS - 2 - k)
+            k = CLOCKS - 2
+        one_clock(p, c, lines, k)
+        k += 1
+    conclude(p, c, lines)
+
+
+@step
+def conclude(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """After the clocks of a tick: is the decoder at rest, and what is the drive word now."""
+    c.busy = 0 if is_settled(c.decoder, c.channel_a, c.channel_b) else 1
+    decide(p, c, lines)
+
+
+@step
+def decide(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """Error and drive word after a change, and whether the axis is in position."""
+    d = c.deviation
+    if d.state == FAULT and c.failed == 0:
+        c.failed = 1
+        c.event = 1
+    lines.word = drive_word(p.deviation, d, c.filter.output)
+    lines.run = 1 if d.state == RUN else 0
+    away = c.generator.command != c.generator.goal or abs(d.deviation) > p.window
+    if away:
+        c.wake = NEVER
+    elif c.away:
+        c.arrived = c.tick
+        c.wake = c.tick + p.window_ticks
+    c.away = 1 if away else 0
+
+
+@step
+def leave_reset(c: FilteredController) -> None:
+    """Power-on, or the host's answer to a fault: all counters at zero, the command where the slide stands."""
+    c.deviation.deviation = 0
+    c.generator.goal = c.generator.command = c.deviation.position
+    c.generator.present = c.generator.phase = c.generator.direction = 0
+    c.speed.count = c.speed.word = 0
+    c.filter.accumulator = c.filter.input = 0
+    c.filter.output = c.deviation.error = 0.0
+    preset_decoder(c.decoder, c.channel_a, c.channel_b)
+    c.deviation.reset = 0
+    c.deviation.state = RUN
+    c.failed = 0
+    c.event = 0
+    c.busy = 1
+
+
+@hot_step
+def begin(p: FilteredControllerParams, c: FilteredController) -> None:
+    """What the host has written, and the rate of the command in this tick."""
+    if c.deviation.reset:
+        leave_reset(c)
+    moving = c.generator.command != c.generator.goal or c.generator.present > 0
+    if moving and not keeps_rate(p.generator, c.generator):
+        ramp_rate(p.generator, c.generator)
+
+
+@hot_step
+def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
+    """True when no level changes in the tick, no noise and no strobe comes, and nothing is left to do."""
+    changes = (lines.a ^ -c.channel_a & LEVELS) | (lines.b ^ -c.channel_b & LEVELS)
+    told = lines.swallowed | lines.missed
+    return (changes | lines.plus | lines.minus | told | c.busy) == 0 and c.clock.left > CLOCKS
+
+
+@hot_step
+def end(c: FilteredController) -> None:
+    """Tell the host when the axis has been in position for its time."""
+    if c.tick >= c.wake:
+        c.wake = NEVER
+        c.event = 1
+    c.tick += 1
+
+
+@controls(FilteredControllerParams)
+@hot_step
+def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """Ten microseconds."""
+    begin(p, c)
+    if not is_quiet(c, lines):
+        run_clocks(p, c, lines)
+    elif skip_clocks(p, c, CLOCKS):
+        decide(p, c, lines)
+    end(c)
