@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
-from detent.methods.filtered_servo.controller import CLOCKS
+from detent.methods.filtered_servo.controller import CLOCKS, set_period
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
 
@@ -112,7 +112,7 @@ def play(rig, script):
         elif what == "goal":
             rig.c.generator.goal = rig.c.generator.command + value
         elif what == "period":
-            rig.c.clock.demanded = value
+            set_period(rig.c, value)
         columns.append(rig.record(ticks * 1e-5, RECORDED))
     run = {name: np.concatenate([column[name] for column in columns]) for name in RECORDED}
     # After a fault nothing is promised but that the drive is off.

@@ -23,10 +23,10 @@ from detent.control.pulse_generator import (
 )
 from detent.control.sample_clock import SampleClock, count_clock
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1, u2
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
-from detent.sensing.quadrature import ClockedDecoder, clock_decoder, is_settled, preset_decoder
+from detent.sensing.quadrature import ClockedDecoder, clock_decoder, edge_direction, is_settled, preset_decoder
 from detent.sensing.speed_filter import SpeedFilter, SpeedFilterParams, filter_speed
 
 CLOCKS = 10
@@ -35,20 +35,17 @@ CLOCKS = 10
 LEVELS = (1 << CLOCKS) - 1
 """A channel that is high in all clocks of a tick."""
 
-NEVER = 1 << 62
-
 
 class FilteredLines(Registers):
     """Wires between controller and plant; levels lie clock by clock, the first of the tick in bit 0."""
 
     a: u2 = register("levels of channel A in the ten clocks of the tick, the first in bit 0", by=PLANT)
     b: u2 = register("levels of channel B in the ten clocks of the tick, the first in bit 0", by=PLANT)
-    plus: u1 = register("forward pulses that noise puts on the counting line in the first clock", by=PLANT)
-    minus: u1 = register("backward pulses that noise puts on the counting line in the first clock", by=PLANT)
-    swallow: u1 = register("how many of the next pulses the counting line swallows in the tick", by=PLANT)
-    mask: u1 = register("how many of the next strobes the strobe line loses in the tick", by=PLANT)
-    swallowed: u1 = register("pulses that were swallowed in the tick", by=CONTROLLER)
-    missed: u1 = register("strobes that were lost in the tick", by=CONTROLLER)
+    stray: i1 = register("pulses that noise puts on the counting lines in the first clock, signed", by=PLANT)
+    swallow: u1 = register("the counting line swallows pulses until `swallowed` is this", by=PLANT)
+    mask: u1 = register("the strobe line loses strobes until `missed` is this", by=PLANT)
+    swallowed: u1 = register("pulses swallowed so far, modulo 256", by=CONTROLLER)
+    missed: u1 = register("strobes lost so far, modulo 256", by=CONTROLLER)
     word: f8 = register("drive word: E, saturated", unit="count", by=CONTROLLER)
     run: u1 = register("1 enables the amplifier", by=CONTROLLER)
 
@@ -67,7 +64,6 @@ class FilteredControllerParams(Registers):
 class FilteredController(Registers):
     """State of the controller."""
 
-    tick: i8 = register("periods of 10 us since power-on", unit="tick")
     generator: PulseGenerator = block("command pulses")
     channel_a: u1 = register("channel A as the running clock takes it")
     channel_b: u1 = register("channel B as the running clock takes it")
@@ -79,8 +75,7 @@ class FilteredController(Registers):
     filter: SpeedFilter = block("scale and filter")
     failed: u1 = register("1 when the host has been told of a fault")
     away: u1 = register("1 while commanded or out of position")
-    arrived: i8 = register("tick in which the axis last came into position", unit="tick")
-    wake: i8 = register("tick at which the axis will be in position", unit="tick")
+    settling: i8 = register("ticks until the axis says that it is in position; 0 it does not come to that", unit="tick")
     event: u1 = register("1 when the axis has come into position or failed; the host clears it")
 
 
@@ -92,9 +87,8 @@ def power_on(c: FilteredController, lines: FilteredLines, sample_us: int) -> Non
     """The lines show where the disc stands; the first tick leaves the reset."""
     c.channel_a, c.channel_b = lines.a & 1, lines.b & 1
     c.clock.demanded = c.clock.period = c.clock.left = sample_us
-    c.wake = NEVER
     c.deviation.state = RESET
-    c.deviation.reset = 1
+    reset(c)
 
 
 @step
@@ -114,7 +108,7 @@ def set_period(c: FilteredController, sample_us: int) -> None:
 @step
 def reset(c: FilteredController) -> None:
     """Leave a fault."""
-    c.deviation.reset = 1
+    c.deviation.reset = c.busy = 1
     c.event = 0
 
 
@@ -137,9 +131,18 @@ def count_movement(p: FilteredControllerParams, c: FilteredController, commanded
 
 
 @hot_step
+def take_pulse(lines: FilteredLines, moved: int) -> int:
+    """What the counting lines show of a pulse of the decoder, or of none."""
+    if moved and lines.swallowed != lines.swallow:
+        lines.swallowed += 1
+        return 0
+    return moved
+
+
+@hot_step
 def sample_speed(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Strobe CS: counter to register and filter, in one event."""
-    if lines.missed < lines.mask:
+    if lines.missed != lines.mask:
         lines.missed += 1
     else:
         close_window(c.speed)
@@ -156,26 +159,14 @@ def one_clock(p: FilteredControllerParams, c: FilteredController, lines: Filtere
     c.channel_a, c.channel_b = lines.a >> k & 1, lines.b >> k & 1
     if count_clock(c.clock):
         sample_speed(p, c, lines)
-    moved = c.decoder.forward - c.decoder.reverse
-    if moved and lines.swallowed < lines.swallow:
-        lines.swallowed += 1
-        moved = 0
+    moved = take_pulse(lines, c.decoder.forward - c.decoder.reverse)
     if k == 0:
-        moved += lines.plus - lines.minus
+        moved += lines.stray
     count_movement(p, c, clock_generator(c.generator, 1), moved)
     clock_decoder(c.decoder, c.channel_a, c.channel_b)
 
 
 # ---- a tick
-
-
-@hot_step
-def skip_clocks(p: FilteredControllerParams, c: FilteredController, clocks: int) -> int:
-    """Clocks in which nothing but command pulses can come, which count alike wherever they do; returns them, signed."""
-    c.clock.left -= clocks
-    commanded = clock_generator(c.generator, clocks)
-    count_movement(p, c, commanded, 0)
-    return commanded
 
 
 @hot_step
@@ -192,22 +183,41 @@ def is_calm(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
     return changes & (changes - 1) == 0 and abs(c.deviation.deviation) + clocks < p.deviation.range
 
 
+@hot_step
+def skip_clocks(p: FilteredControllerParams, c: FilteredController, clocks: int, moved: int) -> int:
+    """Clocks in which command pulses, and one edge at most, count alike wherever they come; returns the former."""
+    c.clock.left -= clocks
+    commanded = clock_generator(c.generator, clocks)
+    count_movement(p, c, commanded, moved)
+    return commanded
+
+
+@hot_step
+def skip_rest(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> None:
+    """The calm rest of a tick at once: an edge is counted in it, unless it comes in the last clock."""
+    last = CLOCKS - 1
+    a, b, moved = lines.a >> last, lines.b >> last, 0
+    if a == lines.a >> last - 1 & 1 and b == lines.b >> last - 1 & 1:
+        moved = take_pulse(lines, edge_direction(c.channel_a, c.channel_b, a, b))
+        preset_decoder(c.decoder, a, b)
+    else:
+        clock_decoder(c.decoder, a, b)
+    c.channel_a, c.channel_b = a, b
+    skip_clocks(p, c, CLOCKS - k, moved)
+
+
 @step
 def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
-    """Ten decoder clocks in which something happens, and what follows from them.
-
-    From where the tick is calm only its last two clocks are run: an edge is counted in the tick in which it comes,
-    unless it comes in the last clock. Noise puts its pulses into the first.
-    """
-    lines.swallowed = lines.missed = 0
+    """Ten decoder clocks in which something happens, until the rest is calm, and what follows from them."""
+    if c.deviation.reset:
+        leave_reset(c)
     k = 0
-    while k < CLOCKS:
-        stray = k == 0 and lines.plus + lines.minus > 0
-        if k < CLOCKS - 2 and not stray and is_calm(p, c, lines, k):
-            skip_clocks(p, c, CLOCKS - 2 - k)
-            k = CLOCKS - 2
+    # Noise puts its pulses into the first clock.
+    while k < CLOCKS and ((k == 0 and lines.stray != 0) or not is_calm(p, c, lines, k)):
         one_clock(p, c, lines, k)
         k += 1
+    if k < CLOCKS:
+        skip_rest(p, c, lines, k)
     conclude(p, c, lines)
 
 
@@ -229,10 +239,9 @@ def decide(p: FilteredControllerParams, c: FilteredController, lines: FilteredLi
     lines.run = 1 if d.state == RUN else 0
     away = c.generator.command != c.generator.goal or abs(d.deviation) > p.window
     if away:
-        c.wake = NEVER
+        c.settling = 0
     elif c.away:
-        c.arrived = c.tick
-        c.wake = c.tick + p.window_ticks
+        c.settling = p.window_ticks + 1
     c.away = 1 if away else 0
 
 
@@ -254,39 +263,53 @@ def leave_reset(c: FilteredController) -> None:
 
 
 @hot_step
-def begin(p: FilteredControllerParams, c: FilteredController) -> None:
-    """What the host has written, and the rate of the command in this tick."""
-    if c.deviation.reset:
-        leave_reset(c)
+def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
+    """True when no level changes in the tick, no noise and no strobe comes, and nothing is left to do."""
+    held = lines.a == c.channel_a * LEVELS and lines.b == c.channel_b * LEVELS
+    return held and lines.stray == 0 and c.busy == 0 and c.clock.left > CLOCKS
+
+
+@hot_step
+def ramp(p: FilteredControllerParams, c: FilteredController) -> None:
+    """Rate of the command in this tick."""
     moving = c.generator.command != c.generator.goal or c.generator.present > 0
     if moving and not keeps_rate(p.generator, c.generator):
         ramp_rate(p.generator, c.generator)
 
 
 @hot_step
-def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
-    """True when no level changes in the tick, no noise and no strobe comes, and nothing is left to do."""
-    changes = (lines.a ^ -c.channel_a & LEVELS) | (lines.b ^ -c.channel_b & LEVELS)
-    told = lines.swallowed | lines.missed
-    return (changes | lines.plus | lines.minus | told | c.busy) == 0 and c.clock.left > CLOCKS
-
-
-@hot_step
-def end(c: FilteredController) -> None:
+def watch_arrival(c: FilteredController) -> None:
     """Tell the host when the axis has been in position for its time."""
-    if c.tick >= c.wake:
-        c.wake = NEVER
-        c.event = 1
-    c.tick += 1
+    if c.settling > 0:
+        c.settling -= 1
+        if c.settling == 0:
+            c.event = 1
 
 
 @controls(FilteredControllerParams)
 @hot_step
 def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Ten microseconds."""
-    begin(p, c)
+    ramp(p, c)
     if not is_quiet(c, lines):
         run_clocks(p, c, lines)
-    elif skip_clocks(p, c, CLOCKS):
+    elif skip_clocks(p, c, CLOCKS, 0):
         decide(p, c, lines)
-    end(c)
+    watch_arrival(c)
+
+
+@step
+def control_clock(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> None:
+    """Clock `k` of a tick with every clock run, for timing diagrams: the same bits; `end_tick` follows the last."""
+    if k == 0:
+        ramp(p, c)
+        if c.deviation.reset:
+            leave_reset(c)
+    one_clock(p, c, lines, k)
+
+
+@step
+def end_tick(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """What follows from ten clocks."""
+    conclude(p, c, lines)
+    watch_arrival(c)

@@ -9,6 +9,9 @@ from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
 from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.interference import Interference, InterferenceParams, interfere
 
+MOST_PENDING = 255
+"""Losses that the lines can announce at once."""
+
 
 class AmplifierParams(Registers):
     """PWM and amplifier."""
@@ -39,18 +42,12 @@ class FilteredPlant(Registers):
     """State of the machine."""
 
     sampled: f8 = register("slide position at the last sample", unit="m")
+    change: i8 = register("tick in which the lines change, wherever the slide stands", unit="tick")
     encoder: Encoder = block("encoder disc")
     amplifier: Amplifier = block("PWM and amplifier")
     train: DriveTrain = block("motor and slide")
     interference: Interference = block("noise on the pulse lines")
     gauge: Gauge = block("what an observer sees of the move")
-
-
-@hot_step
-def hold_levels(r: Encoder, lines: FilteredLines) -> None:
-    """The levels of the disc where it stands, in all clocks of the tick."""
-    lines.a = -r.channel_a & LEVELS
-    lines.b = -r.channel_b & LEVELS
 
 
 @hot_step
@@ -85,29 +82,34 @@ def pass_edges(p: EncoderParams, r: Encoder, lines: FilteredLines, start: float,
         else:
             pass_left(p, r)
         later = LEVELS << k & LEVELS
-        lines.a = lines.a & ~later | -r.channel_a & later
-        lines.b = lines.b & ~later | -r.channel_b & later
+        lines.a = lines.a & ~later | r.channel_a * later
+        lines.b = lines.b & ~later | r.channel_b * later
 
 
 @step
-def disturb(p: InterferenceParams, r: Interference, tick: int, lines: FilteredLines) -> None:
-    """Noise of this tick: pulses and an inverted sample in its first clock."""
-    interfere(p, r, tick)
-    lines.plus, lines.minus = r.plus, r.minus
-    lines.a ^= r.corrupt
+def lay_lines(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
+    """Levels and noise of a tick in which the lines change; noise acts in its first clock."""
+    r, noise = plant.encoder, plant.interference
+    lines.a, lines.b = r.channel_a * LEVELS, r.channel_b * LEVELS
+    pass_edges(p.encoder, r, lines, plant.sampled, x)
+    if tick >= noise.next_tick:
+        interfere(p.interference, noise, tick)
+    lines.stray = noise.plus - noise.minus
+    lines.a ^= noise.corrupt
+    lines.swallow = noise.removed + min(noise.remove, MOST_PENDING)
+    lines.mask = noise.lost + min(noise.lose_sample, MOST_PENDING)
+    lasting = (
+        lines.a == r.channel_a * LEVELS and lines.b == r.channel_b * LEVELS and noise.remove + noise.lose_sample == 0
+    )
+    plant.change = noise.next_tick if lasting else tick + 1
 
 
 @hot_step
 def sense(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
     """What happened on the lines during the last tick; the slide stands at `x` [m] now."""
-    hold_levels(plant.encoder, lines)
-    if x >= plant.encoder.next_right or x < plant.encoder.next_left:
-        pass_edges(p.encoder, plant.encoder, lines, plant.sampled, x)
+    if x >= plant.encoder.next_right or x < plant.encoder.next_left or tick >= plant.change:
+        lay_lines(p, plant, x, tick, lines)
     plant.sampled = x
-    if tick >= plant.interference.next_tick:
-        disturb(p.interference, plant.interference, tick, lines)
-    lines.swallow = min(plant.interference.remove, CLOCKS)
-    lines.mask = min(plant.interference.lose_sample, CLOCKS)
 
 
 @hot_step
@@ -122,17 +124,18 @@ def actuate(p: AmplifierParams, r: Amplifier, lines: FilteredLines) -> None:
 @step
 def count_losses(r: Interference, lines: FilteredLines) -> None:
     """Pulses swallowed and strobes lost in this tick."""
-    r.remove -= lines.swallowed
-    r.removed += lines.swallowed
-    r.lose_sample -= lines.missed
-    r.lost += lines.missed
+    swallowed, missed = (lines.swallowed - r.removed) & 255, (lines.missed - r.lost) & 255
+    r.remove -= swallowed
+    r.removed += swallowed
+    r.lose_sample -= missed
+    r.lost += missed
 
 
 @hot_step
 def move(p: FilteredPlantParams, plant: FilteredPlant, train: DriveTrain, tick: int, lines: FilteredLines) -> None:
     """The plant moves through the tick; without drive it coasts, whatever the amplifier."""
     actuate(p.amplifier, plant.amplifier, lines)
-    if lines.swallowed | lines.missed:
+    if tick + 1 >= plant.change:  # the lines were not at rest
         count_losses(plant.interference, lines)
     train.force = push_force(p.push, tick)
     output = plant.amplifier.word * p.amplifier.per_count

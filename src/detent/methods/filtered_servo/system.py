@@ -18,14 +18,12 @@ from detent.methods.filtered_servo.controller import (
     FilteredController,
     FilteredControllerParams,
     FilteredLines,
-    begin,
-    conclude,
     control,
-    end,
-    one_clock,
+    control_clock,
+    end_tick,
     power_on,
 )
-from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, hold_levels, move, sense
+from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, lay_lines, move, sense
 from detent.plant.drive_train import DriveTrain
 from detent.sensing.encoder import stand_at
 from detent.sensing.interference import start_interference
@@ -70,18 +68,15 @@ def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, most: int, trace
 
     Row ``10 tick + clock`` modulo rows of `trace` holds the registers after that clock.
     """
-    c, lines, train = r.controller, r.lines, r.plant.train
+    train = r.plant.train
     n = 0
-    while n < most and c.event == 0:
-        sense(p.plant, r.plant, train.position, r.tick, lines)
-        begin(p.controller, c)
-        lines.swallowed = lines.missed = 0
+    while n < most and r.controller.event == 0:
+        sense(p.plant, r.plant, train.position, r.tick, r.lines)
         for k in range(CLOCKS):
-            one_clock(p.controller, c, lines, k)
+            control_clock(p.controller, r.controller, r.lines, k)
             write_row(r, r.tick * CLOCKS + k, trace, picks, 1)
-        conclude(p.controller, c, lines)
-        end(c)
-        move(p.plant, r.plant, train, r.tick, lines)
+        end_tick(p.controller, r.controller, r.lines)
+        move(p.plant, r.plant, train, r.tick, r.lines)
         r.tick += 1
         n += 1
     return n
@@ -94,5 +89,5 @@ def switch_on(p: FilteredServoParams, r: FilteredServo, position: float, sample_
     stand_at(p.plant.encoder, plant.encoder, position, seed)
     start_interference(p.plant.interference, plant.interference, seed ^ 0x5DEECE66D)
     plant.amplifier.left = 1
-    hold_levels(plant.encoder, r.lines)
+    lay_lines(p.plant, plant, position, 0, r.lines)
     power_on(r.controller, r.lines, sample_us)

@@ -12,6 +12,7 @@ from tests.filtered_servo_rig import EXAMPLE
 
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.controller import acknowledge, go_to
 from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
@@ -107,12 +108,9 @@ def registers_after(overrides: tuple[str, ...]) -> tuple[bytes, ...]:
     r.controller.event = 1
     while machine.time < 1.2:
         if r.controller.event:
-            r.controller.event = 0
+            acknowledge(r.controller)
             if moves:
-                r.controller.generator.rate, r.controller.generator.goal = (
-                    round(spec.limits.speed / spec.pulse * PER_PULSE),
-                    moves.pop(0),
-                )
+                go_to(r.controller, moves.pop(0), round(spec.limits.speed / spec.pulse * PER_PULSE))
         machine.pass_time(5e-3)
         states.append(bytes(r))
     return tuple(states)
@@ -161,7 +159,7 @@ def test_the_parameters_of_the_default_axis() -> None:
 
 
 def test_the_plant_is_seen_from_the_slide() -> None:
-    t = build_filtered_servo(load_spec(EXAMPLE, ["mechanics.screw_inertia=50 g*cm^2"])).train
+    t = build_filtered_servo(load_spec(EXAMPLE, ["mechanics.screw_inertia=50 g*cm^2"])).plant.train
     radius = 5e-3 / (2 * math.pi)
     assert t.mass == pytest.approx(15.8 + 6.5e-5 / radius**2)
     assert t.force_constant == pytest.approx(0.05 / radius) == pytest.approx(t.emf_constant)
@@ -184,13 +182,13 @@ def test_a_voltage_amplifier_gives_its_supply_at_a_full_word() -> None:
 def test_the_filter_is_the_one_asked_for(filter_: str, coefficient: float, kind: int, shift: int) -> None:
     f = build_filtered_servo(
         load_spec(EXAMPLE, [f"method.filter={filter_}", f"method.coefficient={coefficient}"])
-    ).filter
+    ).controller.filter
     assert (f.kind, f.shift, f.coefficient) == (kind, shift, coefficient)
 
 
 def test_a_substep_is_short_against_the_fastest_time_constant() -> None:
     for inductance in ("1 mH", "0.01 mH"):
-        t = build_filtered_servo(load_spec(EXAMPLE, [f"motor.inductance={inductance}"])).train
+        t = build_filtered_servo(load_spec(EXAMPLE, [f"motor.inductance={inductance}"])).plant.train
         assert 0 < t.substep <= 0.25 * t.inductance / t.resistance
 
 

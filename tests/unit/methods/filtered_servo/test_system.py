@@ -6,7 +6,7 @@ from tests.filtered_servo_rig import NO_TRACE, PLANT_B, PULSE, START, Rig, plant
 
 from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, RESET, RUN, SPEED_RANGE
 from detent.kernel.loop import advance
-from detent.methods.filtered_servo.controller import CLOCKS, NEVER
+from detent.methods.filtered_servo.controller import CLOCKS, acknowledge, reset, set_period
 from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 
 RAMP = "method.command_acceleration=1 m/s^2"
@@ -15,7 +15,7 @@ RAMP = "method.command_acceleration=1 m/s^2"
 def at_rest(rig):
     """What the logic holds when nothing has happened since reset."""
     d = rig.c.deviation
-    return (d.deviation, d.error, d.word, rig.c.speed.count, rig.c.speed.word, rig.c.filter.output) == (0,) * 6
+    return (d.deviation, d.error, rig.lines.word, rig.c.speed.count, rig.c.speed.word, rig.c.filter.output) == (0,) * 6
 
 
 # --------------------------------------------------------------------------------------------------------------- reset
@@ -156,19 +156,25 @@ def test_a_push_is_held_by_the_following_error_it_causes():
 # --------------------------------------------------------------------------------------------------------- in position
 
 
+AT_EASE = (RAMP, "method.in_position=30", "method.in_position_time=20 ms")
+
+
 @pytest.mark.compiled
 def test_the_axis_says_so_when_it_has_been_in_position_for_its_time():
-    rig = Rig(RAMP, "method.in_position=30", "method.in_position_time=20 ms")
+    rig = Rig(*AT_EASE)
     rig.go(400)
     assert advance(rig.p, rig.r, 10**6, *NO_TRACE) < 10**6
     r = rig.r
     assert (r.controller.event, r.controller.failed, r.controller.deviation.state) == (1, 0, RUN)
     assert (r.controller.generator.command, r.controller.away) == (400, 0)
     assert abs(r.controller.deviation.deviation) <= rig.p.controller.window
-    assert r.tick - 1 - r.controller.arrived == rig.p.controller.window_ticks == 2000
-    assert r.controller.wake == NEVER
+    twin = Rig(*AT_EASE)
+    twin.go(400)
+    run = twin.record((r.tick - 1) * TICK, ["controller.away", "tick"])
+    assert r.tick - 1 - run["tick"][run["controller.away"] == 1][-1] == rig.p.controller.window_ticks == 2000
+    assert r.controller.settling == 0
     assert advance(rig.p, r, 100, *NO_TRACE) == 0, "the loop waits for its host"
-    r.controller.event = 0
+    acknowledge(r.controller)
     rig.run_ticks(10)
     assert advance(rig.p, r, 50_000, *NO_TRACE) == 50_000, "it says so once"
 
@@ -178,16 +184,25 @@ def test_the_axis_says_so_when_it_has_been_in_position_for_its_time():
 def test_what_counts_as_in_position_is_the_window_and_the_end_of_the_command(window):
     rig = Rig(RAMP, f"method.in_position={window}", "method.in_position_time=1 ms")
     rig.go(400)
-    run = rig.record(0.6, ["controller.generator.command", "controller.deviation.deviation", "controller.away", "tick"])
+    run = rig.record(
+        0.6,
+        [
+            "controller.generator.command",
+            "controller.deviation.deviation",
+            "controller.away",
+            "controller.event",
+            "tick",
+        ],
+    )
     away = (run["controller.generator.command"] != 400) | (np.abs(run["controller.deviation.deviation"]) > window)
     first = np.flatnonzero(run["controller.away"])[0]
     assert first <= 10_000 / 20  # at the latest with the first command pulse
     assert np.array_equal(away[first:], run["controller.away"][first:] == 1)
     back = np.flatnonzero(np.diff(away.astype(int)) == -1) + 1
-    assert rig.c.arrived == run["tick"][back[-1]] - 1
     assert not away[-1]
     # It may come and go: only the last time counts, and then it says so once.
-    assert rig.c.wake == NEVER
+    said = run["tick"][run["controller.event"] == 1]
+    assert said[-1] == run["tick"][back[-1]] + rig.p.controller.window_ticks
 
 
 # --------------------------------------------------------------------------------------------------------------- fault
@@ -196,14 +211,14 @@ def test_what_counts_as_in_position_is_the_window_and_the_end_of_the_command(win
 def overrun(rig):
     """A command that no slide can follow."""
     rig.go(10**6, rate=200_000)
-    rig.c.event = 0
+    acknowledge(rig.c)
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
 def spin(rig):
     """A slide that moves more pulses in a sample than the counter holds, though nobody asks it to."""
     rig.plant.train.velocity = 40_000 * PULSE
-    rig.c.event = 0
+    acknowledge(rig.c)
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
@@ -221,7 +236,7 @@ def test_a_fault_drives_to_zero_current_and_says_why(make, cause, plant):
     )
     assert (r.lines.word, r.plant.amplifier.word, r.plant.train.current) == (0.0, 0.0, 0.0)
     velocity = r.plant.train.velocity
-    r.controller.event = 0
+    acknowledge(r.controller)
     run = rig.record(0.01, ["lines.word", "plant.amplifier.word", "plant.train.current", "plant.train.velocity"])
     assert not run["lines.word"].any()
     assert not run["plant.amplifier.word"].any()
@@ -234,7 +249,7 @@ def test_a_fault_drives_to_zero_current_and_says_why(make, cause, plant):
 def test_a_fault_is_told_once():
     rig = Rig()
     overrun(rig)
-    rig.c.event = 0
+    acknowledge(rig.c)
     assert advance(rig.p, rig.r, 1000, *NO_TRACE) == 1000
     assert (rig.c.event, rig.c.deviation.state) == (0, FAULT)
 
@@ -261,7 +276,7 @@ def test_a_reset_by_the_host_leaves_the_fault(make):
     rig.plant.train.velocity = 0.0  # somebody has stopped the slide
     rig.run_ticks(10)
     assert rig.c.deviation.state == FAULT
-    rig.c.deviation.reset = 1
+    reset(rig.c)
     before = rig.c.deviation.position
     rig.run_ticks(1)
     d, g = rig.c.deviation, rig.c.generator
@@ -284,7 +299,7 @@ def test_a_reset_while_the_slide_coasts_counts_on_without_a_false_pulse():
     rig.plant.train.velocity = 3000 * PULSE
     for ticks in (50, 51, 53, 57):
         rig.run_ticks(ticks)
-        rig.c.deviation.reset = 1
+        reset(rig.c)
         rig.run_ticks(1)
         position, edge = rig.c.deviation.position, rig.plant.encoder.edge
         assert rig.c.deviation.state == RUN
@@ -310,7 +325,7 @@ def test_a_retune_takes_effect_at_the_next_window():
     rig.command_rate(1000)
     rig.run(1.0)
     rig.run_ticks(-rig.r.tick % 500 + 123)
-    rig.c.clock.demanded = 2500
+    set_period(rig.c, 2500)
     level = rig.c.filter.output
     run = rig.record(
         0.0333,

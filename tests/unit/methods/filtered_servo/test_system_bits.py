@@ -12,7 +12,7 @@ from tests.filtered_servo_rig import PLANT_B, PULSE, Rig, plant_a
 from tests.places import ROOT
 
 from detent.control.deviation_counter import FAULT
-from detent.methods.filtered_servo.controller import CLOCKS
+from detent.methods.filtered_servo.controller import CLOCKS, go_to, reset, set_period
 from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks
 
 RAMP = "method.command_acceleration=1 m/s^2"
@@ -25,13 +25,13 @@ NOISE = (
 def scenario(*, noise):
     """A rig with a ramped command, and what its host does on the way: (ticks, action)."""
     rig = Rig(RAMP, *(NOISE if noise else ()))
-    g, c = rig.c.generator, rig.c.clock
+    g = rig.c.generator
     actions = [
         (400, lambda: rig.go(300, rate=9000)),
-        (900, lambda: setattr(c, "demanded", 2770)),
-        (700, lambda: setattr(g, "goal", g.command - 40)),
+        (900, lambda: set_period(rig.c, 2770)),
+        (700, lambda: go_to(rig.c, g.command - 40, g.rate)),
         (300, lambda: rig.go(-500, rate=1037)),
-        (1200, lambda: setattr(c, "demanded", 5000)),
+        (1200, lambda: set_period(rig.c, 5000)),
     ]
     return rig, actions
 
@@ -175,7 +175,7 @@ def run_hash(servo: str) -> str:
     digest = hashlib.sha256(rig.p.snapshot())
     rig.go(400, rate=12_000)
     for demanded in (5000, 1330, 7000):
-        rig.c.clock.demanded = demanded
+        set_period(rig.c, demanded)
         rig.run_ticks(2500)
         digest.update(rig.r.snapshot())
     assert rig.c.deviation.position > 100
@@ -185,7 +185,7 @@ def run_hash(servo: str) -> str:
     assert rig.c.deviation.state == FAULT
     digest.update(rig.r.snapshot())
     rig.run_ticks(200)
-    rig.c.deviation.reset = 1
+    reset(rig.c)
     rig.run_ticks(500)
     digest.update(rig.r.snapshot())
     return digest.hexdigest()
