@@ -45,7 +45,7 @@ def composition() -> None:
     from detent.sensing.angle_composition import AbsoluteAngle, compose
 
     spec = table().spec
-    p, r = build_rotary_table(spec).detector.composition, AbsoluteAngle()
+    p, r = build_rotary_table(spec).controller.composition, AbsoluteAngle()
     turn = 360 / spec.ratio
     places = np.arange(0, spec.period, 719)
     errors = np.arange(-2.5, 2.51, 0.1)
@@ -82,8 +82,9 @@ def composition() -> None:
 
 # -- the method --------------------------------------------------------------------------------------------------------
 WALK_SIGNALS = (
-    "positioner.angle.dar", "positioner.angle.aar", "positioner.angle.turn", "positioner.oar", "positioner.z",
-    "positioner.interpolator.irr", "positioner.dr", "positioner.rollovers",
+    "controller.positioner.angle.dar", "controller.positioner.angle.aar", "controller.positioner.angle.turn",
+    "controller.positioner.oar", "controller.positioner.z", "controller.positioner.interpolator.irr",
+    "controller.positioner.dr", "controller.positioner.rollovers",
 )  # fmt: skip
 
 
@@ -94,9 +95,9 @@ def walk() -> None:
     spec, part = axis.spec, done.trace
     t, begin = part.time - done.result.time_ready, done.result.time_ready
     scale = np.degrees(spec.count)
-    d, r, m = (part[f"positioner.{name}"] * scale for name in ("angle.dar", "angle.aar", "oar"))
-    left = degrees(spec, part["positioner.interpolator.irr"])
-    c = m - part["positioner.z"] * left
+    d, r, m = (part[f"controller.positioner.{name}"] * scale for name in ("angle.dar", "angle.aar", "oar"))
+    left = degrees(spec, part["controller.positioner.interpolator.irr"])
+    c = m - part["controller.positioner.z"] * left
     jogging = m > 700
     with picture("endless-jog.svg", 3, 7.6) as (angle, rest, lag):
         angle.plot(t, np.where(jogging, m, np.nan), color=GREEN, linestyle=":", linewidth=1.5, label="M target")
@@ -119,11 +120,11 @@ def walk() -> None:
             rest.text(1.01, level, text, va="center", fontsize=9, transform=rest.get_yaxis_transform())
         rest.set_ylabel("remaining IR [deg]")
         rest.set_yticks(range(0, 721, 180))
-        lag.plot(t, degrees(spec, part["positioner.dr"]), color=PINK)
+        lag.plot(t, degrees(spec, part["controller.positioner.dr"]), color=PINK)
         lag.set_ylabel("deviation dR [deg]")
         lag.set_xlabel("time since the button was pressed [s]")
         lag.set_xlim(0, part.time[-1] - begin)
-        extended = part["positioner.angle.turn"] != 0
+        extended = part["controller.positioner.angle.turn"] != 0
         for area in (angle, rest, lag):
             area.fill_between(
                 t, 0, 1, where=extended, transform=area.get_xaxis_transform(), color=BLUE, alpha=0.08, linewidth=0
@@ -134,8 +135,8 @@ def _name_points(area: Any, t: Any, part: Any, r: Any, m: Any) -> None:
     """Names of figure 5 of the method at the points of the first two cycles."""
     area.plot(t[2], r[2], "o", color=BLUE, markersize=5, clip_on=False)
     label(area, "P0", (t[2], r[2]), (5, 18))
-    crossed = np.flatnonzero(np.diff(part["positioner.angle.turn"]) > 0) + 1
-    rolled = np.flatnonzero(np.diff(part["positioner.rollovers"]) > 0) + 1
+    crossed = np.flatnonzero(np.diff(part["controller.positioner.angle.turn"]) > 0) + 1
+    rolled = np.flatnonzero(np.diff(part["controller.positioner.rollovers"]) > 0) + 1
     for k in crossed:
         area.plot(t[k], r[k], "o", color=BLUE, markersize=5)
         label(area, "P2", (t[k], r[k]), (7, -3))
@@ -183,8 +184,8 @@ def start_angles() -> None:
     with picture("start-angles.svg", 1, 4.2, columns=2, share_x=False) as (ways, places):
         for place, colour in ((3.0, BLUE), (1.5, PINK), (0.5, ORANGE)):
             axis = table(f"mechanics.start_angle={place} deg", "method.form=flag", *LITERAL)
-            done = jog(axis, 14, FAST, signals=("positioner.angle.position",), every=20)
-            t, way = done.trace.time - done.result.time_ready, done.trace["positioner.angle.position"]
+            done = jog(axis, 14, FAST, signals=("controller.positioner.angle.position",), every=20)
+            t, way = done.trace.time - done.result.time_ready, done.trace["controller.positioner.angle.position"]
             shown = t < 14
             ways.plot(
                 t[shown], np.degrees((way[shown] - way[0]) * axis.spec.count), color=colour, label=f"{place:g} deg"
@@ -218,19 +219,20 @@ def race() -> None:
         ("flag first", "flag first", ORANGE), ("remaining angle first", "remaining first", PINK),
         ("indivisible", "atomic", BLUE),
     )  # fmt: skip
-    signals = ("positioner.dr", "positioner.s4", "machine.motor.velocity", "positioner.rollovers")
+    registers = tuple(f"controller.positioner.{name}" for name in ("dr", "s4", "rollovers"))
+    signals = (*registers, "plant.train.motor.velocity")
     with picture("race.svg", 3, 6.2) as (lag, signal, speed):
         for text, update, colour in cases:
             axis = table("mechanics.start_angle=100 deg", f"method.update={update}", "method.task_phase=0.2 ms")
             done = jog(axis, 6.3, FAST, signals=signals, every=1)
             part, spec = done.trace, axis.spec
-            rolled = int(np.flatnonzero(np.diff(part["positioner.rollovers"]) > 0)[0]) + 1
+            rolled = int(np.flatnonzero(np.diff(part["controller.positioner.rollovers"]) > 0)[0]) + 1
             keep = slice(rolled - 60, rolled + 160)
             t = (part.time[keep] - part.time[rolled]) * 1e3
             word = np.degrees(spec.speed_per_word)
-            velocity = np.degrees(part["machine.motor.velocity"][keep]) / spec.ratio
-            lag.step(t, degrees(spec, part["positioner.dr"][keep]), where="post", color=colour, label=text)
-            signal.step(t, part["positioner.s4"][keep] * word, where="post", color=colour)
+            velocity = np.degrees(part["plant.train.motor.velocity"][keep]) / spec.ratio
+            lag.step(t, degrees(spec, part["controller.positioner.dr"][keep]), where="post", color=colour, label=text)
+            signal.step(t, part["controller.positioner.s4"][keep] * word, where="post", color=colour)
             speed.plot(t, velocity, color=colour)
         lag.set_ylabel("deviation dR [deg]")
         lag.set_yticks(range(-360, 361, 180))
@@ -257,9 +259,9 @@ def feed_axis(overrides: tuple[str, ...]) -> Any:
 
 def mean_speed(axis: Any, speed: float) -> float:
     """Speed of a jog once it runs evenly [deg/s]: the slope of a line through 5 s of it."""
-    signals = ("machine.motor.turns", "machine.motor.angle")
+    signals = ("plant.train.motor.turns", "plant.train.motor.angle")
     part = jog(axis, 7.0, speed, signals=signals, every=20).trace
-    way = (part["machine.motor.turns"] + part["machine.motor.angle"] / (2 * np.pi)) * 360 / axis.spec.ratio
+    way = (part["plant.train.motor.turns"] + part["plant.train.motor.angle"] / (2 * np.pi)) * 360 / axis.spec.ratio
     even = (part.time > 1.5) & (part.time < 6.5)
     return float(np.polyfit(part.time[even], way[even], 1)[0])
 
@@ -283,9 +285,9 @@ def feed() -> None:
         error.legend(**LEGEND)
         for _, colour, overrides in (FEEDS[0], FEEDS[2]):
             axis = feed_axis(overrides)
-            done = jog(axis, 10.0, SLOW, signals=("machine.motor.angle",), every=20)
+            done = jog(axis, 10.0, SLOW, signals=("plant.train.motor.angle",), every=20)
             t = done.trace.time - done.result.time_ready
-            moved = np.unwrap(done.trace["machine.motor.angle"]) / axis.spec.ratio
+            moved = np.unwrap(done.trace["plant.train.motor.angle"]) / axis.spec.ratio
             asked = np.radians(SLOW) * t
             way.plot(t, (moved - moved[0] - asked) / axis.spec.count, color=colour)
         zero = {"color": GREY, "linewidth": 0.8}
@@ -301,12 +303,12 @@ def sequence() -> None:
 
     axis = table()
     job = axis.load_job(detent.example("index_sequence.toml"))
-    done = axis.run(job, signals=("positioner.angle.position", "positioner.dr"), every=20)
+    done = axis.run(job, signals=("controller.positioner.angle.position", "controller.positioner.dr"), every=20)
     result, part = done.result, done.trace
     begin = result.time_ready
     t = part.time - begin
     with picture("sequence.svg", 3, 6.4) as (angle, lines, lag):
-        angle.plot(t, np.degrees(part["positioner.angle.position"] * axis.spec.count), color=BLUE)
+        angle.plot(t, np.degrees(part["controller.positioner.angle.position"] * axis.spec.count), color=BLUE)
         angle.set_ylabel("table angle [deg]")
         angle.set_yticks(range(0, 1081, 180))
         for step in result.steps:
@@ -324,7 +326,7 @@ def sequence() -> None:
             lines.fill_between(times, 1.4 * place, drawn, step="post", color=colour, alpha=0.15, linewidth=0)
         lines.set_yticks([1.4 * place + 0.5 for place in range(len(names))], names)
         lines.grid(visible=False, axis="y")
-        lag.plot(t, degrees(axis.spec, part["positioner.dr"]), color=PINK)
+        lag.plot(t, degrees(axis.spec, part["controller.positioner.dr"]), color=PINK)
         lag.set_ylabel("deviation [deg]")
         lag.set_xlabel("time since the sequence began [s]")
         lag.set_xlim(0, result.time_end - begin)

@@ -131,7 +131,8 @@ The cause stands in the register `deviation.cause`. A phase servo knows no fault
 """
 TABLE_REFUSALS = """## Rotary table: refused starts
 
-The register `positioner.refused` counts starts that were not taken, `positioner.reason` says why the last was not.
+The register `controller.positioner.refused` counts starts that were not taken, `controller.positioner.reason` says why
+the last was not.
 """
 STEP_FAULTS = """## Stepper envelope: faults
 

@@ -74,17 +74,17 @@ def make_params(
 ) -> RotaryTableParams:
     """The default plant; `droop` is the share of its reference by which the velocity stays behind."""
     p = RotaryTableParams()
-    p.clocks.strobe_ticks, p.clocks.delay_ticks, p.clocks.task_ticks = 20, 2, 200
-    p.detector.fine.counts, p.detector.coarse.counts = FINE, COARSE
-    fill_composition(p.detector.composition)
-    fill_positioner(p.positioner, kp=kp, dac=dac, fraction=fraction)
-    a, m = p.amplifier, p.machine.motor
+    p.controller.clocks.strobe_ticks, p.controller.clocks.delay_ticks, p.controller.clocks.task_ticks = 20, 2, 200
+    p.plant.fine.counts, p.plant.coarse.counts = FINE, COARSE
+    fill_composition(p.controller.composition)
+    fill_positioner(p.controller.positioner, kp=kp, dac=dac, fraction=fraction)
+    a, m = p.plant.amplifier, p.plant.train.motor
     total = INERTIA / LAG
     m.inertia, m.viscous, m.period = INERTIA, droop * total, TICK
     a.stiffness, a.max_torque = (1.0 - droop) * total, max_torque
     a.speed_per_count = math.radians(dac[1] / dac[0]) * RATIO
     fill_motor(m, a.stiffness)
-    p.machine.gear.ratio = p.machine.reduction.ratio = RATIO
+    p.plant.train.gear.ratio = p.plant.train.reduction.ratio = RATIO
     return p
 
 
@@ -108,19 +108,19 @@ class Rig:
     ) -> None:
         known = {k: changes.pop(k) for k in ("kp", "dac", "droop", "fraction", "max_torque") if k in changes}
         self.p, self.r = make_params(**known), RotaryTable()
-        self.p.positioner.angle.form = form
-        self.p.detector.fine.noise = noise * 2**32 / FINE
+        self.p.controller.positioner.angle.form = form
+        self.p.plant.fine.noise = noise * 2**32 / FINE
         for name, value in changes.items():
             assert name in PositionerParams.__fields__, name
-            setattr(self.p.positioner, name, value)
+            setattr(self.p.controller.positioner, name, value)
         self.turns = (math.floor(place / COUNT + 1e-6) + 0.5) / FINE
         switch_on(self.p, self.r, self.turns, task_at, seed)
         self.positioner, self.angle, self.interpolator = (
-            self.r.positioner,
-            self.r.positioner.angle,
-            self.r.positioner.interpolator,
+            self.r.controller.positioner,
+            self.r.controller.positioner.angle,
+            self.r.controller.positioner.interpolator,
         )
-        self.fraction = 1 << self.p.positioner.interpolator.fraction
+        self.fraction = 1 << self.p.controller.positioner.interpolator.fraction
         self.run_ticks(self.START)
 
     # ------------------------------------------------------------------------------------------ what is seen
@@ -133,13 +133,13 @@ class Rig:
     @property
     def travel(self) -> float:
         """True way of the motor since power-on, at the table [deg]."""
-        m = self.r.machine.motor
+        m = self.r.plant.train.motor
         return (m.turns - self.turns + m.angle / (2 * math.pi)) * 360.0 / RATIO
 
     @property
     def speed(self) -> float:
         """Velocity of the motor, at the table [deg/s]."""
-        return math.degrees(self.r.machine.motor.velocity) / RATIO
+        return math.degrees(self.r.plant.train.motor.velocity) / RATIO
 
     @property
     def detected(self) -> float:
@@ -184,7 +184,7 @@ class Rig:
     @property
     def word(self) -> float:
         """Table speed per count of S4 [deg/s]."""
-        return math.degrees(self.p.amplifier.speed_per_count) / RATIO
+        return math.degrees(self.p.plant.amplifier.speed_per_count) / RATIO
 
     # ------------------------------------------------------------------------------------------ what is done
 
@@ -202,7 +202,7 @@ class Rig:
 
     def press(self, sign: int, speed: float = 60.0) -> "Rig":
         """Hold the + or - button down; the dial in deg/s."""
-        self.positioner.dial = speed_word(speed, self.p.positioner.interpolator.fraction)
+        self.positioner.dial = speed_word(speed, self.p.controller.positioner.interpolator.fraction)
         self.positioner.plus, self.positioner.minus = sign > 0, sign < 0
         return self
 
@@ -213,7 +213,7 @@ class Rig:
 
     def entry(self, number: int, angle: float, speed: float = 60.0, policy: int = SHORTEST) -> "Rig":
         """Write an entry of the position table; angle in deg, speed in deg/s."""
-        pdt = self.p.positioner.pdt
+        pdt = self.p.controller.positioner.pdt
         pdt.angle[number], pdt.speed[number], pdt.policy[number] = round(angle / COUNT), speed_word(speed), policy
         pdt.entries = max(pdt.entries, number + 1)
         return self

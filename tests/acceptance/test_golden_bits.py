@@ -101,7 +101,8 @@ def rotary_table() -> Job:
             host.acknowledge()
 
     machine = host.machine
-    return Job({"": machine.params}, {"": machine.state}, (lambda: host.begin(1), lambda: host.begin(2)), run)
+    stations = (lambda: host.begin(1), lambda: host.begin(2))
+    return Job({"": machine.params}, {"": machine.state}, stations, run, acknowledge=host.acknowledge)
 
 
 def stepper_envelope() -> Job:

@@ -31,18 +31,19 @@ from detent.control.table_positioner import (
     HOLD,
     JOG,
     REMAINING_FIRST,
-    begin_pass,
+    begin_task,
 )
+from detent.kernel.noise import NoiseSource
 from detent.kernel.step import step
 from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
-from detent.sensing.resolver_counter import Resolver, ResolverParams, count_phase
+from detent.sensing.resolver_counter import ResolverParams, count_phase
 
-POSITIONER = "positioner."
+POSITIONER = "controller.positioner."
 DR, S4 = POSITIONER + "dr", POSITIONER + "s4"
 IR, OAR = POSITIONER + "interpolator.irr", POSITIONER + "oar"
 DAR, AAR = POSITIONER + "angle.dar", POSITIONER + "angle.aar"
 CROSSINGS, ROLLOVERS = POSITIONER + "angle.crossings", POSITIONER + "rollovers"
-VELOCITY = "machine.motor.velocity"
+VELOCITY = "plant.train.motor.velocity"
 ANGLE = pytest.approx
 WALK = 0.3
 FORMS = [TURN_COUNTER, FLAG]
@@ -58,11 +59,8 @@ def degrees(words):
 
 @pytest.mark.parametrize("offset", [0, 1 << 30, 123456789])
 def test_01_the_word_is_linear_and_increases_with_positive_rotation(offset):
-    p, r = ResolverParams(counts=FINE, offset=offset), Resolver()
-    words = []
-    for eighth in range(8 * FINE):
-        count_phase(p, r, eighth * 2**32 // (8 * FINE))
-        words.append(r.word)
+    p, noise = ResolverParams(counts=FINE, offset=offset), NoiseSource()
+    words = [count_phase(p, noise, eighth * 2**32 // (8 * FINE)) for eighth in range(8 * FINE)]
     start = offset * FINE / 2**32
     assert words == [int(start + eighth / 8) % FINE for eighth in range(8 * FINE)]
     steps = np.diff([*words, words[0]])
@@ -118,11 +116,11 @@ def test_03_the_interrupt_follows_its_strobe_ten_times_a_pass():
     for _ in range(400):
         rig.run_ticks(1)
         now, tick = rig.r, rig.r.tick - 1
-        if now.positioner.interrupts != before.positioner.interrupts:
+        if now.controller.positioner.interrupts != before.controller.positioner.interrupts:
             interrupts.append(tick)
-        if now.positioner.angle.dar != before.positioner.angle.dar:
+        if now.controller.positioner.angle.dar != before.controller.positioner.angle.dar:
             changes.append(tick)
-        if now.detector.absolute.theta != before.detector.absolute.theta:
+        if now.controller.absolute.theta != before.controller.absolute.theta:
             strobes.append(tick)
         before = now.copy()
     assert [tick % 20 for tick in strobes] == [0] * 20  # every 2 ms
@@ -151,7 +149,7 @@ def test_04_initial_set(form, sign, target):
 def test_04_the_target_is_two_periods_ahead(place, plus):
     bench = PositionerBench(place)
     bench.r.plus, bench.r.minus = plus, not plus
-    begin_pass(bench.p, bench.r)
+    begin_task(bench.p, bench.r)
     assert 2 * T <= bench.r.oar < 3 * T if plus else -2 * T <= bench.r.oar < -T
 
 
@@ -160,7 +158,8 @@ def assert_point(rig, d, on, r, ir, c, ar):
     for seen, wanted in zip((rig.present, rig.theoretical, rig.command, rig.actual), (r, ir, c, ar), strict=True):
         assert seen == ANGLE(wanted, abs=WALK)
     assert (rig.detected - d + 180) % 360 - 180 == ANGLE(0, abs=WALK)
-    assert (rig.angle.flg if rig.p.positioner.angle.form == FLAG else rig.angle.turn * rig.positioner.z) == on
+    form = rig.p.controller.positioner.angle.form
+    assert (rig.angle.flg if form == FLAG else rig.angle.turn * rig.positioner.z) == on
 
 
 def next_crossing(rig, limit):
@@ -289,7 +288,7 @@ def test_10_exactly_one_period_at_a_pass_is_20_ms_earlier():
     passes = []
     for inclusive in (0, 1):
         rig = Rig(100, inclusive=inclusive).press(1)
-        rig.p.positioner.interpolator.acceleration = 64 * ONE
+        rig.p.controller.positioner.interpolator.acceleration = 64 * ONE
         rig.positioner.dial = 64 * ONE  # 5760 interrupts, 576 passes, are a period exactly
         rig.run_until(11.52)
         assert rig.interpolator.irr == T * ONE
@@ -376,7 +375,7 @@ def test_14_noise_at_the_boundary(place, sign):
     worst = {}
     for form in (FLAG, TURN_COUNTER):
         rig = Rig(place, form=form, seed=7)
-        rig.p.detector.fine.noise = 3 * 2**32 / FINE
+        rig.p.plant.fine.noise = 3 * 2**32 / FINE
         worst[form] = np.abs(degrees(rig.press(sign, 2.0).record(400, [DR])[DR])).max()
         assert form == FLAG or sign * rig.travel == ANGLE(800, abs=WALK)
     assert worst[TURN_COUNTER] < 3
@@ -546,7 +545,7 @@ def test_23_the_remaining_angle_must_be_signed():
     words = {}
     for unsigned in (1, 0):
         rig = Rig(100, unsigned_remaining=unsigned)
-        rig.r.machine.motor.angle += 2 * np.pi / FINE
+        rig.r.plant.train.motor.angle += 2 * np.pi / FINE
         rig.run_until(0.01)
         assert rig.angle.aar - rig.positioner.oar == 1
         words[unsigned] = rig.s4

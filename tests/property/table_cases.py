@@ -33,18 +33,18 @@ WINDOW = 2
 FASTEST = 100.0
 """Speed that still leaves a 12-bit word room for the overshoot [deg/s]."""
 NAMES = (
-    "positioner.dr",
-    "positioner.s4",
-    "positioner.state",
-    "positioner.z",
-    "positioner.oar",
-    "positioner.interpolator.irr",
-    "positioner.interpolator.speed",
-    "positioner.angle.position",
-    "positioner.angle.dar",
-    "positioner.angle.aar",
-    "machine.motor.turns",
-    "machine.motor.angle",
+    "controller.positioner.dr",
+    "controller.positioner.s4",
+    "controller.positioner.state",
+    "controller.positioner.z",
+    "controller.positioner.oar",
+    "controller.positioner.interpolator.irr",
+    "controller.positioner.interpolator.speed",
+    "controller.positioner.angle.position",
+    "controller.positioner.angle.dar",
+    "controller.positioner.angle.aar",
+    "plant.train.motor.turns",
+    "plant.train.motor.angle",
 )
 
 
@@ -120,12 +120,13 @@ class TableRecord:
 
     def __post_init__(self) -> None:
         rows = self.rows
-        z = self.at_interrupt(rows["positioner.z"].astype(float))
-        active = rows["positioner.state"] != HOLD
+        z = self.at_interrupt(rows["controller.positioner.z"].astype(float))
+        active = rows["controller.positioner.state"] != HOLD
         # The pass that starts may follow at once on the interrupt that has come to rest.
-        begun = active & (rows["positioner.interpolator.speed"] == 0) & (rows["positioner.interpolator.irr"] > 0)
-        self.position = rows["positioner.angle.position"]
-        self.deviation = z * rows["positioner.dr"] / ONE
+        speed, left = (rows[f"controller.positioner.interpolator.{name}"] for name in ("speed", "irr"))
+        begun = active & (speed == 0) & (left > 0)
+        self.position = rows["controller.positioner.angle.position"]
+        self.deviation = z * rows["controller.positioner.dr"] / ONE
         """C less R."""
         self.command = self.position + self.deviation
         """C, on beyond every turn."""
@@ -141,17 +142,18 @@ class TableRecord:
 def judge_angles(record: TableRecord, noise: int) -> None:
     """D, R and the position of record are one angle, and that of the motor; C is where the registers say."""
     rows = record.rows
-    dar, aar = rows["positioner.angle.dar"], rows["positioner.angle.aar"]
+    dar, aar = rows["controller.positioner.angle.dar"], rows["controller.positioner.angle.aar"]
     assert ((dar >= 0) & (dar < T)).all(), "D leaves its range"
     assert ((record.position - dar) % T == 0).all(), "the position of record is not the detected angle"
     assert ((aar - dar) % T == 0).all(), "R is not the detected angle"
-    motor = (rows["machine.motor.turns"] + rows["machine.motor.angle"] / (2 * np.pi)) * FINE
+    motor = (rows["plant.train.motor.turns"] + rows["plant.train.motor.angle"] / (2 * np.pi)) * FINE
     # Noise may show an angle just above the boundary as one just below it: that is a period, for good.
     wrong = record.position[1:] - motor[:-1]
     wrong -= T * np.round(wrong[0] / T)
     assert np.abs(wrong).max() <= noise + 1, f"the position of record is {np.abs(wrong).max()} counts wrong"
     if not record.late:
-        command = rows["positioner.oar"] - rows["positioner.z"] * (rows["positioner.interpolator.irr"] / ONE)
+        left = rows["controller.positioner.interpolator.irr"] / ONE
+        command = rows["controller.positioner.oar"] - rows["controller.positioner.z"] * left
         assert (command - aar == record.deviation).all(), "C, R and dR do not belong together"
 
 
@@ -282,7 +284,7 @@ class TableCase:
         )
         word = self.dac[1] / self.dac[0] / COUNT
         speed = self.kp * most + word / 2
-        assert np.abs(record.rows["positioner.s4"]).max() * word <= speed, (
+        assert np.abs(record.rows["controller.positioner.s4"]).max() * word <= speed, (
             "S4 is more than the following error asks for"
         )
         jump = np.abs(np.diff(record.position)).max()

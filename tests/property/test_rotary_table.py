@@ -19,8 +19,8 @@ from detent.control.table_positioner import (
     REMAINING_FIRST,
     Positioner,
     PositionerParams,
-    begin_pass,
-    end_pass,
+    begin_task,
+    end_task,
     interrupt,
 )
 from detent.kernel.noise import NoiseSource, uniform
@@ -81,8 +81,8 @@ def every_change(p: EndlessAngleParams, r: EndlessAngle, turn: int) -> int:
 @step
 def jog_by_hand(p: PositionerParams, r: Positioner, lag: int, base: int, interrupts: int) -> int:
     """Jog a table that is `lag` counts behind C, its record from `base` on; returns interrupts that were not exact."""
-    begin_pass(p, r)
-    end_pass(p, r)
+    begin_task(p, r)
+    end_task(p, r)
     f, home = p.interpolator.fraction, r.angle.dar
     r.angle.position = base + home
     way = wrong = 0
@@ -93,8 +93,8 @@ def jog_by_hand(p: PositionerParams, r: Positioner, lag: int, base: int, interru
         way += left - r.interpolator.irr
         wrong += r.angle.position != base + place or r.dr != way - ((counts - lag) << f) or abs(r.angle.turn) > 2
         if n % 10 == 0:
-            begin_pass(p, r)
-            end_pass(p, r)
+            begin_task(p, r)
+            end_task(p, r)
     return wrong
 
 
@@ -166,7 +166,7 @@ def test_a_jog_over_a_million_turns_that_ends_2_62_counts_from_home(z, lag):
 def test_nothing_depends_on_how_many_turns_the_table_has_made(turns):
     def jogged(turns):
         rig = Rig(359.0, noise=2.0, seed=5)
-        rig.r.machine.motor.turns += turns * RATIO
+        rig.r.plant.train.motor.turns += turns * RATIO
         rig.angle.position += turns * T
         rig.press(1).run_until(2.0).release().run_until(2.5).press(-1).run_until(6.0)
         return rig
@@ -175,7 +175,7 @@ def test_nothing_depends_on_how_many_turns_the_table_has_made(turns):
     assert there.angle.position - here.angle.position == turns * T
     assert there.angle.crossings == here.angle.crossings >= 2
     there.angle.position = here.angle.position
-    there.r.machine.motor.turns -= turns * RATIO
+    there.r.plant.train.motor.turns -= turns * RATIO
     assert bytes(there.r) == bytes(here.r)
 
 
@@ -228,15 +228,15 @@ def test_a_rollover_and_a_stop_never_move_command_against_measurement(place, plu
     bench = PositionerBench(place)
     r, z = bench.r, 1 if plus else -1
     r.plus, r.minus = plus, not plus
-    begin_pass(bench.p, r)
+    begin_task(bench.p, r)
     r.interpolator.irr = irr
     r.interpolator.speed = min(speed, int((2 * bench.p.interpolator.acceleration * irr) ** 0.5))
     bench.p.interpolator.max_speed = 0
     bench.feed(round(bench.command) - z * lag)
     before = r.dr
     r.plus = r.minus = 0 if irr % 2 else 1
-    begin_pass(bench.p, r)
-    end_pass(bench.p, r)
+    begin_task(bench.p, r)
+    end_task(bench.p, r)
     extend(bench.p.angle, r.angle, z)
     left = z * (r.oar - r.angle.aar)
     assert (left << 16) - r.interpolator.irr == before
@@ -266,12 +266,12 @@ ACTS = st.lists(
     max_size=5,
 )
 NAMES = [
-    "positioner.dr",
-    "positioner.angle.position",
-    "positioner.angle.dar",
-    "positioner.state",
-    "machine.motor.velocity",
-    "positioner.s4",
+    "controller.positioner.dr",
+    "controller.positioner.angle.position",
+    "controller.positioner.angle.dar",
+    "controller.positioner.state",
+    "plant.train.motor.velocity",
+    "controller.positioner.s4",
 ]
 
 
@@ -303,12 +303,12 @@ def test_the_table_never_jumps(place, acts, noise, seed, task_at):
     lag = 60 / KP * 1.04 + (2 * noise + 2) * COUNT
     for act in acts:
         seen = perform(rig, act)
-        assert np.abs(seen["positioner.dr"]).max(initial=0) / ONE * COUNT <= lag
-        steps = np.diff(seen["positioner.angle.position"])
+        assert np.abs(seen["controller.positioner.dr"]).max(initial=0) / ONE * COUNT <= lag
+        steps = np.diff(seen["controller.positioner.angle.position"])
         assert np.abs(steps).max(initial=0) * COUNT <= 63 * 2e-3 + (2 * noise + 1) * COUNT
-        speed = np.degrees(seen["machine.motor.velocity"]) / RATIO
+        speed = np.degrees(seen["plant.train.motor.velocity"]) / RATIO
         assert np.abs(speed).max(initial=0) <= 63
-        assert (seen["positioner.angle.position"] % T == seen["positioner.angle.dar"]).all()
+        assert (seen["controller.positioner.angle.position"] % T == seen["controller.positioner.angle.dar"]).all()
     rig.run_until(rig.time + 12)  # the longest way at 60 deg/s, and to rest
     if rig.positioner.state == HOLD:
         assert abs(rig.present - rig.target) <= (2 * noise + 2) * COUNT
@@ -331,19 +331,19 @@ def test_the_table_never_jumps(place, acts, noise, seed, task_at):
 def test_from_any_state_no_tick_exceeds_the_limits(velocity, oar, irr, word, state, z, task_at):
     rig = Rig(123.4, task_at=task_at)
     r = rig.positioner
-    rig.r.machine.motor.velocity = velocity
-    rig.r.amplifier.word = word
+    rig.r.plant.train.motor.velocity = velocity
+    rig.r.lines.word = word
     r.oar, r.state, r.z, r.plus = oar, state, z, 1
     rig.interpolator.irr = irr
-    fastest = max(abs(velocity), 32767 * rig.p.amplifier.speed_per_count)
+    fastest = max(abs(velocity), 32767 * rig.p.plant.amplifier.speed_per_count)
     for _ in range(20):
         rig.run_ticks(37)
         assert abs(r.s4) <= 32767
-        assert abs(rig.r.machine.motor.velocity) <= fastest * (1 + 1e-12)
+        assert abs(rig.r.plant.train.motor.velocity) <= fastest * (1 + 1e-12)
         assert 0 <= rig.interpolator.irr <= irr + 2 * T * ONE
         assert 0 <= rig.angle.dar < T
-        assert 0 <= rig.r.machine.motor.angle < 6.283185307179587
-        assert rig.r.detector.fine.word < FINE
+        assert 0 <= rig.r.plant.train.motor.angle < 6.283185307179587
+        assert rig.r.lines.fine < FINE
 
 
 # ------------------------------------------------------------------------------------------------------ numbered cases
@@ -372,7 +372,7 @@ def test_the_judge_sees_the_jumps_of_what_is_not_robust(form, least):
     for number in range(300):
         case = TableCase(number, **form)
         if "update" in form:  # an interrupt in the middle of every pass
-            case.rig.r.clocks.task += DELAY_TICKS - case.rig.r.clocks.task % STROBE_TICKS
+            case.rig.r.controller.clocks.task += DELAY_TICKS - case.rig.r.controller.clocks.task % STROBE_TICKS
             case.late = False
         try:
             case.run()

@@ -62,7 +62,7 @@ def test_timing_and_registers() -> None:
     answer = call("timing", TABLE, "--at", "30 ms", "--figure", "t.png", "--vcd", "t.vcd")
     assert answer.status == 0, answer.err
     assert len(load_vcd(Path("t.vcd")).signals) >= 10
-    assert re.search(r"^positioner\.oar +i8 +count ", call("registers", TABLE).out, flags=re.MULTILINE)
+    assert re.search(r"^controller\.positioner\.oar +i8 +count ", call("registers", TABLE).out, flags=re.MULTILINE)
 
 
 BAD = {

@@ -61,7 +61,7 @@ class PositionerParams(Registers):
 
 
 class Positioner(Registers):
-    """Registers of the positioner and the lines from and to sequence controller and panel."""
+    """Registers of the positioner, and the mailbox of sequence controller and panel."""
 
     plus: u1 = register("+ button, written by the host: 1 while held down, to jog to larger angles")
     minus: u1 = register("- button, written by the host: 1 while held down")
@@ -94,7 +94,7 @@ class Positioner(Registers):
 def interrupt(p: PositionerParams, r: Positioner, d: int) -> None:
     """Interrupt S8 with the detected angle: steps 200 to 228."""
     if r.state == POWER_ON:
-        power_on(r, d)
+        hold_first(r, d)
     manual = r.state in (JOG, STOPPING)
     read_angle(p.angle, r.angle, d, manual)
     extend(p.angle, r.angle, r.z)
@@ -117,7 +117,7 @@ def speed_limit(p: PositionerParams, r: Positioner) -> int:
 
 
 @step
-def power_on(r: Positioner, d: int) -> None:
+def hold_first(r: Positioner, d: int) -> None:
     """The table is held where the first angle finds it."""
     first_angle(r.angle, d)
     r.oar = d
@@ -170,7 +170,7 @@ def rest(p: PositionerParams, r: Positioner) -> None:
 
 
 @step
-def begin_pass(p: PositionerParams, r: Positioner) -> None:
+def begin_task(p: PositionerParams, r: Positioner) -> None:
     """Timer task, steps 100 to 122, up to where an interrupt can come between the halves of a rollover."""
     r.passes += 1
     if r.state == HOLD and r.plus != r.minus:
@@ -186,7 +186,7 @@ def begin_pass(p: PositionerParams, r: Positioner) -> None:
 
 
 @step
-def end_pass(p: PositionerParams, r: Positioner) -> None:
+def end_task(p: PositionerParams, r: Positioner) -> None:
     """The rest of the pass: the other half of a rollover."""
     if r.unfinished == FLAG_FIRST:
         advance_remaining(p, r)

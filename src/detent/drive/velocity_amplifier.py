@@ -1,10 +1,10 @@
-"""Speed register, D/A converter and servo amplifier with a tachometer (rotary-table specification 2, 7; 5 to 8, 12).
+"""D/A converter and servo amplifier with a tachometer (rotary-table specification 2, 7; 5 to 8, 12).
 
 The amplifier's torque is in proportion to the speed error, up to its limit. Against the inertia it is a first order
 lag; against viscous friction it droops: the velocity stays behind its reference by ``b / (b + stiffness)``.
 """
 
-from detent.kernel.registers import Registers, f8, i4, register, u1
+from detent.kernel.registers import Registers, f8, register, u1
 from detent.kernel.step import hot_step
 
 
@@ -17,20 +17,19 @@ class VelocityAmplifierParams(Registers):
 
 
 class VelocityAmplifier(Registers):
-    """What is set and what it drives."""
+    """What it drives."""
 
-    word: i4 = register("speed register 5", unit="count")
     torque: f8 = register("torque at the beginning of the tick", unit="N.m")
     limited: u1 = register("1 while the amplifier is at its limit")
 
 
 @hot_step
-def drive_torque(p: VelocityAmplifierParams, r: VelocityAmplifier, velocity: float) -> float:
+def drive_torque(p: VelocityAmplifierParams, r: VelocityAmplifier, word: int, velocity: float) -> float:
     """Torque that would act at standstill [N.m]: within the limit ``stiffness * reference``, at the limit the limit.
 
     Whether the amplifier is at its limit is asked once per tick.
     """
-    reference = r.word * p.speed_per_count
+    reference = word * p.speed_per_count
     r.torque = p.stiffness * (reference - velocity)
     r.limited = 1 if abs(r.torque) > p.max_torque else 0
     if r.limited:

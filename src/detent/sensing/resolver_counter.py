@@ -8,7 +8,7 @@ shaft angle in parts of a turn. Phases are integers of 2^-32 turn.
 import math
 
 from detent.kernel.noise import NoiseSource, uniform
-from detent.kernel.registers import Registers, block, f8, i8, register, u4
+from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
 from detent.kernel.turn_table import FRACTION, TurnTable, at_phase
 from detent.sensing.phase_detector import DetectorParams, fill_errors
@@ -23,22 +23,15 @@ class ResolverParams(Registers):
     noise: f8 = register("largest displacement of a zero crossing by noise, uniform", unit="turn/2^32")
 
 
-class Resolver(Registers):
-    """What the comparator has counted last."""
-
-    word: u4 = register("clocks from excitation to output", unit="count")
-    noise: NoiseSource = block("noise of the comparator")
-
-
 @step
-def count_phase(p: ResolverParams, r: Resolver, shaft: int) -> None:
-    """One conversion with the shaft at a phase in [0, 2^32); positive rotation increases the word."""
+def count_phase(p: ResolverParams, noise: NoiseSource, shaft: int) -> int:
+    """Clocks from excitation to output, the shaft at a phase in [0, 2^32); positive rotation increases them."""
     phase = (shaft + p.offset) & FRACTION
     if p.errors.used:
         phase += at_phase(p.errors, phase)
     if p.noise > 0.0:
-        phase += math.floor((2.0 * uniform(r.noise) - 1.0) * p.noise + 0.5)
-    r.word = ((phase & FRACTION) * p.counts) >> 32
+        phase += math.floor((2.0 * uniform(noise) - 1.0) * p.noise + 0.5)
+    return ((phase & FRACTION) * p.counts) >> 32
 
 
 def fill_resolver(p: ResolverParams, gain: float, quadrature: float, offset: float) -> None:

@@ -14,8 +14,8 @@ from detent.control.table_positioner import (
     REMAINING_FIRST,
     STOPPING,
     TOO_FAR,
-    begin_pass,
-    end_pass,
+    begin_task,
+    end_task,
 )
 
 PLACE = 100_000
@@ -26,15 +26,15 @@ def jogging(sign: int = 1, interrupts: int = 0, **changes) -> PositionerBench:
     bench = PositionerBench(PLACE, **changes)
     bench.r.dial = speed_word(60)
     bench.r.plus, bench.r.minus = sign > 0, sign < 0
-    begin_pass(bench.p, bench.r)
+    begin_task(bench.p, bench.r)
     for _ in range(interrupts):
         bench.feed(round(bench.command))
     return bench
 
 
 def run_pass(bench: PositionerBench) -> None:
-    begin_pass(bench.p, bench.r)
-    end_pass(bench.p, bench.r)
+    begin_task(bench.p, bench.r)
+    end_task(bench.p, bench.r)
 
 
 def test_power_on_holds_where_the_table_stands():
@@ -152,9 +152,9 @@ def test_the_conventional_unit_never_rolls_over():
 def test_a_rollover_in_halves_ends_the_same(update, halfway):
     bench = jogging(1, 20, update=update)
     bench.r.interpolator.irr = T * ONE - 5
-    begin_pass(bench.p, bench.r)
+    begin_task(bench.p, bench.r)
     assert (bench.r.angle.turn, round(bench.r.interpolator.irr / T / ONE)) == halfway
-    end_pass(bench.p, bench.r)
+    end_task(bench.p, bench.r)
     assert (bench.r.angle.turn, bench.r.interpolator.irr, bench.r.unfinished) == (-1, 2 * T * ONE - 5, 0)
     run_pass(bench)
     assert bench.r.rollovers == 1

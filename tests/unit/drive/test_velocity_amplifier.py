@@ -20,6 +20,6 @@ P = VelocityAmplifierParams(speed_per_count=0.1, stiffness=0.05, max_torque=1.0)
     ],
 )
 def test_torque_in_proportion_to_the_speed_error_up_to_the_limit(word, velocity, standstill, torque, limited):
-    r = VelocityAmplifier(word=word)
-    assert drive_torque(P, r, velocity) == pytest.approx(standstill)
+    r = VelocityAmplifier()
+    assert drive_torque(P, r, word, velocity) == pytest.approx(standstill)
     assert (r.torque, r.limited) == (pytest.approx(torque, abs=1e-12), limited)

@@ -3,19 +3,15 @@ import math
 import numpy as np
 import pytest
 
-from detent.sensing.resolver_counter import Resolver, ResolverParams, count_phase, fill_resolver
+from detent.kernel.noise import NoiseSource
+from detent.sensing.resolver_counter import ResolverParams, count_phase, fill_resolver
 
 COUNTS = 4096
 
 
 def words(p: ResolverParams, phases, seed: int = 1) -> list[int]:
-    r = Resolver()
-    r.noise.state = seed
-    found = []
-    for phase in phases:
-        count_phase(p, r, int(phase))
-        found.append(r.word)
-    return found
+    noise = NoiseSource(state=seed)
+    return [count_phase(p, noise, int(phase)) for phase in phases]
 
 
 @pytest.mark.parametrize("counts", [4096, 1000, 4093, 1 << 20])

@@ -22,16 +22,17 @@ def build_rotary_table(spec: RotaryTableSpec) -> RotaryTableParams:
     """Parameters of the rotary table."""
     p = RotaryTableParams()
     method = spec.method
-    p.clocks.strobe_ticks, p.clocks.delay_ticks = ticks(method.strobe_period), ticks(method.interrupt_delay)
-    p.clocks.task_ticks = ticks(method.task_period)
+    clocks = p.controller.clocks
+    clocks.strobe_ticks, clocks.delay_ticks = ticks(method.strobe_period), ticks(method.interrupt_delay)
+    clocks.task_ticks = ticks(method.task_period)
     _fill_detector(p, spec)
     _fill_positioner(p, spec)
     _fill_positions(p, spec)
     _fill_machine(p, spec)
     load = spec.disturbance.load
     if load is not None:
-        p.machine.load.torque = load.torque / spec.ratio
-        p.machine.load.begin, p.machine.load.end = ticks(load.at), ticks(load.at) + ticks(load.duration)
+        p.plant.train.load.torque = load.torque / spec.ratio
+        p.plant.train.load.begin, p.plant.train.load.end = ticks(load.at), ticks(load.at) + ticks(load.duration)
     return p
 
 
@@ -61,10 +62,10 @@ def _word(angle: float, counts: int) -> int:
 
 def _fill_detector(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     fine, coarse = spec.detector.fine, spec.detector.coarse
-    _fill_resolver(p.detector.fine, fine)
-    _fill_resolver(p.detector.coarse, coarse)
-    p.detector.coarse.offset = _phase(coarse.mounting + coarse.alignment_error)
-    c = p.detector.composition
+    _fill_resolver(p.plant.fine, fine)
+    _fill_resolver(p.plant.coarse, coarse)
+    p.plant.coarse.offset = _phase(coarse.mounting + coarse.alignment_error)
+    c = p.controller.composition
     c.ratio, c.fine, c.coarse = spec.ratio, fine.counts, coarse.counts
     c.fine_zero, c.coarse_zero = _word(fine.mounting, fine.counts), _word(coarse.mounting, coarse.counts)
     c.truncating = spec.detector.composition == "truncated"
@@ -78,7 +79,7 @@ def _fill_resolver(p: ResolverParams, table: FineTable) -> None:
 
 
 def _fill_positioner(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
-    q, method = p.positioner, spec.method
+    q, method = p.controller.positioner, spec.method
     one = 1 << method.fraction_bits
     q.angle.period, q.angle.form = spec.period, FORMS[method.form]
     q.interpolator.fraction = method.fraction_bits
@@ -95,7 +96,7 @@ def _fill_positioner(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
 
 
 def _fill_positions(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
-    pdt = p.positioner.pdt
+    pdt = p.controller.positioner.pdt
     for name, entry in spec.position.items():
         number = int(name)
         pdt.angle[number] = round(entry.angle / spec.count)
@@ -106,7 +107,7 @@ def _fill_positions(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
 
 
 def _fill_machine(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
-    a, m, mechanics = p.amplifier, p.machine.motor, spec.mechanics
+    a, m, mechanics = p.plant.amplifier, p.plant.train.motor, spec.mechanics
     # Stiffness plus viscous friction give the time constant, their shares the droop.
     damping = spec.inertia / spec.drive.time_constant
     a.stiffness, a.max_torque = (1 - spec.drive.droop) * damping, spec.limits.effort
@@ -114,9 +115,9 @@ def _fill_machine(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     m.inertia, m.viscous, m.period = spec.inertia, spec.drive.droop * damping, TICK
     m.coulomb, m.static = mechanics.coulomb, mechanics.static
     fill_motor(m, a.stiffness)
-    _fill_gear(p.machine.gear, spec.ratio, mechanics.backlash, mechanics.eccentricity, mechanics.eccentricity_angle)
+    _fill_gear(p.plant.train.gear, spec.ratio, mechanics.backlash, mechanics.eccentricity, mechanics.eccentricity_angle)
     coarse: CoarseTable = spec.detector.coarse
-    _fill_gear(p.machine.reduction, spec.ratio, coarse.backlash, coarse.eccentricity, coarse.eccentricity_angle)
+    _fill_gear(p.plant.train.reduction, spec.ratio, coarse.backlash, coarse.eccentricity, coarse.eccentricity_angle)
 
 
 def _fill_gear(p: GearParams, ratio: int, backlash: float, eccentricity: float, angle: float) -> None:

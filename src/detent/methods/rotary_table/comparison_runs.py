@@ -126,8 +126,8 @@ class _Seen:
 
 
 _SIGNALS = (
-    "machine.motor.turns", "machine.motor.angle", "machine.motor.velocity", "positioner.dr", "positioner.s4",
-    "positioner.angle.crossings",
+    "plant.train.motor.turns", "plant.train.motor.angle", "plant.train.motor.velocity", "controller.positioner.dr",
+    "controller.positioner.s4", "controller.positioner.angle.crossings",
 )  # fmt: skip
 
 
@@ -146,15 +146,15 @@ def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], Non
         host.acknowledge()
     host.machine.close()
     trace = make_trace(recorder, blocks, {})
-    turns = trace["machine.motor.turns"] - math.floor(start_turns(spec))
-    way = (turns + trace["machine.motor.angle"] / FULL_TURN - start_turns(spec) % 1) * (FULL_TURN / spec.ratio)
+    turns = trace["plant.train.motor.turns"] - math.floor(start_turns(spec))
+    way = (turns + trace["plant.train.motor.angle"] / FULL_TURN - start_turns(spec) % 1) * (FULL_TURN / spec.ratio)
     return _Seen(
         t=trace.time - start * TICK,
         way=way,
-        speed=trace["machine.motor.velocity"] / spec.ratio,
-        deviation=trace["positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
-        s4=trace["positioner.s4"] * spec.speed_per_word,
-        crossings=trace["positioner.angle.crossings"],
+        speed=trace["plant.train.motor.velocity"] / spec.ratio,
+        deviation=trace["controller.positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
+        s4=trace["controller.positioner.s4"] * spec.speed_per_word,
+        crossings=trace["controller.positioner.angle.crossings"],
     )
 
 

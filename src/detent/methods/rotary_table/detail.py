@@ -37,10 +37,14 @@ POINTS = 1500
 
 DEG = 180.0 / math.pi
 
-STATE, AHEAD, TARGET = "positioner.state", "positioner.z", "positioner.oar"
-DETECTED, PRESENT, REMAINING = "positioner.angle.dar", "positioner.angle.aar", "positioner.interpolator.irr"
-TURNS, FLAG = "positioner.angle.turn", "positioner.angle.flg"
-DEVIATION, SIGNAL, VELOCITY = "positioner.dr", "positioner.s4", "machine.motor.velocity"
+STATE, AHEAD, TARGET = "controller.positioner.state", "controller.positioner.z", "controller.positioner.oar"
+DETECTED, PRESENT, REMAINING = (
+    "controller.positioner.angle.dar",
+    "controller.positioner.angle.aar",
+    "controller.positioner.interpolator.irr",
+)
+TURNS, FLAG = "controller.positioner.angle.turn", "controller.positioner.angle.flg"
+DEVIATION, SIGNAL, VELOCITY = "controller.positioner.dr", "controller.positioner.s4", "plant.train.motor.velocity"
 
 NEEDED = (STATE, AHEAD, TARGET, DETECTED, PRESENT, REMAINING, TURNS, FLAG, DEVIATION, SIGNAL, VELOCITY)
 """Signals that a step is drawn from."""

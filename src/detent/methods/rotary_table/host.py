@@ -1,7 +1,7 @@
-"""The host of a rotary table: its sequence controller with the panel. It sees what the lines show, no more.
+"""The host of a rotary table: its sequence controller with the panel. It sees what the positioner says, no more.
 
-The lines to the positioner are position number and start, the buttons + and - and the speed dial; the lines from it
-say that the table has come to rest, that a start was refused, and whether the table is within its window.
+To the positioner go position number and start, the buttons + and - and the speed dial; the positioner says that the
+table has come to rest, that a start was refused, and how far from its target it sees the table.
 """
 
 import math
@@ -12,11 +12,12 @@ from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import at_least, at_most
 from detent.kernel.loop import advance
-from detent.methods.rotary_table import system as rotary_table
+from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_faults import Fault, find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
+from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
 
@@ -29,21 +30,22 @@ SETTLING = 10.0
 
 def rotary_table_machine(
     spec: RotaryTableSpec, recorder: AnyRecorder | None = None
-) -> Machine[rotary_table.RotaryTableParams, rotary_table.RotaryTable]:
+) -> Machine[RotaryTableParams, RotaryTable]:
     """Rotary table at power-on."""
-    p, r = build_rotary_table(spec), rotary_table.RotaryTable()
-    rotary_table.switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
-    return Machine(p, r, Loop(rotary_table.TICK, advance), recorder)
+    p, r = build_rotary_table(spec), RotaryTable()
+    switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
+    return Machine(p, r, Loop(TICK, advance), recorder)
 
 
 class TableHost:
-    """Lines of a rotary table, and the passing of time."""
+    """Panel of a rotary table, and the passing of time."""
 
     def __init__(self, spec: RotaryTableSpec, recorder: AnyRecorder | None = None) -> None:
         self.spec = spec
         self.machine = rotary_table_machine(spec, recorder)  # the simulated axis
         # ctypes gives every register its type at run time only.
-        self._lines: Any = self.machine.state.positioner
+        self._controller: Any = self.machine.state.controller
+        self._positioner: Any = self._controller.positioner
         self._refused_before = 0
 
     @property
@@ -53,64 +55,64 @@ class TableHost:
 
     def start(self) -> None:
         """Wait for the first interrupt, which takes the angle over and holds the table there."""
-        while self._lines.state == POWER_ON:
+        while self._positioner.state == POWER_ON:
             self.machine.pass_ticks(1)
 
-    # ------------------------------------------------------------------------------------------------------ lines
+    # ------------------------------------------------------------------------------------------------------ panel
 
     @property
     def at_rest(self) -> bool:
-        """The table has come to rest: the line that the host has to acknowledge."""
-        return bool(self._lines.event)
+        """The table has come to rest: the host has to acknowledge it."""
+        return bool(self._positioner.event)
 
     def acknowledge(self) -> None:
-        """Clear the line."""
-        self._lines.event = 0
+        """The host has seen that the table is at rest."""
+        controller.acknowledge(self._controller)
 
     @property
     def is_moving(self) -> bool:
         """A jog, a stop or a positioning is under way."""
-        return self._lines.state != HOLD
+        return self._positioner.state != HOLD
 
     @property
     def in_position(self) -> bool:
         """The table is within its window about the target."""
-        return abs(self._lines.oar - self._lines.angle.aar) <= self.spec.method.in_position
+        return abs(self._positioner.oar - self._positioner.angle.aar) <= self.spec.method.in_position
 
     @property
     def refused(self) -> int:
         """Starts that were refused since power-on."""
-        return self._lines.refused
+        return self._positioner.refused
 
     def press(self, direction: int, speed: float) -> None:
         """Set the dial to a table speed [rad/s] and hold a button down: 1 for +, -1 for -."""
-        self._lines.dial = dial_of(self.spec, speed)
-        self._lines.plus, self._lines.minus = direction > 0, direction < 0
+        controller.set_dial(self._controller, dial_of(self.spec, speed))
+        controller.press(self._controller, direction)
 
     def release(self) -> None:
         """No button."""
-        self._lines.plus = self._lines.minus = 0
+        controller.release(self._controller)
 
     def begin(self, number: int) -> None:
         """Set the position number and start; the positioner takes it in its next task."""
-        self._refused_before = self._lines.refused
-        self._lines.number, self._lines.start = number, 1
+        self._refused_before = self._positioner.refused
+        controller.start_position(self._controller, number)
 
     @property
     def is_pending(self) -> bool:
         """A start has not been taken yet."""
-        return bool(self._lines.start)
+        return bool(self._positioner.start)
 
     @property
     def refusal(self) -> str:
         """Why the last start was refused, and what to do; empty if it was not."""
-        refused = self._lines.refused != self._refused_before
-        return TABLE_REFUSAL_TEXT[self._lines.reason] if refused else ""
+        refused = self._positioner.refused != self._refused_before
+        return TABLE_REFUSAL_TEXT[self._positioner.reason] if refused else ""
 
     @property
     def way(self) -> float:
         """Distance of the table from its target [rad], not signed."""
-        return abs(self._lines.oar - self._lines.angle.aar) * self.spec.count
+        return abs(self._positioner.oar - self._positioner.angle.aar) * self.spec.count
 
     # ------------------------------------------------------------------------------------------------------ times
 

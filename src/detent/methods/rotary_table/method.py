@@ -15,9 +15,10 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
-    "detector.fine.word", "detector.coarse.word", "detector.absolute.theta", "positioner.angle.dar",
-    "positioner.angle.flg", "positioner.angle.turn", "positioner.angle.aar", "positioner.oar",
-    "positioner.interpolator.irr", "positioner.dr", "positioner.s4", "amplifier.word", "machine.motor.velocity",
+    "lines.fine", "lines.coarse", "controller.absolute.theta", "controller.positioner.angle.dar",
+    "controller.positioner.angle.flg", "controller.positioner.angle.turn", "controller.positioner.angle.aar",
+    "controller.positioner.oar", "controller.positioner.interpolator.irr", "controller.positioner.dr",
+    "controller.positioner.s4", "lines.word", "plant.train.motor.velocity",
 )  # fmt: skip
 
 

@@ -31,8 +31,12 @@ from detent.page.table import Cell, left_out, long_table, offset_cell
 from detent.page.words import CountUnit, angle, count, degrees, duration, further
 from detent.record.trace import Trace
 
-PHASE, VELOCITY = "table", "machine.motor.velocity"
-DETECTED, AHEAD, COMMANDED = "positioner.angle.dar", "positioner.z", "positioner.interpolator.speed"
+PHASE, VELOCITY = "plant.table", "plant.train.motor.velocity"
+DETECTED, AHEAD, COMMANDED = (
+    "controller.positioner.angle.dar",
+    "controller.positioner.z",
+    "controller.positioner.interpolator.speed",
+)
 
 NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)
 """Signals that the whole sequence is drawn from."""

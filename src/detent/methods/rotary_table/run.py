@@ -16,10 +16,12 @@ from detent.sensing.angle_gauge import set_angle_gauge
 from detent.units import format_quantity
 
 SEQUENCE_SIGNALS = (
-    "machine.motor.velocity", "table", "detector.absolute.theta", "positioner.state", "positioner.z",
-    "positioner.angle.aar", "positioner.angle.dar", "positioner.angle.flg", "positioner.angle.turn",
-    "positioner.angle.position", "positioner.oar", "positioner.arr", "positioner.interpolator.irr",
-    "positioner.interpolator.speed", "positioner.dr", "positioner.s4", "amplifier.torque",
+    "plant.train.motor.velocity", "plant.table", "controller.absolute.theta", "controller.positioner.state",
+    "controller.positioner.z", "controller.positioner.angle.aar", "controller.positioner.angle.dar",
+    "controller.positioner.angle.flg", "controller.positioner.angle.turn", "controller.positioner.angle.position",
+    "controller.positioner.oar", "controller.positioner.arr", "controller.positioner.interpolator.irr",
+    "controller.positioner.interpolator.speed", "controller.positioner.dr", "controller.positioner.s4",
+    "plant.amplifier.torque",
 )  # fmt: skip
 """Registers that a run records unless told otherwise."""
 
@@ -193,7 +195,7 @@ class _WatchedTable:
         """Do a step and record it; what went wrong, or nothing."""
         self._number = number
         self._tell()
-        set_angle_gauge(self._state.gauge)
+        set_angle_gauge(self._state.plant.gauge)
         self._start = self._observer.angle
         begin, counters = self._host.machine.time, self._counters
         try:
@@ -217,7 +219,7 @@ class _WatchedTable:
 
     @property
     def _counters(self) -> tuple[int, int]:
-        positioner = self._state.positioner
+        positioner = self._state.controller.positioner
         return positioner.angle.crossings, positioner.rollovers
 
     @property
@@ -253,7 +255,7 @@ class _WatchedTable:
 
     def _make_record(self, index: int, step: Action, begin: float, counters: tuple[int, int]) -> StepRecord:
         """The record of the step that has ended."""
-        spec, gauge = self._host.spec, self._state.gauge
+        spec, gauge = self._host.spec, self._state.plant.gauge
         stop = self._observer.angle
         # During a jog the target is two turns ahead: it is nowhere to be held.
         is_held = isinstance(step, Go) or (isinstance(step, Jog) and not self._host.is_moving)
@@ -289,7 +291,7 @@ class _WatchedTable:
         result.turns = int(math.copysign(abs(net) + result.in_position + result.count, net) / FULL_TURN)
         result.crossings = sum(step.crossings for step in result.steps)
         result.rollovers = sum(step.rollovers for step in result.steps)
-        result.position = self._state.positioner.angle.position
+        result.position = self._state.controller.positioner.angle.position
         result.refused = self._host.refused
         result.done = not result.failure
         if result.done and controller.coming:

@@ -17,8 +17,8 @@ def endless_phase(p: RotaryTableParams, r: RotaryTable) -> int:
 
     Whole numbers of any length: it is as fine after a million turns as in the first.
     """
-    gear, motor = p.machine.gear, r.machine.motor
-    within = math.floor((motor.angle + r.machine.gear.slack) * PHASE_PER_RADIAN)
+    gear, motor = p.plant.train.gear, r.plant.train.motor
+    within = math.floor((motor.angle + r.plant.train.gear.slack) * PHASE_PER_RADIAN)
     phase = ((motor.turns << 32) + within) // gear.ratio
     return phase + at_phase(gear.eccentricity, phase & FRACTION) if gear.eccentricity.used else phase
 
@@ -31,7 +31,7 @@ class TableObserver:
         # ctypes gives every register its type at run time only.
         self._state: Any = machine.state
         # The axis knows the angle within a turn only: it starts in [0, T) whatever turn the table is in.
-        away = self._state.positioner.angle.position - self._motor_counts
+        away = self._state.controller.positioner.angle.position - self._motor_counts
         self._start_turns = round(away / spec.period)
 
     @property
@@ -52,16 +52,16 @@ class TableObserver:
 
     @property
     def _target_counts(self) -> int:
-        positioner = self._state.positioner
+        positioner = self._state.controller.positioner
         angle = positioner.angle
         return angle.position + positioner.oar - angle.aar - self._start_turns * self._spec.period
 
     @property
     def _motor_counts(self) -> float:
-        motor, fine = self._state.machine.motor, self._spec.detector.fine.counts
+        motor, fine = self._state.plant.train.motor, self._spec.detector.fine.counts
         return motor.turns * fine + motor.angle / FULL_TURN * fine
 
     @property
     def speed(self) -> float:
         """Velocity of the motor, at the table [rad/s]."""
-        return self._state.machine.motor.velocity / self._spec.ratio
+        return self._state.plant.train.motor.velocity / self._spec.ratio

@@ -34,23 +34,23 @@ class Bench:
         left = round(seconds * 1e4)
         while left > 0:
             left -= advance(self.p, self.r, left, *NO_TRACE)
-            self.r.positioner.event = 0
+            self.r.controller.positioner.event = 0
         return self
 
     def jog(self, sign: int) -> "Bench":
-        positioner = self.r.positioner
+        positioner = self.r.controller.positioner
         positioner.dial = round(self.spec.per_interrupt(self.spec.limits.speed))
         positioner.plus, positioner.minus = sign > 0, sign < 0
         return self
 
     def go(self, number: int) -> "Bench":
-        self.r.positioner.number, self.r.positioner.start = number, 1
+        self.r.controller.positioner.number, self.r.controller.positioner.start = number, 1
         return self
 
     @property
     def travel(self) -> float:
         """True way since power-on, at the table [deg]."""
-        motor = self.r.machine.motor
+        motor = self.r.plant.train.motor
         return (motor.turns - self.start + motor.angle / (2 * math.pi)) * 360 / self.spec.ratio
 
 

@@ -143,17 +143,18 @@ def test_the_example_goes_where_it_is_sent(bench_of: Any) -> None:
     bench = bench_of(()).run(0.1)
     for number, angle in ((1, 90), (2, 180), (3, 350), (4, 370)):
         bench.go(number).run(8)
-        assert bench.r.positioner.state == HOLD
+        assert bench.r.controller.positioner.state == HOLD
         assert 10 + bench.travel == pytest.approx(angle, abs=2 * 360 / bench.spec.period)
 
 
 def test_the_parameters_of_the_default_axis() -> None:
     spec = load_spec(EXAMPLE)
     p = build_rotary_table(spec)
-    assert (p.clocks.strobe_ticks, p.clocks.delay_ticks, p.clocks.task_ticks) == (20, 2, 200)
-    c, q = p.detector.composition, p.positioner
+    clocks = p.controller.clocks
+    assert (clocks.strobe_ticks, clocks.delay_ticks, clocks.task_ticks) == (20, 2, 200)
+    c, q = p.controller.composition, p.controller.positioner
     assert (c.ratio, c.fine, c.coarse, c.fine_zero, c.coarse_zero, c.truncating) == (90, 4096, 4096, 0, 0, 0)
-    assert (p.detector.fine.errors.used, p.detector.fine.noise) == (0, 0)
+    assert (p.plant.fine.errors.used, p.plant.fine.noise) == (0, 0)
     assert (q.angle.period, q.angle.form, q.judge, q.update) == (368_640, TURN_COUNTER, 0, ATOMIC)
     # 60 deg/s are 122.88 counts in 2 ms; 300 deg/s^2 are 1.2288 counts more in each (7).
     assert (q.interpolator.fraction, q.interpolator.max_speed) == (16, round(122.88 * 65536))
@@ -164,14 +165,14 @@ def test_the_parameters_of_the_default_axis() -> None:
     assert q.speed_gain * 65536 == pytest.approx(360 / 368_640 / 2e-3 / word)
     assert (q.max_word, q.window, q.window_interrupts) == (2047, 2, 10)
     assert (q.unsigned_remaining, q.open_loop, q.inclusive, q.guarded) == (0, 0, 0, 0)
-    assert p.amplifier.speed_per_count == pytest.approx(2000 / 60 * 2 * math.pi / 2047)
-    assert (p.amplifier.max_torque, p.machine.gear.ratio, p.machine.reduction.ratio) == (3.0, 90, 90)
-    assert (p.machine.load.torque, p.machine.load.end) == (0, 0)
+    assert p.plant.amplifier.speed_per_count == pytest.approx(2000 / 60 * 2 * math.pi / 2047)
+    assert (p.plant.amplifier.max_torque, p.plant.train.gear.ratio, p.plant.train.reduction.ratio) == (3.0, 90, 90)
+    assert (p.plant.train.load.torque, p.plant.train.load.end) == (0, 0)
 
 
 def test_the_velocity_loop_is_a_first_order_lag_with_droop() -> None:
     p = build_rotary_table(load_spec(EXAMPLE))
-    motor, stiffness = p.machine.motor, p.amplifier.stiffness
+    motor, stiffness = p.plant.train.motor, p.plant.amplifier.stiffness
     assert motor.inertia == pytest.approx(9e-4 + 0.8 / 90**2)
     assert motor.inertia / (stiffness + motor.viscous) == pytest.approx(20e-3)
     assert stiffness / (stiffness + motor.viscous) == pytest.approx(0.95)
@@ -182,14 +183,14 @@ def test_the_position_table() -> None:
         load_spec(
             EXAMPLE, ["position.7.angle=-90 deg", "position.7.direction=as commanded", "position.1.speed=30 deg/s"]
         )
-    ).positioner.pdt
+    ).controller.positioner.pdt
     assert p.entries == 8
     assert [p.angle[k] for k in range(8)] == [0, 92_160, 184_320, 358_400, 10_240, 0, 0, -92_160]
     sixty, thirty = round(122.88 * 65536), round(61.44 * 65536)
     assert [p.speed[k] for k in range(8)] == [sixty, thirty, sixty, sixty, sixty, 0, 0, sixty]
     assert [p.policy[k] for k in (0, 2, 7)] == [SHORTEST, POSITIVE, AS_COMMANDED]
     assert p.tolerance == 10
-    p = build_rotary_table(load_spec(EXAMPLE, ["position.2.direction=negative"])).positioner.pdt
+    p = build_rotary_table(load_spec(EXAMPLE, ["position.2.direction=negative"])).controller.positioner.pdt
     assert p.policy[2] == NEGATIVE
 
 
@@ -199,7 +200,7 @@ def test_the_position_table() -> None:
 )
 def test_forms(form: str, update: str, found: tuple[int, int]) -> None:
     more = [f"method.form={form}", f"method.update={update}", "method.judge=actual", "method.signed_remaining=false"]
-    q = build_rotary_table(load_spec(EXAMPLE, [*COMMANDED, *more])).positioner
+    q = build_rotary_table(load_spec(EXAMPLE, [*COMMANDED, *more])).controller.positioner
     assert (q.angle.form, q.update) == found
     assert (q.judge, q.unsigned_remaining) == (BY_ACTUAL, 1)
 
@@ -211,37 +212,37 @@ def test_the_start_lies_in_the_middle_of_a_count(bench_of: Any, angle: float) ->
     assert counts % 1 == pytest.approx(0.5)
     assert counts - 0.5 == pytest.approx(angle / 360 * spec.period, abs=1)
     bench = bench_of((f"mechanics.start_angle={angle} deg",)).run(0.01)
-    assert bench.r.positioner.angle.dar == math.floor(counts) % spec.period
+    assert bench.r.controller.positioner.angle.dar == math.floor(counts) % spec.period
 
 
 @pytest.mark.parametrize("mounting", ["0 deg", "37 deg", "-120 deg"])
 def test_mounting_is_calibrated_out_and_alignment_is_not(bench_of: Any, mounting: str) -> None:
     zeros = (f"detector.fine.mounting={mounting}", f"detector.coarse.mounting={mounting}")
-    angle = bench_of((*zeros, "mechanics.start_angle=200 deg")).run(0.01).r.positioner.angle.dar
+    angle = bench_of((*zeros, "mechanics.start_angle=200 deg")).run(0.01).r.controller.positioner.angle.dar
     # A zero in the middle of a count leaves a count of doubt.
     assert abs(angle - 204_800) <= 1
     shifted = bench_of((*zeros, "mechanics.start_angle=200 deg", "detector.coarse.alignment_error=4 deg"))
-    assert abs(shifted.run(0.01).r.positioner.angle.dar - 204_800 - 4096) <= 1
+    assert abs(shifted.run(0.01).r.controller.positioner.angle.dar - 204_800 - 4096) <= 1
 
 
 def test_gears_are_stated_at_the_table() -> None:
     p = build_rotary_table(
         load_spec(EXAMPLE, ["mechanics.backlash=0.1 deg", "detector.coarse.backlash=0.2 deg"])
-    ).machine
+    ).plant.train
     # Half of 0.1 deg at the table is 4.5 deg of the motor.
     assert p.gear.half_backlash == pytest.approx(math.radians(4.5))
     assert p.reduction.half_backlash == pytest.approx(math.radians(9))
 
 
 def test_a_load_is_seen_through_the_gear_and_counts_in_base_ticks() -> None:
-    p = build_rotary_table(load_spec(EXAMPLE, LOAD)).machine.load
+    p = build_rotary_table(load_spec(EXAMPLE, LOAD)).plant.train.load
     assert (p.torque, p.begin, p.end) == (pytest.approx(20 / 90), 10_000, 30_000)
     short = [LOAD[0], "disturbance.load.at=150 us", "disturbance.load.duration=100 us"]
-    p = build_rotary_table(load_spec(EXAMPLE, short)).machine.load
+    p = build_rotary_table(load_spec(EXAMPLE, short)).plant.train.load
     assert p.end - p.begin == 1
 
 
 @pytest.mark.parametrize(("time", "interrupts"), [("20 ms", 10), ("0.1 ms", 1), ("21.2 ms", 11)])
 def test_time_in_position_is_a_number_of_interrupts(time: str, interrupts: int) -> None:
-    q = build_rotary_table(load_spec(EXAMPLE, [f"method.in_position_time={time}"])).positioner
+    q = build_rotary_table(load_spec(EXAMPLE, [f"method.in_position_time={time}"])).controller.positioner
     assert q.window_interrupts == interrupts

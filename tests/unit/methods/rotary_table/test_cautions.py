@@ -144,7 +144,7 @@ def test_the_flag_fails_at_the_start_angles_named(bench_of, more, start, sign, f
 @pytest.mark.parametrize(("short_way", "travel"), [("0 deg", 360), ("0.001954 deg", 0)])
 def test_a_table_a_count_beyond_its_target_goes_round(bench_of, short_way, travel):
     bench = bench_of(("mechanics.start_angle=180 deg", f"method.short_way={short_way}")).run(0.1)
-    bench.r.machine.motor.angle += 6.283185 / 4096
+    bench.r.plant.train.motor.angle += 6.283185 / 4096
     bench.run(0.002).go(2).run(8)
     assert bench.travel == pytest.approx(travel, abs=0.01)
 
@@ -156,6 +156,6 @@ def test_an_interrupted_rollover_jumps_as_far_as_the_warning_says(bench_of, upda
     largest = 0.0
     for _ in range(3300):
         bench.run(0.002)
-        largest = max(largest, abs(bench.r.positioner.dr) / 65_536 * 360 / bench.spec.period)
-    assert bench.r.positioner.rollovers == 1
+        largest = max(largest, abs(bench.r.controller.positioner.dr) / 65_536 * 360 / bench.spec.period)
+    assert bench.r.controller.positioner.rollovers == 1
     assert spike - 0.5 < largest < spike + 0.5

@@ -87,14 +87,14 @@ def test_the_simulated_axis_follows_as_the_figures_say(bench_of, overrides):
     torque = error = 0.0
     for _ in range(5000):
         bench.run(1e-4)
-        torque = max(torque, bench.r.amplifier.torque)
-        error = max(error, bench.r.positioner.dr / 65_536 * bench.spec.count)
+        torque = max(torque, bench.r.plant.amplifier.torque)
+        error = max(error, bench.r.controller.positioner.dr / 65_536 * bench.spec.count)
     machine = Machine(bench.spec)
     following, passed = machine.following_error(machine.speed), machine.overshoot(machine.speed)
     assert error == pytest.approx(following + passed, abs=0.001 * DEG)
     bench.run(1.0)
-    assert bench.r.positioner.dr / 65_536 * bench.spec.count == pytest.approx(following, abs=0.002 * DEG)
-    assert bench.r.positioner.s4 == pytest.approx(machine.word_at(machine.speed), abs=1)
+    assert bench.r.controller.positioner.dr / 65_536 * bench.spec.count == pytest.approx(following, abs=0.002 * DEG)
+    assert bench.r.controller.positioner.s4 == pytest.approx(machine.word_at(machine.speed), abs=1)
     # Droop and friction are at their largest at the end of an acceleration, which itself is at its beginning; a short
     # one does not come to its peak. The word is rounded.
     word = machine.stiffness * bench.spec.speed_per_word * bench.spec.ratio
@@ -110,7 +110,7 @@ def test_no_positioning_of_the_simulated_axis_rests_farther_off(bench_of, overri
     errors = []
     for k in range(25):
         bench = bench_of((*overrides, f"position.1.angle={20 + 3.37 * k} deg")).run(0.1).go(1).run(7)
-        errors.append(abs(bench.r.positioner.oar - bench.r.positioner.angle.aar))
+        errors.append(abs(bench.r.controller.positioner.oar - bench.r.controller.positioner.angle.aar))
     assert Machine(bench.spec).resting_error == most
     assert max(errors) <= most
     assert most == 1 or max(errors) > most / 3
@@ -120,9 +120,9 @@ def test_a_table_that_is_put_beside_its_place_rests_there(bench_of):
     # 45 counts of 46 are held by friction; from 50 the motor breaks loose.
     for counts, stays in ((45, True), (50, False)):
         bench = bench_of(("mechanics.coulomb=0.09 N*m", "mechanics.static=0.1 N*m")).run(0.1)
-        bench.r.machine.motor.angle += counts * math.tau / 4096
+        bench.r.plant.train.motor.angle += counts * math.tau / 4096
         bench.run(0.5)
-        held = bench.r.positioner.angle.aar - bench.r.positioner.oar
+        held = bench.r.controller.positioner.angle.aar - bench.r.controller.positioner.oar
         assert (held == counts) == stays
 
 
@@ -130,7 +130,7 @@ def test_a_load_is_held_with_the_deviation_stated(load_text, good_text, bench_of
     figure = derived(load_text(good_text, *LOAD))["deviation under the load"]
     assert figure.value == pytest.approx(0.497 * DEG, abs=0.001 * DEG)
     bench = bench_of((*LOAD, "drive.word_bits=20")).run(3.0)
-    moved = (bench.r.positioner.angle.aar - bench.r.positioner.oar) * bench.spec.count
+    moved = (bench.r.controller.positioner.angle.aar - bench.r.controller.positioner.oar) * bench.spec.count
     assert moved == pytest.approx(figure.value, abs=2 * bench.spec.count)
 
 

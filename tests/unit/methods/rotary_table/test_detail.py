@@ -258,7 +258,7 @@ def test_a_sequence_without_motion_has_no_detail() -> None:
 def test_a_table_that_dithers_at_the_end_of_its_turn_marks_few_crossings() -> None:
     spec, run, trace = play(Go(1), Go(0), Wait(0.3))
     zero = np.where(np.arange(len(trace)) % 2 > 0, 0, spec.period - 1)
-    dithering = Trace(columns={name: trace[name] for name in trace} | {"positioner.angle.dar": zero})
+    dithering = Trace(columns={name: trace[name] for name in trace} | {"controller.positioner.angle.dar": zero})
     figure = detail_of((spec, run, dithering))
     assert sum("crosses" in text for text in texts_of(figure)) == 6
     assert min(event.t for event in figure.events) == 0.0

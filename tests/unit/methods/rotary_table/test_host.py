@@ -36,20 +36,20 @@ def host():
 
 
 def positioner(host):
-    return host.machine.state.positioner
+    return host.machine.state.controller.positioner
 
 
 def test_the_machine_stands_where_the_axis_file_says():
     spec = table("mechanics.start_angle=200 deg", "method.task_phase=3 ms", "detector.seed=7")
     machine = rotary_table_machine(spec)
-    motor = machine.state.machine.motor
+    motor = machine.state.plant.train.motor
     assert (motor.turns + motor.angle / (2 * math.pi)) / spec.ratio * 360 == pytest.approx(200, abs=360 / spec.period)
     assert motor.velocity == 0.0
-    assert (machine.state.clocks.task, machine.tick) == (30, TICK)
-    assert machine.state.detector.fine.noise.state == 7
-    assert machine.state.positioner.state == POWER_ON
+    assert (machine.state.controller.clocks.task, machine.tick) == (30, TICK)
+    assert machine.state.plant.fine.state == 7
+    assert machine.state.controller.positioner.state == POWER_ON
     machine.pass_ticks(3)
-    assert machine.state.positioner.state == HOLD
+    assert machine.state.controller.positioner.state == HOLD
 
 
 def test_it_is_ready_after_the_first_interrupt(host):
@@ -105,8 +105,8 @@ def test_a_refusal_is_forgotten_with_the_next_start(host):
 
 
 def test_a_way_too_far_is_refused(host):
-    host.machine.params.positioner.pdt.policy[1] = 3  # as commanded
-    host.machine.params.positioner.pdt.angle[1] = 1 << 40
+    host.machine.params.controller.positioner.pdt.policy[1] = 3  # as commanded
+    host.machine.params.controller.positioner.pdt.angle[1] = 1 << 40
     host.begin(1)
     host.machine.pass_ticks(400)
     assert host.refusal.startswith("the way is longer than the remaining angle can count")

@@ -52,9 +52,9 @@ def test_droop_takes_its_share_of_the_gain():
 def test_overshoot_and_acceleration_are_those_of_the_simulated_axis(speed):
     passed, hardest = LOOP.stop(speed / 300)
     rig = Rig(100).press(1, speed)
-    seen = rig.record(3.0, ["positioner.dr", "machine.motor.velocity"], every=1)
-    assert seen["positioner.dr"].max() / ONE * COUNT == pytest.approx(speed / 30 + 300 * passed, abs=0.001)
-    acceleration = np.abs(np.diff(np.degrees(seen["machine.motor.velocity"]) / RATIO)).max() / TICK
+    seen = rig.record(3.0, ["controller.positioner.dr", "plant.train.motor.velocity"], every=1)
+    assert seen["controller.positioner.dr"].max() / ONE * COUNT == pytest.approx(speed / 30 + 300 * passed, abs=0.001)
+    acceleration = np.abs(np.diff(np.degrees(seen["plant.train.motor.velocity"]) / RATIO)).max() / TICK
     assert acceleration == pytest.approx(300 * hardest, rel=0.01)
 
 

@@ -230,8 +230,8 @@ def test_what_is_recorded_by_default_exists_and_shows_the_run():
     assert trace.time[-1] == pytest.approx(found.time_end, abs=21 * TICK)
     one = 2 * math.pi / 2**32
     at_first_end = int(np.searchsorted(trace.time, found.steps[0].end))
-    assert trace["table"][at_first_end] * one == pytest.approx(found.steps[0].stop, abs=found.count)
-    deviation = np.abs(trace["positioner.dr"]).max() * found.count / 65536
+    assert trace["plant.table"][at_first_end] * one == pytest.approx(found.steps[0].stop, abs=found.count)
+    deviation = np.abs(trace["controller.positioner.dr"]).max() * found.count / 65536
     assert deviation == pytest.approx(found.peak_deviation)
 
 

@@ -26,7 +26,7 @@ class Bench:
         self.host = TableHost(load_spec(detent.example("rotary_table.toml"), overrides), recorder)
         self.host.start()
         self.start = self.host.tick
-        self.lines = self.host.machine.state.positioner
+        self.lines = self.host.machine.state.controller.positioner
         self.asked = []
         self.controller = SequenceController(self.host, inputs, self.asked.append)
 
@@ -97,10 +97,10 @@ def test_outputs_are_switched_at_once():
 
 @pytest.mark.parametrize(("direction", "line"), [(1, "plus"), (-1, "minus")])
 def test_the_button_follows_the_signal_to_the_tick(direction, line):
-    recorder = Recorder(RotaryTable, [f"positioner.{line}"], every=1, period=TICK)
+    recorder = Recorder(RotaryTable, [f"controller.positioner.{line}"], every=1, period=TICK)
     bench = Bench(recorder=recorder, a=((0.0301, 0.2507),)).do(Jog(direction, SPEED, "a"))
     bench.host.machine.close()
-    held = np.flatnonzero(recorder.trace()[f"positioner.{line}"])
+    held = np.flatnonzero(recorder.trace()[f"controller.positioner.{line}"])
     # The row of a tick is written at its end: the first row is tick 1.
     assert (held[0] + 1, held[-1] + 1) == (bench.start + 302, bench.start + 2507)
     assert len(held) == 2507 - 301
@@ -172,7 +172,7 @@ def test_a_table_that_does_not_get_there_is_given_up():
 
 def test_a_refused_start_ends_the_step():
     bench = Bench()
-    bench.host.machine.params.positioner.pdt.speed[1] = 0
+    bench.host.machine.params.controller.positioner.pdt.speed[1] = 0
     with pytest.raises(AxisError, match="the positioner refused the start: the position table has no such entry"):
         bench.do(Go(1))
 

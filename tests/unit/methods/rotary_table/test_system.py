@@ -25,18 +25,18 @@ def test_power_on_waits_for_the_first_angle():
     r = RotaryTable()
     switch_on(rig.p, r, 123 / 4 + 0.5 / 4096, 0, 1)
     advance(rig.p, r, 2, *NO_TRACE)
-    assert r.positioner.state == POWER_ON
+    assert r.controller.positioner.state == POWER_ON
     advance(rig.p, r, 1, *NO_TRACE)
-    assert (r.positioner.state, r.positioner.oar * COUNT) == (HOLD, 123)
-    assert (r.positioner.passes, r.positioner.interrupts) == (1, 1)
+    assert (r.controller.positioner.state, r.controller.positioner.oar * COUNT) == (HOLD, 123)
+    assert (r.controller.positioner.passes, r.controller.positioner.interrupts) == (1, 1)
 
 
 def test_the_word_acts_in_the_tick_of_its_interrupt():
     rig = Rig(100).press(1)
     rig.run_ticks(2)
-    assert (rig.r.amplifier.word, rig.speed) == (0, 0)
+    assert (rig.r.lines.word, rig.speed) == (0, 0)
     rig.run_ticks(1)
-    assert rig.r.amplifier.word == rig.positioner.s4 > 0
+    assert rig.r.lines.word == rig.positioner.s4 > 0
     assert rig.speed > 0
 
 
@@ -78,13 +78,13 @@ def test_rows_are_the_registers_after_every_so_many_ticks():
 
 def test_the_true_angle_of_the_table_lags_by_the_backlash():
     rig = Rig(100)
-    rig.p.machine.gear.half_backlash = math.radians(0.05) * RATIO
+    rig.p.plant.train.gear.half_backlash = math.radians(0.05) * RATIO
     lag = {}
     for sign in (1, -1):
         rig.press(sign, 10).run_ticks(5000)
-        m = rig.r.machine.motor
+        m = rig.r.plant.train.motor
         motor = (m.turns + m.angle / (2 * math.pi)) / RATIO * 360 - rig.speed * 2e-3
-        lag[sign] = motor - rig.r.table / 2**32 * 360
+        lag[sign] = motor - rig.r.plant.table / 2**32 * 360
         rig.release().run_ticks(3000)
         assert rig.positioner.state == HOLD
     assert lag == pytest.approx({1: 0.05, -1: -0.05}, abs=0.002)
@@ -94,31 +94,31 @@ def test_the_coarse_word_lags_by_the_backlash_of_its_own_reduction():
     words = []
     for half_backlash in (0.0, math.radians(1.0) * RATIO):
         rig = Rig(100)
-        rig.p.machine.reduction.half_backlash = half_backlash
+        rig.p.plant.train.reduction.half_backlash = half_backlash
         rig.press(1, 30).run_ticks(5000)
-        words.append(rig.r.detector.coarse.word)
+        words.append(rig.r.lines.coarse)
     assert words[0] - words[1] == pytest.approx(4096 / 360, abs=1)
 
 
 @pytest.mark.compiled
 def test_faults_of_the_coarse_side_do_not_reach_the_angle():
     clean, faulty = (Rig(100) for _ in range(2))
-    reduction, coarse = faulty.p.machine.reduction, faulty.p.detector.coarse
+    reduction, coarse = faulty.p.plant.train.reduction, faulty.p.plant.coarse
     reduction.half_backlash = math.radians(0.3) * RATIO
     fill_eccentricity(reduction, math.radians(0.8), 1.0)
     fill_resolver(coarse, 0.01, 0.005, 0.0)
     for rig in (clean, faulty):
         rig.press(1).run_until(12)
     assert (faulty.angle.dar, faulty.positioner.s4) == (clean.angle.dar, clean.positioner.s4)
-    assert faulty.r.detector.coarse.word != clean.r.detector.coarse.word
+    assert faulty.r.lines.coarse != clean.r.lines.coarse
 
 
 def test_a_load_moves_the_table_out_by_what_the_loop_gives_way():
     rig = Rig(100)
-    rig.p.machine.load.torque, rig.p.machine.load.begin, rig.p.machine.load.end = 0.1, 0, 1 << 60
+    rig.p.plant.train.load.torque, rig.p.plant.train.load.begin, rig.p.plant.train.load.end = 0.1, 0, 1 << 60
     rig.run_until(1.0)
     # The velocity loop needs 0.1 N.m / stiffness of speed error; the position loop 1 / Kp of that in angle.
-    away = math.degrees(0.1 / rig.p.amplifier.stiffness) / RATIO / 30
+    away = math.degrees(0.1 / rig.p.plant.amplifier.stiffness) / RATIO / 30
     assert rig.travel == pytest.approx(away, abs=2 * COUNT)
     assert away > 10 * COUNT
 
@@ -126,18 +126,18 @@ def test_a_load_moves_the_table_out_by_what_the_loop_gives_way():
 def test_a_torque_limit_limits_the_acceleration():
     rig = Rig(100, max_torque=0.02).press(1)
     rig.run_until(0.5)
-    assert rig.r.amplifier.limited == 1
-    gained = math.degrees(0.02 / rig.p.machine.motor.inertia) / RATIO * 0.5
+    assert rig.r.plant.amplifier.limited == 1
+    gained = math.degrees(0.02 / rig.p.plant.train.motor.inertia) / RATIO * 0.5
     assert rig.speed == pytest.approx(gained, rel=0.1)
 
 
 @pytest.mark.compiled
 def test_static_friction_leaves_a_rest_in_hold():
     rig = Rig(10).entry(0, 20).go(0)
-    m = rig.p.machine.motor
+    m = rig.p.plant.train.motor
     m.coulomb, m.static = 0.02, 0.03
     rig.run_until(3)
-    word = 0.03 / rig.p.amplifier.stiffness / rig.p.amplifier.speed_per_count
+    word = 0.03 / rig.p.plant.amplifier.stiffness / rig.p.plant.amplifier.speed_per_count
     assert abs(rig.positioner.s4) <= word
     assert rig.speed == 0.0
     assert rig.positioner.state == (MOVE if abs(rig.positioner.oar - rig.angle.aar) > 2 else HOLD)
@@ -157,14 +157,14 @@ def test_a_stretch_gives_the_same_bytes_compiled_and_plain():
 def run_hash() -> str:
     """Hash of parameters and state along jogs both ways across the boundary and a positioning, with every fault."""
     rig = Rig(359.0, noise=2.0, droop=0.05, max_torque=0.6, seed=9)
-    machine, detector = rig.p.machine, rig.p.detector
-    machine.gear.half_backlash, machine.reduction.half_backlash = 0.02, 0.1
-    fill_eccentricity(machine.gear, 1e-3, 0.3)
-    fill_eccentricity(machine.reduction, 5e-3, 1.3)
-    fill_resolver(detector.fine, 0.01, 0.003, 0.02)
-    fill_resolver(detector.coarse, 0.02, 0.01, 0.01)
-    machine.motor.coulomb, machine.motor.static = 0.002, 0.003
-    machine.load.torque, machine.load.begin, machine.load.end = 0.03, 900, 2500
+    train, plant = rig.p.plant.train, rig.p.plant
+    train.gear.half_backlash, train.reduction.half_backlash = 0.02, 0.1
+    fill_eccentricity(train.gear, 1e-3, 0.3)
+    fill_eccentricity(train.reduction, 5e-3, 1.3)
+    fill_resolver(plant.fine, 0.01, 0.003, 0.02)
+    fill_resolver(plant.coarse, 0.02, 0.01, 0.01)
+    train.motor.coulomb, train.motor.static = 0.002, 0.003
+    train.load.torque, train.load.begin, train.load.end = 0.03, 900, 2500
     digest = hashlib.sha256(rig.p.snapshot())
     for sign in (1, -1):
         rig.press(sign, 40).run_ticks(1500)

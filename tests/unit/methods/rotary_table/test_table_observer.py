@@ -27,18 +27,18 @@ def observed(*overrides):
 @pytest.mark.parametrize("slack", [0.0, 0.3, -0.3])
 def test_the_phase_goes_on_beyond_a_turn(turns, slack):
     rig = Rig(0)
-    fill_eccentricity(rig.p.machine.gear, 0.01, 0.5)
-    motor = rig.r.machine.motor
+    fill_eccentricity(rig.p.plant.train.gear, 0.01, 0.5)
+    motor = rig.r.plant.train.motor
     motor.turns, motor.angle = math.floor(turns), (turns - math.floor(turns)) * 2 * math.pi
-    rig.r.machine.gear.slack = slack
+    rig.r.plant.train.gear.slack = slack
     phase = endless_phase(rig.p, rig.r)
-    assert phase % TURN == output_phase(rig.p.machine.gear, slack, motor.turns, motor.angle)
+    assert phase % TURN == output_phase(rig.p.plant.train.gear, slack, motor.turns, motor.angle)
     assert phase / TURN == pytest.approx((turns + slack / 2 / math.pi) / RATIO, abs=0.0017)
 
 
 def test_the_phase_is_as_fine_after_a_million_turns():
     rig = Rig(0)
-    motor = rig.r.machine.motor
+    motor = rig.r.plant.train.motor
     phases = []
     for turns in (0, 10**6 * RATIO):
         motor.turns, motor.angle = turns, 1e-6
@@ -53,7 +53,8 @@ def test_the_angle_at_power_on_is_that_of_the_axis_file_and_so_is_the_target(deg
     assert observer.angle == pytest.approx(math.radians(degrees), abs=count)
     assert observer.target == pytest.approx(math.radians(degrees), abs=count)
     assert observer.miss * host.spec.detector.fine.counts == pytest.approx(-0.5)  # it stands in the middle of a count
-    assert host.machine.state.positioner.angle.position == round(degrees / 360 * host.spec.period) % host.spec.period
+    position = host.machine.state.controller.positioner.angle.position
+    assert position == round(degrees / 360 * host.spec.period) % host.spec.period
 
 
 def test_angle_and_target_stay_together_over_turns_and_boundaries():
@@ -70,7 +71,7 @@ def test_angle_and_target_stay_together_over_turns_and_boundaries():
         assert observer.target == pytest.approx(observer.angle, abs=2.5 * host.spec.count)
     # Each jog goes on up to the task's next pass.
     assert math.degrees(observer.angle) == pytest.approx(-10 + 20 * 60 - 31 * 60, abs=2.5)
-    assert host.machine.state.positioner.angle.crossings > 3
+    assert host.machine.state.controller.positioner.angle.crossings > 3
 
 
 def test_a_detector_that_is_wrong_by_a_motor_turn_shows_as_a_miss():
@@ -87,8 +88,8 @@ def test_backlash_and_eccentricity_are_in_the_angle_not_in_the_miss():
     machine.pass_ticks(3)
     observer = TableObserver(spec, machine)
     state = machine.state
-    state.positioner.dial, state.positioner.plus = round(spec.per_interrupt(1.0)), 1
+    state.controller.positioner.dial, state.controller.positioner.plus = round(spec.per_interrupt(1.0)), 1
     machine.pass_time(1.5)  # in the first quarter: the table leads by up to a degree, less the half backlash
-    motor = (state.machine.motor.turns + state.machine.motor.angle / 2 / math.pi) * 360 / spec.ratio
+    motor = (state.plant.train.motor.turns + state.plant.train.motor.angle / 2 / math.pi) * 360 / spec.ratio
     led = math.sin(math.radians(motor)) - 0.2
     assert math.degrees(observer.angle) - motor == pytest.approx(led, abs=0.01)
