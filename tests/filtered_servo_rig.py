@@ -24,8 +24,11 @@ START = 25.0
 COMMON = (
     "limits.travel=50 m", f"mechanics.start_position={START} m", "mechanics.moving_mass=0 kg",
     "motor.rotor_inertia=700 g*cm^2", "method.command_acceleration=0 m/s^2",
+    *(f"protection.{watch}=0" for watch in ("overspeed", "jump")),
+    *(f"protection.{watch}_time=0 s" for watch in ("saturation", "stuck", "reversed")),
     *(f"mechanics.friction.{side}.{kind}=0 N" for side in ("right", "left") for kind in ("coulomb", "static")),
 )  # fmt: skip
+"""What the tests of the law have in common; loops that swing and plants without friction are nothing to protect."""
 
 PULSE = 5e-6
 """Travel per pulse [m]."""

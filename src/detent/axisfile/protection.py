@@ -6,10 +6,11 @@ a second); the effort under which a standing sensor counts as stuck is twice wha
 
 import math
 
-from detent.control.guard import GuardParams
+from detent.control.guard import Guard, GuardParams
 from detent.errors import GUARD_TEXT
 from detent.files.fields import Table, optional
 from detent.files.quantities import Time
+from detent.units import format_quantity
 
 
 class ProtectionTable(Table, frozen=True):
@@ -48,11 +49,25 @@ def samples(time: float, sample: float) -> int:
     return max(1, math.ceil(time / sample - 1e-9)) if time > 0.0 else 0
 
 
-def breaking_effort(table: ProtectionTable, static: float, effort: float) -> float:
-    """Share of the largest effort [N, N.m or V] under which the axis must move, with this static friction."""
-    return min(max(0.3, 2.0 * static / effort), 1.0) if math.isnan(table.stuck_effort) else table.stuck_effort
+def breaking_effort(static: float, effort: float) -> float:
+    """Share of the largest effort [N or N.m] under which the axis must move, with this static friction."""
+    return min(max(0.3, 2.0 * static / effort), 1.0) if effort > 0.0 else 1.0
 
 
 def guard_text(code: int, **limits: str) -> str:
     """What a fault of the guard means and what to do, with the limits of the axis."""
     return GUARD_TEXT[code].format(**limits)
+
+
+def describe_fault(guard: Guard, table: ProtectionTable, *, speed: str, lower: str, upper: str, **more: str) -> str:
+    """What a fault of the guard means and what to do, by the keys of the file; largest speed and ends for people."""
+    return guard_text(
+        guard.code,
+        stuck=format_quantity(table.stuck_time, "s"),
+        reversed=format_quantity(table.reversed_time, "s"),
+        saturated=format_quantity(table.saturation_time, "s"),
+        speed=f"{table.overspeed:g} x {speed}",
+        side="upper" if guard.side > 0 else "lower",
+        end=upper if guard.side > 0 else lower,
+        **more,
+    )

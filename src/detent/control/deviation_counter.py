@@ -4,8 +4,8 @@ from detent.kernel.registers import Registers, f8, i4, i8, register, u1
 from detent.kernel.step import step
 
 RESET, RUN, FAULT = 0, 1, 2
-DEVIATION_RANGE, SPEED_RANGE = 1, 2
-"""Causes of a fault; their texts stand in `errors.SERVO_FAULT_TEXT`."""
+DEVIATION_RANGE, SPEED_RANGE, GUARDED = 1, 2, 3
+"""Causes of a fault; the texts of two stand in `errors.SERVO_FAULT_TEXT`, of the third in `errors.GUARD_TEXT`."""
 
 
 class DeviationParams(Registers):
@@ -21,7 +21,9 @@ class Deviation(Registers):
     """Following error, and whether it drives."""
 
     state: u1 = register("0 reset, 1 run, 2 fault", unit="code")
-    cause: u1 = register("of the last fault: 1 deviation out of range, 2 speed counter about to wrap", unit="code")
+    cause: u1 = register(
+        "of the last fault: 1 deviation out of range, 2 speed counter about to wrap, 3 the guard", unit="code"
+    )
     reset: u1 = register("leave a fault, written by the host, cleared when done")
     deviation: i4 = register("P: command pulses less movement pulses", unit="count")
     position: i8 = register("movement pulses since reset, forward less backward", unit="count")

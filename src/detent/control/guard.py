@@ -21,8 +21,6 @@ JUMPS = 2
 FAST = 2
 """Samples in a row beyond the largest speed that are a fault."""
 
-NEVER = 1 << 62
-
 
 class GuardParams(Registers):
     """Windows and times; a time of 0 switches its watch off."""
@@ -36,6 +34,7 @@ class GuardParams(Registers):
         "samples at rest under an effort that breaks the axis loose until that is a fault", unit="count"
     )
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
+    period: i4 = register("time between two samples, of a controller that has no slower clock of its own", unit="tick")
 
 
 class Guard(Registers):
@@ -51,23 +50,27 @@ class Guard(Registers):
     pushed: i4 = register("samples of effort in one direction in the running window", unit="count")
     push: i1 = register("direction of that effort")
     began: i8 = register("movement in the first sample of the window", unit="count")
-    deadline: i8 = register("time at which the axis must have arrived, on the controller's own clock", unit="tick")
+    awaited: i8 = register("time in which the axis must still arrive; 0: none waits for it", unit="tick")
 
 
+@step
 def enable_guard(g: Guard) -> None:
-    """Host action: forget the last fault and what led to it."""
-    deadline = g.deadline
-    g.restore(bytes(len(bytes(g))))
-    g.deadline = deadline
+    """Forget the last fault and what led to it: the axis is enabled."""
+    g.code = g.side = g.push = g.pushed = 0
+    g.following = g.saturated = g.stuck = g.fast = g.jumps = 0
+    g.awaited = 0
 
 
-def await_arrival(g: Guard, deadline: int) -> None:
-    """Host action: the axis must arrive by this tick of the controller's own clock; `NEVER` lifts it."""
-    g.deadline = deadline
+@step
+def await_arrival(g: Guard, ticks: int) -> None:
+    """Host action: the axis must arrive within so many ticks; 0 lifts it."""
+    g.awaited = ticks
+    if ticks and g.code == NO_ARRIVAL:
+        g.code = 0
 
 
 @hot_step
-def lasting(wrong: bool, before: int) -> int:
+def lasting(wrong: int, before: int) -> int:
     """Samples in a row in which something is wrong."""
     return before + 1 if wrong else 0
 
@@ -111,12 +114,12 @@ def watch_speed(p: GuardParams, g: Guard, moved: int) -> None:
 
 
 @step
-def watch(p: GuardParams, g: Guard, late: bool, side: int, limited: bool, pushing: int, moved: int) -> int:
+def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing: int, moved: int) -> int:
     """One sample; returns the code of the fault, 0 while there is none.
 
-    `late`: the following error is beyond its largest; `side`: -1 or 1 beyond the lower or upper end of the travel;
-    `limited`: the command is at its limit; `pushing`: direction of an effort that breaks the axis loose, else 0;
-    `moved`: counts since the last sample.
+    `late`: 1 while the following error is beyond its largest; `side`: -1 or 1 beyond the lower or upper end of the
+    travel; `limited`: 1 while the command is at its limit; `pushing`: direction of an effort that breaks the axis
+    loose, else 0; `moved`: counts since the last sample.
     """
     g.following = lasting(late, g.following)
     if 0 < p.following <= g.following:
@@ -132,8 +135,11 @@ def watch(p: GuardParams, g: Guard, late: bool, side: int, limited: bool, pushin
     return g.code
 
 
-@step
-def miss_arrival(g: Guard) -> None:
-    """The time for the move is over and the axis has not arrived: told, and the drive goes on holding."""
-    g.deadline = NEVER
+@hot_step
+def is_overdue(g: Guard) -> bool:
+    """Of one tick of an arrival that is awaited: true in the last. That is told, and the drive goes on holding."""
+    g.awaited -= 1
+    if g.awaited:
+        return False
     trip(g, NO_ARRIVAL)
+    return True

@@ -13,7 +13,7 @@ def guard_of(sample=1e-3, speed=10_000.0, **keys):
 
 
 def test_every_watch_is_on_by_default():
-    assert all(value > 0 for path, value in guard_of().values().items() if path != "following")
+    assert all(value > 0 for path, value in guard_of().values().items() if path not in {"following", "period"})
 
 
 def test_windows_are_in_samples_and_speeds_in_counts_of_one():
@@ -46,12 +46,7 @@ def test_a_time_shorter_than_a_sample_is_one():
 
 @pytest.mark.parametrize(("static", "share"), [(0.0, 0.3), (20.0, 0.4), (90.0, 1.0)])
 def test_the_effort_that_must_move_the_axis_follows_its_friction(static, share):
-    assert breaking_effort(ProtectionTable(), static, 100.0) == pytest.approx(share)
-
-
-def test_a_stated_effort_counts():
-    table = ProtectionTable.model_construct(stuck_effort=0.8)
-    assert breaking_effort(table, 20.0, 100.0) == 0.8
+    assert breaking_effort(static, 100.0) == pytest.approx(share)
 
 
 def test_a_text_names_the_limit():

@@ -3,7 +3,6 @@ import pytest
 from detent.control.guard import (
     FOLLOWING,
     JUMPED,
-    NEVER,
     NO_ARRIVAL,
     OVERSPEED,
     REVERSED,
@@ -14,7 +13,7 @@ from detent.control.guard import (
     GuardParams,
     await_arrival,
     enable_guard,
-    miss_arrival,
+    is_overdue,
     watch,
 )
 from detent.errors import GUARD_TEXT
@@ -26,7 +25,7 @@ def fault(samples, **params):
     """Code and number of the sample with the first fault; (0, None) without."""
     p, g = GuardParams(**(WATCHES | params)), Guard()
     for number, one in enumerate(samples, 1):
-        seen = {"late": False, "side": 0, "limited": False, "pushing": 0, "moved": 5} | one
+        seen = {"late": 0, "side": 0, "limited": 0, "pushing": 0, "moved": 5} | one
         if watch(p, g, *seen.values()):
             return int(g.code), number
     return 0, None
@@ -38,8 +37,8 @@ CALM = {}
 @pytest.mark.parametrize(
     ("wrong", "code", "lasts"),
     [
-        ({"late": True}, FOLLOWING, 3),
-        ({"limited": True}, SATURATED, 4),
+        ({"late": 1}, FOLLOWING, 3),
+        ({"limited": 1}, SATURATED, 4),
         ({"pushing": 1, "moved": 0}, STUCK, 5),
         ({"pushing": -1, "moved": 0}, STUCK, 5),
         ({"side": 1}, TRAVEL, 1),
@@ -54,8 +53,8 @@ def test_a_fault_is_what_lasts(wrong, code, lasts):
 @pytest.mark.parametrize(
     ("watch_of", "wrong"),
     [
-        ("following", {"late": True}),
-        ("saturated", {"limited": True}),
+        ("following", {"late": 1}),
+        ("saturated", {"limited": 1}),
         ("stuck", {"pushing": 1, "moved": 0}),
         ("travel", {"side": -1}),
         ("speed", {"moved": 12}),
@@ -86,15 +85,23 @@ def test_braking_is_none(way):
 
 def test_the_first_cause_stays_until_the_axis_is_enabled():
     p, g = GuardParams(**WATCHES), Guard()
-    await_arrival(g, 1000)
-    watch(p, g, False, -1, False, 0, 0)
+    watch(p, g, 0, -1, 0, 0, 0)
     for _ in range(20):
-        assert watch(p, g, True, 1, True, 1, 0) == TRAVEL
+        assert watch(p, g, 1, 1, 1, 1, 0) == TRAVEL
     assert (g.code, g.side) == (TRAVEL, -1)
     enable_guard(g)
-    assert (g.code, g.side, g.stuck, g.deadline) == (0, 0, 0, 1000)
-    miss_arrival(g)
-    assert (g.code, g.deadline) == (NO_ARRIVAL, NEVER)
+    assert (g.code, g.side, g.stuck, g.awaited) == (0, 0, 0, 0)
+
+
+def test_an_arrival_is_awaited_for_so_many_ticks():
+    g = Guard()
+    await_arrival(g, 3)
+    assert [is_overdue(g) for _ in range(3)] == [False, False, True]
+    assert (g.code, g.awaited) == (NO_ARRIVAL, 0)
+    await_arrival(g, 0)
+    assert g.code == NO_ARRIVAL
+    await_arrival(g, 3)
+    assert g.code == 0
 
 
 def test_every_fault_has_its_text():

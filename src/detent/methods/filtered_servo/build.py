@@ -4,10 +4,14 @@ import math
 
 from detent.axisfile.drive_train import fill_drive_train
 from detent.axisfile.interference import fill_interference, fill_push
+from detent.axisfile.protection import fill_guard
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
+
+GUARD_PERIOD = 1e-3
+"""Time between two looks of the guard [s]."""
 
 
 def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
@@ -38,6 +42,12 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     )  # fmt: skip
     fill_interference(m.interference, spec.disturbance.lines, TICK)
     fill_push(m.push, spec.disturbance.push, TICK)
+    fill_guard(c.guard, spec.protection, sample=GUARD_PERIOD, speed=spec.limits.speed / spec.pulse)
+    c.guard.period = round(GUARD_PERIOD / TICK)
+    c.breaking = spec.protection.stuck_effort * c.deviation.word_limit
+    start = spec.mechanics.start_position
+    c.lowest = round(-start / spec.pulse) - method.in_position
+    c.highest = round((spec.limits.travel - start) / spec.pulse) + method.in_position
     c.window = method.in_position
     c.window_ticks = round(method.in_position_time / TICK)
     return p

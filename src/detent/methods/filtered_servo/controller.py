@@ -6,6 +6,7 @@ Clocks in which nothing happens, or nothing whose moment matters, are skipped.
 
 from detent.control.deviation_counter import (
     FAULT,
+    GUARDED,
     RESET,
     RUN,
     Deviation,
@@ -14,6 +15,7 @@ from detent.control.deviation_counter import (
     drive_word,
     watch_ranges,
 )
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
 from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
@@ -59,6 +61,10 @@ class FilteredControllerParams(Registers):
     filter: SpeedFilterParams = block("scale and filter")
     window: i8 = register("deviation that counts as in position", unit="count")
     window_ticks: i8 = register("time inside it until the axis says so", unit="tick")
+    guard: GuardParams = block("protection")
+    breaking: f8 = register("drive word that breaks the slide loose", unit="count")
+    lowest: i8 = register("lower end of the travel, from where the slide stood at power-on", unit="count")
+    highest: i8 = register("upper end of the travel", unit="count")
 
 
 class FilteredController(Registers):
@@ -77,6 +83,9 @@ class FilteredController(Registers):
     away: u1 = register("1 while commanded or out of position")
     settling: i8 = register("ticks until the axis says that it is in position; 0 it does not come to that", unit="tick")
     event: u1 = register("1 when the axis has come into position or failed; the host clears it")
+    guard: Guard = block("protection")
+    watched: i8 = register("pulses at the last look of the guard", unit="count")
+    look: i8 = register("ticks until its next look", unit="tick")
 
 
 # ---- host actions
@@ -97,6 +106,12 @@ def go_to(c: FilteredController, goal: int, rate: int) -> None:
     c.generator.goal, c.generator.rate = goal, rate
     c.away = c.busy = 1
     c.event = 0
+
+
+@step
+def arrive_within(c: FilteredController, ticks: int) -> None:
+    """The axis must be in position within so many ticks; 0 lifts it."""
+    await_arrival(c.guard, ticks)
 
 
 @step
@@ -257,6 +272,7 @@ def leave_reset(c: FilteredController) -> None:
     preset_decoder(c.decoder, c.channel_a, c.channel_b)
     c.deviation.reset = 0
     c.deviation.state = RUN
+    enable_guard(c.guard)
     c.failed = 0
     c.event = 0
     c.busy = 1
@@ -279,11 +295,38 @@ def ramp(p: FilteredControllerParams, c: FilteredController) -> None:
 
 @hot_step
 def watch_arrival(c: FilteredController) -> None:
-    """Tell the host when the axis has been in position for its time."""
+    """Tell the host when the axis has been in position for its time, or has not come there in time."""
     if c.settling > 0:
         c.settling -= 1
         if c.settling == 0:
             c.event = 1
+    if c.guard.awaited and is_overdue(c.guard) and c.event == 0:
+        c.event = 1
+
+
+@step
+def protect(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """The guard looks: effort by the drive word, way by the counted pulses."""
+    c.look = p.guard.period
+    d, moved = c.deviation, c.deviation.position - c.watched
+    c.watched = d.position
+    if d.state != RUN:
+        return
+    pushing = 1 if lines.word >= p.breaking else -1 if lines.word <= -p.breaking else 0
+    side = 1 if d.position > p.highest else -1 if d.position < p.lowest else 0
+    limited = 1 if abs(lines.word) >= p.deviation.word_limit else 0
+    if watch(p.guard, c.guard, 0, side, limited, pushing, moved):
+        d.state, d.cause = FAULT, GUARDED
+        decide(p, c, lines)
+
+
+@hot_step
+def end_tick(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """What the clocks have left to say: the guard looks, and the axis may have arrived."""
+    c.look -= 1
+    if c.look <= 0:
+        protect(p, c, lines)
+    watch_arrival(c)
 
 
 @controls(FilteredControllerParams)
@@ -295,12 +338,12 @@ def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
         run_clocks(p, c, lines)
     elif skip_clocks(p, c, CLOCKS, 0):
         decide(p, c, lines)
-    watch_arrival(c)
+    end_tick(p, c, lines)
 
 
 @step
 def control_clock(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> None:
-    """Clock `k` of a tick with every clock run, for timing diagrams: the same bits; `end_tick` follows the last."""
+    """Clock `k` of a tick with every clock run, for timing diagrams: the same bits; after the last, what follows."""
     if k == 0:
         ramp(p, c)
         if c.deviation.reset:
@@ -309,7 +352,7 @@ def control_clock(p: FilteredControllerParams, c: FilteredController, lines: Fil
 
 
 @step
-def end_tick(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+def end_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """What follows from ten clocks."""
     conclude(p, c, lines)
-    watch_arrival(c)
+    end_tick(p, c, lines)

@@ -1,12 +1,13 @@
 """The host of a filtered servo: command pulses, in position, fault."""
 
-from detent.control.deviation_counter import FAULT
+from detent.axisfile.protection import describe_fault
+from detent.control.deviation_counter import FAULT, GUARDED
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT, FileProblem
 from detent.kernel.loop import advance
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.controller import acknowledge, go_to, set_period
+from detent.methods.filtered_servo.controller import acknowledge, arrive_within, go_to, set_period
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.moves.host import Destination, Host, Problem
 from detent.methods.moves.job import Move
@@ -49,8 +50,11 @@ class FilteredHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until in position; False on a fault, or when it is not within `seconds`."""
-        self.machine.pass_time(seconds)
-        arrived = bool(self.controller.event) and self.controller.deviation.state != FAULT
+        ticks = max(1, round(seconds / self.machine.tick))
+        arrive_within(self.controller, ticks)
+        self.machine.pass_ticks(ticks)
+        arrived = bool(self.controller.event) and not self.controller.guard.code and not self.failure
+        arrive_within(self.controller, 0)
         acknowledge(self.controller)
         return arrived
 
@@ -77,8 +81,13 @@ class FilteredHost(Host):
     @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it runs."""
-        d = self.controller.deviation
-        return SERVO_FAULT_TEXT[d.cause] if d.state == FAULT else ""
+        d, limits = self.controller.deviation, self.spec.limits
+        if d.state != FAULT:
+            return ""
+        if d.cause != GUARDED:
+            return SERVO_FAULT_TEXT[d.cause]
+        speed, lower, upper = format_quantity(limits.speed, "m/s"), "0 m", format_quantity(limits.travel, "m")
+        return describe_fault(self.controller.guard, self.spec.protection, speed=speed, lower=lower, upper=upper)
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand; that it comes into position again after a disturbance is no news."""

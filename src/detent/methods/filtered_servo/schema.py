@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from detent.axisfile.protection import ProtectionTable, breaking_effort
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
@@ -147,6 +148,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
     mechanics: MechanicsTable
     encoder: EncoderTable
     method: MethodTable = Field(default_factory=MethodTable)
+    protection: ProtectionTable = Field(default_factory=ProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property
@@ -217,8 +219,11 @@ class FilteredServoSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: FilteredServoSpec) -> FilteredServoSpec:
     """Fill the defaults that depend on another key, as their `derived` texts say."""
-    if not math.isnan(spec.mechanics.start_position):
-        return spec
-    return spec.model_copy(
-        update={"mechanics": spec.mechanics.model_copy(update={"start_position": 0.1 * spec.limits.travel})}
-    )
+    friction, mechanics, protection = spec.mechanics.friction, spec.mechanics, spec.protection
+    if math.isnan(mechanics.start_position):
+        mechanics = mechanics.model_copy(update={"start_position": 0.1 * spec.limits.travel})
+    if math.isnan(protection.stuck_effort):
+        static = max(friction.right.static, friction.left.static)
+        share = breaking_effort(static, spec.word_limit * spec.force_per_count)
+        protection = protection.model_copy(update={"stuck_effort": share})
+    return spec.model_copy(update={"mechanics": mechanics, "protection": protection})

@@ -20,7 +20,7 @@ from detent.methods.filtered_servo.controller import (
     FilteredLines,
     control,
     control_clock,
-    end_tick,
+    end_clocks,
     power_on,
 )
 from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, lay_lines, move, sense
@@ -75,7 +75,7 @@ def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, most: int, trace
         for k in range(CLOCKS):
             control_clock(p.controller, r.controller, r.lines, k)
             write_row(r, r.tick * CLOCKS + k, trace, picks, 1)
-        end_tick(p.controller, r.controller, r.lines)
+        end_clocks(p.controller, r.controller, r.lines)
         move(p.plant, r.plant, train, r.tick, r.lines)
         r.tick += 1
         n += 1

@@ -36,7 +36,7 @@ class MoveMethod(Method[SpecT], Protocol[SpecT]):
         """Base tick [s]."""
         ...
 
-    def host(self, spec: SpecT, recorder: "AnyRecorder | None" = None) -> "Host":
+    def host(self, spec: SpecT, recorder: "AnyRecorder | None") -> "Host":
         """The simulated axis at power-on, and what commands it."""
         return self.brought(self.commands)(spec, recorder)
 
