@@ -20,8 +20,7 @@ METHODS = {"regression": "regression", "output-error": "output error"}
 
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 
-MOST_LINES = 6
-"""Logs, findings and refusals shown; --json and the report have them all."""
+MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
 Mapping = Annotated[
     Path | None, typer.Option("--map", metavar="FILE", help="Mapping file (TOML): what the columns of the logs are.")

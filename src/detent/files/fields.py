@@ -15,8 +15,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from detent.units import QuantityError, describe_kind, format_quantity, parse_quantity
 
-LIST_EXAMPLE = "[20000, 20096]"
-"""List of whole numbers shown for a key that has no example of its own."""
+LIST_EXAMPLE = "[20000, 20096]"  # list of whole numbers shown for a key that has no example of its own
 
 
 IN_SI: Final = "values are in SI units"

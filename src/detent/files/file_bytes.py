@@ -6,9 +6,7 @@ from pathlib import Path
 
 from detent.errors import InputError
 
-PACKED = ".gz"
-"""Ending of a packed text file, after that of its kind: ``run.csv.gz``."""
-
+PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
 _REMEDY = "check the name of the recording"
 
 

@@ -10,11 +10,8 @@ from detent.files.fields import Table, unit_of
 from detent.files.problems import field_at
 from detent.units import IN_DEGREES, format_quantity, in_degrees, parse_quantity
 
-BARELY = 1e-9
-"""Relative distance that a value keeps from a bound it must not touch."""
-
-UNITS = "check the units of what it depends on"
-"""Remedy where a key has no value that would do."""
+BARELY = 1e-9  # relative distance that a value keeps from a bound it must not touch
+UNITS = "check the units of what it depends on"  # remedy where a key has no value that would do
 
 
 def at_most(value: float, unit: str, digits: int = 4) -> str:

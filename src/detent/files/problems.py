@@ -31,8 +31,7 @@ from detent.files.locate import Index, Path, Place, find_place
 from detent.files.text import MAX_SHOWN
 from detent.units import format_quantity
 
-MAX_ELEMENTS = 3
-"""Wrong numbers of a list shown in a message."""
+MAX_ELEMENTS = 3  # wrong numbers of a list shown in a message
 
 
 class Reporter:

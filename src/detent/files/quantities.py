@@ -4,9 +4,7 @@ from typing import Annotated
 
 from detent.files.fields import Unit
 
-INCH = 0.0254
-"""One inch [m]."""
-
+INCH = 0.0254  # one inch [m]
 Length = Annotated[float, Unit("m")]
 Velocity = Annotated[float, Unit("m/s")]
 Acceleration = Annotated[float, Unit("m/s^2")]

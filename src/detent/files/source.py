@@ -10,12 +10,8 @@ from typing import Any
 from detent.errors import FileProblem, InputError
 from detent.files.locate import Index, Place, locate_keys
 
-MAX_BYTES = 1_000_000
-"""Largest axis file read; a real one has a few thousand bytes."""
-
-MAX_SYNTAX_PROBLEMS = 20
-"""Syntax errors reported at most: a file of another kind would have one in each line."""
-
+MAX_BYTES = 1_000_000  # largest axis file read; a real one has a few thousand bytes
+MAX_SYNTAX_PROBLEMS = 20  # syntax errors reported at most: a file of another kind would have one in each line
 _POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _ASSIGNMENT = re.compile(r"\s*[\w.\"' -]+=")
 _UNQUOTED_QUANTITY = re.compile(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?\s*[A-Za-z%µΩ][^\"']*")

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from detent.errors import FileProblem, InputError
 
-MAX_SHOWN = 60
-"""Characters of a value shown in a message."""
+MAX_SHOWN = 60  # characters of a value shown in a message
 
 MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
 """Largest file read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly

@@ -13,23 +13,12 @@ from detent.logs.differences import FARTHEST, Likeness, correlation_curve, grain
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity
 
-OPPOSED = -0.7
-"""Correlation below which two signals that should agree have opposite signs."""
-
-ALIKE = 0.9
-"""Correlation above which their factor is a unit's and not the noise's."""
-
-FOLLOWS = 0.95
-"""The same for a position and its reference, whose sizes differ where a weak loop does not follow."""
-
-NEAR = 0.05
-"""Relative distance from a known factor at which it is taken for that one."""
-
-NEAR_REFERENCE = 0.12
-"""The same for a reference."""
-
-TOLERATED = 0.25
-"""Relative deviation of a factor from 1 that a filter or a calibration may make."""
+OPPOSED = -0.7  # correlation below which two signals that should agree have opposite signs
+ALIKE = 0.9  # correlation above which their factor is a unit's and not the noise's
+FOLLOWS = 0.95  # the same for a position and its reference, whose sizes differ where a weak loop does not follow
+NEAR = 0.05  # relative distance from a known factor at which it is taken for that one
+NEAR_REFERENCE = 0.12  # the same for a reference
+TOLERATED = 0.25  # relative deviation of a factor from 1 that a filter or a calibration may make
 
 FACTORS: dict[str, dict[float, str]] = {
     "m": {

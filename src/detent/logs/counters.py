@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 from detent.logs.draft import Draft, tell_count
 from detent.logs.log import Action, Kind, Values
 
-WIDTHS = (16, 32)
-"""Bits of counters that are tried where none are stated."""
-
-POSITIONS = ("position", "position_load", "reference")
-"""Signals that come from counters."""
+WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
+POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
 
 SMALL = 1 / 8
 """Step across the end of a counter, as a share of its range, up to which it is a wrap: an axis moves less than an
@@ -22,11 +19,8 @@ USUAL = 3.0
 """Step across the end of a counter, in steps of the rows around, up to which it is a wrap: a counter that was set to
 zero steps by any amount."""
 
-AROUND = 5
-"""Rows to either side whose steps are the usual ones."""
-
-_FREE = 8.0
-"""Step that is believed whatever the rows around do [numbers of the file]: an axis may start right there."""
+AROUND = 5  # rows to either side whose steps are the usual ones
+_FREE = 8.0  # step that is believed whatever the rows around do [numbers of the file]: an axis may start right there
 
 
 def unwrap_clock(draft: Draft) -> None:

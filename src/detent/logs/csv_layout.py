@@ -14,9 +14,7 @@ from detent.logs.log_units import is_unit, split_heading
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
 """Separators by the words that name them in options."""
 
-SAMPLE_LINES = 200
-"""Lines that say something from which the layout is guessed."""
-
+SAMPLE_LINES = 200  # lines that say something from which the layout is guessed
 _TRIED = ("\t", ";", ",", "|", " ")
 _COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
 

@@ -9,14 +9,9 @@ from detent.logs.log import Values
 from detent.logs.stamps import stretches
 from detent.logs.windows import sliding_products
 
-QUANTA = 20.0
-"""Times its grain by which a position should change over a window for rounding and noise not to count."""
-
-FARTHEST = 200
-"""Rows up to which a shift is looked for."""
-
-FEWEST_WINDOWS = 20
-"""Windows that a recording is divided into at least."""
+QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
+FARTHEST = 200  # rows up to which a shift is looked for
+FEWEST_WINDOWS = 20  # windows that a recording is divided into at least
 
 
 class Likeness(NamedTuple):

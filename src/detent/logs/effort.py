@@ -17,12 +17,8 @@ from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 from detent.logs.windows import parabolas
 
-EXPLAINED = 0.3
-"""Share of the variance of an effort that the motion must explain before its sign is judged."""
-
-AGAINST = -0.3
-"""Sum of the shares (standardised) of inertia and friction below which an effort has the wrong sign."""
-
+EXPLAINED = 0.3  # share of the variance of an effort that the motion must explain before its sign is judged
+AGAINST = -0.3  # sum of the shares (standardised) of inertia and friction below which an effort has the wrong sign
 _FEWEST = 50
 _HELPS = 0.15
 _LOSES = 0.5

@@ -8,14 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Values = NDArray[np.float64]
-"""Numbers of a signal, shape (n,)."""
-
-Rows = NDArray[np.int64]
-"""Numbers of rows of a file, from 1, header lines not counted, shape (n,)."""
-
-MOST_RANGES = 5
-"""Stretches of rows named in a sentence; the finding itself holds all."""
+Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
+Rows = NDArray[np.int64]  # numbers of rows of a file, from 1, header lines not counted, shape (n,)
+MOST_RANGES = 5  # stretches of rows named in a sentence; the finding itself holds all
 
 
 class Kind(StrEnum):

@@ -43,9 +43,7 @@ from detent.logs.csv_layout import SEPARATORS, FileOptions
 from detent.logs.log_units import find_conversion
 from detent.logs.roles import ROLES
 
-MAX_BYTES = 100_000
-"""Largest mapping file read; a real one has a few hundred bytes."""
-
+MAX_BYTES = 100_000  # largest mapping file read; a real one has a few hundred bytes
 _DECIMALS = {"point": ".", "comma": ","}
 _OPTION = re.compile(r"\s*([A-Za-z_]+)\s*=\s*(.*)", re.DOTALL)
 _MOST_BITS = 63

@@ -8,8 +8,7 @@ from detent.logs.log import Action, Kind, Severity
 SLOW = frozenset({"supply", "temperature", "enabled"})
 """Signals that change slowly and are often recorded only now and then: they keep their last value."""
 
-MOST = 0.1
-"""Share of empty cells from which a signal is left out: with more, too many rows would go with them."""
+MOST = 0.1  # share of empty cells from which a signal is left out: with more, too many rows would go with them
 
 
 def mend_missing(draft: Draft) -> None:

@@ -12,20 +12,11 @@ from detent.errors import InputError
 from detent.files.text import short
 from detent.logs.log import Finding, Rows, Values
 
-MAX_CELLS = 50_000_000
-"""Most numbers read from one file: 400 MB of them."""
-
-MAX_COLUMNS = 2000
-"""Most columns read from one file."""
-
-MAX_CONSTANTS = 200
-"""Most single values kept beside the columns."""
-
-LARGEST_EXACT = 2**53
-"""Whole numbers up to this size are exact as floats."""
-
-MOST_NAMED = 12
-"""Columns named in a message."""
+MAX_CELLS = 50_000_000  # most numbers read from one file: 400 MB of them
+MAX_COLUMNS = 2000  # most columns read from one file
+MAX_CONSTANTS = 200  # most single values kept beside the columns
+LARGEST_EXACT = 2**53  # whole numbers up to this size are exact as floats
+MOST_NAMED = 12  # columns named in a message
 
 
 class Item(NamedTuple):

@@ -17,9 +17,7 @@ from detent.logs.log_units import split_heading
 from detent.logs.raw_table import MAX_CELLS, Item, RawTable, table_of
 from detent.logs.read_hdf5 import read_hdf5
 
-MAX_BYTES = 500_000_000
-"""Largest file of arrays read."""
-
+MAX_BYTES = 500_000_000  # largest file of arrays read
 ALLOWED_MAT = "a MATLAB file with vectors of equal length"
 ALLOWED_NPZ = "an NPZ or NPY file with vectors of equal length"
 

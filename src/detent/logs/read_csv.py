@@ -19,9 +19,7 @@ MAX_BYTES = 200_000_000
 
 ALLOWED = "a table as text: CSV, packed with gzip or not"
 
-BLOCK_ROWS = 16384
-"""Rows whose cells are in memory as text at once."""
-
+BLOCK_ROWS = 16384  # rows whose cells are in memory as text at once
 _MOST_BROKEN = 0.2
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 

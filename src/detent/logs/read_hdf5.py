@@ -14,9 +14,7 @@ from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
 from detent.logs.raw_table import MAX_CELLS, MAX_COLUMNS, MAX_CONSTANTS, Item, RawTable, table_of, tell
 
-MAX_BYTES = 2_000_000_000
-"""Largest file read; what counts is how many numbers are taken from it."""
-
+MAX_BYTES = 2_000_000_000  # largest file read; what counts is how many numbers are taken from it
 ALLOWED = "an HDF5 file with vectors of equal length"
 
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")

@@ -25,9 +25,7 @@ from detent.logs.raw_table import (
     tell,
 )
 
-MAX_BYTES = 100_000_000
-"""Longest file of JSON read, unpacked; its values take ten times the memory."""
-
+MAX_BYTES = 100_000_000  # longest file of JSON read, unpacked; its values take ten times the memory
 ALLOWED = "JSON: a list of records, lists by their names, or one record per line"
 
 Record = dict[str, Any]

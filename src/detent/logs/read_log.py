@@ -17,9 +17,7 @@ from detent.logs.raw_table import RawTable
 from detent.logs.read_table import read_table
 from detent.logs.rotation import mend_rotation
 
-EPOCH = 1e8
-"""A time from which on it counts from some year, and is counted from the first sample instead [s]."""
-
+EPOCH = 1e8  # a time from which on it counts from some year, and is counted from the first sample instead [s]
 _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 
 

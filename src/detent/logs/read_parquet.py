@@ -13,9 +13,7 @@ from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
 from detent.logs.raw_table import Item, RawTable, check_size, table_of
 
-MAX_BYTES = 2_000_000_000
-"""Largest file read; what counts is how many numbers it holds."""
-
+MAX_BYTES = 2_000_000_000  # largest file read; what counts is how many numbers it holds
 ALLOWED = "a Parquet file with columns of numbers"
 
 

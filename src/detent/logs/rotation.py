@@ -15,12 +15,8 @@ SHORTEST = 10
 """Rows in which a column must run like a clock to be taken for one: a signal that happens to rise as evenly as a clock
 for so long, while the clock does not, is not met by chance."""
 
-_HOLE = 3
-"""Rows in which a clock may stumble (a row dropped, a row doubled) without ending the stretch."""
-
-_EVEN = 0.5
-"""A clock's step is within this share of the usual one."""
-
+_HOLE = 3  # rows in which a clock may stumble (a row dropped, a row doubled) without ending the stretch
+_EVEN = 0.5  # a clock's step is within this share of the usual one
 _ROUNDING = 0.02
 _MOSTLY, _HALF, _MANY, _FEW = 0.9, 0.5, 0.1, 0.02
 _WHOLE = 0.95

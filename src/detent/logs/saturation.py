@@ -10,14 +10,9 @@ from detent.logs.log import Action, Kind, Severity, Values
 LIMITED = ("command", "voltage", "current", "force", "torque")
 """Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus."""
 
-SHORTEST = 3
-"""Rows at the extreme value from which it is a plateau."""
-
-FEWEST = 10
-"""Rows at the extreme value, in plateaus, from which the signal is cut off there."""
-
-FEWEST_LEVELS = 20
-"""Different numbers below which a signal is one of levels, such as a square wave or a staircase."""
+SHORTEST = 3  # rows at the extreme value from which it is a plateau
+FEWEST = 10  # rows at the extreme value, in plateaus, from which the signal is cut off there
+FEWEST_LEVELS = 20  # different numbers below which a signal is one of levels, such as a square wave or a staircase
 
 PILED = 3.0
 """Rows at the extreme value, in those at any one of the `NEIGHBOURS` numbers next to it, from which values are piled

@@ -14,27 +14,13 @@ from detent.logs.counters import unwrap_clock
 from detent.logs.draft import Draft, tell_count
 from detent.logs.log import Action, Kind, Severity, Values
 
-FEWEST = 10
-"""Samples that a recording must have."""
-
-COARSE = 0.05
-"""Share of repeated stamps from which the stamps are coarse: below it, rows were written twice."""
-
-LONG = 20
-"""Rows of a stretch from which a clock that goes back has started again: single rows are out of order."""
-
-FARTHEST = 50
-"""Rows by which a row out of order is put back into its place."""
-
-_HOLE = 1.4
-"""Usual steps between two rows from which a third is missing there."""
-
-JITTER = 0.05
-"""Deviation of a step from the usual one, as its share, from which it is irregular."""
-
-
-_ODD = 0.25
-"""Deviation of a single step worth a note."""
+FEWEST = 10  # samples that a recording must have
+COARSE = 0.05  # share of repeated stamps from which the stamps are coarse: below it, rows were written twice
+LONG = 20  # rows of a stretch from which a clock that goes back has started again: single rows are out of order
+FARTHEST = 50  # rows by which a row out of order is put back into its place
+_HOLE = 1.4  # usual steps between two rows from which a third is missing there
+JITTER = 0.05  # deviation of a step from the usual one, as its share, from which it is irregular
+_ODD = 0.25  # deviation of a single step worth a note
 
 
 def mend_clock(draft: Draft) -> None:

@@ -9,19 +9,14 @@ from detent.logs.log import Action, Kind, Severity, Values
 from detent.logs.twins import FEWEST, find_twins
 from detent.logs.windows import spread
 
-MOST_RUNS = 200
-"""Runs of equal numbers that are looked at, the longest first."""
+MOST_RUNS = 200  # runs of equal numbers that are looked at, the longest first
 
 STRONGER = 4.0
 """By how much the disagreement with another signal must grow in a run, in what it usually grows (95th percentile) in
 as many rows: noise, delay and friction between the two are in the usual growth already."""
 
-CALIBRATION = 0.1
-"""Disagreement, as a share of the way in a run, that two good sensors may have."""
-
-CHANCE = 1e-6
-"""Probability of a run by chance, over the whole recording, below which a noisy sensor is stuck."""
-
+CALIBRATION = 0.1  # disagreement, as a share of the way in a run, that two good sensors may have
+CHANCE = 1e-6  # probability of a run by chance, over the whole recording, below which a noisy sensor is stuck
 _NOISY = ("current", "force", "torque", "acceleration", "voltage")
 _MEASURED = ("position", "position_load", "velocity", *_NOISY)
 _BESIDE = 50

@@ -18,12 +18,8 @@ from detent.logs.differences import (
 from detent.logs.draft import Draft
 from detent.logs.log import Values
 
-FEWEST = 10
-"""Rows with the same number from which a sensor can be stuck."""
-
-TRACKS = 0.9
-"""Correlation from which two series are taken for the same motion."""
-
+FEWEST = 10  # rows with the same number from which a sensor can be stuck
+TRACKS = 0.9  # correlation from which two series are taken for the same motion
 _FEWEST_WINDOWS = 20
 _SMALL_WINDOW = 4
 

@@ -13,11 +13,8 @@ import numpy as np
 from detent.page.parts import Event, Numbers
 from detent.page.thin import thin_indices
 
-Chart = dict[str, Any]
-"""One plot area, as template/report.js reads it; its "id" is that of the element it is drawn in."""
-
-POINTS = 3000
-"""Points of one curve: three per pixel of a wide screen."""
+Chart = dict[str, Any]  # one plot area, as template/report.js reads it; its "id" is that of the element it is drawn in
+POINTS = 3000  # points of one curve: three per pixel of a wide screen
 
 SCALES: dict[str, tuple[float, int]] = {"ms": (1e3, 3), "s": (1.0, 5)}
 """Per unit of time: factor from seconds, and digits that a chart keeps."""

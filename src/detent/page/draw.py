@@ -15,17 +15,10 @@ from detent.page.plots import Axes, check_figure_path, new_figure
 from detent.page.table import Table
 from detent.page.words import GAP
 
-WIDTH = 10.0
-"""Of the picture [in]."""
-
-LETTERS = 125
-"""Letters of a caption in one line."""
-
-LINE = 0.19
-"""Height of a line of text [in]."""
-
-DOTS = 96.0
-"""Dots of the page per inch."""
+WIDTH = 10.0  # of the picture [in]
+LETTERS = 125  # letters of a caption in one line
+LINE = 0.19  # height of a line of text [in]
+DOTS = 96.0  # dots of the page per inch
 
 COLOURS = {
     "ink": "#17202a", "soft": "#5b6673", "grid": "#e8ebef", "good": "#0a7d55", "bad": "#b3261e", "warn": "#8a5a00",
@@ -39,8 +32,7 @@ BANDS = {"good": ("#0a7d55", 0.11), "brake": ("#d67814", 0.16)}
 ABOVE: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "fontsize": 8}
 """Place of a legend: above the curves, never over them."""
 
-Part = tuple[float, Callable[[Any, Any], None]]
-"""Height [in], and what draws it into a place of the picture."""
+Part = tuple[float, Callable[[Any, Any], None]]  # height [in], and what draws it into a place of the picture
 
 
 def draw_figures(figures: Sequence[Figure], path: str | Path) -> None:

@@ -11,8 +11,7 @@ from detent.page.parts import Note
 from detent.page.table import TextTable
 from detent.page.words import GAP, count
 
-Level = Literal["good", "warn", "bad"]
-"""Colour and sign of a badge."""
+Level = Literal["good", "warn", "bad"]  # colour and sign of a badge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

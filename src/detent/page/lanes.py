@@ -7,15 +7,9 @@ import numpy as np
 
 from detent.page.chart import Chart, rounded
 
-LANE_HEIGHT = 26
-"""Height of a lane [px]."""
-
-FOOT_HEIGHT = 44
-"""Height of what is above and below the lanes [px]."""
-
-PLACES = 600
-"""Places at which the cursor stops besides the ends of the bars."""
-
+LANE_HEIGHT = 26  # height of a lane [px]
+FOOT_HEIGHT = 44  # height of what is above and below the lanes [px]
+PLACES = 600  # places at which the cursor stops besides the ends of the bars
 DIGITS = 4
 
 

@@ -21,8 +21,7 @@ Figure = Any
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
-POINTS = 8000
-"""Points of one curve: more than a printed page resolves."""
+POINTS = 8000  # points of one curve: more than a printed page resolves
 
 # Okabe and Ito's colours, told apart by colour-blind readers, with the yellow that is too light on white left out.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")

@@ -19,13 +19,10 @@ from detent.page.figure import about
 from detent.page.frame import Page
 from detent.page.words import further
 
-LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}
-"""Of notes, in the order of the page."""
-
+LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}  # of notes, in the order of the page
 SIGNS = {"good": "✔", "warn": "!", "bad": "✘"}
 
-FOR_THE_PAGE = {"title", "about"}
-"""What is said of a chart outside the plot area."""
+FOR_THE_PAGE = {"title", "about"}  # what is said of a chart outside the plot area
 
 
 def write_page(path: str | Path, page: Page) -> None:

@@ -12,14 +12,9 @@ from detent.page.parts import Event, Note, Numbers
 from detent.page.words import count, duration
 from detent.record.trace import Trace
 
-FEWEST_ROWS = 10
-"""Rows of a trace without which nothing is drawn."""
-
-LONGEST = 30.0
-"""Time that the figure of a whole job shows [s]: more than this is a grey block on any screen."""
-
-HAPPENED = 1e-6
-"""How much later than the end of a move an event may be noted [s]."""
+FEWEST_ROWS = 10  # rows of a trace without which nothing is drawn
+LONGEST = 30.0  # time that the figure of a whole job shows [s]: more than this is a grey block on any screen
+HAPPENED = 1e-6  # how much later than the end of a move an event may be noted [s]
 
 
 class RunOf(Protocol):

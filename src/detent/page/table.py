@@ -9,11 +9,8 @@ from markupsafe import Markup
 
 from detent.page.words import arrow, further, number
 
-MOST_ROWS = 500
-"""Rows of a table on a page: more than anybody reads."""
-
-WIDEST_BAR = 48
-"""Length of the longest bar of a column [px]."""
+MOST_ROWS = 500  # rows of a table on a page: more than anybody reads
+WIDEST_BAR = 48  # length of the longest bar of a column [px]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

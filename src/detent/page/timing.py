@@ -22,40 +22,18 @@ from detent.record.waveforms import Waveform, Waveforms
 # matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
 Axes = Any
 
-MAX_SIGNALS = 40
-"""More rows than these do not fit a page that can be read."""
-
-WIDTH = 11.0
-"""Width of the figure [in]."""
-
-ROW = 0.30
-"""Height of one row of a flag or a word [in]."""
-
+MAX_SIGNALS = 40  # more rows than these do not fit a page that can be read
+WIDTH = 11.0  # width of the figure [in]
+ROW = 0.30  # height of one row of a flag or a word [in]
 SLOT_FLOAT = 2.0
-SLOT_HEADING = 1.0
-"""Heights of the other rows, in rows."""
-
-MARK_LINE = 0.8
-"""Height of one line of marks, in rows."""
-
-LEVEL = 0.62
-"""Height of a square wave, in rows."""
-
-SLANT = 0.003
-"""Half of a lozenge's slanted end, as a part of the window."""
-
-FINEST = 1 / 900
-"""Part of the window below which two changes cannot be told apart."""
-
-POINTS = 4000
-"""Points of one curve: more than a printed page resolves."""
-
-DOC_WIDTH = 36
-"""Characters in one of the two lines of a description."""
-
-VALUE_SIZE = 7.5
-"""Size of the values inside lozenges [pt]."""
-
+SLOT_HEADING = 1.0  # heights of the other rows, in rows
+MARK_LINE = 0.8  # height of one line of marks, in rows
+LEVEL = 0.62  # height of a square wave, in rows
+SLANT = 0.003  # half of a lozenge's slanted end, as a part of the window
+FINEST = 1 / 900  # part of the window below which two changes cannot be told apart
+POINTS = 4000  # points of one curve: more than a printed page resolves
+DOC_WIDTH = 36  # characters in one of the two lines of a description
+VALUE_SIZE = 7.5  # size of the values inside lozenges [pt]
 INK = "#17202a"
 GREY = "#6b7785"
 BLOCK_COLOURS = (COLOURS[0], COLOURS[2], COLOURS[1], COLOURS[3])

@@ -8,8 +8,7 @@ from markupsafe import Markup
 
 from detent.page.parts import INCH
 
-GAP = "\u202f"
-"""Narrow space that does not break: between a number and its unit, and between thousands."""
+GAP = "\u202f"  # narrow space that does not break: between a number and its unit, and between thousands
 
 
 def count(value: int, word: str = "", plural: str = "") -> str:
@@ -82,11 +81,8 @@ def length(value: float) -> str:
     return f"{number(value * 1e6, 2 if abs(value) < 10e-6 else 3)}{GAP}µm"
 
 
-ARCSEC = pi / 180 / 3600
-"""A second of arc [rad]."""
-
-SMALL = 360 * ARCSEC
-"""Angles below this are written in seconds of arc [rad]."""
+ARCSEC = pi / 180 / 3600  # a second of arc [rad]
+SMALL = 360 * ARCSEC  # angles below this are written in seconds of arc [rad]
 
 
 def degrees(value: float, digits: int = 3) -> str:

@@ -13,8 +13,7 @@ from detent.record.recorder import choose_leaves
 from detent.record.waveforms import Phase, Waveform, Waveforms, clock_waveform, waveforms_from_rows
 from detent.units import format_quantity
 
-MOST_TICKS = 200_000
-"""Ticks of one capture: beyond that no eye follows, and a trace is the better tool."""
+MOST_TICKS = 200_000  # ticks of one capture: beyond that no eye follows, and a trace is the better tool
 
 
 @dataclass(frozen=True, slots=True)

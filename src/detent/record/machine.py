@@ -10,15 +10,9 @@ from detent.kernel.registers import Registers
 from detent.record.capture import Capture
 from detent.record.recorder import Recorder
 
-LONGEST_STRETCH = 1 << 20
-"""Ticks of one call into compiled code: progress can be shown between two."""
-
-AnyRecorder = Recorder | Capture
-"""What records a run: every n-th tick of all of it, or each clock of a stretch."""
-
-Progress = Callable[[float, str], None]
-"""Called with the share done, 0..1, and what is being done."""
-
+LONGEST_STRETCH = 1 << 20  # ticks of one call into compiled code: progress can be shown between two
+AnyRecorder = Recorder | Capture  # what records a run: every n-th tick of all of it, or each clock of a stretch
+Progress = Callable[[float, str], None]  # called with the share done, 0..1, and what is being done
 P = TypeVar("P", bound=Registers)
 S = TypeVar("S", bound=Registers)
 

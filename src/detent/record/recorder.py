@@ -12,9 +12,7 @@ from detent.errors import DetentError
 from detent.kernel.registers import Leaf, Registers
 from detent.record.trace import Attribute, Trace
 
-ROWS = 16384
-"""Rows between two flushes."""
-
+ROWS = 16384  # rows between two flushes
 Sink = Callable[[NDArray[np.void]], None]
 
 

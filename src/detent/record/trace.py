@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 
-Column = NDArray[Any]
-"""One column: a one-dimensional array of integers, floats or booleans."""
-
-Attribute = str | float | int
-"""What is known about a trace as a whole: the axis, the job, the seed."""
-
+Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats or booleans
+Attribute = str | float | int  # what is known about a trace as a whole: the axis, the job, the seed
 TIME = "t"
 
 

@@ -32,13 +32,8 @@ from detent.record.trace_store import (
     writing,
 )
 
-CSV_ROWS = 8192
-"""Rows of text made at once: bounds the memory of a CSV file of any length."""
-
-PARQUET_ROWS = 1 << 20
-"""Rows of one Parquet row group."""
-
-
+CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
+PARQUET_ROWS = 1 << 20  # rows of one Parquet row group
 _HEADER = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
 
 

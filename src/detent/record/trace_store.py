@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from detent.errors import DetentError, InputError
 from detent.record.trace import TIME, Attribute, Column, Trace, check_columns
 
-CHUNK_ROWS = 16384
-"""Rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column."""
-
+CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 GROUP = "trace"
 
 FORMAT = "detent trace 1"

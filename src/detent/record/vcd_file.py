@@ -39,8 +39,7 @@ WRITTEN = [
 ]
 """Timescales written, coarsest first."""
 
-DEFAULT_TITLE = "detent"
-"""Name of the outermost scope of waveforms without title."""
+DEFAULT_TITLE = "detent"  # name of the outermost scope of waveforms without title
 
 
 def save_vcd(waveforms: Waveforms, path: str | Path) -> None:

@@ -17,18 +17,10 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.kernel.registers import Leaf
 
-Times = NDArray[np.int64]
-"""Moments since power-on [ps]."""
-
-Values = NDArray[Any]
-"""One value per moment: integers, or floats."""
-
-PICOSECONDS = 1e12
-"""Picoseconds in a second."""
-
-MAX_BITS = 64
-"""Widest register."""
-
+Times = NDArray[np.int64]  # moments since power-on [ps]
+Values = NDArray[Any]  # one value per moment: integers, or floats
+PICOSECONDS = 1e12  # picoseconds in a second
+MAX_BITS = 64  # widest register
 _NAME = re.compile(r"[!-~]+")
 
 

@@ -14,9 +14,7 @@ from detent.identify.analyse.excitation_period import Periods
 from detent.identify.analyse.frequency_response import Complex, FrequencyResponse, response_deviation
 from detent.logs.log import Values
 
-WEAKEST = 1e-3
-"""Amplitude of an excited line, as a part of the strongest."""
-
+WEAKEST = 1e-3  # amplitude of an excited line, as a part of the strongest
 _GAP = 5.0
 _CLEAR = 10.0
 _FEWEST_LINES = 8

@@ -14,17 +14,10 @@ from detent.errors import DetentError
 from detent.identify.analyse.frequency_response import FrequencyResponse, response_deviation
 from detent.logs.log import Values
 
-WEAKEST_BAND = 1e-4
-"""Power density of an excited frequency, as a part of the strongest."""
-
-OVERLAP = 0.5
-"""Overlap of two windows."""
-
-WINDOWS = 8
-"""Windows that a recording is long, where no frequency step is asked for."""
-
-FEWEST_ROWS = 64
-"""Samples below which there is no response to speak of."""
+WEAKEST_BAND = 1e-4  # power density of an excited frequency, as a part of the strongest
+OVERLAP = 0.5  # overlap of two windows
+WINDOWS = 8  # windows that a recording is long, where no frequency step is asked for
+FEWEST_ROWS = 64  # samples below which there is no response to speak of
 
 
 def average_windows(t: Values, excitation: Values, answer: Values, step_hz: float | None = None) -> FrequencyResponse:

@@ -15,15 +15,9 @@ import numpy as np
 
 from detent.logs.log import Values
 
-FEWEST = 10
-"""Different positions below which a grid would be a guess."""
-
-OFF_GRID = 0.15
-"""Distance from the grid, in steps, that rounding of the file may make."""
-
-SHARE = 0.95
-"""Share of the positions that must lie on the grid: some rows may be interpolated."""
-
+FEWEST = 10  # different positions below which a grid would be a guess
+OFF_GRID = 0.15  # distance from the grid, in steps, that rounding of the file may make
+SHARE = 0.95  # share of the positions that must lie on the grid: some rows may be interpolated
 _MOST_PARTS = 12
 _MOST_DIFFERENCES = 2000
 _ROUNDING = 1e-9

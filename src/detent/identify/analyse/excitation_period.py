@@ -15,12 +15,8 @@ import numpy as np
 from detent.errors import DetentError
 from detent.logs.log import Values
 
-LIKENESS = 0.9
-"""Correlation of an excitation with itself a period later, from which it is taken for periodic."""
-
-FEWEST = 3
-"""Periods that a recording must hold to be called periodic: one to settle, two to compare."""
-
+LIKENESS = 0.9  # correlation of an excitation with itself a period later, from which it is taken for periodic
+FEWEST = 3  # periods that a recording must hold to be called periodic: one to settle, two to compare
 _APART = 0.5
 _AS_GOOD = 0.02
 _EVEN = 1e-6

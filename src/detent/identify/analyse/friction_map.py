@@ -31,17 +31,10 @@ from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 from detent.logs.windows import parabolas
 
-FEWEST_WINDOWS = 5.0
-"""Independent windows of a bin, at least."""
-
-MEMORIES = 10
-"""Length of a window, in memories of the residual."""
-
-RANGE = 40.0
-"""Highest over lowest speed of the map, at most."""
-
-OVER_NOISE = 5.0
-"""Lowest speed of the map, at least, in standard deviations of the noise of the velocity."""
+FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
+MEMORIES = 10  # length of a window, in memories of the residual
+RANGE = 40.0  # highest over lowest speed of the map, at most
+OVER_NOISE = 5.0  # lowest speed of the map, at least, in standard deviations of the noise of the velocity
 
 
 @dataclass(frozen=True, slots=True)

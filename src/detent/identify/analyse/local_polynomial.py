@@ -7,8 +7,7 @@ import numpy as np
 from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Values
 
-DEGREES = ((16, 4), (9, 3), (6, 2))
-"""Samples, at least, and the degree of the polynomial fitted to as many."""
+DEGREES = ((16, 4), (9, 3), (6, 2))  # samples, at least, and the degree of the polynomial fitted to as many
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,18 +33,10 @@ from detent.identify.analyse.two_mass_response import (
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Values
 
-COHERENT = 0.5
-"""Coherence that the lines about a resonance must have on average for it to be trusted."""
-
-SHARP = 0.03
-"""Standard error of a frequency, as a part of it, above which it is not trusted."""
-
-NO_BETTER = 1e-3
-"""Chance to find a resonance in a rigid axis at which it is believed."""
-
-NARROW = 1.5
-"""Least width of a resonance in widths of a window: a narrower one comes out too flat."""
-
+COHERENT = 0.5  # coherence that the lines about a resonance must have on average for it to be trusted
+SHARP = 0.03  # standard error of a frequency, as a part of it, above which it is not trusted
+NO_BETTER = 1e-3  # chance to find a resonance in a rigid axis at which it is believed
+NARROW = 1.5  # least width of a resonance in widths of a window: a narrower one comes out too flat
 _MECHANICAL = {"m": ("kg", "N/m", "N*s/m"), "rad": ("kg*m^2", "N*m/rad", "N*m*s/rad")}
 _FORCES = {"m": "N", "rad": "N*m"}
 _NEAR = 0.08

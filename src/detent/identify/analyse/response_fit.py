@@ -26,12 +26,8 @@ from detent.logs.log import Values
 
 Complex = NDArray[np.complex128]
 
-MOST_DEVIATION = 0.3
-"""Standard deviation of a line from which it is left out: the response there is noise."""
-
-LINES_PER_PARAMETER = 2
-"""Lines below which a fit says nothing."""
-
+MOST_DEVIATION = 0.3  # standard deviation of a line from which it is left out: the response there is noise
+LINES_PER_PARAMETER = 2  # lines below which a fit says nothing
 _COARSE = 0.02
 _NEIGHBOURS = 5
 _ROUNDS = 4

@@ -18,12 +18,8 @@ from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Values
 
-FEWEST_SWINGS = 2
-"""Swings, at least: two give one ratio."""
-
-FAINT = 0.05
-"""Part of the first swing below which the decay is not fitted."""
-
+FEWEST_SWINGS = 2  # swings, at least: two give one ratio
+FAINT = 0.05  # part of the first swing below which the decay is not fitted
 METHOD = "damped oscillation, least squares"
 
 

@@ -27,32 +27,15 @@ from detent.identify.fit.steady import mean_error
 from detent.logs.differences import resolution, runs_of
 from detent.logs.log import Log, Values
 
-STILL = 1e-4
-"""Change of the reference from sample to sample, as a part of its range, up to which it rests."""
-
-PAUSE = 10
-"""Samples of a rest of the reference, at least; a shorter one is part of the step."""
-
-SMALL = 0.05
-"""Steps smaller than this part of the largest are passed over."""
-
-LAST = 0.25
-"""Part of a rest of the reference, its last, in which the position is taken to rest."""
-
-FEWEST = 20
-"""Samples of the answer to a step, at least."""
-
-CREST = 0.2
-"""Part of the overshoot, its highest, that the polynomial of the peak is fitted to."""
-
-ABOUT = 0.08
-"""Part of the way, to both sides of a crossing, that its polynomial is fitted to."""
-
-DITHER = 2.5
-"""Standard deviation of the position, in those of rounding, from which rounding averages out."""
-
-CLEAR = 6.0
-"""Standard deviations of the noise by which a peak or a swing stands out of it."""
+STILL = 1e-4  # change of the reference from sample to sample, as a part of its range, up to which it rests
+PAUSE = 10  # samples of a rest of the reference, at least; a shorter one is part of the step
+SMALL = 0.05  # steps smaller than this part of the largest are passed over
+LAST = 0.25  # part of a rest of the reference, its last, in which the position is taken to rest
+FEWEST = 20  # samples of the answer to a step, at least
+CREST = 0.2  # part of the overshoot, its highest, that the polynomial of the peak is fitted to
+ABOUT = 0.08  # part of the way, to both sides of a crossing, that its polynomial is fitted to
+DITHER = 2.5  # standard deviation of the position, in those of rounding, from which rounding averages out
+CLEAR = 6.0  # standard deviations of the noise by which a peak or a swing stands out of it
 
 
 @dataclass(frozen=True, slots=True)

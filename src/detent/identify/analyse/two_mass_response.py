@@ -25,8 +25,7 @@ from detent.logs.log import Values
 
 Complex = NDArray[np.complex128]
 
-ALIASES = 3
-"""Multiples of the sample rate, to both sides, that are counted."""
+ALIASES = 3  # multiples of the sample rate, to both sides, that are counted
 
 
 class ResponseModel(Protocol):

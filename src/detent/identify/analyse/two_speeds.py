@@ -34,15 +34,9 @@ from detent.identify.fit.steady import (
 )
 from detent.logs.log import Log, Values
 
-APART = 0.1
-"""Difference of the highest and lowest speed, at least, as a part of the highest."""
-
-ROUNDS = 3
-"""Times that weights and line are computed in turn: the errors of the stretches depend on the slope."""
-
-UNLIKELY = 0.05
-"""Probability of the scatter about the line below which it is more than the errors of the stretches."""
-
+APART = 0.1  # difference of the highest and lowest speed, at least, as a part of the highest
+ROUNDS = 3  # times that weights and line are computed in turn: the errors of the stretches depend on the slope
+UNLIKELY = 0.05  # probability of the scatter about the line below which it is more than the errors of the stretches
 DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 
 

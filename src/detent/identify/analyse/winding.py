@@ -43,14 +43,9 @@ from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Log
 from detent.logs.stamps import stretches
 
-EVEN = 0.1
-"""Largest deviation of a time step from their mean, as a part of it."""
-
-TOGETHER = 0.95
-"""Correlation of two constants from which they may be inseparable."""
-
-CLEARLY_BETTER = 0.8
-"""Residual, as a part of the present one, with which another delay of the voltage fits better."""
+EVEN = 0.1  # largest deviation of a time step from their mean, as a part of it
+TOGETHER = 0.95  # correlation of two constants from which they may be inseparable
+CLEARLY_BETTER = 0.8  # residual, as a part of the present one, with which another delay of the voltage fits better
 
 
 @dataclass(frozen=True, slots=True)

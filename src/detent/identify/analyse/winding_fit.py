@@ -11,24 +11,12 @@ from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 
-FEWEST = 100
-"""Samples of a record, at least."""
-
-SMOOTH = 9
-"""Samples over which the speed is averaged to be its own instrument."""
-
-ROUNDS = 50
-"""Times, at most, that instruments and constants are found in turn."""
-
-SETTLED = 1e-7
-"""Change of the constants, relative, at which they are found."""
-
-POLES = (0.01, 0.9999)
-"""Limits of ``a`` in the filter; what lies outside is judged when it has settled."""
-
-VAGUE = 0.3
-"""Relative error from which a constant is not found."""
-
+FEWEST = 100  # samples of a record, at least
+SMOOTH = 9  # samples over which the speed is averaged to be its own instrument
+ROUNDS = 50  # times, at most, that instruments and constants are found in turn
+SETTLED = 1e-7  # change of the constants, relative, at which they are found
+POLES = (0.01, 0.9999)  # limits of ``a`` in the filter; what lies outside is judged when it has settled
+VAGUE = 0.3  # relative error from which a constant is not found
 METHOD = "refined instrumental variable"
 
 

@@ -23,8 +23,7 @@ from detent.sensing.position_sensor import MEMORY
 
 Numbers = NDArray[np.float64]
 
-SUBSTEPS = 4
-"""Ticks of the plant per sample of the log."""
+SUBSTEPS = 4  # ticks of the plant per sample of the log
 
 
 @dataclass(frozen=True, slots=True)

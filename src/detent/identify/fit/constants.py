@@ -37,8 +37,7 @@ _SUMS: dict[str, dict[str, float]] = {
 """Constants as sums of those of the terms; a force that does not turn round is part of both Coulomb constants."""
 
 
-CANCELLED = 1e-9
-"""What is left of a sum, in parts of what was added up, at which nothing is left of it."""
+CANCELLED = 1e-9  # what is left of a sum, in parts of what was added up, at which nothing is left of it
 
 METHODS: dict[Instruments, str] = {
     "reference": "instrumental variables",

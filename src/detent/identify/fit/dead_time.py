@@ -23,15 +23,9 @@ from detent.logs.differences import window_rows
 from detent.logs.log import Values
 from detent.logs.windows import parabolas
 
-LONGEST = 40
-"""Samples up to which a dead time is looked for."""
-
-EXPLAINED = 0.7
-"""Share of the effort's variance that the motion must explain."""
-
-BLOCKS = 8
-"""Parts of the recording whose dead times are compared."""
-
+LONGEST = 40  # samples up to which a dead time is looked for
+EXPLAINED = 0.7  # share of the effort's variance that the motion must explain
+BLOCKS = 8  # parts of the recording whose dead times are compared
 _FEWEST_ROWS = 4
 _SLOW = 0.02
 _PARABOLA = 0.01

@@ -22,14 +22,9 @@ from detent.identify.fit.weights import Kernel, Rows, make_kernel
 
 Numbers = NDArray[np.float64]
 
-FINE, FINEST = 6e-3, 4
-"""Half of the window that tells the direction [s], and its fewest samples."""
-
-NOISES = 5.0
-"""Velocity that is told from standstill, in standard deviations of its noise."""
-
-HOPS = 2
-"""Rows per half window."""
+FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
+NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
+HOPS = 2  # rows per half window
 
 
 @dataclass(frozen=True, slots=True, eq=False)

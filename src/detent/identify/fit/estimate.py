@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-LEVEL = 0.95
-"""Share of intervals that hold the true value."""
+LEVEL = 0.95  # share of intervals that hold the true value
 
 DIGITS = 9
 """Digits of a constant; what comes after them differs from processor to processor, and a simulation that sticks and

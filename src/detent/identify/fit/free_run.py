@@ -23,14 +23,9 @@ from detent.plant.two_mass import fastest_rate
 Numbers = NDArray[np.float64]
 Report = Callable[[float], None]
 
-HORIZONS = (0.1, 0.5, 1.0, 2.0)
-"""Lengths of simulated stretches [s]."""
-
-SUBSTEPS = 4
-"""Ticks of the plant per sample of the log."""
-
-MOST_STARTS = 60
-"""Stretches simulated per horizon at most, evenly spread over the log."""
+HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
+SUBSTEPS = 4  # ticks of the plant per sample of the log
+MOST_STARTS = 60  # stretches simulated per horizon at most, evenly spread over the log
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,11 +27,8 @@ Report = Callable[[str, float], None]
 Method = Literal["regression", "output error"]
 Verdict = Literal["trusted", "partly trusted", "refused"]
 
-WINDOW = 0.02
-"""Half of the window to begin with [s]."""
-
-WIDEST = 0.12
-"""Half of the widest window [s]."""
+WINDOW = 0.02  # half of the window to begin with [s]
+WIDEST = 0.12  # half of the widest window [s]
 
 NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "none": 0.002}
 """Share of the noise in the square of the acceleration, at most, by what instruments are made of."""
@@ -39,11 +36,8 @@ NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "no
 LIKENESS: dict[Instruments, float] = {"reference": 0.6, "position": 0.95}
 """Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken."""
 
-WIDEST_BEND = 0.5
-"""Half of the interval of a Stribeck velocity or a loss over its value, at most."""
-
-HELD_OUT = 0.25
-"""Last part of a log that the simulation is tested on."""
+WIDEST_BEND = 0.5  # half of the interval of a Stribeck velocity or a loss over its value, at most
+HELD_OUT = 0.25  # last part of a log that the simulation is tested on
 
 _WAYS: dict[Instruments, str] = {
     "reference": "references as instruments",
@@ -51,8 +45,7 @@ _WAYS: dict[Instruments, str] = {
     "none": "least squares: no reference that the axis follows closely, and motion too quick for wider windows",
 }
 
-TURN = 0.5
-"""Range of an angle from which on a weight may show [rad]."""
+TURN = 0.5  # range of an angle from which on a weight may show [rad]
 
 
 @dataclass(frozen=True, eq=False)

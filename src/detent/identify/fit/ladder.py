@@ -32,20 +32,14 @@ from detent.identify.fit.regression import (
 
 Numbers = NDArray[np.float64]
 
-STRETCHES = 8
-"""Parts of a log that are held out one after the other."""
-
-CLEAR = 0.0
-"""Mean gain of a rung in standard errors over the stretches, from which it is taken."""
+STRETCHES = 8  # parts of a log that are held out one after the other
+CLEAR = 0.0  # mean gain of a rung in standard errors over the stretches, from which it is taken
 
 ALIKE = 1e-8
 """Gain in parts of the mean square, up to which two rungs predict the same and only rounding tells them apart."""
 
-SLOWEST = 0.002
-"""Least Stribeck velocity tried, in parts of the top speed."""
-
-FINER = 1.6
-"""Ratio of neighbouring Stribeck velocities tried, at most."""
+SLOWEST = 0.002  # least Stribeck velocity tried, in parts of the top speed
+FINER = 1.6  # ratio of neighbouring Stribeck velocities tried, at most
 
 AT_BOUND = 0.01
 """A bend that is this near to the least or the largest that was tried, in parts of it, is a bound and no value."""
@@ -53,9 +47,7 @@ AT_BOUND = 0.01
 LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
 """Shares lost in a transmission that are tried."""
 
-ROUNDS, WIDER = 8, 1.3
-"""Brackets of a Stribeck velocity or a loss looked at, and the ratio of their ends."""
-
+ROUNDS, WIDER = 8, 1.3  # brackets of a Stribeck velocity or a loss looked at, and the ratio of their ends
 Report = Callable[[float], None]
 
 

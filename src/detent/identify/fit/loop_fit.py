@@ -25,23 +25,12 @@ from detent.identify.fit.prepare import Run
 
 Numbers = NDArray[np.float64]
 
-SPANS = (1, 2, 3, 4, 6, 8, 12)
-"""Samples that the velocity may be a difference over."""
-
-SEEN = 0.7
-"""Part of the log that is fitted; the rest tests."""
-
-WORST = 0.1
-"""Error of the effort over the effort in the rest, at most."""
-
-SLIGHT = 0.01
-"""Share of the effort below which a feed-forward is none."""
-
-REACH = 0.01
-"""To each side, in natural logarithms: between these errors the gain with the least of them is worked out."""
-
-GAINS = (0.5, 2000.0)
-"""Position gains looked at [1/s]."""
+SPANS = (1, 2, 3, 4, 6, 8, 12)  # samples that the velocity may be a difference over
+SEEN = 0.7  # part of the log that is fitted; the rest tests
+WORST = 0.1  # error of the effort over the effort in the rest, at most
+SLIGHT = 0.01  # share of the effort below which a feed-forward is none
+REACH = 0.01  # to each side, in natural logarithms: between these errors the gain with the least of them is worked out
+GAINS = (0.5, 2000.0)  # position gains looked at [1/s]
 
 
 @dataclass(frozen=True, slots=True)

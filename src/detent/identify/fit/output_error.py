@@ -29,29 +29,15 @@ from detent.identify.fit.prepare import Run
 Numbers = NDArray[np.float64]
 Report = Callable[[float], None]
 
-STRETCH = 2.0
-"""Length of a simulated stretch [s]."""
-
-MOST_ROUNDS = 40
-"""Rounds of the search, at most."""
-
-NUDGE = 1e-4
-"""Change of a constant for its sensitivity, in parts of its scale."""
-
-MEANT = 0.98
-"""Share of a stretch's samples that must mean something."""
-
-SLOWEST = 0.1
-"""Least Stribeck velocity in parts of that of the start: towards 0 the plant's rate has no bound."""
-
-_FREE = frozenset({"offset", "pendulum", "pendulum.across"})
-"""Searched constants that may be below 0."""
-
-
+STRETCH = 2.0  # length of a simulated stretch [s]
+MOST_ROUNDS = 40  # rounds of the search, at most
+NUDGE = 1e-4  # change of a constant for its sensitivity, in parts of its scale
+MEANT = 0.98  # share of a stretch's samples that must mean something
+SLOWEST = 0.1  # least Stribeck velocity in parts of that of the start: towards 0 the plant's rate has no bound
+_FREE = frozenset({"offset", "pendulum", "pendulum.across"})  # searched constants that may be below 0
 _FORCES = frozenset({"coulomb", "offset", "static", "pendulum"})
 
-MOST_LOST = 0.95
-"""Share of the effort that a transmission may lose, at most."""
+MOST_LOST = 0.95  # share of the effort that a transmission may lose, at most
 
 
 @dataclass(frozen=True, slots=True)

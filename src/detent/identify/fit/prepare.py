@@ -13,12 +13,8 @@ from detent.logs.roles import EFFORTS
 
 Numbers = NDArray[np.float64]
 
-GAP = 1.5
-"""Time between two samples, in periods, from which on something is missing between them."""
-
-FEWEST = 20
-"""Samples below which nothing is said about a log."""
-
+GAP = 1.5  # time between two samples, in periods, from which on something is missing between them
+FEWEST = 20  # samples below which nothing is said about a log
 _MASS = {"N": "kg", "N*m": "kg*m^2"}
 
 

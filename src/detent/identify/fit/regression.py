@@ -29,18 +29,10 @@ from detent.identify.fit.weights import Kernel, make_kernel
 Numbers = NDArray[np.float64]
 Instruments = Literal["reference", "position", "none"]
 
-WIDER = 2.5
-"""Width of the windows that are instruments where there is no reference, in those of the columns."""
-
-ENDS = 0.1
-"""Share of a run that half of such a window takes at most: rows closer to the ends are lost."""
-
-ROUNDS = 8
-"""Rounds in which the delay of the effort is found, at most."""
-
-
-SHARED = 1e-3
-"""Part of a constant in a sum that nothing tells, from which on it is not told."""
+WIDER = 2.5  # width of the windows that are instruments where there is no reference, in those of the columns
+ENDS = 0.1  # share of a run that half of such a window takes at most: rows closer to the ends are lost
+ROUNDS = 8  # rounds in which the delay of the effort is found, at most
+SHARED = 1e-3  # part of a constant in a sum that nothing tells, from which on it is not told
 
 UNKNOWN = 1e6
 """Standard error of a constant that nothing in the log excites, in largest efforts: nothing is known about it."""

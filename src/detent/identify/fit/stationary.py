@@ -14,14 +14,9 @@ import numpy as np
 from detent.identify.fit.coloured import coloured_covariance, independent_rows
 from detent.logs.log import Values
 
-ORDER = 4
-"""Order of the autoregressive filter, at most."""
-
-ROWS_PER_ORDER = 20
-"""Rows of the series for each order, at least."""
-
-FADED = 200
-"""Rows before the first of a fit whose noise still acts on it, at most."""
+ORDER = 4  # order of the autoregressive filter, at most
+ROWS_PER_ORDER = 20  # rows of the series for each order, at least
+FADED = 200  # rows before the first of a fit whose noise still acts on it, at most
 
 
 def known_noise_covariance(

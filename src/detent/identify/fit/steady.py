@@ -11,23 +11,12 @@ from detent.logs.log import Log, Values
 from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 
-BLOCKS = 10
-"""Blocks, at least, of which a steady stretch is made."""
-
-FEWEST_ROWS = 50
-"""Rows of a steady stretch, at least, where nothing is stated."""
-
-SHARE = 0.004
-"""The same as a part of the recording."""
-
-SLOWEST = 0.003
-"""Speeds below this part of the highest are rest."""
-
-DRIFT = 0.1
-"""Difference of the mean speeds of both halves of a stretch that is none, as a part of the tolerance."""
-
-STANDS_OUT = 3.0
-"""Standard deviations by which the first or last block differs where the speed is still settling there."""
+BLOCKS = 10  # blocks, at least, of which a steady stretch is made
+FEWEST_ROWS = 50  # rows of a steady stretch, at least, where nothing is stated
+SHARE = 0.004  # the same as a part of the recording
+SLOWEST = 0.003  # speeds below this part of the highest are rest
+DRIFT = 0.1  # difference of the mean speeds of both halves of a stretch that is none, as a part of the tolerance
+STANDS_OUT = 3.0  # standard deviations by which the first or last block differs where the speed is still settling there
 
 
 @dataclass(frozen=True, slots=True)

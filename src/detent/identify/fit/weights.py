@@ -23,9 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
-Rows = NDArray[np.intp]
-"""Numbers of samples."""
-
+Rows = NDArray[np.intp]  # numbers of samples
 _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
 _SQUARED = _SHAPE**2
 

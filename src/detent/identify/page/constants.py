@@ -27,8 +27,7 @@ from detent.page.parts import Numbers
 from detent.page.table import Table
 from detent.page.words import GAP, further, number
 
-WIDTH, HEIGHT = 170.0, 18.0
-"""Of the drawing of an interval [px]."""
+WIDTH, HEIGHT = 170.0, 18.0  # of the drawing of an interval [px]
 
 REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Ends of the scale on which intervals are drawn, over the value."""
@@ -36,11 +35,8 @@ REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 UNSCALED = ("delay", "stribeck", "loss")
 """Constants that may be near 0 or are hardly ever known well: they do not set the scale."""
 
-ALIKE = 0.9
-"""Correlation of two constants from which on the data hardly separate them."""
-
-MOST_PAIRS = 4
-"""Pairs told in words."""
+ALIKE = 0.9  # correlation of two constants from which on the data hardly separate them
+MOST_PAIRS = 4  # pairs told in words
 
 
 def constant_figures(found: Identification) -> list[Figure]:

@@ -19,8 +19,7 @@ from detent.page.parts import Numbers
 from detent.page.thin import thin_indices
 from detent.page.words import number
 
-LAGS = 60
-"""Lags of the autocorrelation, in rows of the regression."""
+LAGS = 60  # lags of the autocorrelation, in rows of the regression
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,8 +13,7 @@ from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 
-DOTS = 1500
-"""Windows drawn in the friction map."""
+DOTS = 1500  # windows drawn in the friction map
 
 
 def friction_figures(

@@ -23,8 +23,7 @@ LOOKS: dict[Verdict, Level] = {"trusted": "good", "partly trusted": "warn", "ref
 ON_CARDS = {"mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative"}
 """Constants in large type."""
 
-MOST_NAMES = 12
-"""Recordings that have a line of their own in the small print."""
+MOST_NAMES = 12  # recordings that have a line of their own in the small print
 
 
 def identify_page(found: Identification) -> Page:

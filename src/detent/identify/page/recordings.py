@@ -14,18 +14,10 @@ from detent.page.figure import Figure
 from detent.page.table import Table
 from detent.page.words import count, duration, further
 
-MOST_LOGS = 30
-"""Recordings listed one by one."""
-
-MOST_FINDINGS = 60
-"""Findings listed one by one."""
-
-MOST_BANDS = 200
-"""Stretches marked in a chart; closer ones are drawn as one."""
-
-TALL = 12
-"""Rows from which on a table scrolls inside."""
-
+MOST_LOGS = 30  # recordings listed one by one
+MOST_FINDINGS = 60  # findings listed one by one
+MOST_BANDS = 200  # stretches marked in a chart; closer ones are drawn as one
+TALL = 12  # rows from which on a table scrolls inside
 _COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "soft"}
 
 

@@ -15,20 +15,11 @@ from detent.identify.page.words import unit_text
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 
-COHERENT = 0.8
-"""Coherence of a line that tells something."""
-
-FEWEST_LINES = 10
-"""Coherent lines without which there is no Bode plot."""
-
-AGREEING = 0.9
-"""Share of neighbouring lines whose accelerations are less than a factor of 2 apart, at least."""
-
-BROADEST = 3.0
-"""Highest over lowest coherent frequency, at least."""
-
-MOST_LINES = 800
-"""Frequencies drawn."""
+COHERENT = 0.8  # coherence of a line that tells something
+FEWEST_LINES = 10  # coherent lines without which there is no Bode plot
+AGREEING = 0.9  # share of neighbouring lines whose accelerations are less than a factor of 2 apart, at least
+BROADEST = 3.0  # highest over lowest coherent frequency, at least
+MOST_LINES = 800  # frequencies drawn
 
 
 def response_figures(found: Identification, shown: int) -> list[Figure]:

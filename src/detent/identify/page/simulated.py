@@ -20,11 +20,8 @@ from detent.page.parts import Numbers
 from detent.page.table import Table
 from detent.page.words import count, duration
 
-RESTART = 1.0
-"""Time after which the simulation starts again from the recording [s]."""
-
-SPREAD = 0.5
-"""Room about a measured position for a simulated one that runs away, over its range."""
+RESTART = 1.0  # time after which the simulation starts again from the recording [s]
+SPREAD = 0.5  # room about a measured position for a simulated one that runs away, over its range
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,14 +8,9 @@ from markupsafe import Markup
 from detent.identify.fit.estimate import Estimate
 from detent.page.words import GAP, number
 
-UNKNOWN = 10.0
-"""Half of an interval over the value from which on nothing is known about a constant."""
-
-UNKNOWN_DELAY = 0.1
-"""The same of a delay [s], which may be 0."""
-
-LONGEST = 220
-"""Longest bar of a table [px]."""
+UNKNOWN = 10.0  # half of an interval over the value from which on nothing is known about a constant
+UNKNOWN_DELAY = 0.1  # the same of a delay [s], which may be 0
+LONGEST = 220  # longest bar of a table [px]
 
 _KINDS = {
     "coulomb": "Coulomb friction",

@@ -23,26 +23,16 @@ from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec
 from detent.methods.load import axis_of
 from detent.units import format_quantity
 
-CLEAR = 0.3
-"""Angle of the velocity loop's crossover frequency over its dead time [rad]: 17 degrees of phase."""
+CLEAR = 0.3  # angle of the velocity loop's crossover frequency over its dead time [rad]: 17 degrees of phase
 
 FASTEST = 2 * math.pi * 40
 """Largest bandwidth chosen for a velocity loop [rad/s]: what the log does not show may swing above it."""
 
-STEADY = 0.02
-"""Velocity of one count of the encoder over the top speed, at most."""
-
-LONGEST = 5e-3
-"""Longest stretch that the velocity is a difference over [s]."""
-
-JUMP = 0.08
-"""Share of the largest effort by which one count of the velocity may move the command."""
-
-MARGIN = 0.05
-"""Way left at both ends of the seen travel, over that travel."""
-
-FORCE_SHARE = 0.9
-"""Share of the largest effort that a move at the limits may take."""
+STEADY = 0.02  # velocity of one count of the encoder over the top speed, at most
+LONGEST = 5e-3  # longest stretch that the velocity is a difference over [s]
+JUMP = 0.08  # share of the largest effort by which one count of the velocity may move the command
+MARGIN = 0.05  # way left at both ends of the seen travel, over that travel
+FORCE_SHARE = 0.9  # share of the largest effort that a move at the limits may take
 
 
 def axis_toml(found: Identification, base: str | None = None, file: str = "axis file", reading: str = "") -> str:

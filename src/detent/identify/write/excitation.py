@@ -17,20 +17,11 @@ from detent.identify.write.seen import see
 from detent.methods.cascade.schema import CascadeSpec
 from detent.units import format_quantity
 
-INSIDE = 0.05
-"""Share of the travel that is left free at both ends."""
-
-STEADY = 0.8
-"""Time at a steady speed that a move is planned for [s]."""
-
-SLOWER = 0.5
-"""Share of the top speed that remains where the effort was at its limit."""
-
-LEAST = 20.0
-"""Length of a recording that is aimed at [s]."""
-
-RAMP = 0.15
-"""Time of a ramp where neither the axis nor the log tells one [s]."""
+INSIDE = 0.05  # share of the travel that is left free at both ends
+STEADY = 0.8  # time at a steady speed that a move is planned for [s]
+SLOWER = 0.5  # share of the top speed that remains where the effort was at its limit
+LEAST = 20.0  # length of a recording that is aimed at [s]
+RAMP = 0.15  # time of a ramp where neither the axis nor the log tells one [s]
 
 
 @dataclass(frozen=True, slots=True)

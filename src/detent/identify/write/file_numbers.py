@@ -18,11 +18,8 @@ from detent.identify.fit.prepare import Run
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, FrictionTable
 from detent.units import format_quantity
 
-NATIVE = {"linear": "N", "rotary": "N*m"}
-"""Unit of an effort that an axis file has itself, by the motion of its axis."""
-
-MOST_LOSS = 0.95
-"""Largest share of the effort that a file can say is lost."""
+NATIVE = {"linear": "N", "rotary": "N*m"}  # unit of an effort that an axis file has itself, by the motion of its axis
+MOST_LOSS = 0.95  # largest share of the effort that a file can say is lost
 
 LINEAR_UNITS = {"mass": "kg", "viscous": "N*s/m", "stribeck": "m/s", "delay": "s", "spring": "N/m", "loss": ""}
 """Unit of a constant in the file of a linear axis, by its kind; that of the others is N."""

@@ -10,11 +10,8 @@ from detent.errors import DetentError
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import make_kernel
 
-WINDOW = 0.02
-"""Half of the window of velocities and accelerations [s]."""
-
-NEARLY_ALL = 0.999
-"""Share of the samples whose speed and acceleration count: the rest may be noise."""
+WINDOW = 0.02  # half of the window of velocities and accelerations [s]
+NEARLY_ALL = 0.999  # share of the samples whose speed and acceleration count: the rest may be noise
 
 
 @dataclass(frozen=True, slots=True)
