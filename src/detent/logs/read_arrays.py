@@ -1,6 +1,5 @@
 """Recordings as files of arrays: MATLAB up to version 7, and NumPy's NPZ."""
 
-import importlib
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
 from detent.logs.raw_table import MAX_CELLS, Item, RawTable, table_of
 from detent.logs.read_hdf5 import read_hdf5
+from detent.logs.windows import scipy
 
 MAX_BYTES = 500_000_000  # largest file of arrays read
 ALLOWED_MAT = "a MATLAB file with vectors of equal length"
@@ -29,11 +29,10 @@ def read_mat(path: Path, options: FileOptions) -> RawTable:
 
     Fields of structures give names joined by points; ``table`` names the structure to read.
     """
-    files: Any = importlib.import_module("scipy.io")
     check_file(path, MAX_BYTES, ALLOWED_MAT)
     try:
-        _check_shapes(path, [shape for _, shape, _ in files.whosmat(path)], ALLOWED_MAT)
-        found: dict[str, Any] = files.loadmat(path, squeeze_me=True, struct_as_record=True)
+        _check_shapes(path, [shape for _, shape, _ in scipy("io").whosmat(path)], ALLOWED_MAT)
+        found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
     except NotImplementedError:
         return read_hdf5(path, options)
     except InputError:

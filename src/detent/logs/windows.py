@@ -1,6 +1,6 @@
 """Sliding windows and correlations, by SciPy, which is loaded only where one is computed."""
 
-import importlib
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -9,23 +9,26 @@ from numpy.typing import NDArray
 from detent.logs.log import Values
 
 
+def scipy(part: str) -> Any:
+    """A part of SciPy, loaded where it is used; it states no types."""
+    return import_module(f"scipy.{part}")
+
+
 def spread(values: Values, rows: int) -> Values:
     """Largest less smallest value in the window of some rows about each sample, shape (n,)."""
-    images: Any = importlib.import_module("scipy.ndimage")
+    images = scipy("ndimage")
     return np.asarray(images.maximum_filter1d(values, rows) - images.minimum_filter1d(values, rows), dtype=np.float64)
 
 
 def fill_holes(mask: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
     """The mask with stretches of False of up to some rows between True made True."""
-    images: Any = importlib.import_module("scipy.ndimage")
     padded = np.pad(mask, rows)
-    return np.asarray(images.binary_closing(padded, structure=np.ones(rows + 1)), dtype=np.bool_)[rows:-rows]
+    return np.asarray(scipy("ndimage").binary_closing(padded, structure=np.ones(rows + 1)), dtype=np.bool_)[rows:-rows]
 
 
 def sliding_products(ours: Values, theirs: Values) -> Values:
     """Sum of products of the second series with each part of the first of its length, shape (n - m + 1,)."""
-    signals: Any = importlib.import_module("scipy.signal")
-    return np.asarray(signals.correlate(ours, theirs, mode="valid", method="fft"), dtype=np.float64)
+    return np.asarray(scipy("signal").correlate(ours, theirs, mode="valid", method="fft"), dtype=np.float64)
 
 
 def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
@@ -38,6 +41,5 @@ def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
            [ 4.,  6.,  8.],
            [ 2.,  2.,  2.]])
     """
-    signals: Any = importlib.import_module("scipy.signal")
-    kernels = [signals.savgol_coeffs(rows, 2, deriv=order, delta=period, use="dot") for order in (0, 1, 2)]
+    kernels = [scipy("signal").savgol_coeffs(rows, 2, deriv=order, delta=period, use="dot") for order in (0, 1, 2)]
     return np.array([np.correlate(values, np.asarray(kernel), mode="valid") for kernel in kernels])

@@ -5,14 +5,12 @@ excitation makes the response too small, and a loop that feeds the position back
 of the controller: a periodic excitation is better wherever one can be recorded.
 """
 
-from importlib import import_module
-from typing import Any
-
 import numpy as np
 
 from detent.errors import DetentError
 from detent.identify.analyse.frequency_response import FrequencyResponse, response_deviation
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 WEAKEST_BAND = 1e-4  # power density of an excited frequency, as a part of the strongest
 OVERLAP = 0.5  # overlap of two windows
@@ -22,7 +20,6 @@ FEWEST_ROWS = 64  # samples below which there is no response to speak of
 
 def average_windows(t: Values, excitation: Values, answer: Values, step_hz: float | None = None) -> FrequencyResponse:
     """Response by Welch's method: Hann windows that overlap by half, ``H1 = S_uy / S_uu``."""
-    signals: Any = import_module("scipy.signal")  # it states no types
     mean, excitation, answer, grid = _even(t, excitation, answer)
     rows = len(excitation) // WINDOWS if step_hz is None else round(1.0 / (step_hz * mean))
     if not FEWEST_ROWS // WINDOWS <= rows <= len(excitation) // 2 or not np.ptp(excitation) > 0:
@@ -32,9 +29,9 @@ def average_windows(t: Values, excitation: Values, answer: Values, step_hz: floa
             "excitation that changes; record longer, with a chirp or a multisine"
         )
     how = {"fs": 1.0 / mean, "window": "hann", "nperseg": rows, "noverlap": int(OVERLAP * rows), "detrend": "linear"}
-    frequency, power = signals.welch(excitation, **how)
-    power_out = signals.welch(answer, **how)[1]
-    cross = signals.csd(excitation, answer, **how)[1]
+    frequency, power = scipy("signal").welch(excitation, **how)
+    power_out = scipy("signal").welch(answer, **how)[1]
+    cross = scipy("signal").csd(excitation, answer, **how)[1]
     chosen = (power > WEAKEST_BAND * power.max()) & (frequency > 0) & (frequency < 0.5 / mean)
     coherence = np.abs(cross[chosen]) ** 2 / np.maximum(power[chosen] * power_out[chosen], 1e-300)
     averages = independent_windows(len(excitation), rows)

@@ -7,13 +7,12 @@ which the excitation repeats best.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 
 from detent.errors import DetentError
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 LIKENESS = 0.9  # correlation of an excitation with itself a period later, from which it is taken for periodic
 FEWEST = 3  # periods that a recording must hold to be called periodic: one to settle, two to compare
@@ -71,9 +70,8 @@ def find_period(values: Values) -> float | None:
 
 def autocorrelation(values: Values) -> Values:
     """Correlation of a signal with itself, some rows later, over the part in which the two overlap."""
-    signals: Any = import_module("scipy.signal")  # it states no types
     centred = values - values.mean()
-    products = np.asarray(signals.correlate(centred, centred, mode="full", method="fft"))[len(values) - 1 :]
+    products = np.asarray(scipy("signal").correlate(centred, centred, mode="full", method="fft"))[len(values) - 1 :]
     sums = np.r_[0.0, np.cumsum(centred**2)]
     early, late = sums[len(values) : 0 : -1], sums[-1] - sums[: len(values)]
     # The sums of the last rows are rounding: what is compared there says nothing.

@@ -17,7 +17,6 @@ friction of both directions, with opposite signs.
 """
 
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +28,7 @@ from detent.identify.fit.steady import find_steady, find_velocity, select_effort
 from detent.logs.differences import grain, window_rows
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import parabolas
+from detent.logs.windows import parabolas, scipy
 
 FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
 MEMORIES = 10  # length of a window, in memories of the residual
@@ -220,12 +219,12 @@ def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
     power = float(residual @ residual)
     if not len(residual) or power <= 0.0:
         return 1.0
-    signals: Any = import_module("scipy.signal")  # it states no types
     first = int(place[0])
     rows = int(place[-1]) - first + 1
     series, mask = np.zeros(rows), np.zeros(rows)
     series[place - first], mask[place - first] = residual, 1.0
-    products, pairs = (np.asarray(signals.correlate(x, x, method="fft"), float)[rows - 1 :] for x in (series, mask))
+    correlate = scipy("signal").correlate
+    products, pairs = (np.asarray(correlate(x, x, method="fft"), float)[rows - 1 :] for x in (series, mask))
     known = pairs > 0.5
     rho = np.where(known, products / np.maximum(pairs, 1.0), 0.0) * len(residual) / power
     memory = 2.0 * np.cumsum(rho) - 1.0
@@ -257,9 +256,8 @@ def _dip(direction: str, found: list[_Bin], unit: str) -> Dip:
     depth = (lowest.friction - least.friction) * sign
     error = float(np.hypot(lowest.error, least.error))
     degrees = min(lowest.windows, least.windows) - 1.0
-    stats: Any = import_module("scipy.stats")  # it states no types
     # One-sided, and as many times as there are bins to choose the smallest from (Bonferroni).
-    limit = float(stats.t.ppf(1.0 - (1.0 - LEVEL) / len(others), degrees))
+    limit = float(scipy("stats").t.ppf(1.0 - (1.0 - LEVEL) / len(others), degrees))
     name, method = f"stribeck.{direction}", f"friction map, {len(bins)} bins"
     return Dip(
         direction, depth > limit * error, estimate(name, depth, unit, error, method, degrees), float(least.speed)

@@ -13,7 +13,6 @@ and dry friction move a resonance with the amplitude; the frequencies are then t
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from detent.identify.analyse.two_mass_response import (
 )
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 COHERENT = 0.5  # coherence that the lines about a resonance must have on average for it to be trusted
 SHARP = 0.03  # standard error of a frequency, as a part of it, above which it is not trusted
@@ -158,11 +158,10 @@ def _load_starts(lines: Lines) -> list[Values]:
 
 def _is_no_better(fit: Fit, rigid: Fit, lines: Lines) -> str:
     """Why the axis is taken for rigid; empty where two masses explain it better (F test on the same weights)."""
-    stats: Any = import_module("scipy.stats")  # it states no types
     more = len(fit.parameters) - len(rigid.parameters)
     gain = (_weighted(rigid, fit, lines) - _weighted(fit, fit, lines)) / more
     ratio = gain / (_weighted(fit, fit, lines) / fit.freedom)
-    if float(stats.f.sf(ratio, more, fit.freedom)) > NO_BETTER:
+    if float(scipy("stats").f.sf(ratio, more, fit.freedom)) > NO_BETTER:
         return (
             f"one rigid mass explains the response as well as two (F = {ratio:.2g}): no resonance from "
             f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz stands out; excite higher frequencies, or take "

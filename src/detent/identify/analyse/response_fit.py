@@ -12,8 +12,6 @@ correlations between magnitude and phase, between two encoders and between neigh
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +21,7 @@ from detent.identify.analyse.average_periods import noise_parts
 from detent.identify.analyse.frequency_response import FrequencyResponse
 from detent.identify.analyse.two_mass_response import ResponseModel, laplace, respond_sampled
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 Complex = NDArray[np.complex128]
 
@@ -150,13 +149,12 @@ class _Problem:
 
     def solve(self, weights: Values, start: Values) -> tuple[Values, float]:
         """Parameters at the least sum of squares from a start on, and that sum."""
-        optimize: Any = import_module("scipy.optimize")  # it states no types
 
         def residual(parameters: Values) -> Values:
             values = self.residual(weights, parameters).ravel()
             return np.where(np.isfinite(values), values, 1e6)
 
-        found = optimize.least_squares(residual, start, x_scale="jac", max_nfev=60)
+        found = scipy("optimize").least_squares(residual, start, x_scale="jac", max_nfev=60)
         return np.asarray(found.x, dtype=np.float64), float(found.cost)
 
 

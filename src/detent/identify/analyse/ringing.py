@@ -8,8 +8,6 @@ and noise into account.
 """
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 FEWEST_SWINGS = 2  # swings, at least: two give one ratio
 FAINT = 0.05  # part of the first swing below which the decay is not fitted
@@ -80,13 +79,12 @@ def _waves(t: Values, rate: Values) -> Values:
 
 def _fit_decay(t: Values, y: Values, start: Values, noise: tuple[Values, float]) -> tuple[Estimate, Estimate] | None:
     """Period and damping ratio; None where the fit leaves the neighbourhood of the swings."""
-    optimize: Any = import_module("scipy.optimize")  # it states no types
 
     def miss(scale: Values) -> Values:
         columns = _waves(t, start * scale)
         return y - columns @ np.linalg.lstsq(columns, y, rcond=None)[0]
 
-    found = optimize.least_squares(miss, np.ones(2), bounds=([0.05, 0.5], [20.0, 2.0]))
+    found = scipy("optimize").least_squares(miss, np.ones(2), bounds=([0.05, 0.5], [20.0, 2.0]))
     scale: Values = np.asarray(found.x, float)
     if not found.success or np.any(np.asarray(found.active_mask) != 0) or len(t) < 8:
         return None

@@ -17,7 +17,6 @@ scatter about the line by more than that, the scatter between stretches is added
 """
 
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ from detent.identify.fit.steady import (
     unit_per_speed,
 )
 from detent.logs.log import Log, Values
+from detent.logs.windows import scipy
 
 APART = 0.1  # difference of the highest and lowest speed, at least, as a part of the highest
 ROUNDS = 3  # times that weights and line are computed in turn: the errors of the stretches depend on the slope
@@ -200,9 +200,7 @@ def _scatter_between(columns: Values, effort: Values, pooled: Values, degrees: f
         residual = effort - columns @ (_pull(columns, size) @ effort)
         return float(residual @ (residual / size)) - free
 
-    stats: Any = import_module("scipy.stats")  # it states no types
-    if free < 1 or float(stats.f.sf((excess(0.0) + free) / free, free, degrees)) > UNLIKELY:
+    if free < 1 or float(scipy("stats").f.sf((excess(0.0) + free) / free, free, degrees)) > UNLIKELY:
         return 0.0
-    optimize: Any = import_module("scipy.optimize")
     most = float(np.ptp(effort)) + float(np.sqrt(pooled.max()))
-    return float(optimize.brentq(excess, 0.0, 10.0 * most))
+    return float(scipy("optimize").brentq(excess, 0.0, 10.0 * most))

@@ -1,8 +1,6 @@
 """The equation of a winding from sample to sample, solved with instruments; `winding` tells of it."""
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 
@@ -10,6 +8,7 @@ from detent.identify.fit.estimate import Estimate, estimate, quantile
 from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
+from detent.logs.windows import scipy
 
 FEWEST = 100  # samples of a record, at least
 SMOOTH = 9  # samples over which the speed is averaged to be its own instrument
@@ -45,7 +44,6 @@ class WindingFit:
 
 def make_pieces(log: Log, late: int, *, is_locked: bool) -> list[Piece]:
     """Parts of a log without gaps; where the voltage is late, both ends are cut."""
-    images: Any = import_module("scipy.ndimage")  # it states no types
     role = torque_role(log)
     pieces: list[Piece] = []
     for part in stretches(log.t):
@@ -54,7 +52,7 @@ def make_pieces(log: Log, late: int, *, is_locked: bool) -> list[Piece]:
             continue
         step = float(log.t[part][-1] - log.t[part][0]) / (count - 1)
         v = np.zeros(count - 1) if is_locked else _speed_between(log, part, step)
-        smooth = np.asarray(images.uniform_filter1d(v, SMOOTH, mode="nearest"), float)
+        smooth = np.asarray(scipy("ndimage").uniform_filter1d(v, SMOOTH, mode="nearest"), float)
         u, i = log.signals["voltage"][part], log.signals["current"][part]
         begin, end = max(late, 0), count - 1 - max(-late, 0)
         held = u[begin - late : end - late]
@@ -94,16 +92,14 @@ def iterate(pieces: list[Piece], *, is_moving: bool) -> WindingFit | None:
 
 def _simulated(piece: Piece, values: Values) -> Values:
     """Current that the model makes of voltage and speed, shape as the current."""
-    signals: Any = import_module("scipy.signal")  # it states no types
     emf = values[3] * piece.smooth if len(values) > 3 else 0.0
     drive = values[1] * piece.u - values[2] - emf
-    made, _ = signals.lfilter([1.0], [1.0, -values[0]], drive, zi=[values[0] * piece.i[0]])
+    made, _ = scipy("signal").lfilter([1.0], [1.0, -values[0]], drive, zi=[values[0] * piece.i[0]])
     return np.concatenate([[piece.i[0]], np.asarray(made, float)])
 
 
 def _stacked(pieces: list[Piece], pole: float, made: list[Values] | None, *, is_moving: bool) -> tuple[Values, Values]:
     """Columns of the equation and its left side behind the filter; with currents that were made, the instruments."""
-    signals: Any = import_module("scipy.signal")  # it states no types
     columns: list[Values] = []
     targets: list[Values] = []
     for number, piece in enumerate(pieces):
@@ -111,7 +107,7 @@ def _stacked(pieces: list[Piece], pole: float, made: list[Values] | None, *, is_
         v = piece.v if made is None else piece.smooth
         parts = [i[:-1], piece.u, -np.ones(len(piece.u)), *([-v] if is_moving else [])]
         series = np.column_stack([*parts, i[1:]])
-        filtered = np.asarray(signals.lfilter([1.0], [1.0, -pole], series, axis=0), float)
+        filtered = np.asarray(scipy("signal").lfilter([1.0], [1.0, -pole], series, axis=0), float)
         columns.append(filtered[:, :-1])
         targets.append(filtered[:, -1])
     return np.concatenate(columns), np.concatenate(targets)

@@ -9,19 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import plant_registers, start_velocities
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.prepare import Run
 from detent.kernel.loop import advance
+from detent.logs.log import Values
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, switch_on
 from detent.planning.profile import profile_of_recording
 from detent.plant.two_mass import fastest_rate
 from detent.sensing.position_sensor import MEMORY
-
-Numbers = NDArray[np.float64]
 
 SUBSTEPS = 4  # ticks of the plant per sample of the log
 
@@ -43,7 +41,7 @@ def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequ
     found = [fit_loops(run) for run in seen]
     if any(loops is None for loops in found):
         return None
-    pairs: list[tuple[Numbers, Numbers, Run]] = []
+    pairs: list[tuple[Values, Values, Run]] = []
     for loops, run in zip(found, unseen, strict=True):
         if loops is not None and len(run.position) > MEMORY:
             pairs.append((*_follow(constants, loops, run), run))
@@ -63,7 +61,7 @@ def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequ
     )
 
 
-def _share(error: Numbers, signal: Numbers) -> float:
+def _share(error: Values, signal: Values) -> float:
     size = float(np.linalg.norm(signal))
     return float(np.linalg.norm(error)) / size if size > 0.0 else math.nan
 
@@ -98,7 +96,7 @@ def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
         r.law.integral = float(run.effort[0]) - loops.velocity * (demand - velocity) - fed
 
 
-def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Numbers, Numbers]:
+def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Values]:
     """Position at each sample, and the effort commanded there."""
     p, r = _params(constants, loops, run), Cascade()
     _start(p, r, loops, run)

@@ -16,14 +16,10 @@ Stock, Watson: Introduction to Econometrics, section 15.4: weighted lags, 0.75 n
 Mueller: HAC corrections for strongly autocorrelated time series. Same journal 32 (2014).
 """
 
-from importlib import import_module
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
-
+from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 RANK = 1e-10
 """Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding
@@ -33,7 +29,7 @@ SHARE = 0.3
 """Cosines per independent residual, at most: beyond these the long-run variance would be read where it has fallen."""
 
 
-def independent_rows(residual: Numbers) -> float:
+def independent_rows(residual: Values) -> float:
     """How many independent residuals are worth as much as these, by the correlation of neighbours.
 
     ``n (1 - r) / (1 + r)`` with the correlation `r` of neighbours within 0 and 0.99, corrected for its bias of
@@ -43,7 +39,7 @@ def independent_rows(residual: Numbers) -> float:
     return n * (1.0 - r) / (1.0 + r)
 
 
-def neighbour_correlation(residual: Numbers) -> float:
+def neighbour_correlation(residual: Values) -> float:
     """Correlation of neighbours, within 0 and 0.99, corrected for its bias of ``1 / n``."""
     power = float(np.sum(residual**2))
     correlation = float(np.sum(residual[1:] * residual[:-1])) / power + 1.0 / len(residual) if power > 0.0 else 0.0
@@ -71,14 +67,13 @@ def count_cosines(rows: int, independent: float) -> int:
     return max(4, min(round(0.41 * rows ** (2.0 / 3.0)), round(SHARE * independent)))
 
 
-def long_run_variance(scores: Numbers, cosines: int) -> Numbers:
+def long_run_variance(scores: Values, cosines: int) -> Values:
     """Long-run covariance of rows in their order of time."""
-    transform: Any = import_module("scipy.fft")  # it states no types
-    projected: Numbers = transform.dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
+    projected: Values = scipy("fft").dct(scores, axis=0, norm="ortho")[1 : cosines + 1]
     return projected.T @ projected / len(projected)
 
 
-def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Numbers | None = None) -> tuple[Numbers, int]:
+def coloured_covariance(columns: Values, residual: Values, instruments: Values | None = None) -> tuple[Values, int]:
     """Covariance of the constants of a regression with coloured residuals."""
     n, k = columns.shape
     chosen = columns if instruments is None else instruments
@@ -98,7 +93,7 @@ def coloured_covariance(columns: Numbers, residual: Numbers, instruments: Number
     return found[0] * np.outer(grow, grow) / np.outer(size, size), degrees
 
 
-def carried_degrees(columns: Numbers, residual: Numbers, instruments: Numbers, cosines: int) -> Numbers:
+def carried_degrees(columns: Values, residual: Values, instruments: Values, cosines: int) -> Values:
     """Degrees of freedom behind the variance of each constant.
 
     1 or more, and the cosines at most. A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum h^4``
@@ -114,13 +109,13 @@ def carried_degrees(columns: Numbers, residual: Numbers, instruments: Numbers, c
     return np.clip(carried, 1.0, float(cosines))
 
 
-def _sizes(columns: Numbers) -> Numbers:
+def _sizes(columns: Values) -> Values:
     """Lengths of columns; 1 for one of zeros."""
     length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
     return np.where(length > 0.0, length, 1.0)
 
 
-def _lagged_variance(scores: Numbers, memory: float) -> Numbers:
+def _lagged_variance(scores: Values, memory: float) -> Values:
     """Long-run covariance by weighted lags, far enough for residuals of a memory of so many rows (Newey, West 1987).
 
     It and the projections err independently; the larger of both does not leave an interval too short by chance.

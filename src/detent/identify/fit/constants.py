@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import Estimate, estimate, significant
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit, Instruments
-
-Numbers = NDArray[np.float64]
+from detent.logs.log import Values
 
 _SUMS: dict[str, dict[str, float]] = {
     "mass": {"mass": 1.0},
@@ -52,9 +50,9 @@ class Constants:
     """Constants of an axis with all that is known about their errors."""
 
     names: tuple[str, ...]  # in their order; the delay of the effort comes last
-    values: Numbers  # in SI units
-    covariance: Numbers  # of their errors
-    degrees: Numbers  # degrees of freedom behind the variance of each
+    values: Values  # in SI units
+    covariance: Values  # of their errors
+    degrees: Values  # degrees of freedom behind the variance of each
     method: str  # how they were found
     delay_is_told: bool = True  # False where the delay is only what fits best
 
@@ -63,12 +61,12 @@ class Constants:
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
     @property
-    def errors(self) -> Numbers:
+    def errors(self) -> Values:
         """Standard errors, shape (k,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
-    def correlation(self) -> Numbers:
+    def correlation(self) -> Values:
         """Correlation of the errors, shape (k, k)."""
         error = np.maximum(self.errors, 1e-300)
         return np.clip(self.covariance / np.outer(error, error), -1.0, 1.0)
@@ -100,7 +98,7 @@ def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
     return Constants(names, values, covariance, degrees, METHODS[fit.instruments], fit.instruments == "reference")
 
 
-def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Numbers, Numbers, Numbers]:
+def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
     """Names, values, covariance and degrees of freedom of the constants that a model has; a sum has the fewest."""
     wanted = [name for name, sums in _SUMS.items() if _has(fit, name, sums)]
     weights = np.zeros((len(wanted), len(fit.values)))
@@ -121,7 +119,7 @@ def _has(fit: Fit, name: str, sums: dict[str, float]) -> bool:
     return any(term in fit.names for term in sums)
 
 
-def _spread(names: Sequence[str], values: Numbers, rivals: Sequence[Fit]) -> Numbers:
+def _spread(names: Sequence[str], values: Values, rivals: Sequence[Fit]) -> Values:
     """Mean square of what the rivals say otherwise; a constant that a rival does not have counts as its own value."""
     squares = np.zeros(len(values))
     for rival in rivals:

@@ -15,12 +15,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import Kernel, Rows, make_kernel
-
-Numbers = NDArray[np.float64]
+from detent.logs.log import Values
 
 FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
 NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
@@ -31,15 +29,15 @@ HOPS = 2  # rows per half window
 class Motion:
     """What a position says, window by window, each of shape (m,) unless said otherwise."""
 
-    position: Numbers  # and velocity, acceleration: means over the window around each row [m, m/s, m/s^2] or in rad
-    velocity: Numbers
-    acceleration: Numbers
+    position: Values  # and velocity, acceleration: means over the window around each row [m, m/s, m/s^2] or in rad
+    velocity: Values
+    acceleration: Values
     # right, left: shares of each window in motion to larger and to smaller positions; standstill is half of both
-    right: Numbers
-    left: Numbers
-    quick: Numbers  # and places, effort: velocity, by a short window, position and effort at every sample
-    places: Numbers
-    effort: Numbers
+    right: Values
+    left: Values
+    quick: Values  # and places, effort: velocity, by a short window, position and effort at every sample
+    places: Values
+    effort: Values
     rows: Rows  # samples around which the windows lie
     kernel: Kernel  # their window
 
@@ -49,7 +47,7 @@ def fine_kernel(kernel: Kernel) -> Kernel:
     return make_kernel(min(kernel.half, max(FINEST, round(FINE / kernel.step))), kernel.step)
 
 
-def make_motion(position: Numbers, effort: Numbers, kernel: Kernel, rows: Rows) -> Motion:
+def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows) -> Motion:
     """Position, velocity and acceleration by a window."""
     quick = fine_kernel(kernel).velocities(position)
     still = 0.5 * (quick == 0.0)
@@ -67,11 +65,11 @@ def make_motion(position: Numbers, effort: Numbers, kernel: Kernel, rows: Rows) 
     )
 
 
-Term = Callable[[Motion, float], Numbers]
+Term = Callable[[Motion, float], Values]
 """What multiplies a constant, window by window; the number is the Stribeck velocity, for terms that have one."""
 
 
-def _bristle(m: Motion, stribeck: float, sense: int) -> Numbers:
+def _bristle(m: Motion, stribeck: float, sense: int) -> Values:
     """Part of the low-speed friction that is left at each sample, in one direction."""
     speed = m.quick * sense
     left = np.where(speed > 0.0, np.exp(-np.minimum((speed / stribeck) ** 2, 50.0)), 0.0)
@@ -110,7 +108,7 @@ def terms_of(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name != LOSS)
 
 
-def model_columns(m: Motion, names: Sequence[str], bend: float) -> Numbers:
+def model_columns(m: Motion, names: Sequence[str], bend: float) -> Values:
     """Columns of a model over windows."""
     columns = np.column_stack([TERMS[name](m, bend) for name in terms_of(names)])
     if LOSS not in names:

@@ -1,11 +1,11 @@
 """A constant with its limits: what every method of identification gives."""
 
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from detent.logs.windows import scipy
 
 LEVEL = 0.95  # share of intervals that hold the true value
 
@@ -75,11 +75,5 @@ def quantile(degrees: float) -> float:
     >>> round(quantile(float("inf")), 3), round(quantile(10), 3)
     (1.96, 2.228)
     """
-    stats: Any = import_module("scipy.stats")  # it states no types
-    upper = 0.5 * (1.0 + LEVEL)
+    stats, upper = scipy("stats"), 0.5 * (1.0 + LEVEL)
     return float(stats.norm.ppf(upper) if np.isinf(degrees) else stats.t.ppf(upper, max(degrees, 1.0)))
-
-
-def quantiles(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Reach of each interval in standard errors, shape (k,) as the degrees of freedom."""
-    return np.array([quantile(d) for d in degrees.tolist()], np.float64)

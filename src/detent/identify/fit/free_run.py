@@ -17,10 +17,10 @@ from detent.identify.fit.equations import fine_kernel
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import make_kernel
 from detent.kernel.loop import advance
+from detent.logs.log import Values
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, driven, fill_clocks, switch_on
 from detent.plant.two_mass import fastest_rate
 
-Numbers = NDArray[np.float64]
 Report = Callable[[float], None]
 
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
@@ -55,7 +55,7 @@ class Plant:
         self._hanging = hanging_position(constants)
         self._step = step
 
-    def run(self, effort: Numbers, begin: int, samples: int, position: float, velocity: float) -> Numbers:
+    def run(self, effort: Values, begin: int, samples: int, position: float, velocity: float) -> Values:
         """Positions at samples under a recorded effort, loops open."""
         r = Cascade()
         switch_on(self._params, r, position - self._hanging)
@@ -100,7 +100,7 @@ def _position_bytes() -> NDArray[np.int64]:
 _PICKS = _position_bytes()
 
 
-def start_velocities(run: Run) -> Numbers:
+def start_velocities(run: Run) -> Values:
     """Velocity at every sample, as a simulation starts with it."""
     return fine_kernel(make_kernel(max(4, round(0.02 / run.step)), run.step)).velocities(run.position)
 
@@ -123,7 +123,7 @@ def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report 
     return tuple(found)
 
 
-def _stretches(constants: Constants, run: Run, samples: int) -> Numbers:
+def _stretches(constants: Constants, run: Run, samples: int) -> Values:
     """Error, way and naive error at the end of stretches, shape (stretches, 3)."""
     plant, velocity, q = Plant(constants, run.step), start_velocities(run), run.position
     border = min(max(4, round(0.006 / run.step)), len(q) // 4)
@@ -138,16 +138,16 @@ def _stretches(constants: Constants, run: Run, samples: int) -> Numbers:
     return np.array(rows).reshape(-1, 3)
 
 
-def _horizon(name: str, duration: float, rows: Numbers) -> Horizon:
+def _horizon(name: str, duration: float, rows: Values) -> Horizon:
     error, way, naive = rows.T
     return Horizon(duration, name, len(rows), _rms(error), float(np.abs(error).max()), _rms(way), _rms(naive))
 
 
 def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
     """The whole of each run in one piece."""
-    errors: list[Numbers] = []
-    ways: list[Numbers] = []
-    naive: list[Numbers] = []
+    errors: list[Values] = []
+    ways: list[Values] = []
+    naive: list[Values] = []
     for run in runs:
         velocity = float(start_velocities(run)[_border(run)])
         cut = run.part(_border(run), len(run.position))
@@ -168,7 +168,7 @@ def _border(run: Run) -> int:
     return min(max(4, round(0.006 / run.step)), len(run.position) // 4)
 
 
-def free_run(constants: Constants, run: Run) -> Numbers:
+def free_run(constants: Constants, run: Run) -> Values:
     """A run in one piece, from its first well-known velocity on; a few samples shorter than the run."""
     begin = _border(run)
     samples = len(run.position) - begin
@@ -176,5 +176,5 @@ def free_run(constants: Constants, run: Run) -> Numbers:
     return Plant(constants, run.step).run(run.effort, begin, samples, float(run.position[begin]), velocity)
 
 
-def _rms(values: Numbers) -> float:
+def _rms(values: Values) -> float:
     return float(np.sqrt(np.mean(values**2)))

@@ -5,13 +5,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.identify.fit.closed_loop import ClosedLoop, simulate_closed_loop
 from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS
-from detent.identify.fit.estimate import Estimate, quantiles
+from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import Horizon, simulate_horizons
 from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
 from detent.identify.fit.output_error import STRETCH, fit_output_error
@@ -20,9 +19,8 @@ from detent.identify.fit.regression import Fit, Instruments, Prepared, prepare
 from detent.identify.fit.residuals import Residuals, residuals_of
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
 from detent.identify.fit.weights import make_kernel
-from detent.logs.log import Log
+from detent.logs.log import Log, Values
 
-Numbers = NDArray[np.float64]
 Report = Callable[[str, float], None]
 Method = Literal["regression", "output error"]
 Verdict = Literal["trusted", "partly trusted", "refused"]
@@ -254,7 +252,7 @@ def _follows(part: Prepared) -> bool:
     return all(_cosine(*pair) > LIKENESS[part.instruments] for pair in pairs)
 
 
-def _cosine(a: Numbers, b: Numbers) -> float:
+def _cosine(a: Values, b: Values) -> float:
     """Cosine of the angle between two signals; 0 where one is absent."""
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float(a @ b) / size if size > 0.0 else 0.0
@@ -316,7 +314,7 @@ def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
 
     A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
     """
-    reach = quantiles(fit.degrees) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    reach = np.array([quantile(d) for d in fit.degrees.tolist()]) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     if is_at_bound(parts, fit) or not reach[-1] < WIDEST_BEND * fit.bend:
         return False
     excess = [k for k, name in enumerate(fit.names) if name.startswith("excess")]

@@ -12,8 +12,6 @@ Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +27,8 @@ from detent.identify.fit.regression import (
     make_effort,
     solve,
 )
-
-Numbers = NDArray[np.float64]
+from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 STRETCHES = 8  # parts of a log that are held out one after the other
 CLEAR = 0.0  # mean gain of a rung in standard errors over the stretches, from which it is taken
@@ -86,7 +84,7 @@ class Climb:
 
     rung: Rung
     error: float  # root mean square of the prediction of stretches not seen, over that of the effort
-    stretches: Numbers  # mean squares, stretch by stretch
+    stretches: Values  # mean squares, stretch by stretch
     gain: float  # mean gain over the rung chosen so far, in standard errors; nan for the first
     taken: bool  # True where it was climbed
     possible: bool  # False where its friction falls towards standstill
@@ -98,7 +96,7 @@ def extended(rung: Rung, extra: Sequence[str]) -> Rung:
     return Rung(rung.name, rung.text, (*rung.terms, *extra))
 
 
-def stribeck_speeds(parts: Sequence[Prepared]) -> Numbers:
+def stribeck_speeds(parts: Sequence[Prepared]) -> Values:
     """Stribeck velocities that the log could show, from the slow end of its motion to half its top speed."""
     speed = np.abs(np.concatenate([p.motion.velocity for p in parts]))
     top, low = float(np.quantile(speed, 0.98)), float(np.quantile(speed, 0.02))
@@ -106,7 +104,7 @@ def stribeck_speeds(parts: Sequence[Prepared]) -> Numbers:
     return np.geomspace(least, most, 1 + math.ceil(math.log(most / least) / math.log(FINER)))
 
 
-def bends_tried(parts: Sequence[Prepared], names: Sequence[str]) -> Numbers:
+def bends_tried(parts: Sequence[Prepared], names: Sequence[str]) -> Values:
     """Stribeck velocities, or shares lost, among which the best is looked for."""
     return LOSSES if LOSS in names else stribeck_speeds(parts)
 
@@ -135,13 +133,12 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, f
 
     best = int(np.argmin([miss(float(bend)) for bend in tried]))
     around = tried[[max(best - 1, 0), min(best + 1, len(tried) - 1)]]
-    optimize: Any = import_module("scipy.optimize")  # it states no types
     limits = {"xatol": 1e-4 * float(around[1])}
-    found = float(optimize.minimize_scalar(miss, bounds=tuple(around), method="bounded", options=limits).x)
+    found = float(scipy("optimize").minimize_scalar(miss, bounds=tuple(around), method="bounded", options=limits).x)
     return _refined_bend(parts, names, found, tried), found
 
 
-def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float, tried: Numbers) -> float:
+def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float, tried: Values) -> float:
     """The bend at which the instruments ask for no other; the start where there is none within the range tried.
 
     What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
@@ -159,8 +156,7 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
             return start
         other = asked(far)
         if (other > 0.0) != (wanted > 0.0):
-            optimize: Any = import_module("scipy.optimize")  # it states no types
-            return float(optimize.brentq(asked, near, far, xtol=1e-4 * start))
+            return float(scipy("optimize").brentq(asked, near, far, xtol=1e-4 * start))
         near, wanted = far, other
     return start
 
@@ -233,7 +229,7 @@ def hold_out(parts: Sequence[Prepared], count: int = STRETCHES) -> list[tuple[Ma
     return masks
 
 
-def _held_out(parts: Sequence[Prepared], fit: Fit) -> Numbers:
+def _held_out(parts: Sequence[Prepared], fit: Fit) -> Values:
     """Mean squares of the prediction of each stretch."""
     columns, ideal = (make_columns(parts, fit.model, fit.bend, ideal=ideal) for ideal in (False, True))
     squares: list[float] = []

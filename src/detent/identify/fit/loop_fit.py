@@ -14,7 +14,6 @@ Ljung: System Identification, Theory for the User (1999), section 13.5, direct i
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,8 @@ from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import significant
 from detent.identify.fit.prepare import Run
-
-Numbers = NDArray[np.float64]
+from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 SPANS = (1, 2, 3, 4, 6, 8, 12)  # samples that the velocity may be a difference over
 SEEN = 0.7  # part of the log that is fitted; the rest tests
@@ -60,7 +59,7 @@ def fit_loops(run: Run) -> Loops | None:
     return best if best is not None and best.error < WORST else None
 
 
-def _trials(run: Run, reference: Numbers) -> Iterator["_Trial"]:
+def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
     """Every structure that is tried, the simplest first."""
     step, count = run.step, len(reference)
     velocity = np.gradient(reference, step)
@@ -82,22 +81,22 @@ class _Trial:
     """One structure."""
 
     run: Run
-    error: Numbers
-    demand: Numbers
-    feeds: Numbers
+    error: Values
+    demand: Values
+    feeds: Values
     rows: NDArray[np.intp]
     span: int
     share: float
     integrates: bool
 
-    def parts(self, feeds: tuple[int, ...]) -> Numbers:
+    def parts(self, feeds: tuple[int, ...]) -> Values:
         """What the columns of every position gain are made of, and some of the feed-forwards."""
         loops = [self.error, self.demand]
         if self.integrates:
             loops += [np.cumsum(signal) * self.run.step for signal in loops]
         return np.column_stack([*loops, self.feeds[:, [*feeds, -1]]])[self.rows]
 
-    def mix(self, gain: float, count: int) -> Numbers:
+    def mix(self, gain: float, count: int) -> Values:
         """How a position gain mixes so many parts: their product are its columns."""
         loops = 2 if self.integrates else 1
         mixed = np.zeros((count, count - loops))
@@ -133,9 +132,8 @@ class _Trial:
             share, viscous = viscous / float(theta[0]), 0.0
         return Loops(gain, float(theta[0]), integral, self.span, share, acceleration, viscous, coulomb, error)
 
-    def _search(self, parts: Numbers, effort: Numbers) -> float:
+    def _search(self, parts: Values, effort: Values) -> float:
         """The position gain with the least error: the best of a few, then between its neighbours."""
-        optimize: Any = import_module("scipy.optimize")  # it states no types
         products, moments = parts.T @ parts, parts.T @ effort
 
         def miss(logarithm: float) -> float:
@@ -147,7 +145,7 @@ class _Trial:
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-        found = float(optimize.minimize_scalar(miss, bounds=around, method="bounded").x)
+        found = float(scipy("optimize").minimize_scalar(miss, bounds=around, method="bounded").x)
         # Near its least the error is flat, and rounding decides where the search ends: its slope tells the place.
         for _ in range(2):
             less, least, more = miss(found - REACH), miss(found), miss(found + REACH)
@@ -156,18 +154,18 @@ class _Trial:
         return significant(math.exp(found), 6)
 
 
-def _solve(columns: Numbers, effort: Numbers) -> Numbers:
+def _solve(columns: Values, effort: Values) -> Values:
     """Least squares, worked out with columns of unit length by their normal equations, which are few."""
     return _solve_normal(columns.T @ columns, columns.T @ effort)
 
 
-def _solve_normal(products: Numbers, moments: Numbers) -> Numbers:
+def _solve_normal(products: Values, moments: Values) -> Values:
     """The same from the normal equations."""
     size = np.maximum(np.sqrt(np.diag(products)), 1e-150)
     linalg: Any = np.linalg
-    theta: Numbers = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]
+    theta: Values = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]
     return theta / size
 
 
-def _rms(values: Numbers) -> float:
+def _rms(values: Values) -> float:
     return float(np.sqrt(np.mean(values**2)))

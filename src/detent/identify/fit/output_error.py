@@ -14,19 +14,18 @@ Bock: Recent advances in parameter identification for ordinary differential equa
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import Plant, start_velocities
 from detent.identify.fit.prepare import Run
+from detent.logs.log import Values
+from detent.logs.windows import scipy
 
-Numbers = NDArray[np.float64]
 Report = Callable[[float], None]
 
 STRETCH = 2.0  # length of a simulated stretch [s]
@@ -127,19 +126,19 @@ class _Search:
         self._scale = _scales(self._searched, values)
         self.begin = values / self._scale
         self.count = 0
-        self._removers: list[Numbers] = []
+        self._removers: list[Values] = []
         self.look_at_starts(self.begin)
 
-    def look_at_starts(self, x: Numbers) -> None:
+    def look_at_starts(self, x: Values) -> None:
         """Work out what an error of each start does."""
         self._removers = [self._remover(x, s) for s in self._stretches]
 
-    def _constants(self, x: Numbers) -> Constants:
+    def _constants(self, x: Values) -> Constants:
         values = np.append(self._back @ (x * self._scale), self._start.value("delay"))
         k = len(values)
         return Constants((*self.names, "delay"), values, np.zeros((k, k)), np.ones(k), "output error")
 
-    def _remover(self, x: Numbers, s: Stretch) -> Numbers:
+    def _remover(self, x: Values, s: Stretch) -> Values:
         """What an error of the start does to a stretch: position and velocity, orthonormal columns."""
         plant = Plant(self._constants(x), s.run.step)
         q = float(s.run.position[s.begin])
@@ -149,12 +148,12 @@ class _Search:
         ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
         return np.linalg.qr(ways)[0]
 
-    def residual(self, x: Numbers) -> Numbers:
+    def residual(self, x: Values) -> Values:
         """Simulated less measured position of all stretches, without what the starts explain."""
         self.count += 1
         constants = self._constants(x)
         plants: dict[float, Plant] = {}
-        made: list[Numbers] = []
+        made: list[Values] = []
         for s, ways in zip(self._stretches, self._removers, strict=True):
             plant = plants.setdefault(s.run.step, Plant(constants, s.run.step))
             q = s.run.position[s.begin : s.begin + s.samples]
@@ -162,11 +161,11 @@ class _Search:
             made.append(miss - ways @ (ways.T @ miss))
         return np.concatenate(made)
 
-    def minimise(self, x: Numbers, report: Report | None) -> Any:
+    def minimise(self, x: Values, report: Report | None) -> Any:
         """Least squares within what is possible."""
         rounds = 0
 
-        def jacobian(at: Numbers) -> Numbers:
+        def jacobian(at: Values) -> Values:
             """Change of the residuals with each constant, by differences."""
             nonlocal rounds
             rounds += 1
@@ -177,9 +176,8 @@ class _Search:
             return np.column_stack(columns)
 
         low, high = self._bounds()
-        optimize: Any = import_module("scipy.optimize")  # it states no types
         start = np.clip(x, low + 1e-6, high - 1e-6)
-        found = optimize.least_squares(
+        found = scipy("optimize").least_squares(
             self.residual,
             start,
             jac=jacobian,
@@ -193,7 +191,7 @@ class _Search:
             report(1.0)
         return found
 
-    def _bounds(self) -> tuple[Numbers, Numbers]:
+    def _bounds(self) -> tuple[Values, Values]:
         """Least and largest value of each searched constant, in parts of its scale."""
         low, high = np.zeros(len(self._searched)), np.full(len(self._searched), np.inf)
         for k, name in enumerate(self._searched):
@@ -205,7 +203,7 @@ class _Search:
                 high[k] = MOST_LOST / self._scale[k]
         return low, high
 
-    def constants_at(self, x: Numbers, jacobian: Numbers, residual: Numbers) -> Constants:
+    def constants_at(self, x: Values, jacobian: Values, residual: Values) -> Constants:
         """Constants with the covariance of the stretches' scores."""
         edges = np.cumsum([0, *(s.samples for s in self._stretches)])
         scores = np.array([jacobian[a:b].T @ residual[a:b] for a, b in pairwise(edges.tolist())])
@@ -226,7 +224,7 @@ class _Search:
         )
 
 
-def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Numbers]:
+def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Values]:
     """What is searched, and the sums of it that the constants are, shape (k, k)."""
     searched = tuple({"coulomb.positive": "coulomb", "coulomb.negative": "offset"}.get(name, name) for name in names)
     back = np.eye(len(names))
@@ -239,7 +237,7 @@ def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Numbers]
     return searched, back
 
 
-def _scales(names: Sequence[str], values: Numbers) -> Numbers:
+def _scales(names: Sequence[str], values: Values) -> Values:
     """Scale of each searched constant: its size, or a tenth of the largest of its unit where it is nearly nothing."""
     forces = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.partition(".")[0] in _FORCES]
     drags = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.startswith("viscous")]
@@ -251,5 +249,5 @@ def _scales(names: Sequence[str], values: Numbers) -> Numbers:
     return np.maximum(np.maximum(np.abs(values), floors), 1e-12)
 
 
-def _rms(values: Numbers) -> float:
+def _rms(values: Values) -> float:
     return math.sqrt(float(np.mean(values**2)))

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import InputError
-from detent.logs.log import Kind, Log
+from detent.logs.log import Kind, Log, Values
 from detent.logs.roles import EFFORTS
-
-Numbers = NDArray[np.float64]
 
 GAP = 1.5  # time between two samples, in periods, from which on something is missing between them
 FEWEST = 20  # samples below which nothing is said about a log
@@ -24,19 +22,19 @@ class Run:
 
     name: str  # name of the log
     step: float  # time between two samples [s]
-    position: Numbers  # as measured [m], [rad] or [count]
-    effort: Numbers  # what drives the axis, from each sample to the next
+    position: Values  # as measured [m], [rad] or [count]
+    effort: Values  # what drives the axis, from each sample to the next
     usable: NDArray[np.bool_]  # samples that mean something
     effort_name: str = "force"  # and effort_unit: what it is
     effort_unit: str = "N"
     position_unit: str = "m"
-    reference: Numbers | None = None  # and load_position: position asked for; position of a second encoder
-    load_position: Numbers | None = None
+    reference: Values | None = None  # and load_position: position asked for; position of a second encoder
+    load_position: Values | None = None
     resolution: float = 0.0  # way of a count of the encoder; 0 where none shows
     noise: float = 0.0  # standard deviation of the measured position, counts included
 
     @property
-    def t(self) -> Numbers:
+    def t(self) -> Values:
         """Time from the first sample [s]."""
         return np.asarray(np.arange(len(self.position)) * self.step, np.float64)
 
@@ -92,7 +90,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
         raise InputError.of_file(log.name, f"{len(log.t)} samples", f"{FEWEST} or more", "record a longer run")
     step = log.period
     samples = math.floor((log.t[-1] - log.t[0]) / step + 0.5) + 1
-    grid: Numbers = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
+    grid: Values = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
     position = np.interp(grid, log.t, log.signals["position"])
     others = {
         role: np.interp(grid, log.t, log.signals[role])
@@ -132,7 +130,7 @@ def _choose_effort(log: Log, asked: str | None) -> str:
     return asked or found[0]
 
 
-def _hold(grid: Numbers, t: Numbers, values: Numbers, step: float) -> Numbers:
+def _hold(grid: Values, t: Values, values: Values, step: float) -> Values:
     """A signal that stands from each of its samples to the next, on the grid."""
     if len(grid) == len(t) and float(np.abs(grid - t).max()) < 0.2 * step:
         return values.astype(np.float64)
@@ -140,7 +138,7 @@ def _hold(grid: Numbers, t: Numbers, values: Numbers, step: float) -> Numbers:
     return values[np.clip(places, 0, len(t) - 1)].astype(np.float64)
 
 
-def _usable(log: Log, grid: Numbers, effort: str) -> NDArray[np.bool_]:
+def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
     """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
     bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK)
     for finding in log.findings:
@@ -156,7 +154,7 @@ def _usable(log: Log, grid: Numbers, effort: str) -> NDArray[np.bool_]:
     return ~(bad[before] | (gap & (np.abs(grid - log.t[before]) > 0.2 * log.period)))
 
 
-def find_count(position: Numbers) -> float:
+def find_count(position: Values) -> float:
     """Way of a count: the smallest step of a position whose steps are whole multiples of it; 0 where there is none."""
     ways = np.abs(np.diff(position))
     ways = ways[ways > 1e-12 * max(float(np.abs(position).max()), 1e-300)]
@@ -169,7 +167,7 @@ def find_count(position: Numbers) -> float:
     return count if float(np.median(rest[ways < 20 * count])) < 0.05 else 0.0
 
 
-def noise_of(position: Numbers) -> float:
+def noise_of(position: Values) -> float:
     """Standard deviation of what is not smooth in a position: its third differences, 20 times their variance apart."""
     third = np.diff(position, 3)
     return float(np.sqrt(np.mean(third**2) / 20.0)) if len(third) else 0.0

@@ -25,8 +25,8 @@ from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covaria
 from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import Kernel, make_kernel
+from detent.logs.log import Values
 
-Numbers = NDArray[np.float64]
 Instruments = Literal["reference", "position", "none"]
 
 WIDER = 2.5  # width of the windows that are instruments where there is no reference, in those of the columns
@@ -57,11 +57,11 @@ class Fit:
     # terms of the model that have a column; then ``delay``, that of the effort [s]; then ``stribeck`` or ``loss`` where
     # the model has one
     names: tuple[str, ...]
-    values: Numbers  # their constants
-    covariance: Numbers  # of these
-    degrees: Numbers  # degrees of freedom behind the variance of each
-    residual: Numbers  # and effort: measured less fitted effort, and the effort, window by window
-    effort: Numbers
+    values: Values  # their constants
+    covariance: Values  # of these
+    degrees: Values  # degrees of freedom behind the variance of each
+    residual: Values  # and effort: measured less fitted effort, and the effort, window by window
+    effort: Values
     model: tuple[str, ...]  # what the model was asked for
     half: int  # samples of the window to each side
     condition: float  # condition number of the columns at unit length
@@ -78,7 +78,7 @@ class Fit:
         return float(self.values[-1]) if is_bent(self.model) else 1.0
 
     @property
-    def linear(self) -> Numbers:
+    def linear(self) -> Values:
         """Constants of the columns."""
         return self.values[: len(terms_of(self.model))]
 
@@ -112,17 +112,17 @@ def lag_of(run: Run) -> int:
     return lags[int(np.argmin(miss))]
 
 
-def _delayed(values: Numbers, lag: int) -> Numbers:
+def _delayed(values: Values, lag: int) -> Values:
     return np.concatenate([np.full(lag, values[0]), values[: len(values) - lag]]) if lag else values
 
 
-def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *, ideal: bool = False) -> Numbers:
+def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *, ideal: bool = False) -> Values:
     """Columns of a model over all windows, shape (m, k)."""
     motions = [p.ideal if ideal else p.motion for p in parts]
     return np.concatenate([model_columns(m, names, bend) for m in motions])
 
 
-def make_effort(parts: Sequence[Prepared], delay: float) -> Numbers:
+def make_effort(parts: Sequence[Prepared], delay: float) -> Values:
     """Effort that acts `delay` [s] later than recorded, over all windows, shape (m,)."""
     return np.concatenate([p.motion.kernel.held(p.run.effort, p.motion.rows, delay / p.run.step) for p in parts])
 
@@ -171,14 +171,14 @@ def fit_equations(
     )
 
 
-def _known(names: Sequence[str], theta: Numbers) -> dict[str, float]:
+def _known(names: Sequence[str], theta: Values) -> dict[str, float]:
     """Constants of the columns by their names."""
     return dict(zip(terms_of(names), theta.tolist(), strict=True))
 
 
 def _with_delay(
-    parts: Sequence[Prepared], known: dict[str, float], late: float, columns: Numbers, ideal: Numbers
-) -> tuple[Numbers, Numbers]:
+    parts: Sequence[Prepared], known: dict[str, float], late: float, columns: Values, ideal: Values
+) -> tuple[Values, Values]:
     """Columns and instruments with that of the delay."""
     slope = np.concatenate([p.motion.kernel.held_slope(p.run.effort, p.motion.rows, late / p.run.step) for p in parts])
     x = np.column_stack([columns, slope])
@@ -187,10 +187,10 @@ def _with_delay(
     return x, np.column_stack([ideal, _ideal_slope(parts, known)])
 
 
-def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Numbers:
+def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Values:
     """What the instruments say of the effort's derivative, once mass and viscous friction are roughly known."""
     viscous = max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
-    made: list[Numbers] = []
+    made: list[Values] = []
     for p in parts:
         m = p.ideal
         made.append((known["mass"] or 1.0) * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration)
@@ -200,12 +200,12 @@ def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Numbers:
 def _with_bend(  # noqa: PLR0913 - all that a model consists of
     parts: Sequence[Prepared],
     names: Sequence[str],
-    theta: Numbers,
+    theta: Values,
     bend: float,
-    x: Numbers,
-    residual: Numbers,
-    z: Numbers,
-) -> tuple[Numbers, Numbers, Numbers]:
+    x: Values,
+    residual: Values,
+    z: Values,
+) -> tuple[Values, Values, Values]:
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
     if not is_bent(names):
         return x, residual, z
@@ -213,9 +213,7 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
     return np.column_stack([x, slope]), residual, np.column_stack([z, tool])
 
 
-def _bend_slope(
-    parts: Sequence[Prepared], names: Sequence[str], theta: Numbers, bend: float, *, ideal: bool
-) -> Numbers:
+def _bend_slope(parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, *, ideal: bool) -> Values:
     """Change of the effort with the bend, shape (m,)."""
     more, less = (combine(make_columns(parts, names, bend * f, ideal=ideal), theta) for f in (1.05, 0.95))
     return (more - less) / (0.1 * bend)
@@ -229,13 +227,13 @@ def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
     return float(solve(z, x, fit.residual)[-1])
 
 
-def column_sizes(columns: Numbers) -> Numbers:
+def column_sizes(columns: Values) -> Values:
     """Lengths of columns; 1 for one of zeros, whose constant then comes out as 0."""
     length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
     return np.where(length > 0.0, length, 1.0)
 
 
-def solve(instruments: Numbers, columns: Numbers, effort: Numbers) -> Numbers:
+def solve(instruments: Values, columns: Values, effort: Values) -> Values:
     """Constants ``(Z' X)^-1 Z' y``, worked out with columns of unit length; least squares where Z is X."""
     size, length = column_sizes(columns), column_sizes(instruments)
     tools = instruments / length
@@ -244,18 +242,18 @@ def solve(instruments: Numbers, columns: Numbers, effort: Numbers) -> Numbers:
     return found / size
 
 
-def products(a: Numbers, b: Numbers) -> Numbers:
+def products(a: Values, b: Values) -> Values:
     """``A' B``, each sum in one order on every processor, which BLAS does not promise."""
     right = np.ascontiguousarray(b.T)
     return np.array([(right * column).sum(axis=1) for column in np.ascontiguousarray(a.T)])
 
 
-def combine(columns: Numbers, constants: Numbers) -> Numbers:
+def combine(columns: Values, constants: Values) -> Values:
     """``X theta``, likewise."""
     return np.asarray((columns * constants).sum(axis=1), np.float64)
 
 
-def _unknown(columns: Numbers, instruments: Numbers) -> NDArray[np.intp]:
+def _unknown(columns: Values, instruments: Values) -> NDArray[np.intp]:
     """Constants that the columns cannot tell: absent, or one with others."""
     matrix = products(instruments / column_sizes(instruments), columns / column_sizes(columns))
     _, singular, ways = np.linalg.svd(matrix)

@@ -6,13 +6,11 @@ series, made from white noise by an autoregressive filter (Yule and Walker). The
 from it, and the larger of both is taken.
 """
 
-from importlib import import_module
-from typing import Any
-
 import numpy as np
 
 from detent.identify.fit.coloured import coloured_covariance, independent_rows
 from detent.logs.log import Values
+from detent.logs.windows import scipy
 
 ORDER = 4  # order of the autoregressive filter, at most
 ROWS_PER_ORDER = 20  # rows of the series for each order, at least
@@ -37,8 +35,6 @@ def known_noise_covariance(
 
 def _shaped(columns: Values, noise: Values) -> Values:
     """Columns through the filter of the noise, backwards: their products are the covariance of the scores."""
-    signals: Any = import_module("scipy.signal")  # it states no types
-    linear: Any = import_module("scipy.linalg")
     order = min(ORDER, len(noise) // ROWS_PER_ORDER)
     power = float(noise @ noise) / len(noise)
     padded = np.vstack([np.zeros((FADED, columns.shape[1])), columns])[::-1]
@@ -47,6 +43,6 @@ def _shaped(columns: Values, noise: Values) -> Values:
     products = np.array([noise[: len(noise) - lag] @ noise[lag:] for lag in range(order + 1)]) / len(noise)
     # A hair of white noise keeps a series without any from being foreseen for certain.
     products[0] *= 1.0 + 1e-9
-    weights = np.asarray(linear.solve_toeplitz(products[:-1], products[1:]), float)
+    weights = np.asarray(scipy("linalg").solve_toeplitz(products[:-1], products[1:]), float)
     white = max(float(products[0] - weights @ products[1:]), 0.0)
-    return np.sqrt(white) * np.asarray(signals.lfilter([1.0], np.r_[1.0, -weights], padded, axis=0), float)
+    return np.sqrt(white) * np.asarray(scipy("signal").lfilter([1.0], np.r_[1.0, -weights], padded, axis=0), float)

@@ -14,9 +14,7 @@ from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Prepared
-from detent.logs.log import Kind, Log, Severity
-
-Numbers = NDArray[np.float64]
+from detent.logs.log import Kind, Log, Severity, Values
 
 LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
 LEAST_EACH_WAY = 0.05  # share of this time in each direction, at least
@@ -137,7 +135,7 @@ def _share_left_behind(run: Run) -> float:
     return float(way[still].sum()) / total if total > 0.0 else 0.0
 
 
-def _share_at_ends(values: Numbers) -> float:
+def _share_at_ends(values: Values) -> float:
     """Share of samples exactly at the largest or the smallest value."""
     top, bottom = float(values.max()), float(values.min())
     at_ends = np.count_nonzero(values == top) + np.count_nonzero(values == bottom)
@@ -211,7 +209,7 @@ def look_at_constants(run: Run, constants: Constants, parts: Sequence[Prepared])
     return found
 
 
-def _one_speed(run: Run, velocity: Numbers, names: Collection[str]) -> list[Refusal]:
+def _one_speed(run: Run, velocity: Values, names: Collection[str]) -> list[Refusal]:
     """Directions in which the axis has hardly more than one speed."""
     found: list[Refusal] = []
     for way, speed in (("positive", velocity[velocity > 0.0]), ("negative", -velocity[velocity < 0.0])):

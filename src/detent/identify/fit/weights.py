@@ -22,7 +22,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from detent.logs.log import Values
+
 Rows = NDArray[np.intp]  # numbers of samples
 _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
 _SQUARED = _SHAPE**2
@@ -36,41 +37,41 @@ class Kernel:
     step: float  # time between two samples [s]
     # value, first, second, third: sums of these times a signal are the weighted mean of the signal [1], of its first
     # [1/s], second [1/s^2] and third derivative [1/s^3]
-    value: Numbers
-    first: Numbers
-    second: Numbers
-    third: Numbers
+    value: Values
+    first: Values
+    second: Values
+    third: Values
 
     @property
     def corner_hz(self) -> float:
         """Frequency at which the mean of a signal is about 0.7 of its amplitude [Hz]."""
         return 0.40 / (self.half * self.step)
 
-    def held(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
+    def held(self, signal: Values, rows: Rows, late: float = 0.0) -> Values:
         """Mean of a signal held from each sample to the next, seen `late` samples later, around samples `rows`."""
         return _sums(signal, _held_weights(self.half, late), rows)
 
-    def held_slope(self, signal: Numbers, rows: Rows, late: float = 0.0) -> Numbers:
+    def held_slope(self, signal: Values, rows: Rows, late: float = 0.0) -> Values:
         """Mean of the first derivative of such a signal [1/s], around samples `rows`."""
         return _sums(signal, _held_slopes(self.half, late), rows) / self.step
 
-    def mean(self, signal: Numbers, rows: Rows) -> Numbers:
+    def mean(self, signal: Values, rows: Rows) -> Values:
         """Mean of a signal between whose samples straight lines run, around samples `rows`."""
         return _sums(signal, self.value, rows)
 
-    def velocity(self, position: Numbers, rows: Rows) -> Numbers:
+    def velocity(self, position: Values, rows: Rows) -> Values:
         """Mean of the first derivative around samples `rows`."""
         return _way_sums(position, self.first, rows)
 
-    def acceleration(self, position: Numbers, rows: Rows) -> Numbers:
+    def acceleration(self, position: Values, rows: Rows) -> Values:
         """Mean of the second derivative around samples `rows`."""
         return _way_sums(position, self.second, rows)
 
-    def jerk(self, position: Numbers, rows: Rows) -> Numbers:
+    def jerk(self, position: Values, rows: Rows) -> Values:
         """Mean of the third derivative around samples `rows`."""
         return _way_sums(position, self.third, rows)
 
-    def velocities(self, position: Numbers) -> Numbers:
+    def velocities(self, position: Values) -> Values:
         """Mean of the first derivative around every sample; wrong for `half` samples at both ends."""
         ways, n = np.pad(np.diff(position), self.half), len(position)
         found = np.zeros(n)
@@ -100,14 +101,14 @@ def make_kernel(half: int, step: float) -> Kernel:
     )
 
 
-def _exact_third(weights: Numbers, t: Numbers) -> Numbers:
+def _exact_third(weights: Values, t: Values) -> Values:
     """Weights that give 0 for a straight line and 6 for a cubic."""
     straight = weights - t * float(np.sum(weights * t)) / float(np.sum(t * t))
     return straight * (6.0 / float(np.sum(straight * t**3)))
 
 
 @cache
-def _held_weights(half: int, late: float) -> Numbers:
+def _held_weights(half: int, late: float) -> Values:
     """Integral of the window over each sample's stretch, `late` samples after it began."""
     reach = half + 1 + int(np.ceil(abs(late)))
     edges = (np.arange(-reach, reach + 2) + late) / half
@@ -117,7 +118,7 @@ def _held_weights(half: int, late: float) -> Numbers:
 
 
 @cache
-def _held_slopes(half: int, late: float) -> Numbers:
+def _held_slopes(half: int, late: float) -> Values:
     """The same of the derivative: the window's change over each stretch, per sample."""
     reach = half + 1 + int(np.ceil(abs(late)))
     edges = np.clip((np.arange(-reach, reach + 2) + late) / half, -1.0, 1.0)
@@ -125,24 +126,24 @@ def _held_slopes(half: int, late: float) -> Numbers:
     return -np.diff(_SHAPE(edges)) / area
 
 
-def _sums(signal: Numbers, weights: Numbers, rows: Rows) -> Numbers:
+def _sums(signal: Values, weights: Values, rows: Rows) -> Values:
     """Weighted sum around each of some samples; the signal keeps its end values beyond its ends."""
     half = len(weights) // 2
     return _weighted(np.concatenate([np.full(half, signal[0]), signal, np.full(half, signal[-1])]), weights, rows)
 
 
-def _way_sums(position: Numbers, weights: Numbers, rows: Rows) -> Numbers:
+def _way_sums(position: Values, weights: Values, rows: Rows) -> Values:
     """The same for weights that add up to 0, by the ways between samples."""
     return _weighted(np.pad(np.diff(position), len(weights) // 2), _way_weights(weights), rows)
 
 
-def _way_weights(weights: Numbers) -> Numbers:
+def _way_weights(weights: Values) -> Values:
     """Weights of the ways between samples, added up from the nearer end: those of the first derivative are positive."""
     half = len(weights) // 2
     return np.concatenate([-np.cumsum(weights[:half]), np.cumsum(weights[:half:-1])[::-1]])
 
 
-def _weighted(padded: Numbers, weights: Numbers, rows: Rows) -> Numbers:
+def _weighted(padded: Values, weights: Values, rows: Rows) -> Values:
     """Weighted sums of what begins at some samples."""
     taken = np.lib.stride_tricks.sliding_window_view(padded, len(weights))[rows]
     taken *= weights

@@ -13,7 +13,7 @@ from detent.identify.fit.coloured import (
     independent_rows,
     long_run_variance,
 )
-from detent.identify.fit.estimate import quantile, quantiles
+from detent.identify.fit.estimate import quantile
 
 
 def autoregressive(rng, shape, memory):
@@ -156,7 +156,10 @@ def test_intervals_hold_for_a_constant_that_few_rows_carry():
         residual = noise - columns @ theta
         covariance, cosines = coloured_covariance(columns, residual)
         error = np.sqrt(np.diag(covariance))
-        held.append(np.abs(theta) < quantiles(carried_degrees(columns, residual, columns, cosines)) * error)
+        held.append(
+            np.abs(theta)
+            < np.array([quantile(d) for d in carried_degrees(columns, residual, columns, cosines)]) * error
+        )
         short.append(np.abs(theta) < quantile(cosines) * error)
     low, _ = binomial_bounds(1000, doubt=1e-3)
     assert np.mean(held, axis=0).min() > low
