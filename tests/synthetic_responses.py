@@ -1,5 +1,7 @@
 """Frequency responses of two masses whose constants are known: computed with noise, or recorded from a cascade axis."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from detent.identify.analyse.average_periods import noise_parts
@@ -83,3 +85,10 @@ def record_cascade(seed, *, delay=2, coulomb=0.0, resolution=0.0, coupled=True, 
     names = ["source.command", "motor_sensor.position", "load_sensor.position"]
     rows = Rig(p).record(len(command) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=command)
     return rows["t"], *(rows[name] for name in names)
+
+
+def within(response, low, high):
+    """The part of a response between two frequencies [Hz], both included."""
+    inside = (response.frequency >= low) & (response.frequency <= high)
+    series = ("frequency", "response", "coherence", "deviation")
+    return replace(response, **{name: getattr(response, name)[inside] for name in series})

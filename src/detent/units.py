@@ -54,41 +54,23 @@ KINDS: dict[str, tuple[str, str]] = {
 """Name and example of each unit a file may ask for, as they appear in messages."""
 
 COMMON_UNITS: dict[str, dict[str, Fraction]] = {
-    "m": {"m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
-    "m/s": {"m/s": Fraction(1), "mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
-    "m/s^2": {"m/s^2": Fraction(1), "mm/s^2": Fraction(1, 1000)},
-    "m/s^3": {"m/s^3": Fraction(1)},
-    "Hz": {"Hz": Fraction(1), "kHz": Fraction(1000), "MHz": Fraction(10**6)},
-    "s": {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
-    "kg": {"kg": Fraction(1), "g": Fraction(1, 1000)},
-    "kg*m^2": {"kg*m^2": Fraction(1), "g*cm^2": Fraction(1, 10**7)},
-    "N": {"N": Fraction(1)},
-    "N*s/m": {"N*s/m": Fraction(1)},
-    "N/m": {"N/m": Fraction(1), "N/mm": Fraction(1000), "N/um": Fraction(10**6)},
-    "N/V": {"N/V": Fraction(1)},
-    "N*m/A": {"N*m/A": Fraction(1), "mN*m/A": Fraction(1, 1000)},
-    "V": {"V": Fraction(1)},
-    "V*s/rad": {"V*s/rad": Fraction(1)},
-    "V*s/m": {"V*s/m": Fraction(1)},
-    "V/m": {"V/m": Fraction(1), "V/mm": Fraction(1000)},
-    "V/rad": {"V/rad": Fraction(1)},
-    "V/(m*s)": {"V/(m*s)": Fraction(1)},
-    "V/(rad*s)": {"V/(rad*s)": Fraction(1)},
-    "ohm": {"ohm": Fraction(1)},
-    "H": {"H": Fraction(1), "mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
-    "A": {"A": Fraction(1), "mA": Fraction(1, 1000)},
-    "A/V": {"A/V": Fraction(1)},
-    "rad": {"rad": Fraction(1)},
-    "rad/s": {"rad/s": Fraction(1)},
-    "rad/s^2": {"rad/s^2": Fraction(1)},
-    "rad/s^3": {"rad/s^3": Fraction(1)},
-    "N*m": {"N*m": Fraction(1), "N*cm": Fraction(1, 100), "mN*m": Fraction(1, 1000)},
-    "N*m*s/rad": {"N*m*s/rad": Fraction(1), "mN*m*s/rad": Fraction(1, 1000)},
-    "N*m/rad": {"N*m/rad": Fraction(1)},
-    "N*m/V": {"N*m/V": Fraction(1)},
+    "m": {"cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
+    "m/s": {"mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
+    "m/s^2": {"mm/s^2": Fraction(1, 1000)},
+    "Hz": {"kHz": Fraction(1000), "MHz": Fraction(10**6)},
+    "s": {"ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
+    "kg": {"g": Fraction(1, 1000)},
+    "kg*m^2": {"g*cm^2": Fraction(1, 10**7)},
+    "N/m": {"N/mm": Fraction(1000), "N/um": Fraction(10**6)},
+    "N*m/A": {"mN*m/A": Fraction(1, 1000)},
+    "V/m": {"V/mm": Fraction(1000)},
+    "H": {"mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
+    "A": {"mA": Fraction(1, 1000)},
+    "N*m": {"N*cm": Fraction(1, 100), "mN*m": Fraction(1, 1000)},
+    "N*m*s/rad": {"mN*m*s/rad": Fraction(1, 1000)},
 }
-"""Factors met in nearly every file, by target unit: with these alone a file is read without waiting for pint's import
-(0.2 s). A test holds each of them to pint's."""
+"""Factors met in nearly every file, by target unit, beside that unit itself: with these alone a file is read without
+waiting for pint's import (0.2 s). A test holds each of them to pint's."""
 
 IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}
 """Units that people read in degrees."""
@@ -210,7 +192,7 @@ def _conversion_factor(unit_text: str, unit: str) -> Fraction:
         if unit == unit_text:
             return Fraction(1, 100)
         raise QuantityError(f'the unit "{unit_text}"', allowed, f'write {kind} as "{example}"')
-    common = COMMON_UNITS.get(unit, {}).get(unit_text)
+    common = Fraction(1) if unit == unit_text and unit in KINDS else COMMON_UNITS.get(unit, {}).get(unit_text)
     if common is not None:
         return common
     if "rad" in unit and re.search(r"[hH]z\b|[hH]ertz", unit_text):

@@ -12,8 +12,7 @@ from detent.errors import InputError
 from detent.logs.agreement import FACTORS
 from detent.logs.differences import runs_of, window_rows
 from detent.logs.log import Action, Kind
-from detent.logs.read_log import read_log
-from detent.logs.read_table import READERS
+from detent.logs.read_log import READERS, read_log
 
 FEW = settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 seeds = st.integers(0, 2000)

@@ -80,13 +80,19 @@ Signals = Annotated[
 
 
 JOB_HELP = "What the axis does: a file of the kind that its method takes, see below."
-Job = Annotated[
-    Path | None,
-    typer.Option(
-        "--job",
-        help=JOB_HELP,
-    ),
-]
+Job = Annotated[Path | None, typer.Option("--job", help=JOB_HELP)]
+
+
+def map_option(begin: str) -> Any:
+    """The option of a mapping file; `begin` begins its help."""
+    return typer.Option("--map", metavar="FILE", help=f"{begin} file (TOML): what the columns of a recording are.")
+
+
+def column_option(begin: str) -> Any:
+    """The option that says what a column is."""
+    roles = "time, position, reference, velocity, force, torque, current, voltage, command, position_load"
+    told = f"{begin} a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: {roles}; "
+    return typer.Option("--column", metavar="ROLE=COLUMN", help=f"{told}what is not said is guessed, and told.")
 
 
 def main() -> NoReturn:

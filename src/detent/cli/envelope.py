@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import File, Json, Set, app
-from detent.cli.terminal import print_json, print_table
+from detent.cli.terminal import folder_for, print_json, print_table
 from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")
@@ -35,8 +35,8 @@ def envelope(
         raise DetentError(f"--motor: came {motor!r}; allowed: {', '.join(found)}; name a motor of the file")
     chosen = {motor: found[motor]} if motor else found
     folder = output or Path("envelope") / file.stem
-    _make_folder(folder)
-    written = {name: [tables.save(folder / f"{name}.{kind}") for kind in KINDS] for name, tables in chosen.items()}
+    with folder_for("--output", folder):
+        written = {name: [tables.save(folder / f"{name}.{kind}") for kind in KINDS] for name, tables in chosen.items()}
     if as_json:
         print_json({name: chosen[name].to_dict() | {"files": [str(f) for f in written[name]]} for name in chosen})
         return
@@ -54,10 +54,3 @@ def _row(found: Any) -> tuple[str, ...]:
         f"{about['run_up'] * 1e3:.4g} ms",
         f"{about['bytes']} bytes",
     )
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DetentError(f"--output {folder}: cannot be written ({error.strerror}); choose another folder") from error

@@ -8,7 +8,7 @@ import typer
 
 from detent import examples
 from detent.cli.app import Json, app
-from detent.cli.terminal import print_json
+from detent.cli.terminal import folder_for, print_json
 from detent.errors import DetentError
 
 
@@ -37,16 +37,12 @@ def examples_command(
 def _copy_examples(found: list[Path], folder: Path) -> list[Path]:
     import shutil
 
-    try:
+    with folder_for("--copy", folder):
         existing = [path.name for path in found if (folder / path.name).exists()]
         if existing:
-            raise DetentError(
-                f"--copy {folder}: it holds {', '.join(existing)} already; nothing was copied; choose another folder"
-            )
-        folder.mkdir(parents=True, exist_ok=True)
+            told = f"it holds {', '.join(existing)} already; nothing was copied; choose another folder"
+            raise DetentError(f"--copy {folder}: {told}")
         return [Path(shutil.copyfile(path, folder / path.name)) for path in found]
-    except OSError as error:
-        raise DetentError(f"--copy {folder}: cannot be written ({error.strerror}); choose another folder") from error
 
 
 def _about(path: Path) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from detent.cli.app import NOT_DONE, Json, app
+from detent.cli.app import NOT_DONE, Json, app, column_option, map_option
 from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
 from detent.errors import DetentError
 
@@ -22,18 +22,8 @@ COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": 
 
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
-Mapping = Annotated[
-    Path | None, typer.Option("--map", metavar="FILE", help="Mapping file (TOML): what the columns of the logs are.")
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="ROLE=COLUMN",
-        help="What a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, reference, "
-        "velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, and told.",
-    ),
-]
+Mapping = Annotated[Path | None, map_option("Mapping")]
+Columns = Annotated[list[str] | None, column_option("What")]
 Effort = Annotated[
     str | None,
     typer.Option(

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, ListsMethods, Set, app
-from detent.cli.terminal import make_console, print_json, progress_bar, say_if_cold, split_names
+from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, ListsMethods, Set, app, column_option, map_option
+from detent.cli.terminal import folder_for, make_console, print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
@@ -23,20 +23,8 @@ Replay = Annotated[
         "simulation are compared.",
     ),
 ]
-Mapping = Annotated[
-    Path | None, typer.Option("--map", metavar="FILE", help="With --replay: mapping file (TOML), what the columns are.")
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="ROLE=COLUMN",
-        help="With --replay: what a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, "
-        "reference, velocity, force, torque, current, voltage, command, position_load; what is not said is guessed.",
-    ),
-]
-
-
+Mapping = Annotated[Path | None, map_option("With --replay: mapping")]
+Columns = Annotated[list[str] | None, column_option("With --replay: what")]
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -148,12 +136,9 @@ def _trace_kinds(formats: str) -> list[str]:
 
 def _make_folder(folder: Path) -> None:
     """An output folder without the files of an earlier run: a report must not stand beside another run's trace."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with folder_for("--output", folder):
         for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
             (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise DetentError(f"--output {folder}: cannot be written ({error.strerror}); choose another folder") from error
 
 
 def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:

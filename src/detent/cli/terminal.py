@@ -6,7 +6,10 @@ import os
 import sys
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, cast
+
+from detent.errors import DetentError
 
 
 def discard_output() -> None:
@@ -57,6 +60,16 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
     console = make_console()
     console.print(table)
     console.print()
+
+
+@contextmanager
+def folder_for(option: str, folder: Path) -> Generator[None]:
+    """Make a folder and let files be put into it; what keeps them out becomes an error that says what to do."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise DetentError(f"{option} {folder}: cannot be written ({error.strerror}); choose another folder") from error
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import Any
 
 from detent.errors import FileProblem, InputError
 from detent.files.locate import Index, Place, locate_keys
+from detent.files.text import decode_utf8, read_head
 
 MAX_BYTES = 1_000_000  # largest axis file read; a real one has a few thousand bytes
 MAX_SYNTAX_PROBLEMS = 20  # syntax errors reported at most: a file of another kind would have one in each line
@@ -62,31 +63,11 @@ def parse_source(file: str, text: str) -> Source:
 
 def _read_text(path: Path) -> str:
     """Text of a file, or an `InputError` that says why there is none."""
-    remedy = "name an axis file; `detent examples` copies one to start from"
-    try:
-        content = path.read_bytes() if path.stat().st_size <= MAX_BYTES else None
-    except FileNotFoundError:
-        raise InputError.of_file(str(path), "no such file", "an axis file (TOML)", remedy) from None
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError.of_file(
-            str(path), f"a file that cannot be read ({reason})", "an axis file (TOML)", remedy
-        ) from None
-    except ValueError:
-        raise InputError.of_file(repr(str(path)), "a name no file can have", "an axis file (TOML)", remedy) from None
-    if content is None:
-        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", "an axis file (TOML)", remedy)
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        problem = FileProblem(
-            str(path), line, 1, "", f"the byte 0x{content[error.start]:02X}", "UTF-8 text", "save the file as UTF-8"
-        )
-        raise InputError([problem]) from None
-    if not text.strip():
-        raise InputError.of_file(str(path), "an empty file", "an axis file (TOML)", remedy)
-    return text
+    allowed, remedy = "an axis file (TOML)", "name an axis file; `detent examples` copies one to start from"
+    content = read_head(path, MAX_BYTES, allowed, remedy)
+    if len(content) > MAX_BYTES:
+        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", allowed, remedy)
+    return decode_utf8(path, content)
 
 
 def _where(error: Exception, lines: list[str]) -> tuple[int, int, str]:

@@ -1,6 +1,9 @@
-"""Text files: read as far as their kind allows, or refused with the reason; and texts as they fit into a message."""
+"""Bytes and text of files: read as far as their kind allows, or refused with the reason; short texts for messages."""
 
-from collections.abc import Collection
+import gzip
+import zlib
+from collections.abc import Collection, Generator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
@@ -9,16 +12,47 @@ from detent.errors import FileProblem, InputError
 MAX_SHOWN = 60  # characters of a value shown in a message
 
 MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
-"""Largest file read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly
+"""Largest job read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly
 than it is written by hand; a list so long comes from a program, which can write CSV."""
 
-_REMEDY = "check the name after --job"
+PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
+_CHECK_JOB = "check the name after --job"
+_CHECK_LOG = "check the name of the recording"
 
 
 def short(text: str) -> str:
     """Text as it fits into a message."""
     shown = "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text[: MAX_SHOWN + 1])
     return shown if len(shown) <= MAX_SHOWN else f"{shown[:MAX_SHOWN]}..."
+
+
+@contextmanager
+def reading(file: Path, allowed: str, remedy: str) -> Generator[None]:
+    """Turn whatever keeps a file from being read into an error that says what to do."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise InputError.of_file(str(file), "no such file", allowed, remedy) from None
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        came = f"a damaged packed file ({error})"
+        raise InputError.of_file(str(file), came, allowed, "unpack it with gunzip, or record again") from None
+    except OSError as error:
+        came = f"a file that cannot be read ({(error.strerror or str(error)).lower()})"
+        raise InputError.of_file(str(file), came, allowed, remedy) from None
+    except ValueError:
+        raise InputError.of_file(repr(str(file)), "a name no file can have", allowed, remedy) from None
+
+
+def read_head(file: Path, limit: int, allowed: str, remedy: str) -> bytes:
+    """A file, or one byte more of it than the limit; refused where it holds nothing."""
+    with reading(file, allowed, remedy), file.open("rb") as stream:
+        data = stream.read(limit + 1)
+    if limit and not data.strip():
+        raise InputError.of_file(str(file), "an empty file", allowed, remedy)
+    return data
+
+
+# ---- jobs
 
 
 def read_text(path: str | PathLike[str], kinds: Collection[str], allowed: str) -> str:
@@ -29,16 +63,7 @@ def read_text(path: str | PathLike[str], kinds: Collection[str], allowed: str) -
 def read_data(file: Path, kinds: Collection[str], allowed: str) -> bytes:
     """Bytes of a job file, for a kind of text that may be encoded otherwise; arguments and errors as of `read_text`."""
     limit = MAX_BYTES[file.suffix.lower()] if file.suffix.lower() in kinds else 0
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(limit + 1)
-    except FileNotFoundError:
-        raise InputError.of_file(str(file), "no such file", allowed, _REMEDY) from None
-    except OSError as error:
-        came = f"a file that cannot be read ({(error.strerror or str(error)).lower()})"
-        raise InputError.of_file(str(file), came, allowed, _REMEDY) from None
-    except ValueError:
-        raise InputError.of_file(repr(str(file)), "a name no file can have", allowed, _REMEDY) from None
+    data = read_head(file, limit, allowed, _CHECK_JOB)
     if not limit:
         came = f'a name that ends in "{file.suffix}"' if file.suffix else "a name without an ending"
         remedy = "name a file of one of these kinds, or give it the ending of its kind"
@@ -47,8 +72,6 @@ def read_data(file: Path, kinds: Collection[str], allowed: str) -> bytes:
         remedy = "divide the job among several files, or use repeat"
         remedy += "; a CSV file may be longer" if file.suffix.lower() == ".toml" and ".csv" in kinds else ""
         raise InputError.of_file(str(file), f"more than {limit // 1000} kB", f"up to {limit // 1000} kB", remedy)
-    if not data.strip():
-        raise InputError.of_file(str(file), "an empty file", allowed, _REMEDY)
     if b"\0" in data:
         remedy = "save the file as UTF-8 text, or name another"
         raise InputError.of_file(str(file), "NUL bytes, as in a binary file or UTF-16", allowed, remedy)
@@ -66,3 +89,44 @@ def decode_utf8(file: Path, data: bytes) -> str:
         came = f"the byte 0x{data[error.start]:02X}"
         problem = FileProblem(str(file), line, column, "", came, "UTF-8 text", "save the file as UTF-8")
         raise InputError([problem]) from None
+
+
+# ---- recordings
+
+
+def kind_of(path: Path) -> str:
+    """Ending of a file's name in small letters, that of the packing left out.
+
+    >>> kind_of(Path("run.CSV")), kind_of(Path("run.json.gz"))
+    ('.csv', '.json')
+    """
+    suffix = path.suffix.lower()
+    return path.with_suffix("").suffix.lower() if suffix == PACKED else suffix
+
+
+def check_file(path: Path, limit: int, allowed: str) -> None:
+    """Refuse a file that is absent, empty, too large, or no file."""
+    with reading(path, allowed, _CHECK_LOG):
+        size, is_folder = path.stat().st_size, path.is_dir()
+    if is_folder:
+        raise InputError.of_file(str(path), "a folder", allowed, "name a file in it")
+    _check_size(path, size, limit, allowed)
+
+
+def read_bytes(path: Path, limit: int, allowed: str) -> bytes:
+    """Read a file, unpacked if its name ends in ``.gz``."""
+    check_file(path, limit, allowed)
+    is_packed = path.suffix.lower() == PACKED
+    with reading(path, allowed, _CHECK_LOG), gzip.open(path, "rb") if is_packed else path.open("rb") as stream:
+        data = stream.read(limit + 1)
+    _check_size(path, len(data) if data.strip() else 0, limit, allowed)
+    return data
+
+
+def _check_size(path: Path, size: int, limit: int, allowed: str) -> None:
+    """Refuse nothing, and what is beyond the limit."""
+    if not size:
+        raise InputError.of_file(str(path), "an empty file", allowed, _CHECK_LOG)
+    if size > limit:
+        most, remedy = f"{limit // 1_000_000} MB", "cut the recording into pieces, or save it as HDF5 or Parquet"
+        raise InputError.of_file(str(path), f"more than {most}", f"up to {most}", remedy)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
+from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
 from detent.identify.fit.verdict import Refusal
@@ -15,6 +16,7 @@ from detent.identify.write.file_numbers import Contrast, contrasts
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
+from detent.record.trace_store import writing
 
 if TYPE_CHECKING:
     from detent.record.machine import Progress
@@ -122,10 +124,6 @@ class Identified:
         return cascade_spec(self.axis, self.axis_name) if self.axis else None
 
 
-def _untold(_share: float, _text: str) -> None:
-    """Progress that nobody asked for."""
-
-
 def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     logs: str | Path | Sequence[str | Path],
     *,
@@ -171,7 +169,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
         The axis file is of another method.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
-    tell = progress or _untold
+    tell = progress or untold
     text = "" if axis is None else read_axis_text(axis)
     if axis is not None:
         cascade_spec(text, str(axis))
@@ -211,10 +209,6 @@ def read_axis_text(path: str | Path) -> str:
 def write_text(path: str | Path, text: str) -> Path:
     """Write a file."""
     path = Path(path)
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            file.write(text)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
+        file.write(text)
     return path

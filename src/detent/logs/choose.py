@@ -254,7 +254,7 @@ def _check_widths(draft: Draft, table: RawTable, chosen: Chosen) -> None:
         advice = f"state what the column is, as in reference={short(chosen.columns[role])} [{_example(draft)}]"
         beyond = np.flatnonzero(np.abs(values) >= 2**bits)
         draft.note(Kind.WRONG_UNIT, role, beyond, text, Action.LEFT_OUT, advice, Severity.WARNING)
-        draft.drop_signal(role)
+        del draft.values[role]
 
 
 def _example(draft: Draft) -> str:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from detent.logs.log import Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import sliding_products
+from detent.logs.windows import parabolas, sliding_products
 
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
 FARTHEST = 200  # rows up to which a shift is looked for
@@ -47,6 +47,18 @@ def window_rows(position: Values) -> int:
     while rows < most and float(np.sqrt(np.mean((position[rows:] - position[:-rows]) ** 2))) < wanted:
         rows = min(2 * rows, most)
     return rows
+
+
+def smooth(values: Values, t: Values, rows: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Samples whose window of some rows has no gap, and value, slope and curvature there, shapes (m,) and (3, m).
+
+    Uneven stamps are noise here, so the period is the mean.
+    """
+    parts = [part for part in stretches(t) if part.stop - part.start > rows]
+    index = [np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.int64) for part in parts]
+    periods = [float(t[part][-1] - t[part][0]) / (part.stop - part.start - 1) for part in parts]
+    found = [parabolas(values[part], period, rows) for part, period in zip(parts, periods, strict=True)]
+    return np.concatenate([np.empty(0, np.int64), *index]), np.concatenate([np.empty((3, 0)), *found], axis=1)
 
 
 def integral(values: Values, t: Values) -> Values:

@@ -4,9 +4,10 @@ Each works on what the ones before have mended. Those up to the counters need th
 and clocks tick in these; the others need SI units.
 """
 
+import numpy as np
+
 from detent.logs.agreement import find_disagreements
 from detent.logs.counters import mend_counters
-from detent.logs.delays import take_out_delays
 from detent.logs.draft import Draft
 from detent.logs.effort import find_wrong_effort
 from detent.logs.missing import mend_missing
@@ -29,3 +30,16 @@ def clean(draft: Draft) -> None:
     find_disagreements(draft)
     find_shifts(draft)
     find_wrong_effort(draft)
+
+
+def take_out_delays(draft: Draft) -> None:
+    """Take stated delays out, by straight lines between samples; samples without values on both sides are removed."""
+    if not draft.delays:
+        return
+    inside = np.ones(len(draft), dtype=np.bool_)
+    for role, delay in draft.delays.items():
+        if role in draft.values:
+            moments = draft.t + delay
+            draft.values[role] = np.interp(moments, draft.t, draft.values[role])
+            inside &= (moments >= draft.t[0]) & (moments <= draft.t[-1])
+    draft.keep(inside)

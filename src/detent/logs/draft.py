@@ -51,10 +51,6 @@ class Draft:
         rows = self.rows[places] if len(places) else np.empty(0, dtype=np.int64)
         self.findings.append(Finding(kind, signal, row_ranges(np.sort(rows)), text, action, advice, severity))
 
-    def drop_signal(self, role: str) -> None:
-        """Leave a signal out."""
-        del self.values[role]
-
     def convert(self) -> None:
         """Bring all numbers into SI units."""
         conversion = self.conversions["time"]

@@ -10,12 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import grain, window_rows
+from detent.logs.differences import grain, smooth, window_rows
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Values
 from detent.logs.roles import EFFORTS
-from detent.logs.stamps import stretches
-from detent.logs.windows import parabolas
 
 EXPLAINED = 0.3  # share of the variance of an effort that the motion must explain before its sign is judged
 AGAINST = -0.3  # sum of the shares (standardised) of inertia and friction below which an effort has the wrong sign
@@ -27,7 +25,6 @@ _LOSES = 0.5
 class Motion(NamedTuple):
     """A motion smoothed over windows, across no gap."""
 
-    samples: NDArray[np.int64]  # samples it stands for, shape (m,)
     x: Values  # and v, a: position, velocity, acceleration, shape (m,)
     v: Values
     a: Values
@@ -40,31 +37,13 @@ def find_motion(draft: Draft) -> Motion | None:
     if position is None or np.ptp(position) <= 20 * grain(position):
         return None
     rows = 2 * window_rows(position) + 1
-    index: list[NDArray[np.int64]] = []
-    series: list[NDArray[np.float64]] = []
-    for part in stretches(draft.t):
-        if part.stop - part.start > rows:
-            index.append(np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.int64))
-            series.append(_smooth(position[part], draft.t[part], rows))
-    if sum(map(len, index)) < _FEWEST:
-        return None
-    x, v, a = np.concatenate(series, axis=1)
-    return Motion(np.concatenate(index), x, v, a, rows)
-
-
-def _smooth(values: Values, t: Values, rows: int) -> NDArray[np.float64]:
-    """Value, slope and curvature about each sample; uneven stamps are noise here, so the period is the mean."""
-    return parabolas(values, float(t[-1] - t[0]) / (len(t) - 1), rows)
+    samples, series = smooth(position, draft.t, rows)
+    return Motion(*series, rows) if len(samples) >= _FEWEST else None
 
 
 def smoothed(values: Values, draft: Draft, motion: Motion) -> Values:
     """A signal through the same windows as a motion, shape (m,): what is compared has the same delay."""
-    parts = [
-        _smooth(values[part], draft.t[part], motion.rows)[0]
-        for part in stretches(draft.t)
-        if part.stop - part.start > motion.rows
-    ]
-    return np.concatenate(parts)
+    return smooth(values, draft.t, motion.rows)[1][0]
 
 
 def find_wrong_effort(draft: Draft) -> None:

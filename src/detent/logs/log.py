@@ -1,12 +1,15 @@
 """A recorded run after import: signals in SI units, and what was found in the file that held them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from detent.errors import InputError
+from detent.logs.roles import EFFORTS
 
 Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
 Rows = NDArray[np.int64]  # numbers of rows of a file, from 1, header lines not counted, shape (n,)
@@ -122,13 +125,33 @@ class Log:
         """Time between two samples [s], the median."""
         return float(np.median(np.diff(self.t)))
 
-    def mask(self, *kinds: Kind) -> NDArray[np.bool_]:
-        """Samples in the rows of findings of some kinds."""
+    def mask(self, *kinds: Kind, signals: Collection[str] | None = None) -> NDArray[np.bool_]:
+        """Samples in the rows of findings of some kinds, about some signals or any."""
         found = np.zeros(len(self.t), dtype=np.bool_)
         for finding in self.findings:
-            for first, last in finding.rows if finding.kind in kinds else ():
+            is_meant = finding.kind in kinds and (signals is None or finding.signal in signals)
+            for first, last in finding.rows if is_meant else ():
                 found |= (self.rows >= first) & (self.rows <= last)
         return found
+
+    def need(self, *roles: str) -> None:
+        """Refuse a question to signals that the recording does not have."""
+        for role in roles:
+            if role not in self.signals:
+                allowed = f"a recording with {' and '.join(roles)}"
+                raise InputError.of_file(self.name, self._held(), allowed, f"name the column: {role}=COLUMN [UNIT]")
+
+    def effort(self, asked: str = "") -> str:
+        """Role of the signal that drives the axis: as asked for, or the nearest to its mechanics that there is."""
+        found = [role for role in EFFORTS if role in self.signals]
+        if not found or (asked and asked not in found):
+            allowed = f"{asked or 'something'} that drives the axis, one of {', '.join(EFFORTS)}"
+            remedy = f"name its column: {asked or 'force'}=COLUMN [UNIT]"
+            raise InputError.of_file(self.name, self._held(), allowed, remedy)
+        return asked or found[0]
+
+    def _held(self) -> str:
+        return f"signals {', '.join(self.signals)}"
 
     def to_dict(self) -> dict[str, Any]:
         """What was read, as plain data for JSON: everything but the numbers."""

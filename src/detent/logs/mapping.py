@@ -34,11 +34,10 @@ from pydantic_core import PydanticCustomError
 
 from detent.errors import FileProblem, InputError
 from detent.files.fields import Table, optional, required
-from detent.files.file_bytes import read_bytes
 from detent.files.quantities import Time
 from detent.files.read import read_tables
 from detent.files.source import Source, parse_source
-from detent.files.text import decode_utf8, short
+from detent.files.text import decode_utf8, read_bytes, short
 from detent.logs.csv_layout import SEPARATORS, FileOptions
 from detent.logs.log_units import find_conversion
 from detent.logs.roles import ROLES

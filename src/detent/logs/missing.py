@@ -25,7 +25,7 @@ def mend_missing(draft: Draft) -> None:
         if gone.all() or (role not in SLOW and gone.mean() > MOST):
             advice = f"record {role} in every row" if not gone.all() else ""
             draft.note(Kind.MISSING_VALUES, role, gone, f"{count} of {len(draft)} empty", Action.LEFT_OUT, advice)
-            draft.drop_signal(role)
+            del draft.values[role]
         elif role in SLOW:
             last = np.maximum.accumulate(np.where(gone, 0, np.arange(len(draft))))
             # Before the first value there is none to keep: that one it becomes.

@@ -1,8 +1,10 @@
 """The columns of a file before anybody knows what they mean: numbers, headings, row numbers."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -89,6 +91,24 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
         table.notes.append(f"passed over: {tell(passed)}")
     table.rows = np.arange(1, length + 1, dtype=np.int64)
     return table
+
+
+@contextmanager
+def whole(path: Path, kind: str, allowed: str, remedy: str = "save it again, or as CSV") -> Generator[None]:
+    """Turn whatever a library stumbles over in a damaged file into an error that says what to do."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 - parsers raise whatever the damage makes them stumble over
+        came = f"a file that is no {kind} file ({short(str(error) or type(error).__name__)})"
+        raise InputError.of_file(str(path), came, allowed, remedy) from None
+
+
+def no_table(file: str, name: str, held: Iterable[str], nothing: str = "") -> InputError:
+    """The error for a table that a file does not hold."""
+    allowed = f"one of {', '.join(map(short, [*held][:MOST_NAMED])) or nothing}"
+    return InputError.of_file(file, f'the table "{short(name)}"', allowed, "state one of these as table=")
 
 
 def add_column(table: RawTable, item: Item) -> None:

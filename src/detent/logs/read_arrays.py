@@ -1,7 +1,6 @@
 """Recordings as files of arrays: MATLAB up to version 7, and NumPy's NPZ."""
 
 import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from detent.errors import InputError
-from detent.files.file_bytes import check_file
-from detent.files.text import short
+from detent.files.text import check_file
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
-from detent.logs.raw_table import MAX_CELLS, Item, RawTable, table_of
+from detent.logs.raw_table import MAX_CELLS, Item, RawTable, no_table, table_of, whole
 from detent.logs.read_hdf5 import read_hdf5
 from detent.logs.windows import scipy
 
@@ -30,16 +28,12 @@ def read_mat(path: Path, options: FileOptions) -> RawTable:
     Fields of structures give names joined by points; ``table`` names the structure to read.
     """
     check_file(path, MAX_BYTES, ALLOWED_MAT)
-    try:
-        _check_shapes(path, [shape for _, shape, _ in scipy("io").whosmat(path)], ALLOWED_MAT)
-        found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
-    except NotImplementedError:
-        return read_hdf5(path, options)
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 - a damaged file is reported by whatever SciPy's parser stumbles over
-        came = f"a file that is no MATLAB file ({short(str(error) or type(error).__name__)})"
-        raise InputError.of_file(str(path), came, ALLOWED_MAT, "save it again with save -v7, or as CSV") from None
+    with whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
+        try:
+            _check_shapes(path, [shape for _, shape, _ in scipy("io").whosmat(path)], ALLOWED_MAT)
+            found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
+        except NotImplementedError:
+            return read_hdf5(path, options)
     items = [item for name, value in found.items() if not name.startswith("__") for item in _fields(name, value, 0)]
     return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
 
@@ -48,20 +42,16 @@ def read_npz(path: Path, options: FileOptions) -> RawTable:
     """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused."""
     check_file(path, MAX_BYTES, ALLOWED_NPZ)
     items: list[Item] = []
-    try:
-        with path.open("rb") as stream:
-            if zipfile.is_zipfile(stream):
-                _check_unpacked(path)
-                with np.load(path, allow_pickle=False) as arrays:
-                    for name in arrays.files:
-                        items += _fields(name, _load_member(arrays, name), 0)
-            else:
-                stream.seek(0)  # whether it is an archive was asked at its end
-                array = np.load(stream, allow_pickle=False)
-                items = list(_fields("" if array.dtype.names else "column", array, 0))
-    except (MemoryError, ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, SyntaxError) as error:
-        came = f"a file that is no NPZ file ({short(str(error) or type(error).__name__)})"
-        raise InputError.of_file(str(path), came, ALLOWED_NPZ, "save it again with numpy.savez, or as CSV") from None
+    with whole(path, "NPZ", ALLOWED_NPZ, "save it again with numpy.savez, or as CSV"), path.open("rb") as stream:
+        if zipfile.is_zipfile(stream):
+            _check_unpacked(path)
+            with np.load(path, allow_pickle=False) as arrays:
+                for name in arrays.files:
+                    items += _fields(name, _load_member(arrays, name), 0)
+        else:
+            stream.seek(0)  # whether it is an archive was asked at its end
+            array = np.load(stream, allow_pickle=False)
+            items = list(_fields("" if array.dtype.names else "column", array, 0))
     return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
 
 
@@ -112,7 +102,5 @@ def _inside(file: str, items: list[Item], table: str) -> list[Item]:
         return items
     found = [item for item in items if item.name == table or item.name.startswith(f"{table}.")]
     if not found:
-        names = sorted({item.name.partition(".")[0] for item in items})
-        allowed = f"one of {', '.join(map(short, names[:12]))}"
-        raise InputError.of_file(file, f'the table "{short(table)}"', allowed, "state one of these as table=")
+        raise no_table(file, table, sorted({item.name.partition(".")[0] for item in items}))
     return [item._replace(name=item.name.removeprefix(f"{table}.")) for item in found]

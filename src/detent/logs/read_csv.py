@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
-from detent.files.file_bytes import read_bytes
-from detent.files.text import short
+from detent.files.text import read_bytes, short
 from detent.logs.csv_cells import read_cell, read_column, read_moments
 from detent.logs.csv_layout import CsvLayout, FileOptions, guess_layout, is_telling, split_lines
 from detent.logs.raw_table import BrokenRow, Item, RawTable, add_column, check_size

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from detent.errors import InputError
-from detent.files.file_bytes import check_file
-from detent.files.text import short
+from detent.files.text import check_file
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
-from detent.logs.raw_table import MAX_CELLS, MAX_COLUMNS, MAX_CONSTANTS, Item, RawTable, table_of, tell
+from detent.logs.raw_table import MAX_CELLS, MAX_COLUMNS, MAX_CONSTANTS, Item, RawTable, no_table, table_of, tell, whole
 
 MAX_BYTES = 2_000_000_000  # largest file read; what counts is how many numbers are taken from it
 ALLOWED = "an HDF5 file with vectors of equal length"
@@ -30,14 +29,8 @@ def read_hdf5(path: Path, options: FileOptions) -> RawTable:
     import h5py
 
     check_file(path, MAX_BYTES, ALLOWED)
-    try:
-        with h5py.File(path, "r") as file:
-            items, notes = _read_file(str(path), file, options.table.strip("/"))
-    except InputError:
-        raise
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
-        came = f"a file that is no HDF5 file ({short(str(error))})"
-        raise InputError.of_file(str(path), came, ALLOWED, "save it again, or as CSV") from None
+    with whole(path, "HDF5", ALLOWED), h5py.File(path, "r") as file:
+        items, notes = _read_file(str(path), file, options.table.strip("/"))
     table = table_of(str(path), items, ALLOWED)
     table.notes += notes
     return table
@@ -58,10 +51,7 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[Item], list[str]
         notes = [f"group {chosen or '/'} read, not {tell(others)}"] if others else []
     below = [dataset for dataset in found if f"{dataset.name.strip('/')}/".startswith(f"{chosen}/" if chosen else "")]
     if wanted and not below:
-        names = ", ".join(map(short, [name or "/" for name in groups][:12])) or "none: it holds no datasets"
-        raise InputError.of_file(
-            path, f'the table "{short(wanted)}"', f"one of {names}", "state one of these as table="
-        )
+        raise no_table(path, wanted, (name or "/" for name in groups), "none: it holds no datasets")
     taken = below if wanted else groups.get(chosen, [])
     singles = [dataset for dataset in found if dataset.size == 1 and dataset not in taken][:MAX_CONSTANTS]
     cells = sum(int(dataset.size) for dataset in taken)

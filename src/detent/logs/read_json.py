@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
-from detent.files.file_bytes import kind_of, read_bytes
-from detent.files.text import decode_utf8, short
+from detent.files.text import decode_utf8, kind_of, read_bytes, short
 from detent.logs.csv_cells import is_moment, read_cell, read_moments
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
@@ -21,6 +20,7 @@ from detent.logs.raw_table import (
     check_size,
     flatten,
     keep_constant,
+    no_table,
     table_of,
     tell,
 )
@@ -67,8 +67,7 @@ def _from_object(file: str, found: Any, name: str) -> RawTable:
     lists = [key for key, value in items.items() if _is_records(value)]
     inside = {key.removeprefix(f"{name}."): value for key, value in items.items() if key.startswith(f"{name}.")}
     if name and name not in lists and not inside:
-        allowed = f"one of {', '.join(map(short, lists)) or 'none: it holds no lists of records'}"
-        raise InputError.of_file(file, f'the table "{short(name)}"', allowed, "state one of these as table=")
+        raise no_table(file, name, lists, "none: it holds no lists of records")
     if inside or not lists:
         arrays = [Item(key, _array(value)) for key, value in (inside or items).items()]
         return table_of(file, arrays, ALLOWED)

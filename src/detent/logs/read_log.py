@@ -1,23 +1,38 @@
 """Read a recording: the file, what its columns are, what is wrong with them, and the log that comes of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from detent.errors import InputError
-from detent.files.text import short
+from detent.files.text import kind_of, short
 from detent.logs.choose import choose_columns, make_draft
+from detent.logs.csv_layout import FileOptions
 from detent.logs.dirt import clean
 from detent.logs.draft import Draft, tell_count
 from detent.logs.log import Action, Finding, Kind, Log, Severity, row_ranges
 from detent.logs.mapping import ColumnMapping, load_mapping, parse_options
 from detent.logs.raw_table import RawTable
-from detent.logs.read_table import read_table
+from detent.logs.read_arrays import read_mat, read_npz
+from detent.logs.read_csv import read_csv
+from detent.logs.read_hdf5 import read_hdf5
+from detent.logs.read_json import read_json
+from detent.logs.read_parquet import read_parquet
 from detent.logs.rotation import mend_rotation
 
 EPOCH = 1e8  # a time from which on it counts from some year, and is counted from the first sample instead [s]
+READERS: dict[str, Callable[[Path, FileOptions], RawTable]] = {
+    ".csv": read_csv, ".tsv": read_csv, ".txt": read_csv, ".dat": read_csv, ".log": read_csv,
+    ".json": read_json, ".jsonl": read_json, ".ndjson": read_json,
+    ".h5": read_hdf5, ".hdf5": read_hdf5, ".mat": read_mat, ".npz": read_npz, ".npy": read_npz,
+    ".parquet": read_parquet,
+}  # fmt: skip
+"""Reader of each kind of file, by the ending of its name."""
+
+_TEXTS = frozenset(kind for kind, reader in READERS.items() if reader in {read_csv, read_json})
+
 _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 
 
@@ -37,6 +52,18 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "record the signals again")
     return _finish(Path(path).name, table, draft)
+
+
+def read_table(path: str | Path, options: FileOptions | None = None) -> RawTable:
+    """Read the columns of a recording."""
+    path = Path(path)
+    kind = kind_of(path)
+    is_packed = path.suffix.lower() == ".gz"
+    if kind not in READERS or (is_packed and kind not in _TEXTS):
+        came = f'a name that ends in "{path.suffix}"' if path.suffix else "a name without an ending"
+        remedy = "give the file the ending of its kind, or save it as one of these"
+        raise InputError.of_file(str(path), came, f"{', '.join(READERS)}; text also with .gz", remedy)
+    return READERS[kind](path, options or FileOptions())
 
 
 def _tell_broken(table: RawTable) -> None:

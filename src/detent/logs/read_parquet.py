@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from detent.errors import InputError
-from detent.files.file_bytes import check_file
-from detent.files.text import short
+from detent.files.text import check_file
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
-from detent.logs.raw_table import Item, RawTable, check_size, table_of
+from detent.logs.raw_table import Item, RawTable, check_size, table_of, whole
 
 MAX_BYTES = 2_000_000_000  # largest file read; what counts is how many numbers it holds
 ALLOWED = "a Parquet file with columns of numbers"
@@ -22,19 +21,14 @@ def read_parquet(path: Path, options: FileOptions) -> RawTable:
     del options
     check_file(path, MAX_BYTES, ALLOWED)
     try:
-        arrow: Any = importlib.import_module("pyarrow")
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError:
         remedy = 'pip install "detent[parquet]", or save the recording as CSV or HDF5'
         came = "a file that needs pyarrow, which is not installed"
         raise InputError.of_file(str(path), came, ALLOWED, remedy) from None
-    try:
-        with parquet.ParquetFile(path) as file:
-            check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
-            items = [_item(field, column) for field, column in zip(file.schema_arrow, file.read().columns, strict=True)]
-    except (arrow.ArrowException, OSError, ValueError) as error:
-        came = f"a file that is no Parquet file ({short(str(error))})"
-        raise InputError.of_file(str(path), came, ALLOWED, "save it again, or as CSV") from None
+    with whole(path, "Parquet", ALLOWED), parquet.ParquetFile(path) as file:
+        check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
+        items = [_item(field, column) for field, column in zip(file.schema_arrow, file.read().columns, strict=True)]
     return table_of(str(path), items, ALLOWED)
 
 

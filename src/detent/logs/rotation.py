@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.files.text import short
+from detent.logs.differences import runs_of
 from detent.logs.log import Action, Finding, Kind, Severity, Values, row_ranges
 from detent.logs.raw_table import BrokenRow, RawTable
 from detent.logs.roles import words_of
@@ -100,8 +101,7 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
             away = np.abs(own[own_runs] - usual)
             own_runs &= np.abs(own - usual) <= max(_ROUNDING * usual, 3 * float(np.percentile(away, 75)))
     better = fill_holes(runs, _HOLE)
-    edges = np.flatnonzero(np.diff(np.r_[0, better.astype(np.int8), 0]))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for begin, end in runs_of(better).tolist():
         first, last = _edges(_missed(theirs[begin:end], step), _missed(own[begin:end], step))
         first, last = begin + first, begin + last
         steps = own[first:last]

@@ -52,7 +52,7 @@ def _find_constant(draft: Draft, role: str) -> None:
         draft.note(Kind.STUCK, role, [], f"{text}: the axis or its sensor stands", Action.LEFT, advice, Severity.ERROR)
     else:
         draft.note(Kind.STUCK, role, [], f"{text}: it was not recorded", Action.LEFT_OUT)
-        draft.drop_signal(role)
+        del draft.values[role]
 
 
 def _find_against_twins(draft: Draft, role: str) -> None:

@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,13 +52,11 @@ def _parts(figure: Figure) -> list[Part]:
     caption = textwrap.wrap(plain(figure.caption), LETTERS)
     parts: list[Part] = [((len(caption) + 1.2) * LINE, lambda canvas, at: _write(canvas, at, figure.title, caption))]
     if figure.beside and figure.charts:
-        parts.append((_tallest(figure.charts), lambda canvas, at: _draw_beside(canvas, at, figure.charts)))
+        parts.append((max(map(_height, figure.charts)), partial(_draw_beside, figure.charts)))
     else:
-        parts += [(_height(chart), _drawer(chart)) for chart in figure.charts]
-    for table in (figure.table, figure.event_table):
-        if table:
-            parts.append(((len(table.rows) + 2.5) * 1.4 * LINE, _table_drawer(table)))
-    return parts
+        parts += [(_height(chart), partial(_draw_beside, [chart])) for chart in figure.charts]
+    tables = [table for table in (figure.table, figure.event_table) if table]
+    return parts + [((len(table.rows) + 2.5) * 1.4 * LINE, partial(_draw_table, table)) for table in tables]
 
 
 def plain(text: str) -> str:
@@ -73,11 +72,8 @@ def _write(canvas: Any, at: Any, title: str, caption: Sequence[str]) -> None:
     area.text(0.0, 1.0, "\n".join(caption), transform=area.transAxes, va="top", fontsize=8.5, color=COLOURS["soft"])
 
 
-def _table_drawer(table: Table) -> Callable[[Any, Any], None]:
-    return lambda canvas, at: _draw_table(canvas.add_subplot(at), table)
-
-
-def _draw_table(area: Axes, table: Table) -> None:
+def _draw_table(table: Table, canvas: Any, at: Any) -> None:
+    area: Axes = canvas.add_subplot(at)
     area.axis("off")
     rows = [[cell for cell, _ in table.cells(row)] for row in table.rows]
     texts = [["\n".join(textwrap.wrap(plain(cell.text), 30)) for cell in row] for row in rows]
@@ -108,17 +104,9 @@ def _height(chart: Chart) -> float:
     return chart["height"] / DOTS + (0.0 if chart.get("foot") is False else 0.2)
 
 
-def _tallest(charts: Sequence[Chart]) -> float:
-    return max(map(_height, charts))
-
-
-def _draw_beside(canvas: Any, at: Any, charts: Sequence[Chart]) -> None:
+def _draw_beside(charts: Sequence[Chart], canvas: Any, at: Any) -> None:
     for place, chart in zip(at.subgridspec(1, len(charts)), charts, strict=True):
         draw_chart(canvas.add_subplot(place), chart)
-
-
-def _drawer(chart: Chart) -> Callable[[Any, Any], None]:
-    return lambda canvas, at: draw_chart(canvas.add_subplot(at), chart)
 
 
 def draw_chart(area: Axes, chart: Chart) -> None:
@@ -129,13 +117,14 @@ def draw_chart(area: Axes, chart: Chart) -> None:
     for series in chart["series"]:
         _draw_series(area, x, series)
     for loop in chart.get("loops", ()):
-        area.plot(loop["x"], loop["y"], color=_colour(loop["colour"]), linewidth=0.8 * loop["width"])
+        area.plot(loop["x"], loop["y"], color=COLOURS[loop["colour"]], linewidth=0.8 * loop["width"])
     if "lanes" in chart:
         _draw_lanes(area, chart["lanes"])
     if chart.get("zero"):
         area.axhline(0.0, color=COLOURS["muted"], linewidth=0.8)
     _draw_marks(area, chart)
-    area.set_xlim(float(x[0]), float(x[-1])) if len(x) > 1 and not _bars(chart) else None
+    if len(x) > 1 and not any("bars" in series for series in chart["series"]):
+        area.set_xlim(float(x[0]), float(x[-1]))
     if "yRange" in chart:
         area.set_ylim(*chart["yRange"])
     if "title" in chart:
@@ -148,16 +137,8 @@ def draw_chart(area: Axes, chart: Chart) -> None:
         area.legend(**ABOVE, ncols=4)
 
 
-def _bars(chart: Chart) -> bool:
-    return any("bars" in series for series in chart["series"])
-
-
 def _floats(values: Sequence[float | None]) -> Any:
     return np.array([math.nan if value is None else value for value in values], dtype=np.float64)
-
-
-def _colour(name: str) -> str:
-    return COLOURS[name]
 
 
 def _draw_band(area: Axes, band: Chart) -> None:
@@ -171,7 +152,7 @@ def _draw_band(area: Axes, band: Chart) -> None:
 
 
 def _draw_series(area: Axes, x: Any, series: Chart) -> None:
-    y, colour = _floats(series["y"]), _colour(series["colour"])
+    y, colour = _floats(series["y"]), COLOURS[series["colour"]]
     label = plain(series["label"])
     if "bars" in series:
         width = (x[1] - x[0]) if len(x) > 1 else 1.0
@@ -196,7 +177,7 @@ def _draw_lanes(area: Axes, lanes: Sequence[Chart]) -> None:
     """The first lane on top; a strong edge where each bar begins."""
     middles = [len(lanes) - k - 0.5 for k in range(len(lanes))]
     for middle, lane in zip(middles, lanes, strict=True):
-        colour = _colour(lane["colour"])
+        colour = COLOURS[lane["colour"]]
         for begin, end, short, _ in lane["bars"]:
             area.broken_barh([(begin, end - begin)], (middle - 0.38, 0.76), color=colour, alpha=0.3)
             area.plot([begin, begin], [middle - 0.38, middle + 0.38], color=colour, linewidth=2)

@@ -14,6 +14,7 @@ import numpy as np
 from detent.errors import DetentError
 from detent.page.thin import thin_indices
 from detent.record.trace import Trace
+from detent.record.trace_store import writing
 
 # matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
 Axes = Any
@@ -62,7 +63,7 @@ def plot_signals(
         groups.setdefault(trace.units.get(name, ""), []).append(name)
     with new_figure(path, 9.0, 1.0 + 2.1 * len(groups)) as figure:
         axes: list[Axes] = list(figure.subplots(len(groups), sharex=True, squeeze=False)[:, 0])
-        scale, unit = _time_unit(trace)
+        scale, unit = (1e3, "ms") if trace.time[-1] - trace.time[0] < 1.0 else (1.0, "s")
         for area, (group_unit, members) in zip(axes, groups.items(), strict=True):
             _draw_group(area, trace, members, group_unit, scale)
             area.margins(x=0)
@@ -71,11 +72,6 @@ def plot_signals(
         if title:
             figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
         figure.align_ylabels(axes)
-
-
-def _time_unit(trace: Trace) -> tuple[float, str]:
-    """Choose ms for stretches under a second."""
-    return (1e3, "ms") if trace.time[-1] - trace.time[0] < 1.0 else (1.0, "s")
 
 
 def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale: float) -> None:
@@ -91,18 +87,13 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
             trace.time[kept] * scale, drawn, dash, color=colour, linewidth=1.2, label=name, drawstyle=style
         )  # fmt: skip
     if len(names) == 1:
-        area.set_ylabel(_broken(names[0], unit))
+        area.set_ylabel(f"{names[0]}\n[{unit}]" if unit else names[0])  # two lines, for the side of a low plot area
     else:
         area.set_ylabel(f"[{unit}]" if unit else "")
         # Above the curves, never over them.
         area.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=9, borderaxespad=0.2)
     if all(trace[name].dtype.kind == "b" for name in names):
         area.set_yticks([0, 1], ["off", "on"])
-
-
-def _broken(name: str, unit: str) -> str:
-    """Write a name and its unit on two lines, for the side of a low plot area."""
-    return f"{name}\n[{unit}]" if unit else name
 
 
 def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> Path:
@@ -124,10 +115,7 @@ def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
     with mpl.rc_context(STYLE):
         figure = figures.Figure(figsize=(width, height), layout="constrained")
         yield figure
-        try:
-            # No date inside: the same figure gives the same file.
-            metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
+        # No date inside: the same figure gives the same file.
+        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
+        with writing(path):
             figure.savefig(path, metadata=metadata)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error

@@ -15,7 +15,7 @@ import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,24 +33,21 @@ from detent.record.trace_store import (
 )
 
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
+STORES = (".h5", ".hdf5")  # endings of the store's own files
 PARQUET_ROWS = 1 << 20  # rows of one Parquet row group
 _HEADER = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
 
 
-def save_csv(trace: Trace, path: str | Path) -> None:
-    """Write a trace as CSV: one header row such as ``t [s],motor.current [A]``, then one row per moment.
+def _write_csv(table: "_Table", path: Path) -> None:
+    """Write columns as CSV, piece by piece: a header row such as ``t [s],motor.current [A]``, then a row per moment.
 
     Floats carry every digit needed to read the same bits back (17 at most), integers stay integers, booleans
     become 0 and 1. Descriptions and attributes are not in the file.
     """
-    _write_csv(trace.columns, [trace.label(name) for name in trace], Path(path))
-
-
-def _write_csv(columns: Mapping[str, Column], labels: list[str], path: Path) -> None:
-    """Write columns, in memory or in an open HDF5 file, piece by piece."""
-    part = part_of(path)
+    part, columns, units = part_of(path), table.columns, table.units
     with writing(path):
         with part.open("w", encoding="utf-8", newline="") as stream:
+            labels = [f"{name} [{units[name]}]" if units.get(name) else name for name in columns]
             csv.writer(stream, lineterminator="\n").writerow(labels)
             for first in range(0, len(columns[TIME]), CSV_ROWS):
                 texts = [_texts(values[first : first + CSV_ROWS]) for values in columns.values()]
@@ -66,64 +63,60 @@ def _texts(values: Column) -> list[str]:
     return list(map(repr, values.tolist()))
 
 
-def save_parquet(trace: Trace, path: str | Path) -> None:
-    """Write a trace as Parquet; units and descriptions are in the fields' metadata, attributes in the schema's."""
-    _write_parquet(trace.columns, trace.units, trace.docs, trace.attributes, Path(path))
-
-
-def _write_parquet(
-    columns: Mapping[str, Column],
-    units: Mapping[str, str],
-    docs: Mapping[str, str],
-    attributes: Mapping[str, Attribute],
-    path: Path,
-) -> None:
-    """Write columns, in memory or in an open HDF5 file, one row group at a time."""
+def _write_parquet(table: "_Table", path: Path) -> None:
+    """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
     arrow, parquet = _pyarrow()
     fields = [
         arrow.field(
             name,
             arrow.from_numpy_dtype(values.dtype),
-            metadata={"unit": units.get(name, ""), "doc": docs.get(name, "")},
+            metadata={"unit": table.units.get(name, ""), "doc": table.docs.get(name, "")},
         )
-        for name, values in columns.items()
+        for name, values in table.columns.items()
     ]
-    schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **attributes})})
+    schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **table.attributes})})
     part = part_of(path)
     with writing(path):
         with parquet.ParquetWriter(part, schema) as writer:
-            for first in range(0, len(columns[TIME]), PARQUET_ROWS):
-                block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in columns.values()]
+            for first in range(0, len(table.columns[TIME]), PARQUET_ROWS):
+                block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in table.columns.values()]
                 writer.write_table(arrow.table(block, schema=schema))
         part.replace(path)
+
+
+class _Table(NamedTuple):
+    """What a writer takes of a trace, in memory or in an open HDF5 file."""
+
+    columns: Mapping[str, Column]
+    units: Mapping[str, str]
+    docs: Mapping[str, str]
+    attributes: Mapping[str, Attribute]
+
+
+_WRITERS: dict[str, Callable[[_Table, Path], None]] = {".csv": _write_csv, ".parquet": _write_parquet}
 
 
 def convert_trace(store: str | Path, path: str | Path) -> None:
     """Write an HDF5 trace again as CSV or Parquet, in constant memory however long it is."""
     suffix = Path(path).suffix.lower()
-    if suffix not in (".csv", ".parquet"):
-        raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use .csv or .parquet")
+    if suffix not in _WRITERS:
+        raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use {' or '.join(_WRITERS)}")
     with open_store(Path(store)) as file:
-        group = file[GROUP]
-        columns = {str(name): group[name] for name in group.attrs["columns"]}
-        units = {name: str(values.attrs["unit"]) for name, values in columns.items()}
-        if suffix == ".csv":
-            labels = [f"{name} [{units[name]}]" if units[name] else name for name in columns]
-            _write_csv(columns, labels, Path(path))
-        else:
-            docs = {name: str(values.attrs["doc"]) for name, values in columns.items()}
-            _write_parquet(columns, units, docs, attributes_of(file), Path(path))
+        columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
+        units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
+        _WRITERS[suffix](_Table(columns, units, docs, attributes_of(file)), Path(path))
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
     """Write a trace in the format its suffix names."""
-    writers: dict[str, Callable[[Trace, str | Path], None]] = {
-        ".h5": save_hdf5, ".hdf5": save_hdf5, ".csv": save_csv, ".parquet": save_parquet,
-    }  # fmt: skip
     suffix = Path(path).suffix.lower()
-    if suffix not in writers:
-        raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {', '.join(writers)}")
-    writers[suffix](trace, path)
+    if suffix in STORES:
+        save_hdf5(trace, path)
+    elif suffix in _WRITERS:
+        _WRITERS[suffix](_Table(trace.columns, trace.units, trace.docs, trace.attributes), Path(path))
+    else:
+        allowed = ", ".join([*STORES, *_WRITERS])
+        raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {allowed}")
 
 
 def load_trace(path: str | Path) -> Trace:

@@ -230,9 +230,10 @@ def waveforms_from_rows(
     ([0, 312500, 812500], [0, 1, 0], 1000000)
     """
     period_ps = _checked_period(period)
-    ticks = _checked_ticks(rows)
+    ticks = np.asarray(rows["tick"], dtype=np.int64) - 1
     signals = tuple(
-        _signal(leaf, ticks, _column(rows, leaf), period_ps, _phase_of(leaf.path, phases or {})) for leaf in leaves
+        _signal(leaf, ticks, np.asarray(rows[leaf.path]), period_ps, _phase_of(leaf.path, phases or {}))
+        for leaf in leaves
     )
     edges = _picoseconds(np.array([ticks[0], ticks[-1] + 1]), 0.0, period_ps)
     return Waveforms(int(edges[0]), int(edges[1]), signals, title)
@@ -241,8 +242,6 @@ def waveforms_from_rows(
 def clock_waveform(name: str, period: float, ticks: range, *, high: tuple[float, float], doc: str = "") -> Waveform:
     """Make the waveform of a clock, which is no register: high in the same part of every tick."""
     period_ps = _checked_period(period)
-    if not len(ticks) or ticks.step != 1 or ticks.start < 0:
-        raise DetentError(f"clock {name!r}: came {ticks!r}; allowed: ticks from 0 on, step 1; give those to show")
     numbers = np.arange(ticks.start, ticks.stop, dtype=np.int64)
     times, values = _changes(*_pulses(numbers, np.ones(len(numbers), np.uint8), period_ps, Phase(pulse=high)))
     return Waveform(name=name, bits=1, signed=False, is_float=False, unit="", doc=doc, times=times, values=values)
@@ -256,30 +255,6 @@ def _checked_period(period: float) -> float:
     whole = round(period_ps)
     # 250e-9 s is not a double, and a product with 1e12 rounds once more: two roundings, 2.3e-16 at most.
     return float(whole) if math.isclose(period_ps, whole, rel_tol=1e-15) else period_ps
-
-
-def _checked_ticks(rows: NDArray[np.void]) -> Times:
-    """Numbers of the ticks that the rows describe, counted from 0 at power-on."""
-    if "tick" not in (rows.dtype.names or ()):
-        raise DetentError("waveforms: the rows have no field 'tick'; record the tick counter with the registers")
-    after: Any = rows["tick"]
-    if not len(after):
-        raise DetentError("waveforms: there are no rows; allowed: one or more; record at least one tick")
-    ticks = np.asarray(after, dtype=np.int64) - 1
-    gaps = np.flatnonzero(np.diff(ticks) != 1)
-    if gaps.size or ticks[0] < 0:
-        first = int(gaps[0]) if gaps.size else 0
-        came = f"tick {after[first]} is followed by {after[first + 1]}" if gaps.size else f"tick {after[0]} comes first"
-        raise DetentError(f"waveforms: {came}; allowed: consecutive ticks, from 1 on; record every tick")
-    return ticks
-
-
-def _column(rows: NDArray[np.void], leaf: Leaf) -> Values:
-    if leaf.length:
-        raise DetentError(f"waveforms: {leaf.path!r} is an array of {leaf.length}; allowed: one value; leave it out")
-    if leaf.path not in (rows.dtype.names or ()):
-        raise DetentError(f"waveforms: {leaf.path!r} was not recorded; record it with the others, or leave it out")
-    return np.asarray(rows[leaf.path])
 
 
 def _phase_of(path: str, phases: Mapping[str, Phase]) -> Phase:

@@ -12,7 +12,7 @@ import scipy.io
 
 from detent.errors import DetentError, InputError
 from detent.logs.csv_layout import FileOptions
-from detent.logs.read_table import READERS, read_table
+from detent.logs.read_log import READERS, read_table
 from detent.record.trace import Trace
 from detent.record.trace_files import save_trace
 

@@ -17,8 +17,6 @@ from detent.record.trace_files import (
     convert_trace,
     load_trace,
     need_parquet,
-    save_csv,
-    save_parquet,
     save_trace,
 )
 from detent.record.trace_store import TraceWriter, save_hdf5
@@ -82,7 +80,7 @@ def test_hdf5_layout_is_the_documented_one(tmp_path: Path) -> None:
 
 
 def test_csv_text_is_exact_and_plain(tmp_path: Path) -> None:
-    save_csv(make_trace(), tmp_path / "run.csv")
+    save_trace(make_trace(), tmp_path / "run.csv")
     assert (tmp_path / "run.csv").read_text(encoding="utf-8") == (
         "t [s],motor.current [A],head.drive_cmd [count],head.transition,carriage.position\n"
         "0.0,0.30000000000000004,0,0,1\n"
@@ -93,7 +91,7 @@ def test_csv_text_is_exact_and_plain(tmp_path: Path) -> None:
 
 def test_csv_gives_back_bits_and_units(tmp_path: Path) -> None:
     trace = make_trace()
-    save_csv(trace, tmp_path / "run.csv")
+    save_trace(trace, tmp_path / "run.csv")
     loaded = load_trace(tmp_path / "run.csv")
     assert_same_columns(trace, loaded, dtypes=False)
     assert loaded["carriage.position"].dtype == np.int64
@@ -106,7 +104,7 @@ def test_csv_keeps_every_float_and_integer(
 ) -> None:
     path = tmp_path_factory.mktemp("csv") / "run.csv"
     columns = {"t": np.arange(len(values)) * 0.1, "x": np.array(values), "n": np.full(len(values), n, dtype=np.int64)}
-    save_csv(Trace(columns=columns), path)
+    save_trace(Trace(columns=columns), path)
     loaded = load_trace(path)
     finite = ~np.isnan(columns["x"])
     assert loaded["x"][finite].tobytes() == columns["x"][finite].tobytes()
@@ -115,9 +113,9 @@ def test_csv_keeps_every_float_and_integer(
 
 
 def test_csv_of_several_blocks_is_one_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    save_csv(make_trace(), tmp_path / "whole.csv")
+    save_trace(make_trace(), tmp_path / "whole.csv")
     monkeypatch.setattr(trace_files, "CSV_ROWS", 2)
-    save_csv(make_trace(), tmp_path / "blocks.csv")
+    save_trace(make_trace(), tmp_path / "blocks.csv")
     assert (tmp_path / "blocks.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
 
 
@@ -184,7 +182,7 @@ def test_a_folder_that_is_not_there_is_said(tmp_path: Path, suffix: str) -> None
 def test_parquet_without_pyarrow_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(DetentError, match=r'pip install "detent\[parquet\]"'):
-        save_parquet(make_trace(), tmp_path / "run.parquet")
+        save_trace(make_trace(), tmp_path / "run.parquet")
     (tmp_path / "old.parquet").write_bytes(b"")
     with pytest.raises(DetentError, match=r'pip install "detent\[parquet\]"'):
         load_trace(tmp_path / "old.parquet")
@@ -265,7 +263,7 @@ def test_a_converted_csv_is_the_one_saved_directly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int | None
 ) -> None:
     save_hdf5(make_trace(), tmp_path / "run.h5")
-    save_csv(make_trace(), tmp_path / "direct.csv")
+    save_trace(make_trace(), tmp_path / "direct.csv")
     if rows:
         monkeypatch.setattr(trace_files, "CSV_ROWS", rows)
     convert_trace(tmp_path / "run.h5", tmp_path / "converted.csv")
@@ -277,7 +275,7 @@ def test_a_converted_parquet_holds_what_the_one_saved_directly_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: int | None
 ) -> None:
     save_hdf5(make_trace(), tmp_path / "run.h5")
-    save_parquet(make_trace(), tmp_path / "direct.parquet")
+    save_trace(make_trace(), tmp_path / "direct.parquet")
     if rows:
         monkeypatch.setattr(trace_files, "PARQUET_ROWS", rows)
     convert_trace(tmp_path / "run.h5", tmp_path / "converted.parquet")

@@ -154,31 +154,6 @@ def test_times_are_multiples_of_the_period_however_long_the_run(period, tick, pi
     assert waveforms_from_rows(rows, [LEAVES["tracker.msb"]], period=period).begin == picoseconds
 
 
-@pytest.mark.parametrize(
-    ("break_it", "message"),
-    [
-        (lambda rows: rows[:0], "there are no rows"),
-        (lambda rows: rows[[0, 2]], "tick 5 is followed by 7; allowed: consecutive ticks"),
-        (lambda rows: rows[["tracker.msb"]], "no field 'tick'"),
-        (lambda rows: rows[["tick"]], "'tracker.msb' was not recorded"),
-    ],
-)
-def test_rows_that_cannot_be_drawn_are_refused(break_it, message):
-    rows = make_rows(5, tracker__msb=[0, 1, 0])
-    with pytest.raises(DetentError, match=message):
-        waveforms_from_rows(break_it(rows), [LEAVES["tracker.msb"]], period=T)
-
-
-def test_a_row_from_before_the_first_tick_is_refused():
-    with pytest.raises(DetentError, match="tick 0 comes first"):
-        one("tracker__msb", [0, 1], first_tick=0)
-
-
-def test_an_array_is_refused():
-    with pytest.raises(DetentError, match=r"'motor.history' is an array of 4"):
-        waveforms_from_rows(make_rows(1, tracker__msb=[0]), [LEAVES["motor.history"]], period=T)
-
-
 @pytest.mark.parametrize("period", [0.0, -1e-6, 1e-13, float("nan"), float("inf")])
 def test_a_period_that_is_no_time_is_refused(period):
     with pytest.raises(DetentError, match="period of a tick is"):
@@ -217,12 +192,6 @@ def test_two_phase_clocks_lie_in_the_same_ticks_as_the_rows():
     assert changes(ck2) == [(1_750_000, 0), (1_875_000, 1), (1_937_500, 0), (2_125_000, 1), (2_187_500, 0)]
     assert (ck1.bits, ck1.doc, ck1.block) == (1, "counts", "clocks")
     assert replace(shown, signals=(ck1, ck2, *shown.signals))["clocks.ck2"] is ck2
-
-
-@pytest.mark.parametrize("ticks", [range(0), range(-1, 3), range(0, 8, 2)])
-def test_a_clock_of_no_ticks_is_refused(ticks):
-    with pytest.raises(DetentError, match=r"clock 'clocks\.ck1'"):
-        clock_waveform("clocks.ck1", T, ticks, high=(0, 0.25))
 
 
 # -- what waveforms must be -------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """What else a log can tell, each by its own method: asked for by name, answered with limits or with what is missing."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -17,6 +17,7 @@ from detent.identify.analyse.winding import fit_winding
 from detent.identify.fit.dead_time import find_dead_time
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Log
+from detent.logs.roles import EFFORTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ def _two_speeds(log: Log, effort: str, _: float) -> Found:
     found = fit_two_speeds(log, effort)
     notes = (*found.positive.notes, *found.negative.notes)
     partly = tuple(f"{line.direction}: {line.reason}" for line in (found.positive, found.negative) if line.reason)
-    return found.estimates, found.reason, notes if found.reason else (*partly, *notes), found.to_dict()
+    return found.estimates, found.reason, notes if found.reason else (*partly, *notes), asdict(found)
 
 
 def _friction_map(log: Log, effort: str, mass: float) -> Found:
@@ -62,12 +63,12 @@ def _friction_map(log: Log, effort: str, mass: float) -> Found:
         for dip in found.dips
         if dip.is_found and dip.depth is not None
     )
-    return bins, found.reason, (*dips, *found.refused), found.to_dict()
+    return bins, found.reason, (*dips, *found.refused), asdict(found)
 
 
 def _winding(log: Log, _: str, __: float) -> Found:
     found = fit_winding(log)
-    return found.estimates, found.reason, found.notes, found.to_dict()
+    return found.estimates, found.reason, found.notes, asdict(found)
 
 
 def _steps(log: Log, _: str, __: float) -> Found:
@@ -78,7 +79,7 @@ def _steps(log: Log, _: str, __: float) -> Found:
         for one in step.estimates
     )
     notes = tuple(note for step in found.steps for note in step.notes)
-    return named, found.reason, (*found.notes, *notes), found.to_dict()
+    return named, found.reason, (*found.notes, *notes), asdict(found)
 
 
 def _frequency(log: Log, effort: str, _: float) -> Found:
@@ -94,6 +95,7 @@ def _frequency(log: Log, effort: str, _: float) -> Found:
 
 
 def _sensors(log: Log, effort: str, _: float) -> Found:
+    log.need("position")
     resolution = estimate_resolution(log.signals["position"])
     counts = f"{resolution.counts} counts, {resolution.share:.0%} of the positions on the grid"
     told: list[Estimate] = []
@@ -102,11 +104,8 @@ def _sensors(log: Log, effort: str, _: float) -> Found:
     if np.isfinite(resolution.step):
         unit = log.units["position"]
         told.append(estimate("resolution", resolution.step, unit, 0.0, "step common to all positions"))
-    role = effort or next(
-        (name for name in ("force", "torque", "current", "voltage", "command") if name in log.signals), ""
-    )
-    if role:
-        dead = find_dead_time(log.t, log.signals[role], log.signals["position"])
+    if effort or not log.signals.keys().isdisjoint(EFFORTS):
+        dead = find_dead_time(log.t, log.signals[log.effort(effort)], log.signals["position"])
         told.append(dead.estimate)
         notes += [dead.reason] if dead.reason else []
         details["dead_time"] = dead.to_dict()

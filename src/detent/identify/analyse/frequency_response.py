@@ -3,7 +3,7 @@
 `measure_response` makes one of a recording, `resonances` takes resonances from it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -41,17 +41,6 @@ class FrequencyResponse:
     def phase(self) -> Values:
         """Phase without jumps [rad], shape (n,)."""
         return np.unwrap(np.angle(self.response))
-
-    def within(self, low: float, high: float) -> "FrequencyResponse":
-        """The part between two frequencies [Hz], both included."""
-        inside = (self.frequency >= low) & (self.frequency <= high)
-        return replace(
-            self,
-            frequency=self.frequency[inside],
-            response=self.response[inside],
-            coherence=self.coherence[inside],
-            deviation=self.deviation[inside],
-        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -16,19 +16,18 @@ Assumptions: the velocity is known well enough that samples fall in their own bi
 friction of both directions, with opposite signs.
 """
 
-from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
-from detent.identify.fit.steady import find_steady, find_velocity, select_effort
-from detent.logs.differences import grain, window_rows
+from detent.identify.fit.steady import find_steady, find_velocity
+from detent.logs.differences import grain, smooth, window_rows
 from detent.logs.log import Log, Values
-from detent.logs.stamps import stretches
-from detent.logs.windows import parabolas, scipy
+from detent.logs.windows import scipy
 
 FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
 MEMORIES = 10  # length of a window, in memories of the residual
@@ -66,10 +65,6 @@ class FrictionMap:
     refused: tuple[str, ...] = ()  # bins that have samples, but too few windows
     reason: str = ""  # why there is no map; empty where there is one
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(self).items()}
-
 
 def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) -> FrictionMap:
     """Average the friction of a recording per bin of speed and direction; without `mass`, of steady stretches only."""
@@ -77,7 +72,7 @@ def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) 
         raise DetentError(f"friction map: came a mass of {mass:g}; allowed: 0 or above; 0 takes steady stretches only")
     if bins < 1:
         raise DetentError(f"friction map: came {bins} bins; allowed: at least 1; ten are usual")
-    role = select_effort(log, effort)
+    role = log.effort(effort)
     _, speed_unit, _ = find_velocity(log)
     moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)
     units = (role, log.units[role], speed_unit)
@@ -112,7 +107,7 @@ def _without_result(
 def _steady(log: Log, role: str) -> _Moving:
     """Samples of steady stretches, each at the mean speed of its stretch."""
     velocity, _, step = find_velocity(log)
-    parts = find_steady(log.t, velocity, step=step)
+    parts = find_steady(log.t, velocity, step)
     place = [np.arange(part.start, part.stop, dtype=np.int64) for part in parts]
     speed = [np.full(part.stop - part.start, velocity[part].mean()) for part in parts]
     index = np.concatenate([np.empty(0, dtype=np.int64), *place])
@@ -121,27 +116,17 @@ def _steady(log: Log, role: str) -> _Moving:
 
 def _driven(log: Log, role: str, mass: float) -> _Moving:
     """Samples in motion, velocity and acceleration by a parabola through a window about each."""
-    base = log.signals["position"] if "position" in log.signals else log.signals["velocity"]
+    is_placed = "position" in log.signals
+    base = log.signals["position" if is_placed else "velocity"]
     rows = 2 * window_rows(base) + 1
-    parts = [part for part in stretches(log.t) if part.stop - part.start > rows]
-    place, v, a, f = np.concatenate([np.empty((4, 0)), *(_smoothed(log, role, part, rows) for part in parts)], axis=1)
+    place, (value, slope, curvature) = smooth(base, log.t, rows)
+    v, a = (slope, curvature) if is_placed else (value, slope)
+    f = smooth(log.signals[role], log.t, rows)[1][0]
     top = float(np.abs(v).max(initial=0.0))
     noise = _velocity_noise(log, base, rows)
     lowest = max(top / RANGE, OVER_NOISE * noise)
     kept = ~_near_rest(v, 0.5 * lowest, rows)
-    return _Moving(place[kept].astype(np.int64), v[kept], (f - mass * a)[kept], lowest)
-
-
-def _smoothed(log: Log, role: str, part: slice, rows: int) -> NDArray[np.float64]:
-    """Place, velocity, acceleration and effort in the middle of each window of a part, shape (4, m)."""
-    period = float(log.t[part][-1] - log.t[part][0]) / (part.stop - part.start - 1)
-    effort = parabolas(log.signals[role][part], period, rows)[0]
-    if "position" in log.signals:
-        _, v, a = parabolas(log.signals["position"][part], period, rows)
-    else:
-        v, a, _ = parabolas(log.signals["velocity"][part], period, rows)
-    place = np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.float64)
-    return np.array([place, v, a, effort])
+    return _Moving(place[kept], v[kept], (f - mass * a)[kept], lowest)
 
 
 def _velocity_noise(log: Log, base: Values, rows: int) -> float:

@@ -13,7 +13,6 @@ from detent.identify.analyse.average_windows import FEWEST_ROWS, average_windows
 from detent.identify.analyse.excitation_period import cut_periods
 from detent.identify.analyse.frequency_response import FrequencyResponse
 from detent.logs.log import Log, Values
-from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 
 
@@ -37,13 +36,8 @@ def response_of(
     log: Log, effort: str | None = None, position: str = "position", *, period: float | None = None
 ) -> FrequencyResponse:
     """Measure the response of the position to the effort in a log."""
-    chosen = effort or next((role for role in EFFORTS if role in log.signals), "")
-    for role, wanted in ((chosen, effort or f"one of {', '.join(EFFORTS)}"), (position, position)):
-        if role not in log.signals:
-            raise DetentError(
-                f"{log.name}: came the signals {', '.join(log.signals)}; allowed: {wanted} among them; name "
-                "its column, or record it"
-            )
+    chosen = log.effort(effort or "")
+    log.need(position)
     found = measure_response(log.t, log.signals[chosen], log.signals[position], period=period)
     return replace(found, input_unit=log.units.get(chosen, ""), output_unit=log.units.get(position, ""))
 

@@ -49,7 +49,7 @@ class Resonances:
 
     # ``gain`` (acceleration per effort, below the resonance), ``viscous`` [1/s]; where there is a resonance
     # ``resonance`` [Hz], ``resonance.damping`` [1]; with the encoder of the motor ``delay`` [s], ``antiresonance``
-    # [Hz], ``antiresonance.damping`` [1], ``mass_ratio`` (load over motor) [1]; where the total mass is known
+    # [Hz], ``antiresonance.damping`` [1], ``mass_ratio`` (load over motor) [1]; where the effort is a force
     # ``mass.total``, and of two masses ``mass.motor``, ``mass.load``, ``stiffness``, ``damping``
     estimates: dict[str, Estimate]
     frequency: Values  # lines [Hz], shape (n,)
@@ -83,7 +83,6 @@ def fit_resonances(
     motor: FrequencyResponse | None = None,
     load: FrequencyResponse | None = None,
     *,
-    total_mass: Estimate | None = None,
     hold: float = 0.0,
 ) -> Resonances:
     """Fit two masses to the responses of one or both encoders to the effort.
@@ -102,7 +101,7 @@ def fit_resonances(
     reasons = [why] if why else _doubts(fit, responses)
     fit = rigid if why else fit
     return Resonances(
-        estimates=_estimates(fit, responses[0], total_mass),
+        estimates=_estimates(fit, responses[0]),
         frequency=lines.frequency,
         fitted=fit.sign * respond_sampled(fit.model, fit.parameters, lines.frequency, hold),
         outputs=outputs,
@@ -266,7 +265,7 @@ def _quantities(fit: Fit) -> dict[str, Callable[[Values], float]]:
     return found
 
 
-def _estimates(fit: Fit, response: FrequencyResponse, total_mass: Estimate | None) -> dict[str, Estimate]:
+def _estimates(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
     """Everything that a fit tells, with its intervals."""
     effort = f"({response.input_unit})" if "*" in response.input_unit else response.input_unit or "1"
     gain_unit = f"{response.output_unit or '1'}/s^2/{effort}"
@@ -276,13 +275,12 @@ def _estimates(fit: Fit, response: FrequencyResponse, total_mass: Estimate | Non
     for name, quantity in _quantities(fit).items():
         value, error = fit.spread(quantity)
         found[name] = estimate(name, value, units.get(name, "1"), error, method, fit.degrees)
-    return found | _constants(fit, response, total_mass)
+    return found | _constants(fit, response)
 
 
-def _constants(fit: Fit, response: FrequencyResponse, total_mass: Estimate | None) -> dict[str, Estimate]:
-    """Masses, stiffness and damping in units of mechanics, where the total mass is known."""
-    is_force = response.input_unit == _FORCES.get(response.output_unit)
-    if response.output_unit not in _MECHANICAL or not (is_force or total_mass):
+def _constants(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
+    """Masses, stiffness and damping in units of mechanics, where a force tells the total mass."""
+    if response.output_unit not in _MECHANICAL or response.input_unit != _FORCES[response.output_unit]:
         return {}
     mass_unit, stiffness_unit, damping_unit = _MECHANICAL[response.output_unit]
     per_mass: dict[str, tuple[str, Callable[[Values], float]]] = {"mass.total": (mass_unit, lambda _: 1.0)}
@@ -293,11 +291,6 @@ def _constants(fit: Fit, response: FrequencyResponse, total_mass: Estimate | Non
             per_mass[name] = (unit, lambda parameters, index=index: constants_of(parameters)[index])
     found: dict[str, Estimate] = {}
     for name, (unit, part) in per_mass.items():
-        if total_mass is None:
-            value, error = fit.spread(lambda parameters, part=part: part(parameters) * np.exp(-parameters[-2]))
-        else:
-            value, error = fit.spread(part)
-            error = float(np.hypot(total_mass.value * error, value * total_mass.error))
-            value *= total_mass.value
+        value, error = fit.spread(lambda parameters, part=part: part(parameters) * np.exp(-parameters[-2]))
         found[name] = estimate(name, value, unit, error, _METHOD, fit.degrees)
     return found

@@ -92,7 +92,7 @@ def take_lines(responses: Sequence[FrequencyResponse]) -> Lines:
 
 def fit_model(model: ResponseModel, lines: Lines, starts: Sequence[Values], hold: float = 0.0) -> Fit:
     """Fit a model to responses."""
-    count = len(model.names) + 2
+    count = model.count + 2
     if int(lines.used.sum()) < LINES_PER_PARAMETER * count:
         raise DetentError(
             f"identify: came {int(lines.used.sum())} lines with a standard deviation below {MOST_DEVIATION:.0%}; "

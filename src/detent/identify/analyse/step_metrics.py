@@ -13,8 +13,8 @@ Assumptions: the reference holds still (to 1/10000 of its range) before and afte
 recorded at the same moment.
 """
 
-from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,23 +80,10 @@ class StepResponse:
     reason: str = ""  # why there is none; empty where there is one
     notes: tuple[str, ...] = ()  # what was passed over
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; a time that is not reached is None."""
-        plain = asdict(self)
-        for step in plain["steps"]:
-            for key in ("settling_2", "settling_5"):
-                step[key] = step[key] if np.isfinite(step[key]) else None
-        return plain
-
 
 def measure_steps(log: Log) -> StepResponse:
     """Metrics of each step of the reference of a recording."""
-    missing = [role for role in ("reference", "position") if role not in log.signals]
-    if missing:
-        raise DetentError(
-            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with reference and position; "
-            f"name the column, as in {missing[0]}=COLUMN [mm]"
-        )
+    log.need("reference", "position")
     unit = log.units["position"]
     if unit != log.units["reference"]:
         raise DetentError(

@@ -16,7 +16,7 @@ section 7.4). Both are part of the models where a hold is given.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,7 @@ ALIASES = 3  # multiples of the sample rate, to both sides, that are counted
 class ResponseModel(Protocol):
     """Model of the answers of some outputs to one effort."""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        ...
+    count: ClassVar[int]  # parameters
 
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain, shape (outputs, n), at complex frequencies `s` [rad/s], shape (n,)."""
@@ -46,11 +43,7 @@ class RigidModel:
     """One mass with viscous friction: ``1 / (s (s + b))``."""
 
     outputs: int = 1  # encoders, which all see the same
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Viscous friction per mass [1/s]."""
-        return ("viscous",)
+    count: ClassVar[int] = 1  # viscous friction per mass [1/s]
 
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain."""
@@ -62,11 +55,9 @@ class TwoMassModel:
     """Two masses seen by the encoder of the motor, or by both."""
 
     outputs: int = 1  # 1 for the motor alone, 2 for motor and load
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Logarithms of m2 / m1 and of the anti-resonance [rad/s]; dampings per total mass [1/s]."""
-        return ("log ratio", "log omega", "damping", "viscous motor", "viscous load")
+    # logarithms of m2 / m1 and of the anti-resonance [rad/s]; per total mass [1/s]: damping, viscous friction of motor
+    # and load
+    count: ClassVar[int] = 5
 
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain."""
@@ -84,10 +75,9 @@ class LoadModel:
     The advance d / k and the delay can hardly be told apart below the resonance; neither is told of this model.
     """
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The real pole [1/s], the logarithm of the resonance [rad/s], its damping ratio, and the advance [s]."""
-        return ("pole", "log omega", "ratio", "advance")
+    count: ClassVar[int] = (
+        4  # the real pole [1/s], the logarithm of the resonance [rad/s], its damping ratio, advance [s]
+    )
 
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain."""

@@ -16,8 +16,7 @@ speeds is a line. The error of each stretch is that of its mean with coloured re
 scatter about the line by more than that, the scatter between stretches is added, and said.
 """
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,6 @@ from detent.identify.fit.steady import (
     find_steady,
     find_velocity,
     measure_stretch,
-    select_effort,
     unit_per_speed,
 )
 from detent.logs.log import Log, Values
@@ -75,17 +73,13 @@ class TwoSpeeds:
         lines = (self.positive, self.negative)
         return tuple(found for line in lines for found in (line.slope, line.coulomb) if found is not None)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "reason": self.reason}
 
-
-def fit_two_speeds(log: Log, effort: str = "", shortest: float | None = None, tolerance: float = 0.05) -> TwoSpeeds:
+def fit_two_speeds(log: Log, effort: str = "") -> TwoSpeeds:
     """Slope and friction of each direction from the steady stretches of a recording."""
-    role = select_effort(log, effort)
+    role = log.effort(effort)
     velocity, speed_unit, step = find_velocity(log)
     drive = log.signals[role]
-    parts = find_steady(log.t, velocity, shortest, tolerance, step)
+    parts = find_steady(log.t, velocity, step)
     units = (log.units[role], unit_per_speed(log.units[role], speed_unit), speed_unit)
     lines = {
         name: _fit_direction(name, (log.t, velocity, drive), [p for p in parts if velocity[p].mean() * sign > 0], units)

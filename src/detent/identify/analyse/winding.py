@@ -19,8 +19,7 @@ Assumptions: constant R, L and ke; the voltage is that at the winding (or its me
 not made from the noise of the measured current, as a very stiff current loop does; samples are even, within a tenth.
 """
 
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,19 +68,10 @@ class Winding:
         found = (self.resistance, self.inductance, self.back_emf_constant, self.offset, self.torque_constant)
         return tuple(one for one in (*found, self.apparent_resistance) if one is not None)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return asdict(self)
-
 
 def fit_winding(log: Log, *, is_locked: bool = False, late: int = 0) -> Winding:
     """Constants of the winding from a recording."""
-    missing = [role for role in ("voltage", "current") if role not in log.signals]
-    if missing:
-        raise DetentError(
-            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with voltage and current; "
-            f"name the column, as in {missing[0]}=COLUMN"
-        )
+    log.need("voltage", "current")
     if late < 0:
         raise DetentError(
             f"winding: came a delay of {late} samples; allowed: 0 or more; a voltage acts after it is set"

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.free_run import plant_registers, start_velocities
+from detent.identify.fit.estimate import rms
+from detent.identify.fit.free_run import plant_registers, start_velocities, well_known_from
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.prepare import Run
 from detent.kernel.loop import advance
@@ -52,7 +53,7 @@ def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequ
     if not (np.isfinite(position).all() and np.isfinite(effort).all()):
         return None
     return ClosedLoop(
-        rms=float(np.sqrt(np.mean(position**2))),
+        rms=rms(position),
         largest=float(np.abs(position).max()),
         relative=_share(position, np.concatenate([run.position for *_, run in pairs])),
         effort=_share(effort, np.concatenate([run.effort for *_, run in pairs])),
@@ -83,7 +84,7 @@ def _params(constants: Constants, loops: Loops, run: Run) -> CascadeParams:
 
 def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
     """Where the log says the axis was, as fast, and with the integral that its effort shows."""
-    velocity = float(start_velocities(run)[min(len(run.position) // 4, max(4, round(0.006 / run.step)))])
+    velocity = float(start_velocities(run)[well_known_from(run)])
     place = float(run.position[0])
     switch_on(p, r, place)
     r.machine.motor.velocity = r.machine.load.velocity = velocity

@@ -77,7 +77,7 @@ def coloured_covariance(columns: Values, residual: Values, instruments: Values |
     """Covariance of the constants of a regression with coloured residuals."""
     n, k = columns.shape
     chosen = columns if instruments is None else instruments
-    size, length = _sizes(columns), _sizes(chosen)
+    size, length = column_sizes(columns), column_sizes(chosen)
     independent = independent_rows(residual)
     degrees = count_cosines(n, independent)
     scores = chosen / length * residual[:, None]
@@ -100,7 +100,7 @@ def carried_degrees(columns: Values, residual: Values, instruments: Values, cosi
     degrees (Satterthwaite), times ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their squares are
     correlated by its square.
     """
-    size, length = _sizes(columns), _sizes(instruments)
+    size, length = column_sizes(columns), column_sizes(instruments)
     tools = instruments / length
     weight = (tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size), rcond=RANK), np.float64).T) ** 2
     total, squares = weight.sum(axis=0), (weight**2).sum(axis=0)
@@ -109,8 +109,8 @@ def carried_degrees(columns: Values, residual: Values, instruments: Values, cosi
     return np.clip(carried, 1.0, float(cosines))
 
 
-def _sizes(columns: Values) -> Values:
-    """Lengths of columns; 1 for one of zeros."""
+def column_sizes(columns: Values) -> Values:
+    """Lengths of columns; 1 for one of zeros, whose constant then comes out as 0."""
     length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
     return np.where(length > 0.0, length, 1.0)
 

@@ -5,7 +5,7 @@ later. `find_dead_time` looks for the shift at which the effort is explained bes
 position and a constant, the equation of a rigid axis, where the axis moves one way. It is the peak of a correlation
 through filters (C. H. Knapp, G. C. Carter, "The generalized correlation method for estimation of time delay", IEEE
 Transactions on Acoustics, Speech, and Signal Processing 24 (1976) 320); effort and motion pass the same windows, which
-delay neither. `dead_time_of` takes it from the phase of a frequency response, where a resonance is part of the model.
+delay neither. Where a resonance is part of the model, the phase of a frequency response tells it (`resonances`).
 
 Assumed: an axis that is rigid below the frequencies that the windows let pass, and stays as it is.
 """
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.identify.analyse.resonances import Resonances
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.differences import window_rows
 from detent.logs.log import Values
@@ -75,16 +74,6 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     value = step * shift - 0.5 * (step if hold is None else hold)
     found = estimate("delay", value, "s", error, "shift of the effort that the motion explains best", BLOCKS - 1)
     return DeadTime(found, step, _doubt(shift, explained))
-
-
-def dead_time_of(resonances: Resonances, step: float) -> DeadTime:
-    """Take the dead time from the phase of a frequency response."""
-    if "delay" not in resonances.estimates:
-        raise DetentError(
-            "identify: came the frequency response of the load alone; allowed: that of the motor; record the encoder "
-            "of the motor too"
-        )
-    return DeadTime(resonances.estimates["delay"], step)
 
 
 def _checked_step(t: Values, effort: Values, position: Values) -> float:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from detent.logs.log import Values
 from detent.logs.windows import scipy
 
 LEVEL = 0.95  # share of intervals that hold the true value
@@ -47,6 +48,11 @@ class Estimate:
         """Standard error over magnitude; infinite for a value of 0."""
         return self.error / abs(self.value) if self.value else np.inf
 
+    @property
+    def half(self) -> float:
+        """Half of the interval."""
+        return 0.5 * (self.high - self.low)
+
     def holds(self, value: float) -> bool:
         """True where a value lies within the interval."""
         return self.low <= value <= self.high
@@ -62,6 +68,11 @@ def estimate(  # noqa: PLR0913 - the fields of an estimate
     """Give an estimate its interval, by Student's distribution."""
     reach = quantile(degrees) * error
     return Estimate(name, value, unit, error, value - reach, value + reach, method)
+
+
+def rms(values: Values) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def significant(value: float, digits: int = DIGITS) -> float:

@@ -6,22 +6,22 @@ the end. The same compiled blocks move it as in every other simulation.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
 from detent.identify.fit.equations import fine_kernel
+from detent.identify.fit.estimate import rms
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import make_kernel
 from detent.kernel.loop import advance
 from detent.logs.log import Values
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, driven, fill_clocks, switch_on
 from detent.plant.two_mass import fastest_rate
-
-Report = Callable[[float], None]
 
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
 SUBSTEPS = 4  # ticks of the plant per sample of the log
@@ -105,7 +105,7 @@ def start_velocities(run: Run) -> Values:
     return fine_kernel(make_kernel(max(4, round(0.02 / run.step)), run.step)).velocities(run.position)
 
 
-def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report | None = None) -> tuple[Horizon, ...]:
+def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report = untold) -> tuple[Horizon, ...]:
     """Errors over a sample, over each of `HORIZONS`, and to the end."""
     found: list[Horizon] = []
     step = runs[0].step
@@ -117,8 +117,7 @@ def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report 
         rows = np.concatenate(made) if made else np.empty((0, 3))
         if len(rows):
             found.append(_horizon(name, samples * step, rows))
-        if report is not None:
-            report((k + 1) / (len(named) + 1))
+        report((k + 1) / (len(named) + 1))
     found.append(_free_run(constants, runs))
     return tuple(found)
 
@@ -126,7 +125,7 @@ def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report 
 def _stretches(constants: Constants, run: Run, samples: int) -> Values:
     """Error, way and naive error at the end of stretches, shape (stretches, 3)."""
     plant, velocity, q = Plant(constants, run.step), start_velocities(run), run.position
-    border = min(max(4, round(0.006 / run.step)), len(q) // 4)
+    border = well_known_from(run)
     last = len(q) - samples - border
     starts = np.unique(np.linspace(border, max(last, border), MOST_STARTS).astype(int))
     starts = starts[starts + samples < len(q)]
@@ -140,7 +139,7 @@ def _stretches(constants: Constants, run: Run, samples: int) -> Values:
 
 def _horizon(name: str, duration: float, rows: Values) -> Horizon:
     error, way, naive = rows.T
-    return Horizon(duration, name, len(rows), _rms(error), float(np.abs(error).max()), _rms(way), _rms(naive))
+    return Horizon(duration, name, len(rows), rms(error), float(np.abs(error).max()), rms(way), rms(naive))
 
 
 def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
@@ -149,8 +148,8 @@ def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
     ways: list[Values] = []
     naive: list[Values] = []
     for run in runs:
-        velocity = float(start_velocities(run)[_border(run)])
-        cut = run.part(_border(run), len(run.position))
+        velocity = float(start_velocities(run)[well_known_from(run)])
+        cut = run.part(well_known_from(run), len(run.position))
         q = cut.position
         errors.append(free_run(constants, run) - q)
         ways.append(q - q[0])
@@ -159,22 +158,18 @@ def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
     duration = max(run.t[-1] for run in runs)
     largest = float(np.abs(error).max())
     return Horizon(
-        duration, "free run", len(runs), _rms(error), largest, _rms(np.concatenate(ways)), _rms(np.concatenate(naive))
+        duration, "free run", len(runs), rms(error), largest, rms(np.concatenate(ways)), rms(np.concatenate(naive))
     )
 
 
-def _border(run: Run) -> int:
+def well_known_from(run: Run) -> int:
     """Samples at the begin whose velocity is not known well."""
     return min(max(4, round(0.006 / run.step)), len(run.position) // 4)
 
 
 def free_run(constants: Constants, run: Run) -> Values:
     """A run in one piece, from its first well-known velocity on; a few samples shorter than the run."""
-    begin = _border(run)
+    begin = well_known_from(run)
     samples = len(run.position) - begin
     velocity = float(start_velocities(run)[begin])
     return Plant(constants, run.step).run(run.effort, begin, samples, float(run.position[begin]), velocity)
-
-
-def _rms(values: Values) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 from detent.errors import InputError
+from detent.identify.fit import untold
 from detent.identify.fit.closed_loop import ClosedLoop, simulate_closed_loop
 from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS
@@ -15,8 +17,7 @@ from detent.identify.fit.free_run import Horizon, simulate_horizons
 from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.prepare import Run, make_run
-from detent.identify.fit.regression import Fit, Instruments, Prepared, prepare
-from detent.identify.fit.residuals import Residuals, residuals_of
+from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
 from detent.identify.fit.weights import make_kernel
 from detent.logs.log import Log, Values
@@ -140,7 +141,7 @@ def identify(
     effort: str | None = None,
     *,
     method: Method = "regression",
-    report: Report | None = None,
+    report: Report = untold,
 ) -> Identification:
     """Identify an axis from recorded runs."""
     runs = tuple(make_run(log, effort) for log in logs)
@@ -158,20 +159,10 @@ def identify(
         constants = _refine(runs, constants, "output error", report)
     refusals += look_at_constants(runs[0], constants, parts)
     seen, horizons, closed = _test_simulation(runs, found, constants, method, report)
-    refusals += look_at_prediction(found.climbs, horizons, refusals)
-    return Identification(
-        tuple(logs),
-        runs,
-        constants,
-        constants.estimates(runs[0]),
-        found.climbs,
-        found.fit,
-        horizons,
-        tuple(refusals),
-        seen,
-        closed,
-        _notes_of(runs, parts),
-    )
+    refusals += [*look_at_prediction(found.climbs, horizons, refusals)]
+    told = constants.estimates(runs[0])
+    results = (constants, told, found.climbs, found.fit, horizons, tuple(refusals), seen, closed)
+    return Identification(tuple(logs), runs, *results, _notes_of(runs, parts))
 
 
 def _notes_of(runs: Sequence[Run], parts: Sequence[Prepared]) -> tuple[str, ...]:
@@ -193,30 +184,14 @@ def _check_alike(runs: Sequence[Run]) -> None:
             ("effort", f"{run.effort_name} [{run.effort_unit}]", f"{first.effort_name} [{first.effort_unit}]"),
         ):
             if came != wanted:
-                raise InputError.of_file(
-                    run.name,
-                    f"{what} in {came}",
-                    f"{wanted}, as in {first.name}",
-                    "state the columns and units of both",
-                )
+                allowed, remedy = f"{wanted}, as in {first.name}", "state the columns and units of both"
+                raise InputError.of_file(run.name, f"{what} in {came}", allowed, remedy)
 
 
-def _teller(report: Report | None, what: str) -> Callable[[float], None] | None:
-    """What tells the share of one step that is done."""
-    if report is None:
-        return None
-
-    def tell(share: float) -> None:
-        report(what, share)
-
-    return tell
-
-
-def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report | None) -> Constants:
+def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report) -> Constants:
     """Constants by simulation, from those of the regression on."""
-    tell = _teller(report, what)
     longest = min(float(run.t[-1]) for run in runs)
-    return fit_output_error(runs, constants, min(STRETCH, longest / 4), tell).constants
+    return fit_output_error(runs, constants, min(STRETCH, longest / 4), partial(report, what)).constants
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -245,10 +220,8 @@ def _follows(part: Prepared) -> bool:
     """True where velocity and acceleration of the instruments are those of the axis for the most part."""
     if not len(part.motion.rows):
         return False
-    pairs = (
-        (part.motion.velocity, part.ideal.velocity),
-        (part.motion.acceleration, part.ideal.acceleration),
-    )
+    motion, ideal = part.motion, part.ideal
+    pairs = ((motion.velocity, ideal.velocity), (motion.acceleration, ideal.acceleration))
     return all(_cosine(*pair) > LIKENESS[part.instruments] for pair in pairs)
 
 
@@ -296,9 +269,9 @@ def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ..
     return (*ladder, lossy)
 
 
-def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report | None) -> _Found:
+def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report) -> _Found:
     """Climb the ladder, then fit the chosen model and those as good."""
-    climbs = climb(parts, _rungs_for(parts, runs), _teller(report, "ladder"))
+    climbs = climb(parts, _rungs_for(parts, runs), partial(report, "ladder"))
     chosen = next(c for c in reversed(climbs) if c.taken)
     fits = {c.rung.name: c.fit for c in climbs if _is_rival(c, chosen)}
     if chosen.rung.is_bent and not _is_told(parts, fits[chosen.rung.name]):
@@ -332,7 +305,7 @@ def _is_rival(c: Climb, chosen: Climb) -> bool:
 
 
 def _test_simulation(
-    runs: Sequence[Run], found: _Found, whole: Constants, method: Method, report: Report | None
+    runs: Sequence[Run], found: _Found, whole: Constants, method: Method, report: Report
 ) -> tuple[Constants | None, tuple[Horizon, ...], ClosedLoop | None]:
     """Constants from the first part of each log, simulated along the last; none where those of the whole cannot be."""
     if whole.value("mass") <= 0.0:
@@ -348,5 +321,5 @@ def _test_simulation(
         return None, (), None
     if method == "output error":
         constants = _refine(seen, constants, "output error on the first part", report)
-    tell = _teller(report, "simulation")
+    tell = partial(report, "simulation")
     return constants, simulate_horizons(constants, unseen, tell), simulate_closed_loop(constants, seen, unseen)

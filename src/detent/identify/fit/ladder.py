@@ -10,12 +10,13 @@ Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.identify.fit import Report, untold
 from detent.identify.fit.equations import LOSS, is_bent, terms_of
 from detent.identify.fit.regression import (
     Fit,
@@ -46,7 +47,6 @@ LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
 """Shares lost in a transmission that are tried."""
 
 ROUNDS, WIDER = 8, 1.3  # brackets of a Stribeck velocity or a loss looked at, and the ratio of their ends
-Report = Callable[[float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
 def climb(
     parts: Sequence[Prepared],
     rungs: Sequence[Rung] = RUNGS,
-    report: Report | None = None,
+    report: Report = untold,
 ) -> tuple[Climb, ...]:
     """Hold every rung to stretches it did not see."""
     climbs: list[Climb] = []
@@ -184,8 +184,7 @@ def climb(
         error = float(np.sqrt(squares.mean() / np.mean(fit.effort**2)))
         climbs.append(Climb(rung, error, squares, gain, taken, possible, fit))
         best = climbs[-1] if taken else best
-        if report is not None:
-            report((k + 1) / len(rungs))
+        report((k + 1) / len(rungs))
     return tuple(climbs)
 
 

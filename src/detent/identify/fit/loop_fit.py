@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.estimate import significant
+from detent.identify.fit.estimate import rms, significant
 from detent.identify.fit.prepare import Run
 from detent.logs.log import Values
 from detent.logs.windows import scipy
@@ -117,13 +117,13 @@ class _Trial:
         theta = np.array([significant(value) for value in _solve(columns[:cut], effort[:cut]).tolist()])
         rest = effort[cut:]
         first = 2 if self.integrates else 1
-        least = SLIGHT * _rms(effort)
-        if not (theta[:first] > 0.0).all() or (self.integrates and _rms(columns[:, 1] * theta[1]) < least):
+        least = SLIGHT * rms(effort)
+        if not (theta[:first] > 0.0).all() or (self.integrates and rms(columns[:, 1] * theta[1]) < least):
             return None
-        kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and _rms(columns[:, k] * theta[k]) > least)
+        kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and rms(columns[:, k] * theta[k]) > least)
         if kept != feeds:
             return self.solve(kept)
-        error = _rms(rest - columns[cut:] @ theta) / max(_rms(rest), 1e-300)
+        error = rms(rest - columns[cut:] @ theta) / max(rms(rest), 1e-300)
         known = dict(zip(feeds, theta[first:-1].tolist(), strict=True))
         integral = float(theta[1]) if self.integrates else 0.0
         acceleration, viscous, coulomb = (known.get(f, 0.0) for f in range(3))
@@ -165,7 +165,3 @@ def _solve_normal(products: Values, moments: Values) -> Values:
     linalg: Any = np.linalg
     theta: Values = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]
     return theta / size
-
-
-def _rms(values: Values) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -11,8 +11,7 @@ Ljung: System Identification, 2nd ed. (1999), section 7.2 (output-error structur
 Bock: Recent advances in parameter identification for ordinary differential equations (1983), multiple shooting.
 """
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -20,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
+from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.estimate import rms
 from detent.identify.fit.free_run import Plant, start_velocities
 from detent.identify.fit.prepare import Run
 from detent.logs.log import Values
 from detent.logs.windows import scipy
-
-Report = Callable[[float], None]
 
 STRETCH = 2.0  # length of a simulated stretch [s]
 MOST_ROUNDS = 40  # rounds of the search, at most
@@ -57,7 +56,6 @@ class OutputErrorFit:
     error: float  # root mean square of simulated less measured position over all stretches [m] or [rad]
     before: float  # the same with the constants that it began with
     stretches: int  # stretches simulated
-    simulations: int  # how often all of them were
 
 
 def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretch]:
@@ -80,7 +78,7 @@ def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretc
 
 
 def fit_output_error(
-    runs: Sequence[Run], start: Constants, duration: float = STRETCH, report: Report | None = None
+    runs: Sequence[Run], start: Constants, duration: float = STRETCH, report: Report = untold
 ) -> OutputErrorFit:
     """Fit constants by simulation."""
     names = tuple(name for name in start.names if name != "delay")
@@ -92,23 +90,12 @@ def fit_output_error(
         )
     search = _Search(names, start, stretches)
     before = search.residual(search.begin)
-    rough = search.minimise(search.begin, _part_of(report, 0.0, 0.5))
+    rough = search.minimise(search.begin, lambda share: report(0.5 * share))
     # What an error of a start does depends on the constants: once more with those found.
     search.look_at_starts(rough.x)
-    found = search.minimise(rough.x, _part_of(report, 0.5, 1.0))
+    found = search.minimise(rough.x, lambda share: report(0.5 + 0.5 * share))
     constants = search.constants_at(found.x, found.jac, found.fun)
-    return OutputErrorFit(constants, _rms(found.fun), _rms(before), len(stretches), search.count)
-
-
-def _part_of(report: Report | None, begin: float, end: float) -> Report | None:
-    """What tells the share that is done of a part of the work."""
-    if report is None:
-        return None
-
-    def tell(share: float) -> None:
-        report(begin + share * (end - begin))
-
-    return tell
+    return OutputErrorFit(constants, rms(found.fun), rms(before), len(stretches))
 
 
 class _Search:
@@ -125,7 +112,6 @@ class _Search:
         values = np.asarray(np.linalg.pinv(self._back) @ known, np.float64)
         self._scale = _scales(self._searched, values)
         self.begin = values / self._scale
-        self.count = 0
         self._removers: list[Values] = []
         self.look_at_starts(self.begin)
 
@@ -150,7 +136,6 @@ class _Search:
 
     def residual(self, x: Values) -> Values:
         """Simulated less measured position of all stretches, without what the starts explain."""
-        self.count += 1
         constants = self._constants(x)
         plants: dict[float, Plant] = {}
         made: list[Values] = []
@@ -161,7 +146,7 @@ class _Search:
             made.append(miss - ways @ (ways.T @ miss))
         return np.concatenate(made)
 
-    def minimise(self, x: Values, report: Report | None) -> Any:
+    def minimise(self, x: Values, report: Report) -> Any:
         """Least squares within what is possible."""
         rounds = 0
 
@@ -169,8 +154,7 @@ class _Search:
             """Change of the residuals with each constant, by differences."""
             nonlocal rounds
             rounds += 1
-            if report is not None:
-                report(min(rounds / MOST_ROUNDS, 1.0))
+            report(min(rounds / MOST_ROUNDS, 1.0))
             middle = self.residual(at)
             columns = [(self.residual(at + NUDGE * unit) - middle) / NUDGE for unit in np.eye(len(at))]
             return np.column_stack(columns)
@@ -187,8 +171,7 @@ class _Search:
             xtol=1e-6,
             ftol=1e-8,
         )
-        if report is not None:
-            report(1.0)
+        report(1.0)
         return found
 
     def _bounds(self) -> tuple[Values, Values]:
@@ -247,7 +230,3 @@ def _scales(names: Sequence[str], values: Values) -> Values:
         alike = forces if kind in _FORCES else drags if kind == "viscous" else [0.1]
         floors.append(0.1 * max(alike))
     return np.maximum(np.maximum(np.abs(values), floors), 1e-12)
-
-
-def _rms(values: Values) -> float:
-    return math.sqrt(float(np.mean(values**2)))

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.logs.log import Kind, Log, Values
-from detent.logs.roles import EFFORTS
 
 GAP = 1.5  # time between two samples, in periods, from which on something is missing between them
 FEWEST = 20  # samples below which nothing is said about a log
@@ -78,14 +77,8 @@ def _unit(name: str, effort: str, way: str) -> str:
 
 def make_run(log: Log, effort: str | None = None) -> Run:
     """Put a log on an even grid and choose what drives its axis."""
-    name = _choose_effort(log, effort)
-    if "position" not in log.signals:
-        raise InputError.of_file(
-            log.name,
-            f"signals {', '.join(log.signals)}",
-            "a measured position",
-            "name its column: position=COLUMN [UNIT]",
-        )
+    name = log.effort(effort or "")
+    log.need("position")
     if len(log.t) < FEWEST:
         raise InputError.of_file(log.name, f"{len(log.t)} samples", f"{FEWEST} or more", "record a longer run")
     step = log.period
@@ -114,22 +107,6 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     )
 
 
-def _choose_effort(log: Log, asked: str | None) -> str:
-    found = [role for role in EFFORTS if role in log.signals]
-    if asked is not None and asked not in found:
-        raise InputError.of_file(
-            log.name, f"signals {', '.join(log.signals)}", f"a column for {asked}", f"name it: {asked}=COLUMN"
-        )
-    if not found:
-        raise InputError.of_file(
-            log.name,
-            f"signals {', '.join(log.signals)}",
-            "something that drives the axis: " + ", ".join(EFFORTS),
-            "name its column, such as force=COLUMN [N]",
-        )
-    return asked or found[0]
-
-
 def _hold(grid: Values, t: Values, values: Values, step: float) -> Values:
     """A signal that stands from each of its samples to the next, on the grid."""
     if len(grid) == len(t) and float(np.abs(grid - t).max()) < 0.2 * step:
@@ -140,11 +117,7 @@ def _hold(grid: Values, t: Values, values: Values, step: float) -> Values:
 
 def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
     """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
-    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK)
-    for finding in log.findings:
-        if finding.kind is Kind.SATURATED and finding.signal in {effort, "position"}:
-            for first, last in finding.rows:
-                bad |= (log.rows >= first) & (log.rows <= last)
+    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK) | log.mask(Kind.SATURATED, signals={effort, "position"})
     if effort in {"voltage", "command"} and "enabled" in log.signals:
         # A winding that is switched off does not brake: another axis.
         bad |= log.signals["enabled"] < 0.5

@@ -21,8 +21,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance
+from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows
 from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
+from detent.identify.fit.estimate import rms
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.weights import Kernel, make_kernel
 from detent.logs.log import Values
@@ -85,6 +86,30 @@ class Fit:
     def value(self, name: str) -> float:
         """Constant of a term; 0 where the model does not have it."""
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals:
+    """What is left of the effort when the model has explained its part, window by window."""
+
+    rms: float  # root mean square, in the unit of the effort
+    relative: float  # the same over the root mean square of the effort
+    largest: float  # largest magnitude
+    # correlation of neighbours: 0 for independent ones; windows overlap, which alone makes it about 0.4; near 1 the
+    # model misses something that lasts: friction that changes with position, a missing constant, a clock that is wrong
+    neighbours: float
+    independent: float  # independent residuals that say as much
+    count: int  # windows
+
+
+def residuals_of(fit: Fit) -> Residuals:
+    """Look at the residuals of a fit."""
+    e = fit.residual
+    power, effort = float(e @ e), rms(fit.effort)
+    size = float(np.sqrt(power / len(e)))
+    neighbours = float(e[1:] @ e[:-1]) / power if power > 0.0 else 0.0
+    relative = size / effort if effort > 0.0 else 0.0
+    return Residuals(size, relative, float(np.abs(e).max()), neighbours, independent_rows(e), len(e))
 
 
 def prepare(run: Run, kernel: Kernel, instruments: Instruments) -> Prepared:
@@ -225,12 +250,6 @@ def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
     columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
     x, _, z = _with_bend(parts, names, theta, bend, columns, fit.residual, tools)
     return float(solve(z, x, fit.residual)[-1])
-
-
-def column_sizes(columns: Values) -> Values:
-    """Lengths of columns; 1 for one of zeros, whose constant then comes out as 0."""
-    length = np.asarray(np.linalg.norm(columns, axis=0), np.float64)
-    return np.where(length > 0.0, length, 1.0)
 
 
 def solve(instruments: Values, columns: Values, effort: Values) -> Values:

@@ -8,12 +8,12 @@ from detent.errors import DetentError
 from detent.identify.fit.coloured import coloured_covariance
 from detent.logs.differences import grain
 from detent.logs.log import Log, Values
-from detent.logs.roles import EFFORTS
 from detent.logs.stamps import stretches
 
 BLOCKS = 10  # blocks, at least, of which a steady stretch is made
-FEWEST_ROWS = 50  # rows of a steady stretch, at least, where nothing is stated
+FEWEST_ROWS = 50  # rows of a steady stretch, at least
 SHARE = 0.004  # the same as a part of the recording
+TOLERANCE = 0.05  # difference of the speeds of a steady stretch, as a part of their mean
 SLOWEST = 0.003  # speeds below this part of the highest are rest
 DRIFT = 0.1  # difference of the mean speeds of both halves of a stretch that is none, as a part of the tolerance
 STANDS_OUT = 3.0  # standard deviations by which the first or last block differs where the speed is still settling there
@@ -34,31 +34,11 @@ class SteadyStretch:
     degrees: float  # degrees of freedom behind it
 
 
-def select_effort(log: Log, role: str = "") -> str:
-    """Role of the signal that drives the axis: as asked for, or the most direct one that the log has."""
-    present = [name for name in EFFORTS if name in log.signals]
-    if role and role not in present:
-        raise DetentError(
-            f"{log.name}: came effort {role}; allowed: {', '.join(present) or 'none: the log holds no effort'}; "
-            f"name a signal that drives the axis ({', '.join(EFFORTS)})"
-        )
-    if not present:
-        raise DetentError(
-            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with {', '.join(EFFORTS)}; "
-            "name its column, as in current=COLUMN [A]"
-        )
-    return role or present[0]
-
-
 def find_velocity(log: Log) -> tuple[Values, str, float]:
     """Velocity as measured, or by central differences of the position; its unit; the grain of that position, or 0."""
     if "velocity" in log.signals:
         return log.signals["velocity"], log.units["velocity"], 0.0
-    if "position" not in log.signals:
-        raise DetentError(
-            f"{log.name}: came {', '.join(log.signals)}; allowed: a log with velocity or position; "
-            "name its column, as in position=COLUMN [mm]"
-        )
+    log.need("position")
     if len(log) < 3:
         raise DetentError(f"{log.name}: came {len(log)} samples; allowed: at least 3; record longer")
     position = log.signals["position"]
@@ -75,9 +55,7 @@ def unit_per_speed(effort: str, speed: str) -> str:
     return f"{effort}*s/{length}" if effort else f"s/{length}"
 
 
-def find_steady(
-    t: Values, velocity: Values, shortest: float | None = None, tolerance: float = 0.05, step: float = 0.0
-) -> list[slice]:
+def find_steady(t: Values, velocity: Values, step: float = 0.0) -> list[slice]:
     """Find the stretches of a recording in which the axis moves at a steady speed.
 
     The recording is divided into short blocks. A stretch is as many of them in a row whose mean speeds stay within the
@@ -85,24 +63,20 @@ def find_steady(
     is searched again with blocks twice as long, in which the grain of an encoder counts less; neighbours that are
     steady as one become one.
     """
-    for name, limit in (("shortest", shortest), ("tolerance", tolerance)):
-        if limit is not None and not limit > 0:
-            raise DetentError(f"steady stretches: came {name} = {limit:g}; allowed: above 0; leave it out if unsure")
     if len(t) < 2:
         return []
     period = float(np.median(np.diff(t)))
-    rows = max(FEWEST_ROWS, round(SHARE * len(t))) if shortest is None else round(shortest / period)
-    block = max(1, round(rows / BLOCKS))
+    block = max(1, round(max(FEWEST_ROWS, round(SHARE * len(t))) / BLOCKS))
     rest, found = stretches(t), list[slice]()
     size = block
     while size * (BLOCKS + 2) <= len(t):
-        slowest = max(SLOWEST * _top_speed(velocity, size), 2.0 * step / (tolerance * size * period))
-        new = [part for free in rest for part in _search(velocity, free, size, (tolerance, slowest))]
+        slowest = max(SLOWEST * _top_speed(velocity, size), 2.0 * step / (TOLERANCE * size * period))
+        new = [part for free in rest for part in _search(velocity, free, size, slowest)]
         found += new
         rest = [piece for free in rest for piece in _without(free, new)]
         size *= 2
     found.sort(key=lambda part: int(part.start))
-    return _joined(velocity, found, stretches(t), (block, tolerance))
+    return _joined(velocity, found, stretches(t), block)
 
 
 def measure_stretch(t: Values, velocity: Values, effort: Values, part: slice, slope: float) -> SteadyStretch:
@@ -124,15 +98,14 @@ def _top_speed(velocity: Values, block: int) -> float:
     return float(np.abs(_block_means(velocity, slice(0, len(velocity)), block)).max())
 
 
-def _search(velocity: Values, free: slice, block: int, limits: tuple[float, float]) -> list[slice]:
+def _search(velocity: Values, free: slice, block: int, slowest: float) -> list[slice]:
     """Stretches in a part without gaps, by blocks of some rows."""
     speeds = _block_means(velocity, free, block)
-    tolerance, slowest = limits
     found: list[slice] = []
     first = 0
     while first + BLOCKS + 2 <= len(speeds):
-        stop = _reach(speeds, first, tolerance)
-        kept = _trimmed(speeds, first, stop, tolerance) if abs(speeds[first]) > slowest else None
+        stop = _reach(speeds, first)
+        kept = _trimmed(speeds, first, stop) if abs(speeds[first]) > slowest else None
         if kept is None:
             first += max(1, (stop - first) // BLOCKS)
         else:
@@ -146,20 +119,20 @@ def _block_means(velocity: Values, part: slice, block: int) -> Values:
     return velocity[part][: count * block].reshape(count, block).mean(axis=1)
 
 
-def _reach(speeds: Values, first: int, tolerance: float) -> int:
+def _reach(speeds: Values, first: int) -> int:
     """First block behind `first` that is not of the same speed as those before it."""
     low = high = total = float(speeds[first])
     stop = first + 1
     while stop < len(speeds):
         new = float(speeds[stop])
         low, high, total = min(low, new), max(high, new), total + new
-        if high - low > tolerance * abs(total) / (stop + 1 - first):
+        if high - low > TOLERANCE * abs(total) / (stop + 1 - first):
             break
         stop += 1
     return stop
 
 
-def _trimmed(speeds: Values, first: int, stop: int, tolerance: float) -> tuple[int, int] | None:
+def _trimmed(speeds: Values, first: int, stop: int) -> tuple[int, int] | None:
     """First block and block behind the last of the steady part of a run; None where nothing long enough is left."""
     while stop - first > BLOCKS and _stands_out(speeds[first], speeds[first + 1 : stop]):
         first += 1
@@ -167,38 +140,37 @@ def _trimmed(speeds: Values, first: int, stop: int, tolerance: float) -> tuple[i
         stop -= 1
     # Within the tolerance, the blocks at the ends may still hold the edge of a ramp with its effort of acceleration.
     first, stop = first + 1, stop - 1
-    if stop - first < BLOCKS or _drifts(speeds[first:stop], tolerance):
+    if stop - first < BLOCKS or _drifts(speeds[first:stop]):
         return None
     return first, stop
 
 
-def _drifts(speeds: Values, tolerance: float) -> bool:
+def _drifts(speeds: Values) -> bool:
     """True where the halves of a run differ by more than the scatter of its blocks explains."""
     half = len(speeds) // 2
     drift = abs(float(speeds[:half].mean() - speeds[-half:].mean()))
     scatter = 2.0 * float(speeds.std()) * np.sqrt(2.0 / half)
-    return drift > DRIFT * tolerance * abs(float(speeds.mean())) + scatter
+    return drift > DRIFT * TOLERANCE * abs(float(speeds.mean())) + scatter
 
 
-def _joined(velocity: Values, found: list[slice], wholes: list[slice], limits: tuple[int, float]) -> list[slice]:
+def _joined(velocity: Values, found: list[slice], wholes: list[slice], block: int) -> list[slice]:
     """Neighbours that are steady together made one: grain may have cut one stretch in two."""
-    block, tolerance = limits
     joined: list[slice] = []
     for part in found:
         before = joined[-1] if joined else part
         both = slice(before.start, part.stop)
         is_near = part.start - before.stop < BLOCKS * block
         is_whole = any(whole.start <= both.start and both.stop <= whole.stop for whole in wholes)
-        if joined and is_near and is_whole and _is_steady(velocity, both, tolerance):
+        if joined and is_near and is_whole and _is_steady(velocity, both):
             joined[-1] = both
         else:
             joined.append(part)
     return joined
 
 
-def _is_steady(velocity: Values, part: slice, tolerance: float) -> bool:
+def _is_steady(velocity: Values, part: slice) -> bool:
     speeds = _block_means(velocity, part, (part.stop - part.start) // BLOCKS)
-    return float(np.ptp(speeds)) <= tolerance * abs(float(speeds.mean())) and not _drifts(speeds, tolerance)
+    return float(np.ptp(speeds)) <= TOLERANCE * abs(float(speeds.mean())) and not _drifts(speeds)
 
 
 def _stands_out(speed: float, others: Values) -> bool:

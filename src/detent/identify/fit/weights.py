@@ -26,7 +26,6 @@ from detent.logs.log import Values
 
 Rows = NDArray[np.intp]  # numbers of samples
 _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
-_SQUARED = _SHAPE**2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,11 +40,6 @@ class Kernel:
     first: Values
     second: Values
     third: Values
-
-    @property
-    def corner_hz(self) -> float:
-        """Frequency at which the mean of a signal is about 0.7 of its amplitude [Hz]."""
-        return 0.40 / (self.half * self.step)
 
     def held(self, signal: Values, rows: Rows, late: float = 0.0) -> Values:
         """Mean of a signal held from each sample to the next, seen `late` samples later, around samples `rows`."""

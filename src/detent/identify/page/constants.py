@@ -15,7 +15,6 @@ from detent.identify.page.words import (
     constant_name,
     is_known,
     long_bar,
-    may_be_zero,
     meaning_of,
     relative_half,
     sentence,
@@ -43,7 +42,7 @@ def constant_figures(found: Identification) -> list[Figure]:
     """Every constant with its limits, and whether it is trusted."""
     if not found.estimates:
         return []
-    reach = reach_of([e for e in found.trusted or found.estimates if is_known(e) and not may_be_zero(e)])
+    reach = reach_of([e for e in found.trusted or found.estimates if is_known(e) and not e.holds(0.0)])
     heads = [
         ("constant", False), ("value and 95 % limits", True), (f"interval, scale ±{percent(reach)}", False),
         ("", True), ("trusted", False),
@@ -73,7 +72,7 @@ def _constant_row(found: Identification, e: Estimate, reach: float) -> list[str]
 
 def _why(found: Identification, e: Estimate, *, trusted: bool) -> Markup:
     if trusted:
-        zero = ", but may be 0" if may_be_zero(e) else ""
+        zero = ", but may be 0" if e.holds(0.0) else ""
         return Markup('<span style="color:var(--good)" class="nowrap">✔ yes</span>{}').format(zero)
     reasons = [r for r in found.refusals if e.name in r.constants]
     general = [r for r in found.refusals if not r.constants]

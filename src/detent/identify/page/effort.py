@@ -8,10 +8,11 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.identify.fit.equations import HOPS, Motion
+from detent.identify.fit.estimate import rms
 from detent.identify.fit.identification import Identification, prepare_all
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit
-from detent.identify.page.scales import SINCE, effort_scale, label_of, peak_of, rms_of, scaled
+from detent.identify.page.scales import SINCE, effort_scale, label_of, peak_of, scaled
 from detent.methods.cascade.units import percent
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts
 from detent.page.figure import Figure
@@ -96,7 +97,7 @@ def effort_figures(found: Identification, windows: Sequence[Windows], shown: int
         "standstill, a reversal or missing samples are left out. <b>{} of the effort (rms) stays "
         "unexplained.</b> What repeats in the residual is what the model lacks: a force that depends on the "
         "position, cogging, another friction."
-    ).format(number(one.width * 1e3), percent(rms_of(fit.residual) / rms_of(fit.effort)))
+    ).format(number(one.width * 1e3), percent(rms(fit.residual) / rms(fit.effort)))
     told = (
         "Left: one hump around 0 is as it should be; the outermost bars hold all that is larger. Right: beyond the "
         "overlap of the windows bars within the dashed lines are noise; bars that stay outside tell of something that "
@@ -140,7 +141,7 @@ def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:
     """Count residuals by their size."""
     residual = np.concatenate([one.residual for one in windows])
     # A few far ones must not squeeze all others into one bar; they stand at its end.
-    reach = 4.0 * rms_of(residual) or 1.0
+    reach = 4.0 * rms(residual) or 1.0
     scale = effort_scale(unit, reach)
     at = np.clip(residual, -reach, reach) * scale.factor
     heap = Heap(label="windows", colour="speed", at=at, counts=np.ones(len(at)))

@@ -75,11 +75,6 @@ def peak_of(values: Numbers) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def rms_of(values: Numbers) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def scaled(  # noqa: PLR0913 - what a curve consists of
     label: str,
     colour: str,

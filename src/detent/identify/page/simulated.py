@@ -8,10 +8,11 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.estimate import rms
 from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
 from detent.identify.fit.identification import HELD_OUT, Identification
 from detent.identify.fit.prepare import Run
-from detent.identify.page.scales import SINCE, Ways, label_of, peak_of, rms_of, scaled
+from detent.identify.page.scales import SINCE, Ways, label_of, peak_of, scaled
 from detent.identify.page.words import long_bar
 from detent.methods.cascade.units import Scale, percent
 from detent.page.chart import Chart, Panel, Timeline, time_charts
@@ -37,12 +38,12 @@ class HeldOut:
     @property
     def rms_restarted(self) -> float:
         """Root mean square of what the restarted simulation is off."""
-        return rms_of(self.restarted - self.measured)
+        return rms(self.restarted - self.measured)
 
     @property
     def rms_free(self) -> float:
         """Root mean square of what the simulation in one piece is off."""
-        return rms_of(self.free - self.measured)
+        return rms(self.free - self.measured)
 
 
 def hold_out(found: Identification) -> tuple[HeldOut, ...]:

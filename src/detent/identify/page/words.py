@@ -87,30 +87,20 @@ class Written:
 def written(found: Estimate) -> Written:
     """Write an estimate so that its last digit is the second of its uncertainty; a delay in ms."""
     if found.unit == "s":
-        return _written(found.value * 1e3, half_of(found) * 1e3, "ms")
-    return _written(found.value, half_of(found), unit_text(found.unit))
-
-
-def half_of(found: Estimate) -> float:
-    """Half of the 95 % interval, in SI units."""
-    return 0.5 * (found.high - found.low)
+        return _written(found.value * 1e3, found.half * 1e3, "ms")
+    return _written(found.value, found.half, unit_text(found.unit))
 
 
 def relative_half(found: Estimate) -> float:
     """Half of the 95 % interval over the value; infinite for a value of 0."""
-    return half_of(found) / abs(found.value) if found.value else math.inf
+    return found.half / abs(found.value) if found.value else math.inf
 
 
 def is_known(found: Estimate) -> bool:
     """False where the interval says nothing: a log without what this constant needs."""
     if found.unit == "s":
-        return half_of(found) < UNKNOWN_DELAY
+        return found.half < UNKNOWN_DELAY
     return relative_half(found) < UNKNOWN
-
-
-def may_be_zero(found: Estimate) -> bool:
-    """True where the interval holds 0."""
-    return found.holds(0.0)
 
 
 def _written(value: float, half: float, unit: str) -> Written:

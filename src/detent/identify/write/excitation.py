@@ -7,13 +7,13 @@ the top speed.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from detent.errors import DetentError
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.verdict import Refusal
 from detent.identify.write.file_numbers import plain
-from detent.identify.write.seen import see
+from detent.identify.write.seen import Bounds, see
 from detent.methods.cascade.schema import CascadeSpec
 from detent.units import format_quantity
 
@@ -24,36 +24,11 @@ LEAST = 20.0  # length of a recording that is aimed at [s]
 RAMP = 0.15  # time of a ramp where neither the axis nor the log tells one [s]
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """Where moves may go, and how fast, in m or rad."""
-
-    lowest: float  # and highest: positions
-    highest: float
-    speed: float  # and acceleration: largest magnitudes
-    acceleration: float
-    start: float  # where the axis stands
-    is_rotary: bool  # True for angles
-    source: str  # what told them
-
-    @property
-    def middle(self) -> float:
-        """Place that the moves lie around."""
-        return 0.5 * (self.lowest + self.highest)
-
-
 def bounds_of_axis(spec: CascadeSpec) -> Bounds:
     """Limits of an axis, and a little less of its travel."""
-    margin = INSIDE * spec.limits.travel
-    return Bounds(
-        spec.limits.lowest + margin,
-        spec.highest - margin,
-        spec.limits.speed,
-        spec.limits.acceleration,
-        spec.mechanics.start_position,
-        spec.axis.motion == "rotary",
-        f"limits of {plain(spec.axis.name)}",
-    )
+    limits, margin = spec.limits, INSIDE * spec.limits.travel
+    start, is_rotary = spec.mechanics.start_position, spec.axis.motion == "rotary"
+    return Bounds(limits.lowest + margin, spec.highest - margin, limits.speed, limits.acceleration, start, is_rotary)
 
 
 def bounds_of_logs(found: Identification) -> Bounds:
@@ -64,9 +39,7 @@ def bounds_of_logs(found: Identification) -> Bounds:
             f"{found.runs[0].name}: came a log without motion; allowed: one that shows how far and how fast the axis "
             "may go; name the axis file whose limits the moves shall keep: --axis FILE"
         )
-    source = f"travel and speed of {plain(found.runs[0].name)}"
-    acceleration = max(seen.acceleration, seen.speed / 2.0)
-    return Bounds(seen.lowest, seen.highest, seen.speed, acceleration, seen.start, seen.is_rotary, source)
+    return replace(seen, acceleration=max(seen.acceleration, seen.speed / 2.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,21 +92,22 @@ def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
 def excitation_job(found: Identification, axis: CascadeSpec | None = None) -> str:
     """Write a list of moves that a recording needs for what is missing."""
     bounds = bounds_of_logs(found) if axis is None else bounds_of_axis(axis)
+    told = f"travel and speed of {found.runs[0].name}" if axis is None else f"limits of {axis.axis.name}"
     saturated = any(refusal.subject == "saturated" for refusal in found.refusals)
     moves = _Moves(bounds, SLOWER * bounds.speed if saturated else bounds.speed)
-    lines = ["", "# To the middle of the way.", *moves.to(bounds.middle, 0.5 * moves.top)]
+    lines = ["", "# To the middle of the way.", *moves.to(moves.middle, 0.5 * moves.top)]
     for part in missing_parts(found.refusals):
         lines += ["", f"# {part.text[0].upper()}{part.text[1:]}.", *moves.of(part)]
     lines += ["", "# Back to the begin.", *moves.to(bounds.start, 0.5 * moves.top)]
     repeat = max(1, math.ceil(LEAST / moves.seconds))
-    return "\n".join([*_head(found, bounds, moves, repeat, saturated=saturated), *lines]) + "\n"
+    return "\n".join([*_head(found, plain(told), moves, repeat, saturated=saturated), *lines]) + "\n"
 
 
-def _head(found: Identification, bounds: Bounds, moves: "_Moves", repeat: int, *, saturated: bool) -> Iterator[str]:
+def _head(found: Identification, told: str, moves: "_Moves", repeat: int, *, saturated: bool) -> Iterator[str]:
     """What the job is for."""
     logs = ", ".join(plain(log.name) for log in found.logs)
     yield f"# Moves to be recorded, about {repeat * moves.seconds:.0f} s, after {logs} was looked at."
-    yield f"# They keep to the {bounds.source}: {moves.shown(bounds.lowest)} to {moves.shown(bounds.highest)}, up to"
+    yield f"# They keep to the {told}: {moves.shown(moves.bounds.lowest)} to {moves.shown(moves.bounds.highest)}, up to"
     yield f"# {format_quantity(moves.top, moves.speed_unit, 3)}."
     yield "#"
     yield "# Record position, reference and what drives the axis, 500 samples a second or more, without a gap."
@@ -157,7 +131,7 @@ class _Moves:
 
     def __init__(self, bounds: Bounds, top: float) -> None:
         self.top, self.seconds = top, 0.0
-        self._bounds, self._place = bounds, bounds.start
+        self.bounds, self._place, self.middle = bounds, bounds.start, 0.5 * (bounds.lowest + bounds.highest)
         self.way_unit, self.speed_unit = ("rad", "rad/s") if bounds.is_rotary else ("m", "m/s")
         self._rise = bounds.acceleration if bounds.acceleration > 0.0 else top / RAMP
 
@@ -169,10 +143,10 @@ class _Moves:
         """Moves of a part, each speed there and back around the middle of the travel."""
         for share in part.shares:
             speed = share * self.top
-            free = self._bounds.highest - self._bounds.lowest
+            free = self.bounds.highest - self.bounds.lowest
             way = min(speed * part.steady + speed**2 / self._rise, free)
             for sign in (1.0, -1.0):
-                yield from self.to(self._bounds.middle + sign * 0.5 * way, speed, part.dwell)
+                yield from self.to(self.middle + sign * 0.5 * way, speed, part.dwell)
 
     def to(self, target: float, speed: float, dwell: float = 0.0) -> Iterator[str]:
         """One move."""

@@ -15,18 +15,24 @@ NEARLY_ALL = 0.999  # share of the samples whose speed and acceleration count: t
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """Extremes of some runs of one axis, in m or rad, and the unit of the effort."""
+class Bounds:
+    """Where an axis may go, or went, and how fast, in m or rad."""
 
     lowest: float  # and highest: positions
     highest: float
     speed: float  # and acceleration: largest magnitudes [m/s, m/s^2]
     acceleration: float  # [m/s, m/s^2]
+    start: float  # where it stands, in logs at the begin of the first
+    is_rotary: bool  # True for angles
+
+
+@dataclass(frozen=True, slots=True)
+class Seen(Bounds):
+    """Extremes of some runs of one axis, and the unit of the effort."""
+
     effort: float  # largest magnitude
-    start: float  # position of the first run at its begin
     period: float  # time between two samples [s], the longest of the runs
     resolution: float  # way of a count of the encoder, the coarsest of the runs; 0 where none shows
-    is_rotary: bool  # True where the position is an angle
 
     @property
     def way(self) -> float:

@@ -1,7 +1,5 @@
 """Friction over the speed: known laws come back with intervals that hold, the dip is found where there is one."""
 
-import json
-
 import numpy as np
 import pytest
 from tests.log_rig import EMPS, assert_covers, coloured, make_log, quantised, read_emps
@@ -44,7 +42,6 @@ def test_a_known_law_comes_back():
     assert np.all((found.low < found.friction) & (found.friction < found.high))
     assert found.samples.sum() > 9000
     assert np.all(found.windows >= 5)
-    json.dumps(found.to_dict())
 
 
 def test_intervals_hold_the_true_value_as_often_as_they_say():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy import signal
+from tests.synthetic_responses import within
 
 from detent.errors import DetentError
 from detent.identify.analyse.average_periods import average_periods, noise_parts
@@ -77,7 +78,7 @@ def test_windows_give_the_response_and_its_deviation():
         found = average_windows(
             T * np.arange(len(u)), u, signal.lfilter(B, A, u) + 0.3 * rng.normal(size=len(u)), step_hz=2.0
         )
-        band = found.within(4.0, 80.0)
+        band = within(found, 4.0, 80.0)
         scaled.append(np.log(band.response / exact(band.frequency)) / band.deviation)
     assert np.std(np.real(scaled)) == pytest.approx(1.0, abs=0.06)
     assert np.std(np.imag(scaled)) == pytest.approx(1.0, abs=0.06)
@@ -91,7 +92,7 @@ def test_a_single_chirp_goes_through_windows():
     u = signal.chirp(t, 1.0, t[-1], 200.0)
     found = measure_response(t, u, signal.lfilter(B, A, u))
     assert "H1 by Welch" in found.method
-    band = found.within(10.0, 100.0)
+    band = within(found, 10.0, 100.0)
     assert band.frequency[0] >= 10.0
     assert np.abs(band.response / exact(band.frequency) - 1).max() < 0.02
     assert band.coherence.min() > 0.99

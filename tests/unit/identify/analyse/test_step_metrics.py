@@ -1,7 +1,5 @@
 """Step response: closed forms come back with intervals that hold, and recordings of a real axis as published."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -9,6 +7,7 @@ from tests.log_rig import assert_covers, coloured, make_log, quantised
 from tests.places import DATA
 
 from detent.errors import DetentError
+from detent.identify.analyse.analyses import analyse
 from detent.identify.analyse.local_polynomial import fit_local_polynomial
 from detent.identify.analyse.ringing import find_turns, fit_ringing
 from detent.identify.analyse.step_metrics import find_steps, measure_steps
@@ -64,7 +63,6 @@ def test_closed_forms_come_back():
     assert step.ringing.swings[0] == pytest.approx(
         rest * np.exp(-np.pi * SIGMA / OMEGA) * (1 + np.exp(-np.pi * SIGMA / OMEGA)), rel=0.01
     )
-    json.dumps(found.to_dict())
 
 
 def test_intervals_hold_the_true_value_as_often_as_they_say():
@@ -126,12 +124,12 @@ def test_an_answer_without_overshoot_has_none():
 def test_an_axis_that_does_not_settle_is_said():
     t = np.arange(0.0, 1.0, DT)
     x = np.where(t > 0.1, 1 - np.cos(60 * (t - 0.1)), 0.0)
-    found = measure_steps(make_log(t, reference=np.where(t > 0.1, 1.0, 0.0), position=x))
-    (step,) = found.steps
+    log = make_log(t, reference=np.where(t > 0.1, 1.0, 0.0), position=x)
+    (step,) = measure_steps(log).steps
     assert np.isinf(step.settling_2)
     assert "not settled" in step.notes[0]
     assert step.ringing is None
-    assert found.to_dict()["steps"][0]["settling_2"] is None
+    assert analyse(log, "steps").to_dict()["steps"][0]["settling_2"] is None
     rest = measure_steps(make_log(t, reference=np.where(t > 0.1, 1.0, 0.0), position=0 * t)).steps[0]
     assert (rest.rise_time, rest.overshoot) == (None, None)
     assert rest.rest_error.value == 1.0

@@ -95,7 +95,7 @@ def test_one_mass_is_what_two_on_a_stiff_coupling_are():
 
 @pytest.mark.parametrize("model", [RigidModel(), TwoMassModel(), TwoMassModel(2), LoadModel()])
 def test_every_parameter_counts(model):
-    count = len(model.names)
+    count = model.count
     start = {1: [3.0], 4: [2.0, 6.0, 0.05, 1e-4], 5: OWN}[count]
     before = respond_sampled(model, np.r_[start, 0.0, 0.0], FREQUENCY, HOLD)
     for index in range(count + 2):

@@ -1,7 +1,5 @@
 """Winding: known constants come back with intervals that hold, and what data cannot tell apart is said."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -51,7 +49,6 @@ def test_known_constants_come_back():
     assert [one.unit for one in found.estimates] == ["ohm", "H", "V*s/rad", "V", "N*m/A"]
     assert "conservation of energy" in found.torque_constant.method
     assert 0.02 < found.relative_error < 0.1
-    json.dumps(found.to_dict())
 
 
 def test_intervals_hold_the_true_value_as_often_as_they_say():

@@ -39,7 +39,7 @@ def log_with(*findings, force=None):
 
 def look(*findings, force=None):
     log = log_with(*findings, force=force)
-    return look_at_log(log, make_run(log))
+    return [*look_at_log(log, make_run(log))]
 
 
 def finding(kind, signal="force", rows=(), severity=Severity.ERROR, advice=""):
@@ -88,11 +88,11 @@ def test_a_position_that_stays_behind_its_reference_is_refused():
     log = log_with()
     reference = Recorder(seconds=2.0).columns()[1]
     stands = log.signals["position"].copy()
-    assert look_at_log(log, make_run(log)) == []
+    assert [*look_at_log(log, make_run(log))] == []
     for first, subjects in ((800, []), (250, ["stuck signal"])):
         stands[first:] = stands[first]
         cut = make_log(log.t, log.signals | {"position": stands, "reference": reference})
-        found = look_at_log(cut, make_run(cut))
+        found = [*look_at_log(cut, make_run(cut))]
         assert [r.subject for r in found] == subjects
     assert "of its way while the position stands still" in found[0].text
     assert found[0].record == "look at the encoder, its cable and the drive's enable, and record again"
@@ -118,7 +118,7 @@ def test_an_effort_between_two_limits_is_saturated_though_nobody_said_so():
 
 
 def test_motion_both_ways_is_enough():
-    assert look_at_motion([RUN], PARTS) == []
+    assert [*look_at_motion([RUN], PARTS)] == []
 
 
 def test_less_than_a_second_of_motion_is_too_short():
@@ -129,7 +129,7 @@ def test_less_than_a_second_of_motion_is_too_short():
     assert found.record == "record 10 s or more of moves to and fro"
     # Several short runs are as good as a long one.
     runs = [RUN.part(k, k + 600) for k in range(0, 2400, 600)]
-    assert look_at_motion(runs, [prepared(run) for run in runs]) == []
+    assert [*look_at_motion(runs, [prepared(run) for run in runs])] == []
 
 
 @pytest.mark.parametrize(("sign", "way"), [(1, "larger"), (-1, "smaller")])
@@ -270,8 +270,8 @@ def horizon(name, rms, naive):
 
 
 def test_a_model_that_predicts_and_simulates_well_is_trusted():
-    assert look_at_prediction([climb(0.3)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.1, 1.0)], []) == []
-    assert look_at_prediction([climb(0.3)], (), []) == []
+    assert [*look_at_prediction([climb(0.3)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.1, 1.0)], [])] == []
+    assert [*look_at_prediction([climb(0.3)], (), [])] == []
 
 
 def test_a_model_that_does_not_predict_is_refused():
@@ -279,7 +279,7 @@ def test_a_model_that_does_not_predict_is_refused():
     assert (found.subject, found.constants) == ("model does not explain the log", ())
     assert found.text == "the effort of stretches not seen is predicted with an error of 40%"
     assert "its sign, unit and delay" in found.record
-    assert told(look_at_prediction([climb(np.nan)], (), [])) == [("model does not explain the log", ())]
+    assert told([*look_at_prediction([climb(np.nan)], (), [])]) == [("model does not explain the log", ())]
 
 
 def test_a_model_that_simulates_no_better_than_none_is_refused():
@@ -289,13 +289,13 @@ def test_a_model_that_simulates_no_better_than_none_is_refused():
     assert found.text == "simulated over 0.5 s it errs by 0.9, going on with the velocity by 1"
     assert found.record == "record with more acceleration, or look at units"
     # One good horizon is enough, and others than the short ones do not count.
-    assert look_at_prediction([climb(0.1)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.9, 1.0)], []) == []
-    assert look_at_prediction([climb(0.1)], [horizon("2 s", 0.9, 1.0), horizon("free run", 2.0, 1.0)], []) == []
+    assert [*look_at_prediction([climb(0.1)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.9, 1.0)], [])] == []
+    assert [*look_at_prediction([climb(0.1)], [horizon("2 s", 0.9, 1.0), horizon("free run", 2.0, 1.0)], [])] == []
     # Without a mass that is known there is nothing to simulate; without a delay there is.
     unknown = [Refusal("little acceleration", "", "", ("mass",))]
-    assert look_at_prediction([climb(0.1)], tested, unknown) == []
-    assert told(look_at_prediction([climb(0.4)], tested, unknown)) == [("model does not explain the log", ())]
-    assert look_at_prediction([climb(0.1)], tested, [Refusal("x", "", "", ("delay",))]) == [found]
+    assert [*look_at_prediction([climb(0.1)], tested, unknown)] == []
+    assert told([*look_at_prediction([climb(0.4)], tested, unknown)]) == [("model does not explain the log", ())]
+    assert [*look_at_prediction([climb(0.1)], tested, [Refusal("x", "", "", ("delay",))])] == [found]
 
 
 def test_a_refusal_as_data():

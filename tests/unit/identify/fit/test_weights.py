@@ -94,7 +94,7 @@ def test_velocities_at_every_sample(kernel):
 
 def test_the_corner_is_where_a_sine_loses_three_decibels():
     kernel = make_kernel(40, STEP)
-    wave = np.sin(2 * np.pi * kernel.corner_hz * np.arange(3000) * STEP)
+    wave = np.sin(2 * np.pi * 0.40 / 40 * np.arange(3000))
     assert np.abs(kernel.mean(wave, np.arange(100, 2900))).max() == pytest.approx(0.7, abs=0.05)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.synthetic_responses import within
 from tests.unit.identify.page.samples import constants, refused, rigid, trusted
 
 from detent.identify.page import response as response_module
@@ -23,7 +24,7 @@ def test_moves_in_a_closed_loop_tell_no_response() -> None:
         (rigid(lines=8), False),
         (rigid(coherence=0.5), False),
         (rigid(rough=3.0), False),
-        (rigid().within(10.0, 25.0), False),
+        (within(rigid(), 10.0, 25.0), False),
     ],
 )
 def test_a_response_is_told_by_coherent_lines_that_agree(

@@ -7,10 +7,8 @@ from tests.unit.identify.page.samples import number
 
 from detent.identify.page.words import (
     constant_name,
-    half_of,
     is_known,
     long_bar,
-    may_be_zero,
     meaning_of,
     relative_half,
     unit_text,
@@ -48,7 +46,7 @@ def test_a_pure_number_has_no_unit() -> None:
 
 
 def test_half_an_interval_absolute_and_relative() -> None:
-    assert half_of(number(20.0, 3.0)) == pytest.approx(3.0)
+    assert number(20.0, 3.0).half == pytest.approx(3.0)
     assert relative_half(number(-20.0, 3.0)) == pytest.approx(0.15)
     assert relative_half(number(0.0, 3.0)) == math.inf
 
@@ -62,8 +60,8 @@ def test_what_is_known_at_all() -> None:
 
 
 def test_what_may_be_zero() -> None:
-    assert may_be_zero(number(1.0, 1.1))
-    assert not may_be_zero(number(1.0, 0.9))
+    assert number(1.0, 1.1).holds(0.0)
+    assert not number(1.0, 0.9).holds(0.0)
 
 
 def test_names_say_kind_and_direction() -> None:
