@@ -20,8 +20,7 @@ def envelope(
         str, typer.Option("--motor", metavar="NAME", help="Only this motor of the file. Default: every one.")
     ] = "",
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FOLDER", help="Where the files go. Default: envelope/FILE"),
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Where the files go. Default: envelope/FILE")
     ] = None,
     *,
     as_json: Json = False,

@@ -16,8 +16,7 @@ def timing(
     file: File,
     at: Annotated[str, typer.Option("--at", metavar="TIME", help="Where to look, since power-on, such as '21.5 ms'.")],
     duration: Annotated[
-        str | None,
-        typer.Option("--for", metavar="TIME", help="How long. Default: 80 base ticks."),
+        str | None, typer.Option("--for", metavar="TIME", help="How long. Default: 80 base ticks.")
     ] = None,
     job: Job = None,
     signals: Annotated[

@@ -10,17 +10,7 @@ from typing import Any, cast
 from pydantic.fields import FieldInfo
 
 from detent.errors import FileProblem
-from detent.files.fields import (
-    AnyName,
-    Table,
-    example_of,
-    fits,
-    is_list,
-    leaf_fields,
-    named_as,
-    options_of,
-    unit_of,
-)
+from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_fields, named_as, options_of, unit_of
 from detent.files.locate import Path
 from detent.files.problems import dotted
 

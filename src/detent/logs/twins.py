@@ -6,15 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import (
-    FARTHEST,
-    correlation_curve,
-    equal_runs,
-    integral,
-    likeness,
-    resolution,
-    window_rows,
-)
+from detent.logs.differences import FARTHEST, correlation_curve, equal_runs, integral, likeness, resolution, window_rows
 from detent.logs.draft import Draft
 from detent.logs.log import Values
 

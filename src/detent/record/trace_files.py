@@ -21,16 +21,7 @@ import numpy as np
 
 from detent.errors import DetentError, InputError
 from detent.record.trace import TIME, Attribute, Column, Trace
-from detent.record.trace_store import (
-    FORMAT,
-    GROUP,
-    attributes_of,
-    load_hdf5,
-    open_store,
-    part_of,
-    save_hdf5,
-    writing,
-)
+from detent.record.trace_store import FORMAT, GROUP, attributes_of, load_hdf5, open_store, part_of, save_hdf5, writing
 
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
 STORES = (".h5", ".hdf5")  # endings of the store's own files

@@ -80,10 +80,7 @@ class Resonances:
 
 
 def fit_resonances(
-    motor: FrequencyResponse | None = None,
-    load: FrequencyResponse | None = None,
-    *,
-    hold: float = 0.0,
+    motor: FrequencyResponse | None = None, load: FrequencyResponse | None = None, *, hold: float = 0.0
 ) -> Resonances:
     """Fit two masses to the responses of one or both encoders to the effort.
 

@@ -130,12 +130,7 @@ def modes_of(parameters: Values) -> Modes | None:
     (10.0, 20.0)
     """
     m1, m2, k, d, b1, b2 = constants_of(parameters)
-    cubic = [
-        m1 * m2,
-        m1 * (d + b2) + m2 * (d + b1),
-        k * (m1 + m2) + d * (b1 + b2) + b1 * b2,
-        k * (b1 + b2),
-    ]
+    cubic = [m1 * m2, m1 * (d + b2) + m2 * (d + b1), k * (m1 + m2) + d * (b1 + b2) + b1 * b2, k * (b1 + b2)]
     roots = np.roots(cubic)
     pole = complex(roots[np.argmax(roots.imag)])
     if not pole.imag > 0:

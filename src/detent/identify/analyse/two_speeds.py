@@ -22,13 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import Estimate, estimate
-from detent.identify.fit.steady import (
-    SteadyStretch,
-    find_steady,
-    find_velocity,
-    measure_stretch,
-    unit_per_speed,
-)
+from detent.identify.fit.steady import SteadyStretch, find_steady, find_velocity, measure_stretch, unit_per_speed
 from detent.logs.log import Log, Values
 from detent.logs.windows import scipy
 

@@ -137,11 +137,7 @@ class Identification:
 
 
 def identify(
-    logs: Sequence[Log],
-    effort: str | None = None,
-    *,
-    method: Method = "regression",
-    report: Report = untold,
+    logs: Sequence[Log], effort: str | None = None, *, method: Method = "regression", report: Report = untold
 ) -> Identification:
     """Identify an axis from recorded runs."""
     runs = tuple(make_run(log, effort) for log in logs)

@@ -161,11 +161,7 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
     return start
 
 
-def climb(
-    parts: Sequence[Prepared],
-    rungs: Sequence[Rung] = RUNGS,
-    report: Report = untold,
-) -> tuple[Climb, ...]:
+def climb(parts: Sequence[Prepared], rungs: Sequence[Rung] = RUNGS, report: Report = untold) -> tuple[Climb, ...]:
     """Hold every rung to stretches it did not see."""
     climbs: list[Climb] = []
     best: Climb | None = None

@@ -223,13 +223,7 @@ def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Values:
 
 
 def _with_bend(  # noqa: PLR0913 - all that a model consists of
-    parts: Sequence[Prepared],
-    names: Sequence[str],
-    theta: Values,
-    bend: float,
-    x: Values,
-    residual: Values,
-    z: Values,
+    parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, x: Values, residual: Values, z: Values
 ) -> tuple[Values, Values, Values]:
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
     if not is_bent(names):

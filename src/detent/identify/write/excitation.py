@@ -61,10 +61,7 @@ RAMPS = Part("short ramps, one after the other: the mass", (0.6, 0.8, 1.0, 0.9, 
 SLOW = Part("slow, both ways: friction near standstill", (0.01, 0.02, 0.04, 0.07), 1.5, 0.1)
 REVERSALS = Part("both directions: friction is told from a constant force", (0.3, 0.6), STEADY, 0.1)
 
-_BY_SUBJECT = {
-    "model does not explain the log": (SLOW,),
-    "friction below 0": (SPEEDS, SLOW),
-}
+_BY_SUBJECT = {"model does not explain the log": (SLOW,), "friction below 0": (SPEEDS, SLOW)}
 """What a refusal asks for beside its constants and, where it concerns all of them, a log of its own."""
 
 _BY_CONSTANT = {"mass": RAMPS, "viscous": SPEEDS, "coulomb": REVERSALS}
