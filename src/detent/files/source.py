@@ -99,7 +99,7 @@ def _syntax_problem(file: str, row: int, column: int, reason: str, line: str) ->
     """Say what is wrong with a line of TOML, with the usual cause named."""
     bare = _without_comment(line).strip()
     shown = f"`{bare[:60]}{'...' if len(bare) > 60 else ''}`" if bare else "the end of the file"
-    key, remedy = next(_usual_causes(bare, reason), ("", f"correct the line ({_lower_first(reason)})"))
+    key, remedy = next(_usual_causes(bare, reason), ("", f"correct the line ({reason[:1].lower()}{reason[1:]})"))
     return FileProblem(file, row, column, key, shown, 'TOML: `key = value`, text and quantities in "quotes"', remedy)
 
 
@@ -137,8 +137,3 @@ def _usual_causes(line: str, reason: str) -> Iterator[tuple[str, str]]:
     colon = re.fullmatch(r"([\w.]+)\s*:\s*(\S.*)", line)
     if colon:
         yield colon.group(1), f"write = between key and value: {colon.group(1)} = {colon.group(2)}"
-
-
-def _lower_first(text: str) -> str:
-    """Make a parser's sentence part of ours."""
-    return text[:1].lower() + text[1:]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from detent.logs.log import Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import parabolas, sliding_products
+from detent.logs.windows import parabolas, scipy
 
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
 FARTHEST = 200  # rows up to which a shift is looked for
@@ -101,7 +101,7 @@ def correlation_curve(ours: Values, theirs: Values, most: int) -> Values:
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.
     middle = theirs[most : len(theirs) - most]
-    products = sliding_products(ours, middle)
+    products: Values = scipy("signal").correlate(ours, middle, mode="valid", method="fft")
     squares = np.cumsum(np.r_[0.0, ours**2])
     sizes = np.sqrt(np.maximum(squares[len(middle) :] - squares[: len(squares) - len(middle)], 1e-300))
     return products / (sizes * (float(np.sqrt(middle @ middle)) or 1.0))

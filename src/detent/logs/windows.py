@@ -26,11 +26,6 @@ def fill_holes(mask: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
     return np.asarray(scipy("ndimage").binary_closing(padded, structure=np.ones(rows + 1)), dtype=np.bool_)[rows:-rows]
 
 
-def sliding_products(ours: Values, theirs: Values) -> Values:
-    """Sum of products of the second series with each part of the first of its length, shape (n - m + 1,)."""
-    return np.asarray(scipy("signal").correlate(ours, theirs, mode="valid", method="fft"), dtype=np.float64)
-
-
 def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
     """Value, slope and curvature, in the middle, of the parabola nearest to each window.
 

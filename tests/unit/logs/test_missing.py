@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from detent.logs.dirt import mend_missing
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Severity
 from detent.logs.log_units import Conversion
-from detent.logs.missing import mend_missing
 
 NAN = np.nan
 

@@ -84,8 +84,8 @@ def _steps(log: Log, _: str, __: float) -> Found:
 
 def _frequency(log: Log, effort: str, _: float) -> Found:
     has_load = "position_load" in log.signals
-    motor = response_of(log, effort or None) if "position" in log.signals or not has_load else None
-    load = response_of(log, effort or None, "position_load") if has_load else None
+    motor = response_of(log, effort) if "position" in log.signals or not has_load else None
+    load = response_of(log, effort, "position_load") if has_load else None
     found = fit_resonances(motor, load, hold=log.period)
     lines = found.frequency
     notes = (f"{len(lines)} lines from {lines[0]:.3g} to {lines[-1]:.3g} Hz, encoder of {' and '.join(found.outputs)}",)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from detent.errors import DetentError
 from detent.logs.log import Values
 from detent.logs.windows import scipy
 
@@ -86,20 +85,13 @@ def _summit(curve: Values, top: int) -> float:
     return top + (0.5 * (left - right) / bend if bend < 0 else 0.0)
 
 
-def cut_periods(
-    t: Values, excitation: Values, others: Sequence[Values] = (), period: float | None = None
-) -> Periods | None:
+def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) -> Periods | None:
     """Cut signals along the periods of the first of them."""
     mean = float(t[-1] - t[0]) / (len(t) - 1)
-    if period is not None and not 2 * mean <= period <= (t[-1] - t[0] + mean) / FEWEST:
-        raise DetentError(
-            f"identify: came a period of {period:g} s in a recording of {t[-1] - t[0]:g} s; allowed: two samples or "
-            f"more, and a third of the recording or less; record {FEWEST} periods or more"
-        )
     best: Periods | None = None
     for clock, grid in _clocks(t):
         even: Values = t[0] + mean * np.arange(len(t), dtype=np.float64)
-        rows = period / mean if period is not None else find_period(np.interp(even, clock, excitation))
+        rows = find_period(np.interp(even, clock, excitation))
         for times, text in _grids(clock, mean, rows, grid):
             found = _cut(clock, times, [excitation, *others], text)
             if best is None or found.mismatch * _BETTER < best.mismatch:

@@ -4,7 +4,6 @@
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +35,6 @@ class FrequencyResponse:
     def magnitude(self) -> Values:
         """Magnitude, in units of the output per unit of the input, shape (n,)."""
         return np.abs(self.response)
-
-    @property
-    def phase(self) -> Values:
-        """Phase without jumps [rad], shape (n,)."""
-        return np.unwrap(np.angle(self.response))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        series = ("frequency", "magnitude", "phase", "coherence", "deviation")
-        single = ("averages", "resolution", "method", "input_unit", "output_unit")
-        return {name: getattr(self, name).tolist() for name in series} | {name: getattr(self, name) for name in single}
 
 
 def response_deviation(coherence: Values, averages: float) -> Values:

@@ -125,7 +125,8 @@ def _driven(log: Log, role: str, mass: float) -> _Moving:
     top = float(np.abs(v).max(initial=0.0))
     noise = _velocity_noise(log, base, rows)
     lowest = max(top / RANGE, OVER_NOISE * noise)
-    kept = ~_near_rest(v, 0.5 * lowest, rows)
+    # A window that reaches into rest or a reversal mixes the effort of two directions.
+    kept = np.convolve(np.abs(v) <= 0.5 * lowest, np.ones(rows), "same") <= 0.5
     return _Moving(place[kept], v[kept], (f - mass * a)[kept], lowest)
 
 
@@ -134,11 +135,6 @@ def _velocity_noise(log: Log, base: Values, rows: int) -> float:
     if "position" in log.signals:
         return grain(base) * float(np.sqrt(12.0 / rows**3)) / log.period
     return grain(base) * 1.5 / float(np.sqrt(rows))
-
-
-def _near_rest(v: Values, slow: float, rows: int) -> NDArray[np.bool_]:
-    """Samples whose window reaches into rest or a reversal, where the effort of two directions is mixed."""
-    return np.convolve(np.abs(v) <= slow, np.ones(rows), "same") > 0.5
 
 
 class _Bin(NamedTuple):

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.identify.fit.coloured import known_noise_covariance
 from detent.identify.fit.estimate import Estimate, estimate
-from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Values
 from detent.logs.windows import scipy
 

@@ -82,7 +82,8 @@ def fit_winding(log: Log, *, is_locked: bool = False, late: int = 0) -> Winding:
     pieces = make_pieces(log, late, is_locked=is_locked)
     is_moving = any(np.any(piece.v != 0) for piece in pieces)
     fit = iterate(pieces, is_moving=is_moving)
-    found = _told(pieces, fit, _emf_unit(log)) if is_moving else _still(pieces, fit)
+    way = "" if is_locked else log.units["position" if "position" in log.signals else "velocity"].removesuffix("/s")
+    found = _told(pieces, fit, f"V*s/{way}") if is_moving else _still(pieces, fit)
     if found.reason or fit is None:
         return found
     found = _with_torque(log, pieces, fit, found)
@@ -107,11 +108,6 @@ def _refusal(log: Log, *, is_locked: bool) -> str:
     if float(np.abs(steps - steps.mean()).max()) > EVEN * float(steps.mean()):
         return f"time steps go from {steps.min():.3g} to {steps.max():.3g} s; sample evenly"
     return ""
-
-
-def _emf_unit(log: Log) -> str:
-    """Unit of the back-EMF constant."""
-    return f"V*s/{log.units['position'] if 'position' in log.signals else log.units['velocity'].removesuffix('/s')}"
 
 
 def _told(pieces: list[Piece], fit: WindingFit | None, unit: str) -> Winding:

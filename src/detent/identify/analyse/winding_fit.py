@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from detent.identify.fit.coloured import known_noise_covariance
 from detent.identify.fit.estimate import Estimate, estimate, quantile
-from detent.identify.fit.stationary import known_noise_covariance
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 from detent.logs.windows import scipy

@@ -176,7 +176,7 @@ def fit_equations(
         y = make_effort(parts, late)
         x, z = _with_delay(parts, _known(names, theta), late, columns, ideal)
     residual = y - combine(columns, theta)
-    x, _, z = _with_bend(parts, names, theta, bend, x, residual, z)
+    x, z = _with_bend(parts, names, theta, bend, x, z)
     covariance, cosines = coloured_covariance(x, residual, z)
     unknown = _unknown(x, z)
     covariance[unknown, unknown] = (UNKNOWN * float(np.abs(y).max())) ** 2
@@ -223,13 +223,13 @@ def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Values:
 
 
 def _with_bend(  # noqa: PLR0913 - all that a model consists of
-    parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, x: Values, residual: Values, z: Values
-) -> tuple[Values, Values, Values]:
+    parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, x: Values, z: Values
+) -> tuple[Values, Values]:
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
     if not is_bent(names):
-        return x, residual, z
+        return x, z
     slope, tool = (_bend_slope(parts, names, theta, bend, ideal=ideal) for ideal in (False, z is not x))
-    return np.column_stack([x, slope]), residual, np.column_stack([z, tool])
+    return np.column_stack([x, slope]), np.column_stack([z, tool])
 
 
 def _bend_slope(parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, *, ideal: bool) -> Values:
@@ -242,7 +242,7 @@ def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
     """By how much the bend misses what the instruments say of it, to first order."""
     names, theta, bend = fit.model, fit.linear, fit.bend
     columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
-    x, _, z = _with_bend(parts, names, theta, bend, columns, fit.residual, tools)
+    x, z = _with_bend(parts, names, theta, bend, columns, tools)
     return float(solve(z, x, fit.residual)[-1])
 
 

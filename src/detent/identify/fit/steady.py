@@ -70,7 +70,8 @@ def find_steady(t: Values, velocity: Values, step: float = 0.0) -> list[slice]:
     rest, found = stretches(t), list[slice]()
     size = block
     while size * (BLOCKS + 2) <= len(t):
-        slowest = max(SLOWEST * _top_speed(velocity, size), 2.0 * step / (TOLERANCE * size * period))
+        top = float(np.abs(_block_means(velocity, slice(0, len(velocity)), size)).max())
+        slowest = max(SLOWEST * top, 2.0 * step / (TOLERANCE * size * period))
         new = [part for free in rest for part in _search(velocity, free, size, slowest)]
         found += new
         rest = [piece for free in rest for piece in _without(free, new)]
@@ -91,11 +92,6 @@ def mean_error(values: Values) -> tuple[float, int]:
     """Standard error of a mean of coloured values, and the degrees of freedom behind it."""
     covariance, degrees = coloured_covariance(np.ones((len(values), 1)), values - values.mean())
     return float(np.sqrt(covariance[0, 0])), degrees
-
-
-def _top_speed(velocity: Values, block: int) -> float:
-    """Highest mean speed of a block."""
-    return float(np.abs(_block_means(velocity, slice(0, len(velocity)), block)).max())
 
 
 def _search(velocity: Values, free: slice, block: int, slowest: float) -> list[slice]:

@@ -8,9 +8,8 @@ from tests.places import DATA
 
 from detent.errors import DetentError
 from detent.identify.analyse.analyses import analyse
-from detent.identify.analyse.local_polynomial import fit_local_polynomial
 from detent.identify.analyse.ringing import find_turns, fit_ringing
-from detent.identify.analyse.step_metrics import find_steps, measure_steps
+from detent.identify.analyse.step_metrics import find_steps, fit_local_polynomial, measure_steps
 from detent.logs.read_log import read_log
 
 DUET = DATA / "duet_closed_loop_step/step16-stable-converged_first-97ms.csv"
