@@ -22,8 +22,7 @@ from detent.record.trace_store import TraceWriter
 from detent.record.vcd_file import save_vcd
 from detent.record.waveforms import Waveforms
 
-KEPT_ROWS = 100_000
-"""Rows kept in memory beside a trace that goes to a file, 40 s at the usual rate: the report draws from these."""
+KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-MAX_TEXT = 80
-"""Longest quantity read, in characters: anything longer is not a quantity, and is refused before pint sees it."""
+MAX_TEXT = 80  # longest quantity read, in characters: what is longer is refused before pint sees it
 
 KINDS: dict[str, tuple[str, str]] = {
     "m": ("a length", "12 mm"),

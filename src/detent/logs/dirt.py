@@ -16,9 +16,7 @@ from detent.logs.shifts import find_shifts
 from detent.logs.stamps import look_at_clock, mend_clock
 from detent.logs.stuck import find_stuck
 
-SLOW = frozenset({"supply", "temperature", "enabled"})
-"""Signals that change slowly and are often recorded only now and then: they keep their last value."""
-
+SLOW = frozenset({"supply", "temperature", "enabled"})  # recorded only now and then: they keep their last value
 MOST = 0.1  # share of empty cells from which a signal is left out: with more, too many rows would go with them
 
 

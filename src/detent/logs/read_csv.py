@@ -13,9 +13,7 @@ from detent.logs.csv_cells import read_cell, read_column, read_moments
 from detent.logs.csv_layout import CsvLayout, FileOptions, guess_layout, is_telling, split_lines
 from detent.logs.raw_table import BrokenRow, Item, RawTable, add_column, check_size
 
-MAX_BYTES = 200_000_000
-"""Longest text table read, unpacked: two hours of ten signals at 200 samples a second take 150 MB."""
-
+MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB
 ALLOWED = "a table as text: CSV, packed with gzip or not"
 
 BLOCK_ROWS = 16384  # rows whose cells are in memory as text at once

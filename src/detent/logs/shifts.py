@@ -7,13 +7,9 @@ from detent.logs.draft import Draft
 from detent.logs.effort import Motion, find_motion, smoothed, terms
 from detent.logs.log import Action, Kind, Values
 
-SMALLEST = 1.5
-"""Rows by which signals may be apart: a difference of neighbours lies half a row beside them, rounding adds to it."""
+SMALLEST = 1.5  # rows by which signals may be apart: a difference of neighbours is half a row late, rounding adds
 
-BETTER = 0.5
-"""Share of the disagreement that must be left once the shift is taken out: a filter makes a delay, too, but does not
-vanish with it."""
-
+BETTER = 0.5  # disagreement left without the shift, as a share, at most: that of a filter does not vanish so
 ALIKE = 0.9
 _AS_GOOD = 0.02
 _FEWEST = 200

@@ -11,8 +11,7 @@ from detent.page.chart import rounded
 from detent.page.figure import Figure
 from detent.page.parts import INCH, Numbers
 
-MARKS = 100_000
-"""Characters that a report draws: a megabyte of it. Beyond them whole pages are left out, and the report says so."""
+MARKS = 100_000  # characters that a report draws, a megabyte; beyond them it leaves whole pages out, and says so
 
 
 def _no_numbers() -> Numbers:

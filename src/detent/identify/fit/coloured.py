@@ -29,9 +29,7 @@ RANK = 1e-10
 """Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding
 leaves of them decides nothing."""
 
-SHARE = 0.3
-"""Cosines per independent residual, at most: beyond these the long-run variance would be read where it has fallen."""
-
+SHARE = 0.3  # cosines per independent residual, at most: beyond them the variance would be read where it has fallen
 ORDER = 4  # order of the autoregressive filter, at most
 ROWS_PER_ORDER = 20  # rows of the series for each order, at least
 FADED = 200  # rows before the first of a fit whose noise still acts on it, at most

@@ -94,8 +94,7 @@ TERMS: Mapping[str, Term] = {
 """Every term of an equation of motion; `excess` is static less Coulomb friction."""
 
 
-LOSS = "loss"
-"""Named in a model whose transmission loses a share of the effort; it bends the other terms and has no column."""
+LOSS = "loss"  # named in a model whose transmission loses a share of the effort; it bends the terms, without a column
 
 
 def is_bent(names: Sequence[str]) -> bool:

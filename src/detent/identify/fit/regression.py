@@ -35,8 +35,7 @@ ENDS = 0.1  # share of a run that half of such a window takes at most: rows clos
 ROUNDS = 8  # rounds in which the delay of the effort is found, at most
 SHARED = 1e-3  # part of a constant in a sum that nothing tells, from which on it is not told
 
-UNKNOWN = 1e6
-"""Standard error of a constant that nothing in the log excites, in largest efforts: nothing is known about it."""
+UNKNOWN = 1e6  # standard error, in largest efforts, of a constant that nothing in the log excites
 
 
 @dataclass(frozen=True, slots=True, eq=False)

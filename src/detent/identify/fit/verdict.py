@@ -20,9 +20,7 @@ LEAST_EACH_WAY = 0.05  # share of this time in each direction, at least
 MOST_SATURATED = 0.3  # share of saturated samples, at most
 MOST_STUCK = 0.05  # share of samples with a stuck signal, at most
 
-MOST_LEFT_BEHIND = 0.6
-"""Share of the way of the reference during which the position stands still, at most; friction may hold it for some."""
-
+MOST_LEFT_BEHIND = 0.6  # share of the reference's way while the position stands still, at most: friction may hold it
 WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
 SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from which on they count as one speed

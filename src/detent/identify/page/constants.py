@@ -28,12 +28,9 @@ from detent.page.words import GAP, further, number
 
 WIDTH, HEIGHT = 170.0, 18.0  # of the drawing of an interval [px]
 
-REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""Ends of the scale on which intervals are drawn, over the value."""
+REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # ends of the scale of intervals, over the value
 
-UNSCALED = ("delay", "stribeck", "loss")
-"""Constants that may be near 0 or are hardly ever known well: they do not set the scale."""
-
+UNSCALED = ("delay", "stribeck", "loss")  # near 0 or hardly ever known well: these do not set the scale
 ALIKE = 0.9  # correlation of two constants from which on the data hardly separate them
 MOST_PAIRS = 4  # pairs told in words
 
