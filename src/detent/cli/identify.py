@@ -1,7 +1,6 @@
 """`detent identify`: from recordings to constants with limits, and a verdict."""
 
 import shlex
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -107,14 +106,21 @@ def identify(
         )
         outside = done.contrasts()
         progress(0.97, "writing")
-        files = _write(done, write, job, report)
+        written, errors = _write(done, write, job, report)
     if as_json:
-        names, reasons = [str(path) for path in files.written], [str(error) for error in files.errors]
+        names, reasons = [str(path) for path in written], [str(error) for error in errors]
         print_json(done.to_dict() | {"files": names, "not_written": reasons})
     else:
-        _print(done, [str(one) for one in outside], files, asked=job is not None)
-    if done.verdict != "trusted" or files.errors:
-        raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in files.errors)]))
+        console = make_console()
+        _print(console, done, [str(one) for one in outside])
+        for error in errors:
+            console.print(f"not written: {error}", style="bold red", soft_wrap=True)
+        for path in written:
+            console.print(f"written: {path}", soft_wrap=True)
+        if done.refusals and job is None:
+            console.print("--job FILE writes moves that show what is missing", soft_wrap=True)
+    if done.verdict != "trusted" or errors:
+        raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in errors)]))
 
 
 def _method(word: str) -> str:
@@ -149,33 +155,27 @@ def _reading(mapping: Path | None, columns: list[str]) -> str:
     return shlex.join(options)
 
 
-@dataclass
-class _Files:
+def _write(
+    done: "Identified", axis: Path | None, job: Path | None, report: Path | None
+) -> tuple[list[Path], list[DetentError]]:
     """Files that were written, and why others were not: what was found is shown all the same."""
-
-    written: list[Path] = field(default_factory=list[Path])
-    errors: list[DetentError] = field(default_factory=list[DetentError])
-
-
-def _write(done: "Identified", axis: Path | None, job: Path | None, report: Path | None) -> _Files:
-    """Write what was asked for."""
-    files = _Files()
+    written: list[Path] = []
+    errors: list[DetentError] = []
     for path, save in ((axis, done.save), (job, done.save_job), (report, done.report)):
         if path is None:
             continue
         try:
-            files.written.append(save(path))
+            written.append(save(path))
         except DetentError as error:
-            files.errors.append(error)
-    return files
+            errors.append(error)
+    return written, errors
 
 
 # ---- what a person reads
 
 
-def _print(done: "Identified", outside: list[str], files: _Files, *, asked: bool) -> None:
+def _print(console: Any, done: "Identified", outside: list[str]) -> None:
     found = done.found
-    console = make_console()
     console.print(_verdict_line(done), style=COLOURS[done.verdict], soft_wrap=True)
     _print_refusals(console, done)
     for text in outside:
@@ -187,12 +187,6 @@ def _print(done: "Identified", outside: list[str], files: _Files, *, asked: bool
         _print_ladder(found)
     if found.horizons:
         _print_horizons(found)
-    for error in files.errors:
-        console.print(f"not written: {error}", style="bold red", soft_wrap=True)
-    for path in files.written:
-        console.print(f"written: {path}", soft_wrap=True)
-    if done.refusals and not asked:
-        console.print("--job FILE writes moves that show what is missing", soft_wrap=True)
 
 
 def _verdict_line(done: "Identified") -> str:

@@ -10,29 +10,12 @@ import numpy as np
 from detent.page.frame import Card, Headline, card
 from detent.page.parts import Event, Note, Numbers
 from detent.page.words import count, duration
+from detent.record.run import RunRecord
 from detent.record.trace import Trace
 
 FEWEST_ROWS = 10  # rows of a trace without which nothing is drawn
 LONGEST = 30.0  # time that the figure of a whole job shows [s]: more than this is a grey block on any screen
 HAPPENED = 1e-6  # how much later than the end of a move an event may be noted [s]
-
-
-class RunOf(Protocol):
-    """What every run says of itself."""
-
-    @property
-    def job(self) -> Any:
-        """The job, which has a name."""
-
-    @property
-    def done(self) -> bool:
-        """All of it was done as it should be."""
-        ...
-
-    @property
-    def failure(self) -> str:
-        """Why not, and what to do."""
-        ...
 
 
 class Timed(Protocol):
@@ -56,13 +39,13 @@ R = TypeVar("R", bound=Timed)
 # ---- what came out
 
 
-def page_title(axis_name: str, run: RunOf, *, done: str = "done") -> str:
+def page_title(axis_name: str, run: RunRecord[Any], *, done: str = "done") -> str:
     """Title of the window."""
     return f"{run.job.name} on {axis_name}: {done if run.done else f'not {done}'}"
 
 
 def run_headline(
-    axis_name: str, run: RunOf, lead: str, *, doubt: str = "", words: tuple[str, str] = ("Done", "Not done")
+    axis_name: str, run: RunRecord[Any], lead: str, *, doubt: str = "", words: tuple[str, str] = ("Done", "Not done")
 ) -> Headline:
     """Headline of a run, with `words` for one that is done and one that is not.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.kernel.registers import Leaf, Registers
-from detent.record.recorder import choose_leaves
+from detent.record.recorder import byte_places, choose_leaves
 from detent.record.waveforms import Phase, Waveform, Waveforms, clock_waveform, waveforms_from_rows
 from detent.units import format_quantity
 
@@ -37,15 +37,10 @@ class CaptureDoneError(Exception):
 class Capture:
     """Stands in for a recorder: lets a run pass until the stretch begins, and records it tick by tick."""
 
-    def __init__(
-        self, registers: type[Registers], leaves: Sequence[Leaf], begin: int, end: int, rows_per_tick: int
-    ) -> None:
-        tick = next(leaf for leaf in registers.leaves() if leaf.path == "tick")
-        leaves = [leaf for leaf in leaves if leaf.path != "tick"]
-        picked = [tick, *leaves]
+    def __init__(self, leaves: Sequence[Leaf], begin: int, end: int, rows_per_tick: int) -> None:
         self.begin, self.end, self.rows_per_tick = begin, end, rows_per_tick
-        self.picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
-        self._raw: Any = np.dtype([("tick", "<i8"), *((leaf.path, "<" + leaf.width.code) for leaf in leaves)])
+        self.picks = byte_places(leaves)
+        self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in leaves])
         self.rows = np.zeros(((end - begin + 1) * rows_per_tick, len(self.picks)), np.uint8)
         self._now = 0
 
@@ -102,8 +97,8 @@ def capture(
             "from there; choose a shorter stretch, or record a trace with `detent run --every`"
         )
     shown = choose_leaves(registers, stretch.signals)
-    needed = choose_leaves(registers, [*dict.fromkeys([*(leaf.path for leaf in shown), *clocking.needs])])
-    recorder = Capture(registers, needed, begin, begin + ticks, clocking.rows_per_tick)
+    needed = choose_leaves(registers, ["tick", *(leaf.path for leaf in shown), *clocking.needs])
+    recorder = Capture(needed, begin, begin + ticks, clocking.rows_per_tick)
     try:
         run(recorder)
     except CaptureDoneError:

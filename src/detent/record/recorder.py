@@ -44,6 +44,11 @@ def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -
     )
 
 
+def byte_places(leaves: Iterable[Leaf]) -> NDArray[np.int64]:
+    """Where the bytes of some registers stand in the memory of all, one after the other."""
+    return np.concatenate([np.arange(leaf.offset, leaf.offset + leaf.width.size) for leaf in leaves]).astype(np.int64)
+
+
 class Recorder:
     """Rows of chosen registers at every n-th tick."""
 
@@ -52,11 +57,9 @@ class Recorder:
     ) -> None:
         if every < 1:
             raise DetentError(f"recording: came every {every} ticks; allowed: 1 or more; choose how often to record")
-        self.leaves = [leaf for leaf in choose_leaves(registers, names) if leaf.path != "tick"]
-        tick = next(leaf for leaf in registers.leaves() if leaf.path == "tick")
-        picked = [tick, *self.leaves]
+        picked = choose_leaves(registers, ["tick", *names])
+        self.leaves, self.picks = picked[1:], byte_places(picked)
         self.every, self.period = every, period
-        self.picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
         self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
         self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
         self._blocks: list[NDArray[np.void]] = []

@@ -20,8 +20,10 @@ from detent.logs.log import Values
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, switch_on
 from detent.planning.profile import profile_of_recording
 from detent.plant.two_mass import fastest_rate
+from detent.record.recorder import byte_places, choose_leaves
 from detent.sensing.position_sensor import MEMORY
 
+_PICKS = byte_places(choose_leaves(Cascade, ["machine.motor.position", "law.command"]))
 SUBSTEPS = 4  # ticks of the plant per sample of the log
 
 
@@ -103,12 +105,10 @@ def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Value
     _start(p, r, loops, run)
     reference = run.reference if run.reference is not None else run.position
     asked = profile_of_recording(run.t, reference, run.step)
-    leaves = {leaf.path: leaf.offset for leaf in Cascade.leaves()}
-    picks = np.concatenate([np.arange(leaves[n], leaves[n] + 8) for n in ("machine.motor.position", "law.command")])
     samples = len(run.position)
     rows = np.zeros((samples + 1, 16), np.uint8)
     every = p.sample_ticks
     feed = along(asked.position, asked.velocity, asked.acceleration)
-    advance(p, r, samples * every, rows, picks.astype(np.int64), every, *feed)
+    advance(p, r, samples * every, rows, _PICKS, every, *feed)
     table = rows.view(np.float64)
     return np.concatenate([run.position[:1], table[1:samples, 0]]), table[1 : samples + 1, 1].copy()

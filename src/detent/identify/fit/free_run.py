@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
@@ -22,6 +21,7 @@ from detent.kernel.loop import advance
 from detent.logs.log import Values
 from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, driven, fill_clocks, switch_on
 from detent.plant.two_mass import fastest_rate
+from detent.record.recorder import byte_places, choose_leaves
 
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
 SUBSTEPS = 4  # ticks of the plant per sample of the log
@@ -91,13 +91,7 @@ def plant_registers(constants: Constants) -> CascadeParams:
     return p
 
 
-def _position_bytes() -> NDArray[np.int64]:
-    """Where the position of the motor stands in the registers."""
-    leaf = next(leaf for leaf in Cascade.leaves() if leaf.path == "machine.motor.position")
-    return np.arange(leaf.offset, leaf.offset + 8).astype(np.int64)
-
-
-_PICKS = _position_bytes()
+_PICKS = byte_places(choose_leaves(Cascade, ["machine.motor.position"]))
 
 
 def start_velocities(run: Run) -> Values:
