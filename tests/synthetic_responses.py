@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from detent.identify.analyse.average_periods import noise_parts
-from detent.identify.analyse.frequency_response import FrequencyResponse, response_deviation
+from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts, response_deviation
 from detent.identify.analyse.two_mass_response import TwoMassModel, modes_of, respond_sampled
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 

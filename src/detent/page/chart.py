@@ -161,26 +161,18 @@ def rounded(values: Numbers, digits: int) -> list[float | None]:
 
 def _chart(panel: Panel, kept: Numbers | slice) -> Chart:
     chart: Chart = {"id": panel.name, "yLabel": panel.label, "height": panel.height}
-    told = {"title": panel.title, "about": panel.about}
-    chart |= {name: text for name, text in told.items() if text}
-    if panel.zero:
-        chart["zero"] = True
-    if panel.span:
-        chart["yRange"] = list(panel.span)
-    if panel.levels:
-        chart["levels"] = [{"y": value, "label": label} for value, label in panel.levels]
-    return chart | {"series": [_series(curve, kept) for curve in panel.curves]}
+    levels = [{"y": value, "label": label} for value, label in panel.levels]
+    told: Chart = {"title": panel.title, "about": panel.about, "zero": panel.zero}
+    told |= {"yRange": panel.span and list(panel.span), "levels": levels}
+    given = {name: value for name, value in told.items() if value}
+    return chart | given | {"series": [_series(curve, kept) for curve in panel.curves]}
 
 
 def _series(curve: Curve, kept: Numbers | slice) -> Chart:
     look = {"width": curve.width, "dash": curve.dash and list(curve.dash), "points": curve.rings}
-    series: Chart = {"label": curve.label, "colour": curve.colour}
-    series |= {name: value for name, value in look.items() if value is not None}
-    if curve.step:
-        series["step"] = True
-    if curve.fill:
-        series["fill"] = True
-    return series | {"y": rounded(curve.y[kept], curve.digits)}
+    look |= {"step": curve.step or None, "fill": curve.fill or None}
+    given = {name: value for name, value in look.items() if value is not None}
+    return {"label": curve.label, "colour": curve.colour} | given | {"y": rounded(curve.y[kept], curve.digits)}
 
 
 def _band(band: Band, scale: float, digits: int) -> Chart:

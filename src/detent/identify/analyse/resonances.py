@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.identify.analyse.frequency_response import FrequencyResponse
+from detent.identify.analyse.measure_response import FrequencyResponse
 from detent.identify.analyse.response_fit import Fit, Lines, fit_model, take_lines
 from detent.identify.analyse.two_mass_response import (
     LoadModel,

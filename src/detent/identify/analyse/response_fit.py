@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.identify.analyse.average_periods import noise_parts
-from detent.identify.analyse.frequency_response import FrequencyResponse
+from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts
 from detent.identify.analyse.two_mass_response import ResponseModel, laplace, respond_sampled
 from detent.logs.log import Values
 from detent.logs.windows import scipy

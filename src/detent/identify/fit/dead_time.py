@@ -19,6 +19,7 @@ import numpy as np
 from detent.errors import DetentError
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.differences import window_rows
+from detent.logs.effort import Motion, terms
 from detent.logs.log import Values
 from detent.logs.windows import parabolas
 
@@ -26,7 +27,6 @@ LONGEST = 40  # samples up to which a dead time is looked for
 EXPLAINED = 0.7  # share of the effort's variance that the motion must explain
 BLOCKS = 8  # parts of the recording whose dead times are compared
 _FEWEST_ROWS = 4
-_SLOW = 0.02
 _PARABOLA = 0.01
 _ONE_WAY = 0.999
 _ENOUGH = 0.2
@@ -89,12 +89,12 @@ def _checked_step(t: Values, effort: Values, position: Values) -> float:
 
 def _columns(position: Values, step: float, rows: int) -> Values:
     """What the effort is explained by: acceleration, velocity, its sign, position, one; shape (n - 2 rows + 2, 5)."""
-    x, v, a = parabolas(position, step, rows)
-    slow = _SLOW * float(np.max(np.abs(v))) or 1.0
+    columns = terms(Motion(*parabolas(position, step, rows), rows))
     # The effort is smoothed, and friction with it; where that is not 1 or -1 the axis turned round, or stood.
-    friction = parabolas(np.clip(v / slow, -1.0, 1.0), step, rows)[0]
-    inside = slice(rows // 2, -(rows // 2))
-    return np.column_stack([a[inside], v[inside], friction, x[inside] - x.mean(), np.ones(len(friction))])
+    friction = parabolas(columns[:, 2], step, rows)[0]
+    columns = columns[rows // 2 : -(rows // 2)]
+    columns[:, 2] = friction
+    return columns
 
 
 def _best_shift(columns: Values, effort: Values) -> tuple[float, float]:

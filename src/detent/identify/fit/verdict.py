@@ -28,16 +28,9 @@ WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
 WORST_PREDICTION = 0.35  # error of the prediction of stretches not seen over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
 
-FORCES = (
-    "coulomb.positive",
-    "coulomb.negative",
-    "viscous.positive",
-    "viscous.negative",
-    "static.positive",
-    "static.negative",
-    "pendulum",
-    "pendulum.across",
-)
+_WAYS = ("positive", "negative")
+_FRICTIONS = tuple(f"{kind}.{way}" for kind in ("coulomb", "viscous", "static") for way in _WAYS)
+FORCES = (*_FRICTIONS, "pendulum", "pendulum.across")
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +195,7 @@ def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iter
             text = f"Coulomb friction of both directions is {total:.3g} {coulomb[0].unit}, which would drive the axis"
             record = "look at the sign of the effort and at the delay between the signals"
             yield Refusal("friction below 0", text, record)
-    for way in ("positive", "negative"):
+    for way in _WAYS:
         e = by_name.get(f"viscous.{way}")
         if e is not None and e.high < 0.0 and e.value * top < -0.05 * effort:
             text = f"viscous.{way} is {e.value:.3g} {e.unit}: friction falls with speed"

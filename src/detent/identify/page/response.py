@@ -6,8 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.errors import DetentError
-from detent.identify.analyse.frequency_response import FrequencyResponse
-from detent.identify.analyse.measure_response import response_of
+from detent.identify.analyse.measure_response import FrequencyResponse, response_of
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.identification import Identification
 from detent.identify.page.bode import Line, Plot, frequency_plots

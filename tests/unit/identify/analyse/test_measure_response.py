@@ -6,9 +6,15 @@ from scipy import signal
 from tests.synthetic_responses import within
 
 from detent.errors import DetentError
-from detent.identify.analyse.average_periods import average_periods, noise_parts
 from detent.identify.analyse.excitation_period import Periods, cut_periods
-from detent.identify.analyse.measure_response import average_windows, independent_windows, measure_response, response_of
+from detent.identify.analyse.measure_response import (
+    average_periods,
+    average_windows,
+    independent_windows,
+    measure_response,
+    noise_parts,
+    response_of,
+)
 from detent.logs.log import Log, Source
 
 T = 1e-3

@@ -10,8 +10,7 @@ from tests.places import DATA
 from tests.synthetic_responses import noisy_responses, random_axis, record_cascade, within
 
 from detent.errors import DetentError
-from detent.identify.analyse.frequency_response import FrequencyResponse
-from detent.identify.analyse.measure_response import average_windows, measure_response, response_of
+from detent.identify.analyse.measure_response import FrequencyResponse, average_windows, measure_response, response_of
 from detent.identify.analyse.resonances import fit_resonances
 from detent.identify.analyse.response_fit import fit_model, take_lines
 from detent.identify.analyse.two_mass_response import RigidModel, TwoMassModel, respond_sampled

@@ -9,7 +9,7 @@ import numpy as np
 from tests.trust.judge import write_csv
 from tests.trust.plants import make_case
 
-from detent.identify.analyse.frequency_response import FrequencyResponse
+from detent.identify.analyse.measure_response import FrequencyResponse
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.identification import Identification, identify
