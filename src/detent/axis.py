@@ -15,7 +15,7 @@ from detent.methods.registry import METHODS, bringing
 from detent.page.frame import Comparison
 from detent.record.capture import Stretch, capture
 from detent.record.machine import Progress
-from detent.record.recorder import Recorder, choose_leaves, make_trace
+from detent.record.recorder import Recorder, choose_leaves
 from detent.record.trace import Trace
 from detent.record.trace_files import load_trace, save_trace
 from detent.record.trace_store import TraceWriter
@@ -182,17 +182,16 @@ class Axis:
         about: dict[str, str | float | int] = {"axis": self.name, "job": loaded.name, "seed": method.seed}
         fidelity = getattr(self.spec.axis, "fidelity", None)
         about |= {"fidelity": fidelity} if fidelity else {}
-        memory = _Memory()
-        recorder = Recorder(method.registers, names, every=every, period=method.tick, sink=memory)
+        recorder = Recorder(method.registers, names, every=every, period=method.tick)
         if trace_file is None:
             result = method.run(loaded, recorder=recorder, progress=progress)
         else:
             with TraceWriter(
                 trace_file, recorder.dtype, units=recorder.units, docs=recorder.docs, attributes=about
             ) as writer:
-                memory.also, memory.most = writer.append, KEPT_ROWS
+                recorder.pass_on(writer.append, KEPT_ROWS)
                 result = method.run(loaded, recorder=recorder, progress=progress)
-        return Run(self, result, memory.trace(recorder, about))
+        return Run(self, result, recorder.trace(**about))
 
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:
         """Hold the method against the ways it was made to better, on this axis.
@@ -282,27 +281,6 @@ class Timing:
         """Write a VCD file, which GTKWave and Surfer open."""
         save_vcd(self.waveforms, path)
         return Path(path)
-
-
-class _Memory:
-    """Keeps rows for the report and passes them on."""
-
-    def __init__(self) -> None:
-        self.blocks: list[Any] = []
-        self.rows = 0
-        self.most: int | None = None
-        self.also: Any = None
-
-    def __call__(self, block: Any) -> None:
-        if self.also is not None:
-            self.also(block)
-        room = len(block) if self.most is None else min(len(block), self.most - self.rows)
-        if room > 0:
-            self.blocks.append(block[:room])
-            self.rows += room
-
-    def trace(self, recorder: Recorder, about: dict[str, str | float | int]) -> Trace:
-        return make_trace(recorder, self.blocks, about)
 
 
 @dataclass

@@ -116,11 +116,6 @@ class Log:
         return len(self.t)
 
     @property
-    def is_rotary(self) -> bool:
-        """True where positions or speeds are angles."""
-        return any(unit.startswith("rad") for unit in self.units.values())
-
-    @property
     def period(self) -> float:
         """Time between two samples [s], the median."""
         return float(np.median(np.diff(self.t)))

@@ -99,6 +99,15 @@ class Recorder:
         self._sink(block)
         self._next_row = last + 1
 
+    def pass_on(self, sink: Sink, most: int) -> None:
+        """Hand rows to a sink too, and keep no more than the first so many in memory."""
+
+        def take(block: NDArray[np.void]) -> None:
+            sink(block)
+            self._blocks.append(block[: max(most - sum(map(len, self._blocks)), 0)])
+
+        self._sink = take
+
     def trace(self, **attributes: str | float) -> Trace:
         """What is in memory, as a trace."""
         return make_trace(self, self._blocks, dict(attributes))

@@ -47,7 +47,7 @@ def test_masks():
 
 
 def test_what_a_log_says_of_itself():
-    assert (len(LOG), LOG.period, LOG.is_rotary) == (4, pytest.approx(0.1), False)
+    assert (len(LOG), LOG.period) == (4, pytest.approx(0.1))
     data = json.loads(json.dumps(LOG.to_dict()))
     assert data["findings"][0] == {
         "kind": "stuck", "signal": "velocity", "rows": [[2, 3], [9, 9]], "text": "stays the same", "action": "left",

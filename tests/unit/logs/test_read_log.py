@@ -38,7 +38,6 @@ def test_a_log(write):
     assert log.columns["position"].factor == 0.5e-6
     assert log.findings == ()
     assert log.rows.tolist() == list(range(1, 101))
-    assert not log.is_rotary
 
 
 def test_rows_keep_their_numbers_through_everything(write):

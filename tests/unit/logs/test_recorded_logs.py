@@ -186,5 +186,5 @@ def test_duet_step():
     turned = read_log(
         path, options=["position=Measured Motor Steps [1.8 deg]", "reference=Target Motor Steps [1.8 deg]"]
     )
-    assert turned.is_rotary
+    assert turned.units["position"] == "rad"
     assert np.ptp(turned.signals["position"]) == pytest.approx(np.ptp(log.signals["position"]) * np.pi / 100)

@@ -54,7 +54,6 @@ class Fit:
     sign: float  # sign of the gain
     covariance: Values  # of the parameters, shape (p, p); nan where the fit ended at values that describe no axis
     freedom: float  # values less parameters
-    misfit: float  # sum of the squared misfits over the noise of the lines
     scatter: float  # misfit beyond the noise, as a part of the response: the median over lines
     weights: Values  # reciprocal standard deviations that were used, 0 for a line left out, shape (outputs, n)
     fitted: Complex  # responses of the model at the lines, shape (outputs, n)
@@ -166,7 +165,7 @@ def _refine(problem: _Problem, parameters: Values) -> Fit:
         noise_parts(noise, size, _NEIGHBOURS) for noise, size in zip(lines.deviation**2 * power, power, strict=True)
     ]
     noise, extra = lines.deviation, np.zeros_like(lines.deviation)
-    weights, total = np.zeros_like(noise), 0.0
+    weights = np.zeros_like(noise)
     for _ in range(_ROUNDS):
         weights = np.where(lines.used, 1.0 / np.hypot(noise, extra), 0.0)
         parameters, _ = problem.solve(weights, parameters)
@@ -184,7 +183,6 @@ def _refine(problem: _Problem, parameters: Values) -> Fit:
         sign=problem.sign,
         covariance=_covariance(problem.residual(weights, parameters).T, problem.slopes(weights, parameters)),
         freedom=freedom,
-        misfit=total,
         scatter=float(np.median(extra[lines.used])),
         weights=weights,
         fitted=problem.fitted(parameters),

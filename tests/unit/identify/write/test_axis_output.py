@@ -118,7 +118,7 @@ def test_without_loops_in_the_log_the_file_says_the_rule(folder: Path, found: Id
     [(1e-3, 2, 0.0, "dead time"), (1e-5, 0, 0.0, "fastest"), (1e-3, 0, 2e-3, "count")],
 )
 def test_gains_keep_to_dead_time_swing_and_counts(period: float, delay: int, count: float, bound: str) -> None:
-    seen = Seen(0.0, 1.0, 0.5, 5.0, 20.0, 0.0, period, count, is_rotary=False)
+    seen = Seen(0.0, 1.0, 0.5, 5.0, 0.0, is_rotary=False, effort=20.0, period=period, resolution=count)
     gains = choose_gains(2.0, seen, delay)
     limits = {
         "dead time": 0.3 / gains.dead_time,
