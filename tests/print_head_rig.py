@@ -54,7 +54,7 @@ class Rig:
         self.p: PrintHeadParams = build_print_head(self.spec)
         self.r = PrintHead()
         switch_on(self.p, self.r, start, self.spec.encoder.seed)
-        self.head = self.r.head
+        self.head = self.r.controller.head
         self.responses: list[int] = []
         """Every status byte read so far."""
 
@@ -70,7 +70,7 @@ class Rig:
 
     def place(self, emitter: int, fraction: float = 0.5) -> None:
         """Put the head at rest at an emitter and a fraction of the way to the next; state as after power-on."""
-        switch_on(self.p, self.r, (emitter + fraction) * EMITTER + self.p.encoder.origin, self.spec.encoder.seed)
+        switch_on(self.p, self.r, (emitter + fraction) * EMITTER + self.p.plant.encoder.origin, self.spec.encoder.seed)
         self.head.emitter = emitter
 
     def run(self, ticks: int) -> int:
@@ -79,7 +79,7 @@ class Rig:
 
     def read_status(self) -> int:
         """Take the waiting status byte."""
-        latch = self.r.head.status.latch
+        latch = self.head.status.latch
         assert latch.flag, "no status byte waits"
         latch.flag = 0
         self.responses.append(latch.byte)
@@ -88,9 +88,9 @@ class Rig:
     def next_status(self, seconds: float = 20.0) -> int | None:
         """Advance until a status byte comes and take it; None after `seconds`."""
         left = round(seconds / TICK)
-        while left > 0 and not self.r.head.status.latch.flag:
+        while left > 0 and not self.head.status.latch.flag:
             left -= self.run(left)
-        return self.read_status() if self.r.head.status.latch.flag else None
+        return self.read_status() if self.head.status.latch.flag else None
 
     def put_byte(self, byte: int) -> None:
         """Write the command latch, waiting for the computer to take the last byte (a tick at most)."""
@@ -105,7 +105,7 @@ class Rig:
         found = []
         for k, byte in enumerate(command):
             self.put_byte(byte)
-            if k < len(command) - 1 or (self.p.head.ack_last and len(command) > 1):
+            if k < len(command) - 1 or (self.p.controller.ack_last and len(command) > 1):
                 status = self.next_status(0.01)
                 assert status == 0xFF, f"byte {k} of {[hex(b) for b in command]} answered {status}"
                 found.append(status)
@@ -150,7 +150,7 @@ class Rig:
         begin, done = self.r.tick, 0
         while done < ticks:
             done += advance(self.p, self.r, ticks - done, rows, picks, 1)
-            if self.r.head.status.latch.flag:
+            if self.head.status.latch.flag:
                 if stop_at_status:
                     break
                 self.read_status()
@@ -166,14 +166,14 @@ class Rig:
             if self.head.state in states:
                 return True
             self.run(1)
-            if self.r.head.status.latch.flag:
+            if self.head.status.latch.flag:
                 self.read_status()
         return False
 
     @property
     def speed_value(self) -> float:
         """True speed in speed values, right positive."""
-        return self.r.train.velocity / 0.0254 * 6
+        return self.r.plant.train.velocity / 0.0254 * 6
 
     @property
     def at_rest(self) -> bool:

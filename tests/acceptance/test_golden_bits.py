@@ -61,13 +61,17 @@ def print_head() -> Job:
 
     rig = Rig(overrides=["encoder.jitter=3 deg", "encoder.missing_edges=0.0005"]).pretend_identified()
 
+    def acknowledge() -> None:
+        if rig.head.status.latch.flag:
+            rig.read_status()
+
     def run(ticks: int) -> None:
         while ticks > 0:
             ticks -= rig.run(ticks)
-            rig.head.status.latch.flag = 0
+            acknowledge()
 
     lines = (lambda: rig.send_print(1040.5, 1900), lambda: rig.send_print(1800, 1100))
-    return Job({"": rig.p}, {"": rig.r}, lines, run)
+    return Job({"": rig.p}, {"": rig.r}, lines, run, acknowledge)
 
 
 def phase_servo() -> Job:

@@ -5,7 +5,7 @@ the paper, so it is fired early by commanded speed x flight time; what is left w
 error. Positions in 1/256 emitter, times in microseconds.
 """
 
-from detent.kernel.registers import Registers, f8, i4, i4_array, i8, register, u1, u1_array
+from detent.kernel.registers import Registers, i4, i4_array, i8, register, u1, u1_array
 from detent.kernel.step import step
 
 COLUMNS = 2048
@@ -15,29 +15,24 @@ NEVER = 1 << 62
 
 
 class ColumnTimerParams(Registers):
-    """Geometry of the paper and flight of the wires."""
+    """Geometry of the line and lead of the wires."""
 
     column_zero: i4 = register("carriage position of column 0, 1/256 emitter", unit="emitter/256")
     column_pitch: i4 = register("distance of two columns, 1/256 emitter", unit="emitter/256")
     lead_per_speed: i4 = register("flight lead per speed value, 1/65536 emitter", unit="emitter/65536")
-    flight_time: f8 = register("time from firing to the paper", unit="s")
-    metres_per_unit: f8 = register("length of 1/256 emitter", unit="m")
 
 
 class LineBuffer(Registers):
     """Two banks of columns: the supervisor fills one while the other prints."""
 
     ink: u1_array = register("1 where a column is printed; bank 0, then bank 1", length=2 * COLUMNS)
-    landed: i4_array = register(
-        "where each fired column landed, right of its place; bank 0, then bank 1", unit="nm", length=2 * COLUMNS
-    )
     speed: i4_array = register("speed value the line of each bank was begun with", unit="1/6 in/s", length=2)
     direction: i4_array = register("direction of the line of each bank", length=2)
     turned: i4_array = register("1 if the line of each bank was begun by a turn-around", length=2)
 
 
 class ColumnTimer(Registers):
-    """State of the print timing of the running line and the errors of its columns."""
+    """State of the print timing of the running line."""
 
     bank: u1 = register("bank of the line buffer that prints")
     active: u1 = register("1 while columns of the running line are still to be fired")
@@ -47,7 +42,6 @@ class ColumnTimer(Registers):
     fire_us: i8 = register("time at which the next column fires; far future when none is due", unit="us")
     fired: i8 = register("columns printed so far", unit="count")
     missed: i8 = register("inked columns passed without being fired", unit="count")
-    offset: f8 = register("where the last column landed, right of its place", unit="m")
 
 
 @step
@@ -108,10 +102,7 @@ def schedule(
 
 
 @step
-def fire(p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, x: float, v: float, direction: int) -> None:
-    """Print the due column: `x`, `v` are the true head position [m] and velocity [m/s] at the moment of firing."""
-    wanted = (p.column_zero + r.column * p.column_pitch) * p.metres_per_unit
-    r.offset = x + v * p.flight_time - wanted
+def fired(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
+    """The due column has been fired."""
     r.fired += 1
-    b.landed[r.bank * COLUMNS + r.column] = int(r.offset * 1e9)
     next_column(r, b, direction)

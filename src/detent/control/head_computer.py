@@ -4,7 +4,7 @@ Positions in emitters from the left frame, times in microseconds, speeds as spee
 counts; per-direction values end in `_right` and `_left`. Print-head specification 2.2 (B2), 3 and 4.
 """
 
-from detent.control.column_timer import ColumnTimer, ColumnTimerParams
+from detent.control.column_timer import ColumnTimer, ColumnTimerParams, LineBuffer
 from detent.control.latch import Latch, StatusPort
 from detent.control.self_identification import IdentifiedLine, PlausibleLimits
 from detent.kernel.registers import Registers, block, i1, i2, i4, i4_array, i8, register, u1, u1_array, u2
@@ -73,7 +73,7 @@ class HeadParams(Registers):
     width_tolerance: i4 = register("narrower by more than this is an obstruction", unit="emitter")
     calibration_margin: i4 = register("stop target of calibration passes from the frames", unit="emitter")
     plausible: PlausibleLimits = block("limits of the identified line")
-    columns: ColumnTimerParams = block("paper and flight of the wires")
+    columns: ColumnTimerParams = block("columns of a line")
 
 
 class Receiver(Registers):
@@ -169,6 +169,7 @@ class HeadComputer(Registers):
     status: StatusPort = block("status latch and its queue")
     receiver: Receiver = block("byte collector")
     queue: CommandQueue = block("waiting commands")
+    buffer: LineBuffer = block("columns of the running and of the next line")
 
 
 @step

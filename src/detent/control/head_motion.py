@@ -4,7 +4,7 @@ Print-head specification 3.5 to 3.13 and 4.1. The computer works in counts and m
 count register of the PWM timer and the right/left and transition lines.
 """
 
-from detent.control.column_timer import LineBuffer, set_lead, start_line
+from detent.control.column_timer import set_lead, start_line
 from detent.control.feed_forward import (
     low_speed_start_emitters,
     ramp_interval_us,
@@ -93,7 +93,7 @@ def ramp_interval(p: HeadParams, c: HeadComputer, s: int) -> int:
 
 
 @step
-def begin_move(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> None:
+def begin_move(p: HeadParams, c: HeadComputer, turn: bool) -> None:
     """Start the planned move, or continue the ramp of the last one when `turn` (3.6, 3.10, 3.13)."""
     old_drive, direction, s = c.drive, c.plan.direction, c.plan.speed
     c.moves += 1
@@ -106,7 +106,7 @@ def begin_move(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
     c.phase_start = c.emitter
     c.steady = steady_value(p, c, direction, s)
     if c.operation == PRINT and not c.repositioning:
-        begin_line(p, c, b, turn)
+        begin_line(p, c, turn)
     if s < HIGH_SPEED:
         c.state = LOW_START
         c.start_emitters = min(low_speed_start_emitters(s), c.plan.distance)
@@ -127,7 +127,7 @@ def begin_move(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
 
 
 @step
-def begin_line(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> None:
+def begin_line(p: HeadParams, c: HeadComputer, turn: bool) -> None:
     """Hand the printable interval of the running PRINT command to the column timer; the next bank prints."""
     zero, pitch = p.columns.column_zero, p.columns.column_pitch
     c.columns.bank = 1 - c.columns.bank
@@ -135,11 +135,11 @@ def begin_line(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
         first, last = -((zero - c.start) // pitch), (c.end * 256 - zero) // pitch
     else:
         first, last = (c.start - zero) // pitch, -((zero - c.end * 256) // pitch)
-    b.speed[c.columns.bank] = c.speed
-    b.direction[c.columns.bank] = c.direction
-    b.turned[c.columns.bank] = 1 if turn else 0
+    c.buffer.speed[c.columns.bank] = c.speed
+    c.buffer.direction[c.columns.bank] = c.direction
+    c.buffer.turned[c.columns.bank] = 1 if turn else 0
     set_lead(p.columns, c.columns, c.speed)
-    start_line(c.columns, b, first, last, c.direction)
+    start_line(c.columns, c.buffer, first, last, c.direction)
 
 
 @step

@@ -3,7 +3,7 @@
 Print-head specification 3.2, 3.3, 3.13 and 4.1.
 """
 
-from detent.control.column_timer import NEVER, LineBuffer
+from detent.control.column_timer import NEVER
 from detent.control.feed_forward import steady_drive
 from detent.control.head_commands import (
     answer,
@@ -125,7 +125,7 @@ def begin_calculation(p: HeadParams, c: HeadComputer) -> None:
 
 
 @step
-def homing_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def homing_timer(p: HeadParams, c: HeadComputer) -> None:
     """Raise the drive while the head stands; standing for the contact time with drive to spare is contact."""
     if c.next_ramp_us <= c.now_us:
         c.next_ramp_us += BREAK_LOOSE_US
@@ -142,11 +142,11 @@ def homing_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
         fault(p, c, OBSTRUCTION)
         return
     c.homed = 1
-    begin_pass(p, c, b, PASS_FAST_LEFT)
+    begin_pass(p, c, PASS_FAST_LEFT)
 
 
 @step
-def begin_pass(p: HeadParams, c: HeadComputer, b: LineBuffer, number: int) -> None:
+def begin_pass(p: HeadParams, c: HeadComputer, number: int) -> None:
     """One identification pass: standard acceleration and stop, constant drive between them."""
     stand(p, c, IDLE)
     c.calibration_pass = number
@@ -156,7 +156,7 @@ def begin_pass(p: HeadParams, c: HeadComputer, b: LineBuffer, number: int) -> No
     fast = number in (PASS_FAST_LEFT, PASS_FAST_RIGHT)
     plan_run(c, p.calibration_margin if leftward else c.width - p.calibration_margin, c.emitter, p.run_speed)
     c.plan.speed = p.run_speed if fast else HIGH_SPEED
-    begin_move(p, c, b, False)
+    begin_move(p, c, False)
 
 
 @step
@@ -184,7 +184,7 @@ def window_timer(c: HeadComputer) -> None:
 
 
 @step
-def end_pass(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def end_pass(p: HeadParams, c: HeadComputer) -> None:
     """Zero speed after a pass: book the measured speed; after the last one compute both lines."""
     line = line_of(c, c.direction)
     number = c.calibration_pass
@@ -193,31 +193,31 @@ def end_pass(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
     elif c.windows > 0:
         line.speed_slow = (c.window_total + 2 * c.windows) // (4 * c.windows)
     if number < PASS_SLOW_RIGHT:
-        begin_pass(p, c, b, number + 1)
+        begin_pass(p, c, number + 1)
         return
     c.calibration_pass = 0
     fast = steady_drive(p.slope_default, p.friction_default, p.run_speed)
     slow = steady_drive(p.slope_default, p.friction_default, HIGH_SPEED)
     right = identify(c.right, p.plausible, fast, slow)
     left = identify(c.left, p.plausible, fast, slow)
-    finish(p, c, b, OK if right and left else IMPLAUSIBLE, False)
+    finish(p, c, OK if right and left else IMPLAUSIBLE, False)
 
 
 @step
-def finish(p: HeadParams, c: HeadComputer, b: LineBuffer, code: int, turn: bool) -> None:
+def finish(p: HeadParams, c: HeadComputer, code: int, turn: bool) -> None:
     """Answer the running command and begin the next one; `turn` allows a turn-around instead of a stop."""
     send(c.status, code)
     c.operation = NO_OPERATION
-    begin_next(p, c, b, turn)
+    begin_next(p, c, turn)
 
 
 @step
-def begin_next(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> None:
+def begin_next(p: HeadParams, c: HeadComputer, turn: bool) -> None:
     """Execute waiting commands until one moves the head; without one the drive goes off."""
     while c.queue.waiting > 0:
         take_next(c)
         if is_motion(c.operation):
-            if begin_motion(p, c, b, turn):
+            if begin_motion(p, c, turn):
                 return
         elif c.operation == CALCULATE:
             begin_calculation(p, c)
@@ -233,7 +233,7 @@ def begin_next(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> Non
 
 
 @step
-def begin_motion(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> bool:
+def begin_motion(p: HeadParams, c: HeadComputer, turn: bool) -> bool:
     """Begin the running motion command from the present position; False when it was answered without motion."""
     if not c.homed:
         send(c.status, NOT_CALIBRATED)
@@ -249,30 +249,30 @@ def begin_motion(p: HeadParams, c: HeadComputer, b: LineBuffer, turn: bool) -> b
     continues = turn and q.speed == c.speed and q.direction == -c.direction
     if not continues:
         stand(p, c, IDLE)
-    begin_move(p, c, b, continues)
+    begin_move(p, c, continues)
     return True
 
 
 @step
-def at_zero_speed(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def at_zero_speed(p: HeadParams, c: HeadComputer) -> None:
     """The head has come to rest: next pass, the print after its run back, a turn-around, or the next command."""
     c.columns.active = 0
     c.columns.fire_us = NEVER
     turn = c.state in (HIGH_TRANSITION, HIGH_REVERSE) and c.calibration_pass == 0
     c.expected_stop = c.emitter
     if c.calibration_pass:
-        end_pass(p, c, b)
+        end_pass(p, c)
     elif c.repositioning:
         c.repositioned = 1
-        if not begin_motion(p, c, b, turn):
+        if not begin_motion(p, c, turn):
             c.operation = NO_OPERATION
-            begin_next(p, c, b, False)
+            begin_next(p, c, False)
     else:
-        finish(p, c, b, OK, turn)
+        finish(p, c, OK, turn)
 
 
 @step
-def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change: int) -> None:
+def on_emitter(p: HeadParams, c: HeadComputer, when: int, change: int) -> None:
     """Emitter interrupt: `when` in microseconds, `change` 1 right or -1 left."""
     c.emitter += change
     c.interval_us = when - c.last_emitter_us if c.emitter_seen and change == c.last_step else 0
@@ -287,7 +287,7 @@ def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change:
         fault(p, c, OBSTRUCTION)
     elif c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE):
         if change != c.direction:
-            at_zero_speed(p, c, b)
+            at_zero_speed(p, c)
     elif c.against >= BACKWARD:
         fault(p, c, OBSTRUCTION)
     elif c.state in (HOME_LEFT, HOME_RIGHT):
@@ -300,11 +300,11 @@ def on_emitter(p: HeadParams, c: HeadComputer, b: LineBuffer, when: int, change:
 
 
 @step
-def on_reverse_edge(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def on_reverse_edge(p: HeadParams, c: HeadComputer) -> None:
     """A quadrature edge against the motion: during a stop the head has passed zero speed (3.9)."""
     at_speed = 0 < c.interval_us < REVERSAL_US
     if c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE) and not at_speed:
-        at_zero_speed(p, c, b)
+        at_zero_speed(p, c)
 
 
 @step
@@ -315,15 +315,15 @@ def stalled(c: HeadComputer, quiet: int) -> bool:
 
 
 @step
-def on_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def on_timer(p: HeadParams, c: HeadComputer) -> None:
     """Timers that are due in the present state."""
     if c.state in (HOME_LEFT, HOME_RIGHT):
-        homing_timer(p, c, b)
+        homing_timer(p, c)
         return
     quiet = c.now_us - c.last_emitter_us
     if c.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE):
         if quiet >= p.zero_speed_us:
-            at_zero_speed(p, c, b)
+            at_zero_speed(p, c)
             return
     elif stalled(c, quiet):
         fault(p, c, OBSTRUCTION)
@@ -337,12 +337,12 @@ def on_timer(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
 
 
 @step
-def on_command(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def on_command(p: HeadParams, c: HeadComputer) -> None:
     """Command interrupt; a command that finds the head at rest begins at once."""
     receive_byte(p, c)
     if c.operation == NO_OPERATION:
         if c.queue.waiting > 0:
-            begin_next(p, c, b, False)
+            begin_next(p, c, False)
     else:
         plan_waiting(p, c)
 
@@ -368,13 +368,13 @@ def next_wake(p: HeadParams, c: HeadComputer) -> int:
 
 
 @hot_step
-def decide(p: HeadParams, c: HeadComputer, b: LineBuffer) -> None:
+def decide(p: HeadParams, c: HeadComputer) -> None:
     """The computer's turn in a tick, after the emitters: command interrupt, timers, status latch."""
     if c.command_latch.flag:
-        on_command(p, c, b)
+        on_command(p, c)
         c.wake_us = next_wake(p, c)
     if c.now_us >= c.wake_us:
-        on_timer(p, c, b)
+        on_timer(p, c)
         c.wake_us = next_wake(p, c)
     if c.status.waiting > 0:
         pass_on(c.status)

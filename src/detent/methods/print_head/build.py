@@ -5,6 +5,8 @@ from typing import TypeVar
 
 from detent.axisfile.drive_train import fill_drive_train
 from detent.files.fields import Table
+from detent.methods.print_head.controller import PERIOD_US
+from detent.methods.print_head.plant import AVERAGED, SWITCH_LEVEL
 from detent.methods.print_head.schema import (
     COLUMN,
     EMITTER,
@@ -13,7 +15,7 @@ from detent.methods.print_head.schema import (
     PrintHeadSpec,
     speed_value,
 )
-from detent.methods.print_head.system import AVERAGED, PERIOD_US, SWITCH_LEVEL, PrintHeadParams
+from detent.methods.print_head.system import PrintHeadParams
 from detent.plant.drive_train import DriveTrainParams
 from detent.plant.switched_motor import fill_pulse_table
 
@@ -33,23 +35,24 @@ TableT = TypeVar("TableT", bound=Table)
 def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
     """Parameters of the print-head axis."""
     p = PrintHeadParams()
-    p.fidelity = SWITCH_LEVEL if spec.axis.fidelity == "switch-level" else AVERAGED
-    p.supply = spec.disturbance.supply
-    _fill_drive_train(p.train, spec)
-    fill_pulse_table(p.train, p.switched)
-    p.encoder.edge_pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
+    plant = p.plant
+    plant.fidelity = SWITCH_LEVEL if spec.axis.fidelity == "switch-level" else AVERAGED
+    plant.supply = spec.disturbance.supply
+    _fill_drive_train(plant.train, spec)
+    fill_pulse_table(plant.train, plant.switched)
+    plant.encoder.edge_pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
     # The left frame lies halfway between two emitters: on one, any error of its edge would move the zero by an emitter.
-    p.encoder.origin = -EMITTER / 2
-    p.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
-    p.encoder.missing = spec.encoder.missing_edges
+    plant.encoder.origin = -EMITTER / 2
+    plant.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
+    plant.encoder.missing = spec.encoder.missing_edges
     _fill_options(p, spec)
     _fill_limits(p, spec)
     _fill_columns(p, spec)
     push = spec.disturbance.push
     if push is not None:
-        p.push.force = push.force
-        p.push.begin = round(push.at / (PERIOD_US * 1e-6))
-        p.push.end = round((push.at + push.duration) / (PERIOD_US * 1e-6))
+        plant.push.force = push.force
+        plant.push.begin = round(push.at / (PERIOD_US * 1e-6))
+        plant.push.end = round((push.at + push.duration) / (PERIOD_US * 1e-6))
     return p
 
 
@@ -79,7 +82,7 @@ def _times(table: TableT, keys: tuple[str, ...], *factors: float) -> TableT:
 
 
 def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
-    h, m = p.head, spec.method
+    h, m = p.controller, spec.method
     h.span_steady = m.span == "steady"
     h.plausible.literal_intercept = m.intercept == "literal"
     h.plausible.slope_min, h.plausible.slope_max = m.slope_min, m.slope_max
@@ -90,7 +93,7 @@ def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
 
 
 def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
-    h = p.head
+    h = p.controller
     h.drive_limit = min(
         FULL_DRIVE_COUNTS, math.floor(spec.limits.effort / spec.drive.supply * FULL_DRIVE_COUNTS + 1e-9)
     )
@@ -107,9 +110,9 @@ def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
 
 
 def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
-    c = p.head.columns
-    c.column_zero = round(spec.printing.left_margin / EMITTER * 256)
-    c.column_pitch = round(COLUMN / EMITTER * 256)
-    c.flight_time = spec.printing.flight_time
-    c.lead_per_speed = round(SPEED_STEP * c.flight_time / EMITTER * 65536)
-    c.metres_per_unit = EMITTER / 256
+    c, paper = p.controller.columns, p.plant.paper
+    c.column_zero = paper.column_zero = round(spec.printing.left_margin / EMITTER * 256)
+    c.column_pitch = paper.column_pitch = round(COLUMN / EMITTER * 256)
+    paper.flight_time = spec.printing.flight_time
+    c.lead_per_speed = round(SPEED_STEP * paper.flight_time / EMITTER * 65536)
+    paper.metres_per_unit = EMITTER / 256

@@ -17,6 +17,7 @@ from detent.errors import AxisError, DetentError, describe_sb1
 from detent.files.quantities import INCH
 from detent.kernel.loop import advance
 from detent.methods.print_head.build import build_print_head
+from detent.methods.print_head.controller import read_status, write_command
 from detent.methods.print_head.derive import Machine as Figures
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
 from detent.methods.print_head.system import TICK, PrintHead, switch_on
@@ -283,7 +284,7 @@ def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
     if code != OK:
         text = "no answer" if code is None else describe_sb1(code)
         raise AxisError(f"comparison of drives: CALCULATE PARAMETERS failed: {text}")
-    head = r.head
+    head = r.controller.head
     return DriveConstants(
         slope_right=head.right.slope,
         slope_left=head.left.slope,
@@ -301,7 +302,7 @@ class MeasuringBench:
         self.spec = spec.model_copy(update={"limits": limits, "disturbance": disturbance})
         self.params = build_print_head(self.spec)
         leaves = {leaf.path: leaf for leaf in PrintHead.leaves()}
-        picked = [leaves["train.velocity"], leaves["head.state"]]
+        picked = [leaves["plant.train.velocity"], leaves["controller.head.state"]]
         self._picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
         self._row: Any = np.dtype([("velocity", "<f8"), ("state", "<u1")])
 
@@ -336,19 +337,19 @@ class MeasuringBench:
     def _run(self, way: DriveConstants, speed: float, direction: int, seconds: float, *, trim: bool) -> NDArray[Any]:
         """Rows of a move from its first tick on; fewer than `seconds` of them if the axis gave up."""
         p, r = self.params, PrintHead()
-        p.head.trim = trim
+        p.controller.trim = trim
         begin, target = FROM_FRAME, BENCH_EMITTERS - FROM_FRAME
         if direction < 0:
             begin, target = target, begin
         switch_on(p, r, (begin + 0.5) * EMITTER, self.spec.encoder.seed)
-        head = r.head
+        head = r.controller.head
         head.emitter, head.width, head.homed, head.state = begin, BENCH_EMITTERS, 1, IDLE
         head.right.slope, head.right.friction = way.slope_right, way.friction_right
         head.left.slope, head.left.friction = way.slope_left, way.friction_left
         for byte in (CODE_SPEED, speed_value(speed), CODE_CONTROLLED, target >> 8):
             _put_byte(p, r, byte)
             _next_status(p, r, 0.01)  # an acknowledge, or for the speed value the answer
-        head.command_latch.byte, head.command_latch.flag = target & 0xFF, 1
+        write_command(r.controller, target & 0xFF)
         ticks, before = round(seconds / TICK), r.tick
         rows = np.zeros((ticks, len(self._picks)), np.uint8)
         done = advance(p, r, ticks, rows, self._picks, 1)
@@ -358,19 +359,16 @@ class MeasuringBench:
 
 def _put_byte(p: Any, r: PrintHead, byte: int) -> None:
     """Write the command latch and let the computer take the byte."""
-    r.head.command_latch.byte, r.head.command_latch.flag = byte, 1
+    write_command(r.controller, byte)
     advance(p, r, 1, *_NO_ROWS, 0)
 
 
 def _next_status(p: Any, r: PrintHead, seconds: float) -> int | None:
     """Take the next status byte; None if none comes within `seconds`."""
-    latch = r.head.status.latch
+    latch = r.controller.head.status.latch
     if not latch.flag:
         advance(p, r, round(seconds / TICK), *_NO_ROWS, 0)
-    if not latch.flag:
-        return None
-    latch.flag = 0
-    return latch.byte
+    return read_status(r.controller) if latch.flag else None
 
 
 _NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))

@@ -28,8 +28,9 @@ from detent.page.words import GAP, number
 from detent.record.trace import Trace
 
 SIGNALS = (
-    "train.position", "train.velocity", "train.current", "head.state", "head.drive_cmd", "head.out.transition",
-    "head.speed", "head.direction", "head.columns.fired",
+    "plant.train.position", "plant.train.velocity", "plant.train.current", "controller.head.state",
+    "controller.head.drive_cmd", "lines.transition", "controller.head.speed", "controller.head.direction",
+    "controller.head.columns.fired",
 )  # fmt: skip
 """What the figures over time are drawn from."""
 
@@ -90,8 +91,10 @@ def _line_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     # After the stop the computer already demands the speed of the next line.
     demand = np.where(rows.t <= line.stop - line.start, _demanded(rows), np.nan)
     demanded = Curve(label="demanded", colour="muted", dash=(6, 4), y=demand, thin=0)
-    drive = Curve(label="drive value", colour="drive", width=2, step=True, y=rows["head.drive_cmd"], digits=1)
-    fired = np.flatnonzero(np.diff(rows["head.columns.fired"]))
+    drive = Curve(
+        label="drive value", colour="drive", width=2, step=True, y=rows["controller.head.drive_cmd"], digits=1
+    )
+    fired = np.flatnonzero(np.diff(rows["controller.head.columns.fired"]))
     spans = [(float(rows.t[fired[0]]), float(rows.t[fired[-1] + 1]))] if fired.size else []
     bands, events = [Band(label="printing", colour="good", spans=spans), _transition(rows)], _events(rows)
     timeline = Timeline(name="profile", t=rows.t, label="time since the move began", bands=bands, events=events)
@@ -112,7 +115,7 @@ def _turn_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     rows = _turn(before, after, trace)
     if rows is None:
         return None
-    current = Curve(label="motor current", colour="current", y=rows["train.current"], digits=4)
+    current = Curve(label="motor current", colour="current", y=rows["plant.train.current"], digits=4)
     events = _events(rows)
     timeline = Timeline(
         name="turn", t=rows.t, label="time since the stop began", bands=[_transition(rows)], events=events
@@ -130,7 +133,7 @@ def _turn(before: LineRecord, after: LineRecord, trace: Trace) -> Stretch | None
     rows = stretch(trace, SIGNALS, before.start, after.stop)
     if rows is None:
         return None
-    was, becomes, t = rows["head.state"][:-1], rows["head.state"][1:], rows.t[1:]
+    was, becomes, t = rows["controller.head.state"][:-1], rows["controller.head.state"][1:], rows.t[1:]
     zero_speed = before.stop - before.start
     stops = t[(was == HIGH_STEADY) & (becomes != HIGH_STEADY) & (t < zero_speed)]
     ramps = t[(was == HIGH_ACCEL) & (becomes == HIGH_STEADY) & (t > zero_speed)]
@@ -143,22 +146,24 @@ def _turn(before: LineRecord, after: LineRecord, trace: Trace) -> Stretch | None
 
 def _demanded(rows: Stretch) -> Numbers:
     """Commanded speed [in/s] where one is demanded: from the start of the move to its stop."""
-    moving = np.isin(rows["head.state"], (HIGH_ACCEL, HIGH_STEADY, LOW_START, LOW_STEADY))
-    return np.where(moving, rows["head.speed"] * rows["head.direction"] * (SPEED_STEP / INCH), np.nan)
+    moving = np.isin(rows["controller.head.state"], (HIGH_ACCEL, HIGH_STEADY, LOW_START, LOW_STEADY))
+    return np.where(
+        moving, rows["controller.head.speed"] * rows["controller.head.direction"] * (SPEED_STEP / INCH), np.nan
+    )
 
 
 def _true_speed(rows: Stretch, thin: int) -> Curve:
-    return Curve(label="true speed", colour="speed", width=2, y=rows["train.velocity"] / INCH, thin=thin)
+    return Curve(label="true speed", colour="speed", width=2, y=rows["plant.train.velocity"] / INCH, thin=thin)
 
 
 def _transition(rows: Stretch) -> Band:
-    spans = spans_of(rows.t, rows["head.out.transition"] != 0)
+    spans = spans_of(rows.t, rows["lines.transition"] != 0)
     return Band(label="transition (TR)", colour="brake", spans=spans)
 
 
 def _events(rows: Stretch) -> list[Event]:
     """Changes of the computer's state, each with the drive value right after it."""
-    state, drive = rows["head.state"], rows["head.drive_cmd"]
+    state, drive = rows["controller.head.state"], rows["controller.head.drive_cmd"]
     changes = [(k, int(state[k - 1]), int(state[k])) for k in (np.flatnonzero(np.diff(state)) + 1).tolist()]
     return [
         Event(float(rows.t[k]), STATE_EVENTS[was, becomes], int(drive[k]))

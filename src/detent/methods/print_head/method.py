@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
-    "encoder.channel_a", "encoder.channel_b", "quadrature.count", "head.state", "head.drive_cmd", "timer.pulse",
-    "lines.right_left", "lines.transition", "train.current",
+    "plant.encoder.channel_a", "plant.encoder.channel_b", "controller.quadrature.count", "controller.head.state",
+    "controller.head.drive_cmd", "plant.timer.pulse", "lines.right_left", "lines.transition", "plant.train.current",
 )  # fmt: skip
 
 

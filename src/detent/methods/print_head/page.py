@@ -199,7 +199,7 @@ def _path_figure(spec: PrintHeadSpec, run: PrintRun, trace: Trace | None) -> Fig
         '<span class="left">to the left</span>. Thin: the way between. Look for: long thin stretches are time without '
         "print."
     ).format(number(spec.limits.travel / INCH), GAP)
-    position, right = rows["train.position"] / INCH, rows["train.velocity"] > 0
+    position, right = rows["plant.train.position"] / INCH, rows["plant.train.velocity"] > 0
     printing = _printing(run, rows)
     thick = [
         Curve(label=f"printing to the {name}", colour=name, width=3, thin=POINTS // 2, y=np.where(on, position, np.nan))
@@ -223,7 +223,7 @@ def _path_figure(spec: PrintHeadSpec, run: PrintRun, trace: Trace | None) -> Fig
 
 def _printing(run: PrintRun, rows: Stretch) -> Numbers:
     """True between the first and the last column of a line."""
-    fired = rows["head.columns.fired"]
+    fired = rows["controller.head.columns.fired"]
     printing = np.zeros(len(rows), dtype=bool)
     for line in run.lines:
         first, last = np.searchsorted(rows.t, (line.start, line.stop))

@@ -19,6 +19,7 @@ from detent.files.quantities import INCH
 from detent.kernel.loop import advance
 from detent.methods.print_head import system as print_head
 from detent.methods.print_head.build import build_print_head
+from detent.methods.print_head.controller import load_line
 from detent.methods.print_head.derive import Machine as TrueMachine
 from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
@@ -207,11 +208,13 @@ class _Runner:
         self.state = self.machine.state
         self.result = PrintRun(job)
         self.supervisor = Supervisor(
-            self.state.head, self.machine.pass_time, self.on_answer, ack_last=spec.method.ack_last
+            self.state.controller, self.machine.pass_time, self.on_answer, ack_last=spec.method.ack_last
         )
-        buffer: Any = self.state.buffer
+        self.head = self.state.controller.head
+        buffer: Any = self.head.buffer  # ctypes gives the elements of an array no type
+        paper: Any = self.state.plant.paper
         self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(buffer.ink)
-        self.landed: NDArray[np.int32] = np.ctypeslib.as_array(buffer.landed)
+        self.landed: NDArray[np.int32] = np.ctypeslib.as_array(paper.landed)
         self.plans: tuple[LinePlan, ...] = ()
         self.sum_squares = 0.0
         self.began = 0.0
@@ -221,7 +224,7 @@ class _Runner:
         self.progress(0.0, "homing and identification")
         self.supervisor.send(calculate_parameters())
         self.supervisor.finish()
-        head = self.state.head
+        head = self.head
         self.result.time_ready = self.began = self.machine.time
         self.result.width = head.width * EMITTER
         self.result.identified = {"right": self._direction("right"), "left": self._direction("left")}
@@ -229,7 +232,7 @@ class _Runner:
             return
         geometry = Geometry(
             width_emitters=head.width,
-            column0_emitters=self.machine.params.head.columns.column_zero / 256,
+            column0_emitters=self.machine.params.controller.columns.column_zero / 256,
             emitters_per_column=EMITTERS_PER_COLUMN,
             max_speed=head.maximum,
         )
@@ -237,7 +240,7 @@ class _Runner:
 
     def print_all(self) -> None:
         """Send the lines, one waiting behind the running one."""
-        preselected = int(self.state.head.maximum)
+        preselected = int(self.head.maximum)
         for index, plan in enumerate(self.plans):
             while self.supervisor.outstanding and self.supervisor.outstanding[0].tag != index - 1:
                 self.supervisor.await_answer()
@@ -254,12 +257,8 @@ class _Runner:
 
     def load_line(self, index: int, line: PrintLine) -> None:
         """Fill the bank that this line will print from; banks alternate with every PRINT, the first is bank 1."""
-        bank = self._bank(index)
-        self.ink[bank] = 0
-        self.landed[bank] = NOT_FIRED
-        for character in line.characters:
-            first, last = _ink_span(character)
-            self.ink[bank.start + first : bank.start + last] = 1
+        self.landed[self._bank(index)] = NOT_FIRED
+        load_line(self.state.controller, (index + 1) & 1, [range(*_ink_span(one)) for one in line.characters])
 
     def on_answer(self, answer: Answer) -> None:
         """Book the end of a command."""
@@ -274,11 +273,11 @@ class _Runner:
 
     def _place(self, code: int) -> str:
         """Where an obstruction is, as far as the axis knows."""
-        head = self.state.head
+        head = self.head
         if not code & OBSTRUCTION or head.width <= 0:
             return ""
-        expected = self.machine.params.head.expected_width
-        if head.width < expected - self.machine.params.head.width_tolerance:
+        expected = self.machine.params.controller.expected_width
+        if head.width < expected - self.machine.params.controller.width_tolerance:
             return f" (the way found is {_both(head.width)}, limits.travel is {_both(expected)})"
         return f" (the head stopped {_both(head.emitter)} from the left frame)"
 
@@ -287,7 +286,7 @@ class _Runner:
         line, bank, result = self.plans[index].line, self._bank(index), self.result
         inked = self.ink[bank] != 0
         landed = self.landed[bank]
-        buffer: Any = self.state.buffer  # ctypes gives the elements of an array no type
+        buffer: Any = self.head.buffer
         fired = inked & (landed != NOT_FIRED)
         errors: NDArray[np.float64] = landed[fired].astype(np.float64) * 1e-9
         squares = float(errors @ errors)
@@ -321,7 +320,7 @@ class _Runner:
 
     def finish(self) -> PrintRun:
         """Fill in the totals."""
-        result, head, train = self.result, self.state.head, self.state.train
+        result, head, train = self.result, self.head, self.state.plant.train
         result.time_end = self.machine.time
         result.turn_arounds, result.repositions = int(head.turn_arounds), int(head.repositions)
         result.peak_current, result.energy = train.peak_current, train.energy
@@ -349,8 +348,8 @@ class _Runner:
             self.result.strikes.append(Strike(character, line.number, offset))
 
     def _direction(self, side: str) -> Direction:
-        line = getattr(self.state.head, side)
-        p = self.machine.params.head
+        line = getattr(self.head, side)
+        p = self.machine.params.controller
         true = TrueMachine(self.spec)
 
         def default_drive(s: int) -> int:
@@ -390,7 +389,8 @@ def _ink_span(character: PrintedCharacter) -> tuple[int, int]:
 def default_signals() -> Sequence[str]:
     """Registers a run records unless told otherwise: enough for the report's figures and most questions."""
     return (
-        "train.position", "train.velocity", "train.current", "train.voltage", "train.energy", "head.state",
-        "head.drive_cmd", "head.out.transition", "head.out.right_left", "head.emitter", "head.speed",
-        "head.direction", "head.columns.active", "head.columns.fired",
+        "plant.train.position", "plant.train.velocity", "plant.train.current", "plant.train.voltage",
+        "plant.train.energy", "controller.head.state", "controller.head.drive_cmd", "lines.transition",
+        "lines.right_left", "controller.head.emitter", "controller.head.speed", "controller.head.direction",
+        "controller.head.columns.active", "controller.head.columns.fired",
     )  # fmt: skip

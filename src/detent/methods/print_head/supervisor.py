@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from detent.control.head_commands import ACKNOWLEDGE
-from detent.control.head_computer import STATE_NAMES, HeadComputer
-from detent.control.latch import read_latch, write_latch
+from detent.control.head_computer import STATE_NAMES
 from detent.errors import AxisError, describe_sb1
+from detent.methods.print_head.controller import PrintHeadController, read_status, write_command
 
 MOST_OUTSTANDING = 3
 """Unanswered commands: the running one, and a speed or a motion behind it."""
@@ -74,7 +74,7 @@ def position_low() -> Command:
 class Supervisor:
     """Sends commands and collects answers."""
 
-    head: HeadComputer  # registers of the axis computer; only its two latches are touched
+    controller: PrintHeadController  # only its two latches are touched
     # ``pass_time(seconds) -> None`` lets at most that much time pass and returns earlier when a status byte waits
     pass_time: Callable[[float], None]
     on_answer: Callable[[Answer], None]  # called with every `Answer` the moment it is read
@@ -88,7 +88,7 @@ class Supervisor:
             self.await_answer()
         for k, byte in enumerate(command.data):
             self._await_free_latch(command)
-            write_latch(self.head.command_latch, byte)
+            write_command(self.controller, byte)
             last = k == len(command.data) - 1
             if not last or (self.ack_last and len(command.data) > 1):
                 self._await_acknowledge(command)
@@ -110,15 +110,15 @@ class Supervisor:
     def _await_free_latch(self, command: Command) -> None:
         """Wait until the axis has taken the last byte. Time stands still while an answer waits: it is read first."""
         for _ in range(MOST_TRIES):
-            if not self.head.command_latch.flag:
+            if not self.controller.head.command_latch.flag:
                 return
-            if self.head.status.latch.flag and self.outstanding:
+            if self.controller.head.status.latch.flag and self.outstanding:
                 self.await_answer()
             else:
                 self.pass_time(0.0)
         raise AxisError(
             f"{command.text}: the axis computer does not take the byte before it; it hangs in state "
-            f"{STATE_NAMES[self.head.state]!r}"
+            f"{STATE_NAMES[self.controller.head.state]!r}"
         )
 
     def _await_acknowledge(self, command: Command) -> None:
@@ -134,12 +134,12 @@ class Supervisor:
         self.on_answer(Answer(self.outstanding.popleft(), byte))
 
     def _next_byte(self, command: Command) -> int:
-        latch = self.head.status.latch
+        latch = self.controller.head.status.latch
         if not latch.flag:
             self.pass_time(self.patience)
         if not latch.flag:
             raise AxisError(
                 f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state "
-                f"{STATE_NAMES[self.head.state]!r}"
+                f"{STATE_NAMES[self.controller.head.state]!r}"
             )
-        return int(read_latch(latch))
+        return int(read_status(self.controller))
