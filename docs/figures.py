@@ -16,8 +16,8 @@ FOLDER = Path(__file__).resolve().parent / "_build" / "generated"
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7d8996"
 DRIFTED = ("disturbance.motor_constant=+10 %", "disturbance.friction_right=+20 %", "disturbance.friction_left=+20 %")
 SIGNALS = (
-    "train.position", "train.velocity", "train.current", "head.drive_cmd", "head.state", "head.out.transition",
-    "head.calibration_pass", "head.emitter",
+    "plant.train.position", "plant.train.velocity", "plant.train.current", "controller.head.drive_cmd",
+    "controller.head.state", "lines.transition", "controller.head.calibration_pass", "controller.head.emitter",
 )  # fmt: skip
 IR_COUNTS = 96
 WHITE = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5}
@@ -59,7 +59,7 @@ def line_of(done: Any, number: int) -> Any:
 
 def speed_of(part: Any) -> Any:
     """Carriage speed [in/s]."""
-    return part["train.velocity"] / 0.0254
+    return part["plant.train.velocity"] / 0.0254
 
 
 def label(area: Any, text: str, at: tuple[float, float], offset: tuple[float, float]) -> None:
@@ -71,7 +71,7 @@ def power_up() -> None:
     """Homing and the four identification passes."""
     done = run()
     part = done.trace.between(0.0, done.result.time_ready)
-    t, position, number = part.time, part["train.position"] / 0.0254, part["head.calibration_pass"]
+    t, position, number = part.time, part["plant.train.position"] / 0.0254, part["controller.head.calibration_pass"]
     with picture("power-up.svg", 2, 4.6) as (where, speed):
         where.plot(t, position, color=BLUE)
         where.set_ylabel("head position [in]")
@@ -96,7 +96,7 @@ def parts_of_the_drive() -> None:
     part = done.trace.between(line.start, line.stop)
     found = done.result.identified["right" if line.direction > 0 else "left"]
     sign = line.direction
-    t, drive, speed = (part.time - line.start) * 1e3, part["head.drive_cmd"] * sign, speed_of(part) * sign
+    t, drive, speed = (part.time - line.start) * 1e3, part["controller.head.drive_cmd"] * sign, speed_of(part) * sign
     emf = found.slope * 6 * speed / 256
     friction = np.full_like(emf, found.friction)
     with picture("parts.svg", 2, 5.4) as (whole, parts):
@@ -155,12 +155,12 @@ def transition() -> None:
             done = run(*overrides)
             line = line_of(done, 8)
             part = done.trace.between(line.start, line.stop)
-            state, sign = part["head.state"], line.direction
+            state, sign = part["controller.head.state"], line.direction
             stop = int(np.flatnonzero((state[1:] >= 9) & (state[:-1] == 8))[0]) + 1
             t = (part.time - part.time[stop]) * 1e3
             keep = (t > -15) & (t < (line.stop - part.time[stop]) * 1e3)
-            drive.plot(t[keep], part["head.drive_cmd"][keep] * sign, color=colour, label=text)
-            current.plot(t[keep], part["train.current"][keep] * sign, color=colour)
+            drive.plot(t[keep], part["controller.head.drive_cmd"][keep] * sign, color=colour, label=text)
+            current.plot(t[keep], part["plant.train.current"][keep] * sign, color=colour)
             speed.plot(t[keep], speed_of(part)[keep] * sign, color=colour)
         for area, text in ((drive, "drive value [count]"), (current, "motor current [A]"), (speed, "speed [in/s]")):
             area.set_ylabel(text)
@@ -182,8 +182,8 @@ def turn_around() -> None:
             line = line_of(done, 4)
             part = done.trace.between(line.start - 0.08, line.start + 0.11)
             t = (part.time - line.start) * 1e3
-            drive.plot(t, part["head.drive_cmd"], color=colour, label=text)
-            current.plot(t, part["train.current"], color=colour)
+            drive.plot(t, part["controller.head.drive_cmd"], color=colour, label=text)
+            current.plot(t, part["plant.train.current"], color=colour)
             speed.plot(t, speed_of(part), color=colour)
         for area, text in ((drive, "drive value [count]"), (current, "motor current [A]"), (speed, "speed [in/s]")):
             area.set_ylabel(text)

@@ -21,7 +21,7 @@ for side, line in found.identified.items():
     print(f"{side}: slope {line.slope} (true {line.true_slope:.1f}), friction {line.friction} counts")
 
 # %% The trace: numpy arrays with units, named like the registers of the machine.
-current = run.trace["train.current"]
+current = run.trace["plant.train.current"]
 print(f"{len(run.trace)} rows, current up to {abs(current).max():.2f} {run.trace.units['train.current']}")
 
 # %% Files for other tools, a figure of the first line, the report.
@@ -29,7 +29,7 @@ folder = Path("runs/example")
 folder.mkdir(parents=True, exist_ok=True)
 first = found.lines[0]
 run.save(folder / "trace.h5")
-run.plot(["train.velocity", "head.drive_cmd"], folder / "line.png", (first.start, first.stop))
+run.plot(["plant.train.velocity", "controller.head.drive_cmd"], folder / "line.png", (first.start, first.stop))
 run.report(folder / "report.html")
 print(f"open {folder / 'report.html'}")
 

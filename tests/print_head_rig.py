@@ -11,8 +11,9 @@ from detent.control.head_computer import FAULT, HIGH_STEADY, IDLE, POWER_ON
 from detent.kernel.loop import advance
 from detent.methods.load import load_spec
 from detent.methods.print_head.build import build_print_head
+from detent.methods.print_head.controller import PERIOD_US, read_status, write_command
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec
-from detent.methods.print_head.system import PERIOD_US, PrintHead, PrintHeadParams, switch_on
+from detent.methods.print_head.system import PrintHead, PrintHeadParams, switch_on
 
 EXAMPLE = Path(str(files("detent") / "examples" / "print_head.toml"))
 COUNT = 38.0 / 300
@@ -79,11 +80,9 @@ class Rig:
 
     def read_status(self) -> int:
         """Take the waiting status byte."""
-        latch = self.head.status.latch
-        assert latch.flag, "no status byte waits"
-        latch.flag = 0
-        self.responses.append(latch.byte)
-        return latch.byte
+        assert self.head.status.latch.flag, "no status byte waits"
+        self.responses.append(read_status(self.r.controller))
+        return self.responses[-1]
 
     def next_status(self, seconds: float = 20.0) -> int | None:
         """Advance until a status byte comes and take it; None after `seconds`."""
@@ -96,8 +95,7 @@ class Rig:
         """Write the command latch, waiting for the computer to take the last byte (a tick at most)."""
         while self.head.command_latch.flag:
             self.run(1)
-        self.head.command_latch.byte = byte
-        self.head.command_latch.flag = 1
+        write_command(self.r.controller, byte)
         self.run(1)
 
     def send(self, *command: int) -> list[int]:

@@ -292,7 +292,7 @@ def test_12_motion_starts_after_exactly_the_announced_byte(command):
         rig.put_byte(byte)
         rig.next_status(0.01)
         assert rig.next_status(0.02) is None
-        assert (rig.head.moves, rig.head.state, rig.r.train.velocity) == (0, IDLE, 0.0)
+        assert (rig.head.moves, rig.head.state, rig.r.plant.train.velocity) == (0, IDLE, 0.0)
     rig.put_byte(command[-1])
     assert rig.head.moves == 1
 
@@ -322,7 +322,7 @@ def test_14_a_second_motion_command_waits_and_is_answered_second():
     rig.run(2000)
     assert rig.head.state in (HIGH_ACCEL, HIGH_STEADY)
     assert rig.send(0x92, 0x0C, 0x80) == [0xFF, 0xFF]  # to 3200
-    assert rig.r.train.velocity > 0.5
+    assert rig.r.plant.train.velocity > 0.5
     assert rig.responses == [0xFF] * 4
     assert rig.next_status() == 0x00
     assert abs(rig.head.emitter - 2000) <= 6
@@ -348,9 +348,9 @@ def test_15_what_cannot_be_done_is_answered_and_moves_nothing(command, bit):
     rig = Rig().pretend_identified()
     rig.send(*command)
     assert rig.next_status(0.01) == bit
-    moved = rig.record(0.1, ["train.velocity", "head.drive_cmd"])
-    assert not moved["train.velocity"].any()
-    assert not moved["head.drive_cmd"].any()
+    moved = rig.record(0.1, ["plant.train.velocity", "controller.head.drive_cmd"])
+    assert not moved["plant.train.velocity"].any()
+    assert not moved["controller.head.drive_cmd"].any()
     assert rig.head.moves == 0
 
 
@@ -376,7 +376,7 @@ def test_16_an_unread_status_is_never_overwritten():
     write_latch(head.status.latch, 0x55)
     for byte in (0x40, 0x41):
         write_latch(head.command_latch, byte)
-        decide(rig.p.head, head, rig.r.buffer)
+        decide(rig.p.controller, head, rig.r.controller.head.buffer)
         assert (head.status.latch.byte, head.status.latch.flag) == (0x55, 1)
     assert [rig.read_status() for _ in range(1)] == [0x55]
     assert [rig.next_status(0.01), rig.next_status(0.01)] == [0x0F, 0xA5]
@@ -402,30 +402,30 @@ def test_17_homing_goes_left_then_measures_the_width_slowly(start):
     rig = Rig(start=start)
     rig.send(0x01)
     names = [
-        "head.state",
-        "train.velocity",
-        "train.position",
-        "head.emitter",
-        "head.drive_cmd",
-        "head.calibration_pass",
+        "controller.head.state",
+        "plant.train.velocity",
+        "plant.train.position",
+        "controller.head.emitter",
+        "controller.head.drive_cmd",
+        "controller.head.calibration_pass",
     ]
     log = rig.record(12.0, names)
-    homing_left = log["head.state"] == HOME_LEFT
-    homing_right = log["head.state"] == HOME_RIGHT
+    homing_left = log["controller.head.state"] == HOME_LEFT
+    homing_right = log["controller.head.state"] == HOME_RIGHT
     first_right = int(np.argmax(homing_right))
     assert homing_left[0]
     assert homing_left[:first_right].all()
-    assert (log["train.velocity"][homing_left] <= 0).all()
-    assert log["train.position"][first_right - 1] == 0.0  # contact with the left frame
-    assert log["head.emitter"][first_right] == 0
-    begin = int(np.argmax(log["head.calibration_pass"] > 0))
+    assert (log["plant.train.velocity"][homing_left] <= 0).all()
+    assert log["plant.train.position"][first_right - 1] == 0.0  # contact with the left frame
+    assert log["controller.head.emitter"][first_right] == 0
+    begin = int(np.argmax(log["controller.head.calibration_pass"] > 0))
     assert homing_right[first_right:begin].all()
-    assert log["train.position"][begin - 1] == pytest.approx(rig.p.train.right_end)
+    assert log["plant.train.position"][begin - 1] == pytest.approx(rig.p.plant.train.right_end)
     assert abs(rig.head.width - 4350) <= 1
     homing = homing_left | homing_right
     # 5 in/s without a trim: the defaults give 49 counts, which is 3.3 in/s right and 5.3 in/s left on this machine.
-    assert 3.3 < np.max(np.abs(log["train.velocity"][homing])) / INCH < 7.5
-    assert np.max(np.abs(log["head.drive_cmd"][homing])) <= 110
+    assert 3.3 < np.max(np.abs(log["plant.train.velocity"][homing])) / INCH < 7.5
+    assert np.max(np.abs(log["controller.head.drive_cmd"][homing])) <= 110
     assert rig.responses == []
     assert rig.read_status() == 0x00
 
@@ -439,25 +439,33 @@ def test_17_an_obstacle_is_reported_and_nothing_is_calibrated(start_in):
     assert rig.calculate() == 0x08
     assert rig.head.state == FAULT
     assert (rig.head.moves, rig.head.calibration_pass, rig.head.homed) == (0, 0, 0)
-    assert rig.r.train.peak_current < 1.2
-    after = rig.record(0.2, ["head.drive_cmd", "train.velocity"])
-    assert not after["head.drive_cmd"].any()
-    assert not after["train.velocity"].any()
+    assert rig.r.plant.train.peak_current < 1.2
+    after = rig.record(0.2, ["controller.head.drive_cmd", "plant.train.velocity"])
+    assert not after["controller.head.drive_cmd"].any()
+    assert not after["plant.train.velocity"].any()
 
 
 def test_18_four_passes_in_order_each_with_a_constant_drive():
     rig = Rig()
     rig.send(0x01)
-    log = rig.record(12.0, ["head.calibration_pass", "head.state", "head.drive_cmd", "train.velocity"])
-    passes = log["head.calibration_pass"]
+    log = rig.record(
+        12.0,
+        [
+            "controller.head.calibration_pass",
+            "controller.head.state",
+            "controller.head.drive_cmd",
+            "plant.train.velocity",
+        ],
+    )
+    passes = log["controller.head.calibration_pass"]
     changes = np.flatnonzero(np.diff(passes.astype(int))) + 1
     assert [int(passes[k]) for k in changes] == [1, 2, 3, 4, 0]
     expected = {1: -174, 2: 174, 3: -67, 4: 67}
     for number, drive in expected.items():
-        steady = (passes == number) & (log["head.state"] == HIGH_STEADY)
+        steady = (passes == number) & (log["controller.head.state"] == HIGH_STEADY)
         assert np.count_nonzero(np.diff(steady.astype(int)) == 1) == 1  # one steady phase
-        assert np.unique(log["head.drive_cmd"][steady]).tolist() == [drive]
-        speed = abs(log["train.velocity"][steady][-1]) / INCH
+        assert np.unique(log["controller.head.drive_cmd"][steady]).tolist() == [drive]
+        speed = abs(log["plant.train.velocity"][steady][-1]) / INCH
         wanted = 40 if abs(drive) == 174 else 10
         assert abs(speed / wanted - 1) > 0.015  # the speed is off, and stays off
 
@@ -623,8 +631,9 @@ def test_27_implausible_data_set_the_status_bit():
 
 DIRECTIONS = (1, -1)
 SIGNALS = (
-    "train.velocity", "train.position", "train.mean_current", "head.state", "head.emitter", "head.interval_us",
-    "head.drive", "head.drive_cmd", "head.out.count", "head.out.right_left", "head.out.transition",
+    "plant.train.velocity", "plant.train.position", "plant.train.mean_current", "controller.head.state",
+    "controller.head.emitter", "controller.head.interval_us", "controller.head.drive", "controller.head.drive_cmd",
+    "lines.count", "lines.right_left", "lines.transition",
 )  # fmt: skip
 FRICTION = {1: 36, -1: 28}
 """Counts, default plant."""
@@ -657,16 +666,16 @@ class Move:
     @property
     def speed(self) -> np.ndarray:
         """Speed along the direction of the move [in/s]."""
-        return self.rows["train.velocity"] * self.direction / INCH
+        return self.rows["plant.train.velocity"] * self.direction / INCH
 
     @property
     def way(self) -> np.ndarray:
         """Way along the direction of the move [emitters]."""
-        return self.rows["train.position"] * self.direction / EMITTER
+        return self.rows["plant.train.position"] * self.direction / EMITTER
 
     def first(self, *states: int, after: int = 0) -> int:
         """First row in one of `states`."""
-        return after + int(np.flatnonzero(np.isin(self.rows["head.state"][after:], states))[0])
+        return after + int(np.flatnonzero(np.isin(self.rows["controller.head.state"][after:], states))[0])
 
     def stop(self) -> int:
         """First row of the stop."""
@@ -692,7 +701,7 @@ class TurnAround:
         for target in (3400, 800) if direction > 0 else (950, 3550):
             rig.controlled_run_to(target, wait=False)
         rows = self.rows = rig.record(3, SIGNALS, stop_at_status=False)
-        state, speed = rows["head.state"], rows["train.velocity"] * direction / INCH
+        state, speed = rows["controller.head.state"], rows["plant.train.velocity"] * direction / INCH
         self.begin = int(np.flatnonzero(np.isin(state, (HIGH_TRANSITION, HIGH_REVERSE)))[0])
         self.zero = self.begin + int(np.flatnonzero(speed[self.begin :] <= 0)[0])
         self.turn = self.begin + int(np.flatnonzero(~np.isin(state[self.begin :], (HIGH_TRANSITION, HIGH_REVERSE)))[0])
@@ -776,10 +785,10 @@ def test_32_queued_command_plans_from_the_expected_stop():
 def test_33_low_speed_start_is_five_emitters_of_friction_and_ir():
     move = Move(30, 1, 1500)
     change = move.first(LOW_STEADY)
-    passed = move["head.emitter"] - move.origin
-    assert set(move["head.drive_cmd"][:change]) == {132}
+    passed = move["controller.head.emitter"] - move.origin
+    assert set(move["controller.head.drive_cmd"][:change]) == {132}
     assert (passed[change - 1], passed[change]) == (4, 5)
-    assert move["head.drive_cmd"][change] == 55
+    assert move["controller.head.drive_cmd"][change] == 55
     assert move.speed[change] == pytest.approx(4.2, abs=0.3)
     assert [low_speed_start_emitters(s) for s in (18, 24, 30, 42, 54, 59)] == [2, 3, 5, 10, 16, 19]
 
@@ -812,7 +821,10 @@ def test_35_trim_is_one_count_per_16_ms_by_the_interval():
         assert c.drive == expected
     move = Move(40, 1, 2000)
     begin, end = move.first(LOW_STEADY), move.stop()
-    drive, interval = move["head.drive"][begin:end].astype(int), move["head.interval_us"][begin:end]
+    drive, interval = (
+        move["controller.head.drive"][begin:end].astype(int),
+        move["controller.head.interval_us"][begin:end],
+    )
     changes = np.diff(drive)
     # Every 16 ms; the first trim comes half a period after the steady phase begins.
     boundaries = np.arange(200, end - begin, 400)
@@ -821,7 +833,7 @@ def test_35_trim_is_one_count_per_16_ms_by_the_interval():
     # Interval and drive of the same tick: the computer trims with the interval of the latest emitter.
     np.testing.assert_array_equal(changes[boundaries - 1], np.sign(interval[boundaries] * 40 - 20000))
     # The memory location is the drive that goes out, unless the overspeed test halves it.
-    out = move["head.out.count"][begin:end]
+    out = move["lines.count"][begin:end]
     assert np.all((out == drive) | (out == drive >> 1))
     assert np.mean(out == drive) > 0.9
 
@@ -855,7 +867,7 @@ def low_speed_phase(s, direction, fraction):
     begin, end = move.first(LOW_STEADY), move.stop()
     t = np.arange(end - begin) * TICK
     assert t[-1] > 0.9
-    return t, move.speed[begin:end] / (s / 6) - 1, move["head.drive"][begin:end]
+    return t, move.speed[begin:end] / (s / 6) - 1, move["controller.head.drive"][begin:end]
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS, ids=("right", "left"))
@@ -894,10 +906,10 @@ def test_37_overspeed_test_limits_a_push():
         rig.set_speed(30)
         rig.controlled_run_to(3000, wait=False)
         rig.record(0.6, SIGNALS)
-        rig.p.push.force, rig.p.push.begin, rig.p.push.end = 3.0, rig.r.tick, rig.r.tick + 1500
+        rig.p.plant.push.force, rig.p.plant.push.begin, rig.p.plant.push.end = 3.0, rig.r.tick, rig.r.tick + 1500
         rows = rig.record(0.12, SIGNALS)
-        peaks[test] = rows["train.velocity"].max() / INCH
-        drive, out = rows["head.drive"].astype(int), rows["head.out.count"]
+        peaks[test] = rows["plant.train.velocity"].max() / INCH
+        drive, out = rows["controller.head.drive"].astype(int), rows["lines.count"]
         changed = np.flatnonzero(np.diff(drive))
         assert np.abs(np.diff(drive)).max() == 1
         assert np.diff(changed).min() >= 400
@@ -905,7 +917,7 @@ def test_37_overspeed_test_limits_a_push():
         assert np.all(halved | (out == drive))
         assert np.any(halved) == (test == "true")
         if test == "true":
-            fast = (rows["head.interval_us"] * 30 * 17 < 320_000) & (rows["head.interval_us"] > 0)
+            fast = (rows["controller.head.interval_us"] * 30 * 17 < 320_000) & (rows["controller.head.interval_us"] > 0)
             np.testing.assert_array_equal(halved, fast)
     assert 5.0 < peaks["true"] <= 5.6
     assert 6.8 <= peaks["false"] < 8.0
@@ -919,10 +931,10 @@ def test_38_low_speed_stop_reverses_the_running_drive():
     for s in range(18, 60):
         for direction, move in low_speed_stops(s):
             begin = move.stop()
-            command = move["head.drive_cmd"]
-            assert set(command[begin:-1]) == {-direction * move["head.drive"][begin - 1]}
+            command = move["controller.head.drive_cmd"]
+            assert set(command[begin:-1]) == {-direction * move["controller.head.drive"][begin - 1]}
             assert command[begin - 1] in (-command[begin], -command[begin] // 2)
-            assert not np.any(move["head.out.transition"])
+            assert not np.any(move["lines.transition"])
             distance = move.stop_distance()
             assert abs(distance - s * s / 144) <= 5.5
             if s == 54:
@@ -933,19 +945,19 @@ def test_38_low_speed_stop_reverses_the_running_drive():
             assert (len(command) - move.standstill()) * TICK < 5e-3
             peak = move.way[move.standstill()]
             move.rig.run(2500)
-            assert move.rig.r.train.velocity == 0
-            back = peak - move.rig.r.train.position * direction / EMITTER
+            assert move.rig.r.plant.train.velocity == 0
+            back = peak - move.rig.r.plant.train.position * direction / EMITTER
             assert 0 <= back <= 1.0
 
 
 def test_39_low_speed_forgets_the_trimmed_drive():
     move = Move(30, 1, 1500, start=500)
-    assert move["head.drive"][move.stop() - 1] != 55
+    assert move["controller.head.drive"][move.stop() - 1] != 55
     rig = move.rig
     rig.controlled_run_to(3500, wait=False)
     rows = rig.record(3, SIGNALS)
-    change = int(np.flatnonzero(rows["head.state"] == LOW_STEADY)[0])
-    assert rows["head.drive"][change] == 55
+    change = int(np.flatnonzero(rows["controller.head.state"] == LOW_STEADY)[0])
+    assert rows["controller.head.drive"][change] == 55
 
 
 # --------------------------------------------------------------------------------------------------------- high speed
@@ -993,7 +1005,7 @@ def test_41_acceleration_profile():
     for s, duration, speed in ((240, 66.5, 39.65), (60, 16.6, 9.4), (120, 33.3, 19.5)):
         move = Move(s, 1, 3000)
         steady = move.first(HIGH_STEADY)
-        drive = move["head.drive"].astype(int)
+        drive = move["controller.head.drive"].astype(int)
         assert drive[0] == 132
         assert drive[steady - 1] == (170 * s >> 8) + 36 + 96
         assert drive[steady] == (170 * s >> 8) + 36
@@ -1005,7 +1017,7 @@ def test_41_acceleration_profile():
         assert move.speed[steady] == pytest.approx(speed, abs=0.5)
         if s == 240:
             assert (drive[steady - 1], drive[steady]) == (291, 195)
-            assert move["head.emitter"][steady] - move.origin == pytest.approx(389, abs=8)
+            assert move["controller.head.emitter"][steady] - move.origin == pytest.approx(389, abs=8)
         first, last = round(0.1 * steady), round(0.9 * steady)
         acceleration = (move.speed[last] - move.speed[first]) / ((last - first) * TICK)
         assert acceleration == pytest.approx(600, rel=0.03)
@@ -1013,15 +1025,15 @@ def test_41_acceleration_profile():
 
 def test_42_ramp_ends_early_when_the_speed_is_reached():
     rig = Rig().pretend_identified(emitter=200)
-    rig.r.train.velocity = 30 * INCH
+    rig.r.plant.train.velocity = 30 * INCH
     rig.run_to(3000, wait=False)
     rows = rig.record(0.2, SIGNALS)
-    end = int(np.flatnonzero(rows["head.state"] != HIGH_ACCEL)[0])
-    assert rows["head.state"][end] == HIGH_STEADY
+    end = int(np.flatnonzero(rows["controller.head.state"] != HIGH_ACCEL)[0])
+    assert rows["controller.head.state"][end] == HIGH_STEADY
     assert end * TICK * 1e3 == pytest.approx(54.5, abs=2)
-    assert rows["head.drive"][end - 1] == pytest.approx(262, abs=5)
-    assert 0 < rows["head.interval_us"][end] <= 20000 / 240 < rows["head.interval_us"][end - 4]
-    assert 28.8 <= rows["train.velocity"][:end].min() / INCH < 29.9
+    assert rows["controller.head.drive"][end - 1] == pytest.approx(262, abs=5)
+    assert 0 < rows["controller.head.interval_us"][end] <= 20000 / 240 < rows["controller.head.interval_us"][end - 4]
+    assert 28.8 <= rows["plant.train.velocity"][:end].min() / INCH < 29.9
 
 
 def test_43_high_speed_trim_by_count():
@@ -1037,7 +1049,7 @@ def test_43_high_speed_trim_by_count():
         for direction in DIRECTIONS:
             move = Move(s, direction, 3800)
             begin, end = move.first(HIGH_STEADY), move.stop()
-            drive = move["head.drive"][begin:end].astype(int)
+            drive = move["controller.head.drive"][begin:end].astype(int)
             changes = np.flatnonzero(np.diff(drive)) + 1
             assert set(changes) <= set(range(400, len(drive), 400))
             assert np.abs(np.diff(drive)).max() == 1
@@ -1049,8 +1061,8 @@ def test_43_high_speed_trim_by_count():
 
 
 def steady_begin(rows):
-    begin = int(np.flatnonzero(rows["head.state"] == HIGH_STEADY)[0])
-    return int(rows["head.drive"][begin - 1]), int(rows["head.drive"][begin])
+    begin = int(np.flatnonzero(rows["controller.head.state"] == HIGH_STEADY)[0])
+    return int(rows["controller.head.drive"][begin - 1]), int(rows["controller.head.drive"][begin])
 
 
 def test_44_trimmed_drive_is_kept_per_direction_and_speed():
@@ -1085,8 +1097,8 @@ def test_45_deceleration_through_the_transition_mode():
     move = Move(240, 1, 3000, OPEN_LOOP)
     begin, zero = move.stop(), move.standstill()
     t = (np.arange(len(move.speed)) - begin + 1) * TICK * 1e3
-    drive, count = move["head.drive_cmd"], move["head.out.count"]
-    transition, line = move["head.out.transition"], move["head.out.right_left"]
+    drive, count = move["controller.head.drive_cmd"], move["lines.count"]
+    transition, line = move["lines.transition"], move["lines.right_left"]
     assert (drive[begin - 1], drive[begin]) == (195, 99)
     assert (count[begin], transition[begin], line[begin]) == (201, 1, 1)
     change = begin + int(np.flatnonzero(transition[begin:] == 0)[0])
@@ -1100,7 +1112,7 @@ def test_45_deceleration_through_the_transition_mode():
     assert t[zero] == pytest.approx(66.8, abs=1.5)
     assert drive[zero] == pytest.approx(-60, abs=4)
     assert move.stop_distance() == pytest.approx(403, abs=8)
-    current = move["train.mean_current"]
+    current = move["plant.train.mean_current"]
     braking = current[(t >= 10) & (t <= 60)]
     assert braking.mean() == pytest.approx(-0.638, rel=0.01)
     assert braking.min() >= braking.mean() * 1.08
@@ -1113,28 +1125,28 @@ def test_45_deceleration_through_the_transition_mode():
 def test_46_no_transition_below_the_ir_counts():
     move = Move(90, -1, 1500, OPEN_LOOP)
     begin = move.stop()
-    assert move["head.drive"][begin - 1] == 87
+    assert move["controller.head.drive"][begin - 1] == 87
     # Along the motion: 87 - 96 = -9 against it, to the right.
-    assert (move["head.drive"][begin], move["head.drive_cmd"][begin]) == (-9, 9)
-    assert (move["head.out.right_left"][begin - 1], move["head.out.right_left"][begin]) == (0, 1)
-    assert not np.any(move["head.out.transition"])
-    assert HIGH_TRANSITION not in move["head.state"]
+    assert (move["controller.head.drive"][begin], move["controller.head.drive_cmd"][begin]) == (-9, 9)
+    assert (move["lines.right_left"][begin - 1], move["lines.right_left"][begin]) == (0, 1)
+    assert not np.any(move["lines.transition"])
+    assert HIGH_TRANSITION not in move["controller.head.state"]
 
 
 def test_47_without_transition_the_head_coasts():
     for s, coasting, braked in ((240, 599, 403), (180, 320, 229), (120, 126, 104)):
         free = Move(s, 1, 3000, "method.transition=false")
         assert free.stop_distance() == pytest.approx(coasting, rel=0.05)
-        assert not np.any(free["head.out.transition"])
+        assert not np.any(free["lines.transition"])
         held = Move(s, 1, 3000)
         assert held.stop_distance() == pytest.approx(braked, rel=0.05)
         if s == 240:
-            peak = np.abs(free["train.mean_current"][free.stop() : free.standstill()]).max()
-            constant = np.abs(held["train.mean_current"][held.stop() : held.standstill()]).max()
+            peak = np.abs(free["plant.train.mean_current"][free.stop() : free.standstill()]).max()
+            constant = np.abs(held["plant.train.mean_current"][held.stop() : held.standstill()]).max()
             assert peak == pytest.approx(1.24, rel=0.05)
             assert 1.8 < peak / constant < 2.1
             # Nothing brakes while the drive value is still above zero.
-            assert not np.any(free["train.mean_current"][free.stop() + 200 : free.first(HIGH_REVERSE) - 1])
+            assert not np.any(free["plant.train.mean_current"][free.stop() + 200 : free.first(HIGH_REVERSE) - 1])
 
 
 def answered(turn: TurnAround) -> tuple[int, list[int]]:
@@ -1145,7 +1157,7 @@ def answered(turn: TurnAround) -> tuple[int, list[int]]:
 def test_48_turn_around():
     turn = TurnAround(1, 240, OPEN_LOOP)
     rows, begin = turn.rows, turn.begin
-    command = rows["head.drive_cmd"].astype(int)
+    command = rows["controller.head.drive_cmd"].astype(int)
     change = begin + int(np.flatnonzero(command[begin:] == 0)[0])
     # Event table 4.4.
     assert (command[begin - 1], command[begin]) == (195, 99)
@@ -1153,15 +1165,17 @@ def test_48_turn_around():
     assert -turn.speed[change] == pytest.approx(15.3, abs=0.3)
     assert turn.ms(turn.zero) == pytest.approx(66.8, abs=1.5)
     assert command[turn.zero] == pytest.approx(-60, abs=4)
-    assert rows["head.emitter"][turn.zero] - rows["head.emitter"][begin] == pytest.approx(403, abs=8)
+    assert rows["controller.head.emitter"][turn.zero] - rows["controller.head.emitter"][begin] == pytest.approx(
+        403, abs=8
+    )
     # The jump follows when the encoder has seen the reversal, up to 2.5 ms or six counts later.
     assert command[turn.turn - 1] - command[turn.turn] in (64, 65)
     assert turn.ms(turn.turn) - turn.ms(turn.zero) <= 2.5
     assert (command[turn.end - 1], command[turn.end]) == (-283, -187)
     assert turn.ms(turn.end) == pytest.approx(133.3, abs=1.5)
     assert turn.speed[turn.end] == pytest.approx(39.7, abs=0.3)
-    assert not np.any(rows["head.out.transition"][change : turn.end])
-    assert not np.any(rows["head.out.right_left"][change : turn.end])
+    assert not np.any(rows["lines.transition"][change : turn.end])
+    assert not np.any(rows["lines.right_left"][change : turn.end])
     assert answered(turn) == (1, [OK, OK])
     # Both speeds, both directions, with the trim as in normal work.
     for s, time, tolerance in ((240, 133, 6), (120, 67, 6 * 67 / 133)):
@@ -1189,18 +1203,18 @@ def test_49_turn_around_needs_same_speed_opposite_direction_and_a_queued_command
         assert rig.read_status() == OK, name
         assert rig.head.turn_arounds == 0, name
         if second is None:
-            assert rows["head.drive_cmd"][-1] == 0
+            assert rows["controller.head.drive_cmd"][-1] == 0
             assert rig.head.state == IDLE
             continue
         # The next command starts afresh: from friction + IR of its direction, not from the jumped braking value.
         direction = rig.head.direction
-        assert rows["head.drive_cmd"][-1] == direction * (FRICTION[direction] + 96), name
+        assert rows["controller.head.drive_cmd"][-1] == direction * (FRICTION[direction] + 96), name
         assert rig.head.moves == 2, name
 
 
 def test_50_turn_around_without_the_friction_jump_takes_longer():
     turn = TurnAround(1, 240, "method.friction_jump=false")
-    command = turn.rows["head.drive_cmd"].astype(int)
+    command = turn.rows["controller.head.drive_cmd"].astype(int)
     assert abs(command[turn.turn] - command[turn.turn - 1]) <= 1
     assert turn.ms(turn.end) == pytest.approx(158, abs=4)
     assert turn.ms(turn.reached) == pytest.approx(158, abs=4)
@@ -1210,7 +1224,9 @@ def test_51_literal_span_ramps_too_fast():
     turn = TurnAround(1, 240, "method.span=steady", OPEN_LOOP)
     assert turn.ms(turn.end) == pytest.approx(111, rel=0.03)
     assert turn.speed[turn.end] == pytest.approx(35, rel=0.03)
-    distance = (turn.rows["train.position"][turn.zero] - turn.rows["train.position"][turn.begin - 1]) / EMITTER
+    distance = (
+        turn.rows["plant.train.position"][turn.zero] - turn.rows["plant.train.position"][turn.begin - 1]
+    ) / EMITTER
     assert distance == pytest.approx(377, rel=0.03)
 
 
@@ -1253,7 +1269,7 @@ def test_52_run_moves_end_where_they_should():
             rig.run_to(target, wait=False)
             rows = rig.record(1, SIGNALS)
             assert rig.read_status() == OK
-            speed = rows["train.velocity"] * direction
+            speed = rows["plant.train.velocity"] * direction
             zero = int(np.flatnonzero((speed[1:] <= 0) & (speed[:-1] > 0))[0]) + 2
             time = found[distance, direction] = zero * TICK * 1e3
             rig.run(2500)
@@ -1285,9 +1301,9 @@ def test_53_supply_headroom():
     rig.run_to(3800, wait=False)
     rows = rig.record(2, SIGNALS)
     assert rig.read_status() == OK
-    end = int(np.flatnonzero(rows["head.state"] == HIGH_STEADY)[0])
-    assert rows["head.drive"][end - 1] == 300 == rows["head.drive_cmd"].max()
-    assert rows["head.drive"][end] == 175 + 43 == 314 - 96
+    end = int(np.flatnonzero(rows["controller.head.state"] == HIGH_STEADY)[0])
+    assert rows["controller.head.drive"][end - 1] == 300 == rows["controller.head.drive_cmd"].max()
+    assert rows["controller.head.drive"][end] == 175 + 43 == 314 - 96
     assert end * TICK < 0.1
 
 
@@ -1353,24 +1369,26 @@ def test_56_both_groups_change_the_drive_by_one_per_interval_until_equality(s, s
     rig.set_speed(s)
     rig.send(0xA2, 4200 >> 8, 4200 & 0xFF)
     names = ("drive", "state", "emitter", "interval_us", "now_us", "last_emitter_us")
-    log = rig.record(5.0, ["train.velocity", *(f"head.{name}" for name in names)])
+    log = rig.record(5.0, ["plant.train.velocity", *(f"controller.head.{name}" for name in names)])
     rig.next_status()
-    steady = log["head.state"] == state
-    drive, emitter = (log[f"head.{name}"][steady].astype(int) for name in ("drive", "emitter"))
+    steady = log["controller.head.state"] == state
+    drive, emitter = (log[f"controller.head.{name}"][steady].astype(int) for name in ("drive", "emitter"))
     every = round(0.016 / TICK)
     steps = np.diff(drive)
     # A count needs a whole window; by the interval of one emitter the first trim comes half a period on.
     trims = np.arange(every if state == HIGH_STEADY else every // 2, len(drive), every)
     assert not np.delete(steps, trims - 1).any()  # nothing between the intervals
     if state == LOW_STEADY:  # by the time of a single emitter, against 20000 / s
-        running = log["head.now_us"] - log["head.last_emitter_us"]  # the interval under way, once it is the longer one
-        interval = np.maximum(log["head.interval_us"], running)[steady][trims]
+        running = (
+            log["controller.head.now_us"] - log["controller.head.last_emitter_us"]
+        )  # the interval under way, once it is the longer one
+        interval = np.maximum(log["controller.head.interval_us"], running)[steady][trims]
         expected = np.sign(interval * s - 20_000)
     else:  # by the emitters of the interval, against 0.796 s
         expected = np.sign(round(0.796 * s) - (emitter[trims] - emitter[trims - every]))
     assert steps[trims - 1].tolist() == expected.tolist()
     assert np.sum(steps[trims - 1][:14]) * -wrong > 0  # towards the right drive
-    assert abs(np.mean(log["train.velocity"][steady][-2000:]) / INCH * 6 / s - 1) < 0.03
+    assert abs(np.mean(log["plant.train.velocity"][steady][-2000:]) / INCH * 6 / s - 1) < 0.03
     # 20000 / 48 is no whole number of microseconds, so only the count can meet equality; the next test has it for both.
     assert (0 in expected) == (state == HIGH_STEADY)
     rig.set_speed(s + 10)

@@ -15,6 +15,7 @@
 #define NEVER (INT64_C(1) << 62)
 
 enum { PERIOD_US = 40, STALL_US = 50000, TRIM_US = 16000, RUNAWAY_US = 62, REVERSAL_US = 800, TURN_AROUND_US = 133000 };
+enum { EDGES = 64, FIRES = 4 };
 enum { COLUMNS = 2048, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
 enum { FLOOR = 30, HIGH_SPEED = 60, STALL_MARGIN = 20, RUN_UP_RESERVE = 12 };
 enum {
@@ -131,19 +132,16 @@ static inline void schedule(const ColumnTimerParams *p, ColumnTimer *c, const Li
     }
 }
 
-static inline void fire(Axis *a, double start, double end, double velocity)
+static inline void fire_column(PrintHead *r, int64_t within)
 {
-    const ColumnTimerParams *p = &a->p->head.columns;
-    HeadComputer *h = &a->r->head;
+    HeadComputer *h = &r->controller.head;
     ColumnTimer *c = &h->columns;
-    int direction = h->direction;
-    double share = (double)(c->fire_us - (h->now_us - PERIOD_US)) * (1.0 / PERIOD_US);
-    double x = start + (end - start) * share - a->p->encoder.origin;
-    double wanted = (double)(p->column_zero + (int64_t)c->column * p->column_pitch) * p->metres_per_unit;
-    c->offset = x + velocity * p->flight_time - wanted;
+    int64_t k = least(r->lines.fired, FIRES - 1);
+    r->lines.fired_us[k] = (uint8_t)within;
+    r->lines.place[k] = (int16_t)(c->bank * COLUMNS + c->column);
+    r->lines.fired = (uint8_t)(k + 1);
     c->fired++;
-    a->r->buffer.landed[c->bank * COLUMNS + c->column] = (int32_t)(int64_t)(c->offset * 1e9);
-    next_column(c, &a->r->buffer, direction);
+    next_column(c, &h->buffer, h->direction);
 }
 
 /* ---- drive and lines of the computer ------------------------------------------------------------------------ */
@@ -332,10 +330,11 @@ static void plan_print(const HeadParams *p, HeadComputer *c, int64_t start, int6
     q->reposition = 1;
 }
 
-static void begin_line(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool turn)
+static void begin_line(const HeadParams *p, HeadComputer *c, bool turn)
 {
     int64_t zero = p->columns.column_zero, pitch = p->columns.column_pitch, first, last;
     ColumnTimer *t = &c->columns;
+    LineBuffer *b = &c->buffer;
     if (c->direction > 0) {
         first = -floor_div(zero - c->start, pitch);
         last = floor_div((int64_t)c->end * 256 - zero, pitch);
@@ -375,7 +374,7 @@ static int64_t ramp_interval_us(const HeadParams *p, const HeadComputer *c, int6
     return total <= 0 ? TURN_AROUND_US : (2 * TURN_AROUND_US * s + total) / (2 * total);
 }
 
-static void begin_move(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool turn)
+static void begin_move(const HeadParams *p, HeadComputer *c, bool turn)
 {
     int16_t old_drive = c->drive;
     const IdentifiedLine *line = c->plan.direction > 0 ? &c->right : &c->left;
@@ -391,7 +390,7 @@ static void begin_move(const HeadParams *p, HeadComputer *c, LineBuffer *b, bool
     c->phase_start = c->emitter;
     c->steady = (int16_t)steady_value(p, c, c->direction, c->speed);
     if (c->operation == PRINT && !c->repositioning)
-        begin_line(p, c, b, turn);
+        begin_line(p, c, turn);
     c->state = HIGH_ACCEL;
     c->ramp_us = (int32_t)ramp_interval_us(p, c, c->speed);
     c->ramp_top = (int16_t)least(c->steady + p->ir, p->drive_limit);
@@ -416,8 +415,8 @@ static void stand(const HeadParams *p, HeadComputer *c, int state)
 
 static bool begin_motion(Axis *a, bool turn)
 {
-    const HeadParams *p = &a->p->head;
-    HeadComputer *c = &a->r->head;
+    const HeadParams *p = &a->p->controller;
+    HeadComputer *c = &a->r->controller.head;
     if (!c->homed) {
         a->lost = true;
         return false;
@@ -439,13 +438,13 @@ static bool begin_motion(Axis *a, bool turn)
         a->lost = true;
         return true;
     }
-    begin_move(p, c, &a->r->buffer, continues);
+    begin_move(p, c, continues);
     return true;
 }
 
 static void begin_next(Axis *a, bool turn)
 {
-    HeadComputer *c = &a->r->head;
+    HeadComputer *c = &a->r->controller.head;
     CommandQueue *q = &c->queue;
     while (q->waiting > 0) {
         unsigned k = q->first;
@@ -464,12 +463,12 @@ static void begin_next(Axis *a, bool turn)
             return;
         c->operation = NO_OPERATION;
     }
-    stand(&a->p->head, c, c->state == POWER_ON || c->state == FAULT ? c->state : IDLE);
+    stand(&a->p->controller, c, c->state == POWER_ON || c->state == FAULT ? c->state : IDLE);
 }
 
 static void at_zero_speed(Axis *a)
 {
-    HeadComputer *c = &a->r->head;
+    HeadComputer *c = &a->r->controller.head;
     bool turn = c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE;
     c->columns.active = 0;
     c->columns.fire_us = NEVER;
@@ -502,7 +501,7 @@ static inline int64_t next_wake(const HeadParams *p, const HeadComputer *c)
 
 static inline void on_emitter(Axis *a, int64_t when, int change)
 {
-    HeadComputer *c = &a->r->head;
+    HeadComputer *c = &a->r->controller.head;
     c->emitter += change;
     c->interval_us = c->emitter_seen && change == c->last_step ? when - c->last_emitter_us : 0;
     c->last_emitter_us = when;
@@ -517,7 +516,7 @@ static inline void on_emitter(Axis *a, int64_t when, int change)
         break;
     case HIGH_ACCEL:
     case HIGH_STEADY:
-        move_emitter(&a->p->head, c);
+        move_emitter(&a->p->controller, c);
         break;
     case HIGH_TRANSITION:
     case HIGH_REVERSE:
@@ -528,25 +527,25 @@ static inline void on_emitter(Axis *a, int64_t when, int change)
         a->lost = true;
     }
     a->lost |= c->state != IDLE && c->too_fast >= 2;
-    c->wake_us = next_wake(&a->p->head, c);
+    c->wake_us = next_wake(&a->p->controller, c);
     if (c->columns.active && change == c->direction)
-        schedule(&a->p->head.columns, &c->columns, &a->r->buffer, change > 0 ? c->emitter : c->emitter + 1, change,
+        schedule(&a->p->controller.columns, &c->columns, &c->buffer, change > 0 ? c->emitter : c->emitter + 1, change,
                  when, c->interval_us);
 }
 
 static void on_reverse_edge(Axis *a)
 {
-    HeadComputer *c = &a->r->head;
+    HeadComputer *c = &a->r->controller.head;
     bool at_speed = 0 < c->interval_us && c->interval_us < REVERSAL_US;
     if ((c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE) && !at_speed)
         at_zero_speed(a);
-    c->wake_us = next_wake(&a->p->head, c);
+    c->wake_us = next_wake(&a->p->controller, c);
 }
 
 static void on_timer(Axis *a)
 {
-    const HeadParams *p = &a->p->head;
-    HeadComputer *c = &a->r->head;
+    const HeadParams *p = &a->p->controller;
+    HeadComputer *c = &a->r->controller.head;
     int64_t quiet = c->now_us - c->last_emitter_us;
     if (c->state == HIGH_TRANSITION || c->state == HIGH_REVERSE) {
         if (quiet >= p->zero_speed_us)
@@ -589,16 +588,15 @@ static void steer(Bridge *b, const BridgeLines *lines, unsigned pulse, double su
     b->mean_negative = share * b->on_negative + (1.0 - share) * b->off_negative;
 }
 
-static inline void actuate(const PrintHeadParams *p, PrintHead *r)
+static inline void take_over(const PrintHeadPlantParams *p, PrintHeadPlant *r, const PrintHeadLines *lines)
 {
-    const HeadOutputs *out = &r->head.out;
-    uint16_t count = (uint16_t)out->count;
-    r->timer.count = r->timer.pulse = r->timer.counter = count;
-    r->timer.output = count > 0;
-    if (count != r->bridge.pulse || out->right_left != r->lines.right_left || out->transition != r->lines.transition) {
-        r->lines.right_left = out->right_left;
-        r->lines.transition = out->transition;
-        steer(&r->bridge, &r->lines, count, p->supply);
+    r->timer.count = r->timer.pulse = r->timer.counter = lines->count;
+    r->timer.output = lines->count > 0;
+    if (lines->count != r->bridge.pulse || lines->right_left != r->latch.right_left ||
+        lines->transition != r->latch.transition) {
+        r->latch.right_left = lines->right_left;
+        r->latch.transition = lines->transition;
+        steer(&r->bridge, &r->latch, lines->count, p->supply);
     }
 }
 
@@ -662,66 +660,108 @@ static inline void move(const DriveTrainParams *p, DriveTrain *t, double u_posit
 
 /* ---- the tick --------------------------------------------------------------------------------------------------- */
 
-static inline int64_t edge_time(int64_t now, double start, double end, double x)
+/* What the encoder saw in the last period. */
+static inline void sense(const EncoderParams *p, Encoder *e, PrintHeadLines *lines, double start, double x)
 {
-    double share = end != start ? (x - start) / (end - start) : 0.0;
-    return now - PERIOD_US + least(most((int64_t)(share * PERIOD_US), 0), PERIOD_US - 1);
+    unsigned k = 0;
+    for (;;) {
+        bool rightward = x >= e->next_right;
+        double edge = rightward ? e->next_right : e->next_left;
+        if (!rightward && x >= edge)
+            break;
+        pass_edge(p, e, rightward);
+        double share = x != start ? (edge - start) / (x - start) : 0.0;
+        if (k == EDGES)
+            k -= 4;
+        lines->when_us[k] = (uint8_t)least(most((int64_t)(share * PERIOD_US), 0), PERIOD_US - 1);
+        lines->levels[k] = (uint8_t)(e->channel_a | e->channel_b << 1);
+        k++;
+    }
+    lines->edges = (uint8_t)k;
 }
 
-/* Edges and due columns of the last period, in order of time. A time costs a division: only emitters and ticks with a
- * due column want it. */
-static inline void sample(Axis *a, Encoder *e, double start, double x, double velocity, int64_t now)
+/* Edges and due columns of the last period, in order of time. */
+static inline void take_events(Axis *a, int64_t now)
 {
-    PrintHead *r = a->r;
+    PrintHeadController *c = &a->r->controller;
+    PrintHeadLines *lines = &a->r->lines;
+    int64_t begin = now - PERIOD_US;
+    unsigned k = 0;
+    lines->fired = 0;
     for (;;) {
-        bool rightward = x >= e->next_right, passed = rightward || x < e->next_left;
-        double place = rightward ? e->next_right : e->next_left;
-        int64_t due = r->head.columns.fire_us;
-        if (due < now && (!passed || due <= edge_time(now, start, x, place))) {
-            fire(a, start, x, velocity);
+        int64_t due = c->head.columns.fire_us;
+        if (due < now && (k == lines->edges || due <= begin + lines->when_us[k])) {
+            fire_column(a->r, due - begin);
             continue;
         }
-        if (!passed)
+        if (k == lines->edges)
             return;
-        pass_edge(&a->p->encoder, e, rightward);
-        int change = count_edge(&r->quadrature, e->channel_a, e->channel_b);
-        int64_t cycle = r->quadrature.count >> 2;
-        if (cycle != r->cycle) {
-            int emitter = cycle > r->cycle ? 1 : -1;
-            r->cycle = cycle;
-            on_emitter(a, edge_time(now, start, x, place), emitter);
+        int64_t when = begin + lines->when_us[k];
+        int change = count_edge(&c->quadrature, lines->levels[k] & 1u, lines->levels[k] >> 1);
+        int64_t cycle = c->quadrature.count >> 2;
+        if (cycle != c->cycle) {
+            int emitter = cycle > c->cycle ? 1 : -1;
+            c->cycle = cycle;
+            on_emitter(a, when, emitter);
         }
-        if (change == -r->head.direction)
+        if (change == -c->head.direction)
             on_reverse_edge(a);
+        k++;
+    }
+}
+
+/* The computer's turn, and what it puts out. */
+static inline void decide(Axis *a, int64_t now)
+{
+    HeadComputer *h = &a->r->controller.head;
+    PrintHeadLines *lines = &a->r->lines;
+    if (h->command_latch.flag)
+        a->lost = true;
+    if (now >= h->wake_us)
+        on_timer(a);
+    if (h->status.waiting > 0)
+        pass_on(&h->status);
+    lines->count = (uint16_t)h->out.count;
+    lines->right_left = h->out.right_left;
+    lines->transition = h->out.transition;
+}
+
+static inline void observe(const PrintHeadPlantParams *p, Paper *paper, const PrintHeadLines *lines, double start,
+                           double x, double velocity)
+{
+    const PaperParams *q = &p->paper;
+    for (unsigned k = 0; k < lines->fired; k++) {
+        int64_t column = lines->place[k] & (COLUMNS - 1);
+        double at = start + (x - start) * (lines->fired_us[k] * (1.0 / PERIOD_US)) - p->encoder.origin;
+        double wanted = (double)(q->column_zero + column * q->column_pitch) * q->metres_per_unit;
+        paper->offset = at + velocity * q->flight_time - wanted;
+        paper->landed[lines->place[k]] = (int32_t)(int64_t)(paper->offset * 1e9);
     }
 }
 
 int64_t advance(const PrintHeadParams *p, PrintHead *r, int64_t ticks)
 {
     Axis axis = {p, r, false};
-    DriveTrain train = r->train; /* only move() writes it: the compiler may keep it in registers */
-    Encoder *const encoder = &r->encoder;
-    double sampled = r->sampled;
+    const PrintHeadPlantParams *q = &p->plant;
+    PrintHeadPlant *plant = &r->plant;
+    DriveTrain train = plant->train; /* only move() writes it: the compiler may keep it in registers */
+    double sampled = plant->sampled;
     int64_t tick = r->tick, n = 0;
-    if (p->fidelity != 0 || r->head.calibration_pass != 0)
+    if (q->fidelity != 0 || r->controller.head.calibration_pass != 0)
         return NOT_COVERED;
-    for (; n < ticks && !r->head.status.latch.flag && !axis.lost; n++, tick++) {
-        int64_t now = tick * PERIOD_US;
-        r->head.now_us = now;
-        sample(&axis, encoder, sampled, train.position, train.velocity, now);
+    for (; n < ticks && !r->controller.head.status.latch.flag && !axis.lost; n++, tick++) {
+        int64_t now = r->controller.head.now_us += PERIOD_US;
+        sense(&q->encoder, &plant->encoder, &r->lines, sampled, train.position);
+        take_events(&axis, now);
+        decide(&axis, now);
+        observe(q, &plant->paper, &r->lines, sampled, train.position, train.velocity);
         sampled = train.position;
-        if (r->head.command_latch.flag)
-            axis.lost = true;
-        if (now >= r->head.wake_us)
-            on_timer(&axis);
-        if (r->head.status.waiting > 0)
-            pass_on(&r->head.status);
-        actuate(p, r);
-        train.force = p->push.begin <= tick && tick < p->push.end ? p->push.force : 0.0;
-        move(&p->train, &train, r->bridge.mean_positive, r->bridge.mean_negative);
+        take_over(q, plant, &r->lines);
+        train.force = q->push.begin <= tick && tick < q->push.end ? q->push.force : 0.0;
+        move(&q->train, &train, plant->bridge.mean_positive, plant->bridge.mean_negative);
     }
-    r->train = train;
-    r->sampled = sampled;
+    plant->train = train;
+    plant->sampled = sampled;
     r->tick = tick;
     return axis.lost ? NOT_COVERED : n;
 }

@@ -25,7 +25,7 @@ class Stretch:
 
     def __init__(self, *overrides: str) -> None:
         rig = Rig(overrides=overrides).pretend_identified(emitter=300)
-        rig.r.buffer.ink[:] = [1] * len(rig.r.buffer.ink)
+        rig.head.buffer.ink[:] = [1] * len(rig.head.buffer.ink)
         rig.set_speed(240)
         rig.send_print(1000, 3600)
         rig.run(3000)
@@ -35,7 +35,7 @@ class Stretch:
     def run(self, engine: Engine) -> int:
         """From the beginning through the four lines; returns the ticks."""
         self.r.restore(self.begin)
-        head, ticks = self.r.head, 0
+        head, ticks = self.r.controller.head, 0
         for start, end in LINES:
             self._queue_line(start, end)
             done = engine(self.p, self.r, 100_000)
@@ -47,7 +47,7 @@ class Stretch:
 
     def _queue_line(self, start: int, end: int) -> None:
         """What the bytes of a PRINT command leave behind; the supervisor's side is not what is measured."""
-        queue = self.r.head.queue
+        queue = self.r.controller.head.queue
         k = (queue.first + queue.waiting) % len(queue.operation)
         queue.operation[k], queue.start[k], queue.end[k] = PRINT, start * 256, end
         queue.waiting += 1

@@ -45,9 +45,9 @@ def to_the_end(stretch, engine):
 def test_c_ends_on_the_same_bits(in_c, overrides):
     stretch = Stretch(*overrides)
     end = to_the_end(stretch, compiled)
-    assert stretch.r.head.state == IDLE
-    assert stretch.r.head.turn_arounds == len(LINES)
-    assert stretch.r.head.columns.fired > 5000
+    assert stretch.r.controller.head.state == IDLE
+    assert stretch.r.controller.head.turn_arounds == len(LINES)
+    assert stretch.r.controller.head.columns.fired > 5000
     for name, engine in in_c.items():
         assert to_the_end(stretch, engine) == end, (name, stretch.r.diff(end))
 

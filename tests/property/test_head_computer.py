@@ -25,8 +25,8 @@ from detent.control.speed_selection import HIGH_SPEED
 pytestmark = pytest.mark.compiled
 
 OUTPUTS = (
-    "head.out.count", "head.out.right_left", "head.out.transition", "head.drive_cmd", "head.state", "timer.pulse",
-    "lines.right_left", "lines.transition", "train.voltage",
+    "lines.count", "lines.right_left", "lines.transition", "controller.head.drive_cmd", "controller.head.state",
+    "plant.timer.pulse", "plant.latch.right_left", "plant.latch.transition", "plant.train.voltage",
 )  # fmt: skip
 STARTS = [0x8D, 0x92, 0xA2, 0x99, 0x40, 0x41, 0x01, 0x00, 0x80, 0x83, 0xFF]
 LONGEST_WAIT = 40.0
@@ -60,7 +60,7 @@ class Bench:
         self.rig, self.left, self.first = rig, 0, 0
         self.answers: list[int] = []
         self.expected: deque[set[int] | None] = deque()
-        rig.p.head.ack_last = 0
+        rig.p.controller.ack_last = 0
 
     def drain(self, ticks):
         while ticks > 0:
@@ -149,18 +149,18 @@ def test_arbitrary_bytes_never_hang_the_computer(data):
 
 
 def check_outputs(rows, limit):
-    count, drive = rows["head.out.count"], rows["head.drive_cmd"].astype(int)
-    transition, line = rows["head.out.transition"].astype(int), rows["head.out.right_left"].astype(int)
+    count, drive = rows["lines.count"], rows["controller.head.drive_cmd"].astype(int)
+    transition, line = rows["lines.transition"].astype(int), rows["lines.right_left"].astype(int)
     assert count.min(initial=0) >= 0
     assert count.max(initial=0) <= 300
     assert np.abs(drive).max(initial=0) <= limit
     # Timer and lines take over what the computer put out, together, at the trigger of the same period.
-    np.testing.assert_array_equal(rows["timer.pulse"], count)
-    np.testing.assert_array_equal(rows["lines.right_left"], line)
-    np.testing.assert_array_equal(rows["lines.transition"], transition)
+    np.testing.assert_array_equal(rows["plant.timer.pulse"], count)
+    np.testing.assert_array_equal(rows["plant.latch.right_left"], line)
+    np.testing.assert_array_equal(rows["plant.latch.transition"], transition)
     np.testing.assert_array_equal(count, np.where(transition == 1, 300 - np.abs(drive), np.abs(drive)))
     assert np.all((drive == 0) | ((drive > 0) == (line == 1)))
-    assert np.all((transition == 1) == (rows["head.state"] == HIGH_TRANSITION))
+    assert np.all((transition == 1) == (rows["controller.head.state"] == HIGH_TRANSITION))
     begins, ends = np.flatnonzero(np.diff(transition) == 1), np.flatnonzero(np.diff(transition) == -1)
     assert np.all(line[begins] == line[begins + 1]), "transition begins on the line of the motion"
     assert np.all(drive[ends + 1] == 0), "TR falls with V = 0"
@@ -177,7 +177,7 @@ def test_outputs_stay_within_their_limits(script, effort, slopes):
     slope, right, left = slopes
     rig = Rig(slope, right, left, overrides=[f"limits.effort={effort} V"])
     rig.pretend_identified(slope=slope, right=right, left=left, emitter=2000)
-    limit = rig.p.head.drive_limit
+    limit = rig.p.controller.drive_limit
     assert limit == int(effort / 38 * 300 + 1e-9)
     for command, pause in script:
         for byte in command:
@@ -203,9 +203,9 @@ def test_after_a_fault_nothing_moves_without_calculate_parameters(s, direction, 
     rig.controlled_run_to(target, wait=False)
     end = (rig.head.emitter + 0.5 + share * 4000 * direction) * EMITTER
     if direction > 0:
-        rig.p.train.right_end = end
+        rig.p.plant.train.right_end = end
     else:
-        rig.p.train.left_end = end
+        rig.p.plant.train.left_end = end
     code = rig.next_status(10)
     if code == OK:
         # The obstacle was met while braking: standing still is then the expected end of the move.
@@ -214,7 +214,7 @@ def test_after_a_fault_nothing_moves_without_calculate_parameters(s, direction, 
     assert code == OBSTRUCTION
     assert (rig.head.state, rig.head.out.count, rig.head.homed) == (FAULT, 0, 0)
     rig.run(5000)
-    moves, here = rig.head.moves, rig.r.train.position
+    moves, here = rig.head.moves, rig.r.plant.train.position
     bench = Bench(rig)
     for command in after:
         for byte in command:
@@ -222,8 +222,8 @@ def test_after_a_fault_nothing_moves_without_calculate_parameters(s, direction, 
         bench.drain(2000)
     bench.check_answers()
     assert (rig.head.state, rig.head.moves, rig.head.drive_cmd) == (FAULT, moves, 0)
-    assert rig.r.train.position == here
-    rig.p.train.left_end, rig.p.train.right_end = 0.0, rig.spec.limits.travel
+    assert rig.r.plant.train.position == here
+    rig.p.plant.train.left_end, rig.p.plant.train.right_end = 0.0, rig.spec.limits.travel
     assert rig.calculate() == OK
     assert rig.head.state == IDLE
 
@@ -243,7 +243,7 @@ def test_runs_end_at_their_targets(targets):
         before = rig.head.emitter
         assert rig.run_to(target) == OK
         rig.run(2500)
-        assert rig.r.train.velocity == 0
+        assert rig.r.plant.train.velocity == 0
         if abs(target - before) >= 20:
             bound = 6 if rig.head.speed <= HIGH_SPEED else 12
             assert abs(rig.head.emitter - target) <= bound

@@ -115,18 +115,20 @@ def test_a_run_records_what_the_report_needs_every_tenth_tick(run: detent.Run) -
     assert run.trace.signals == tuple(default_signals())
     np.testing.assert_allclose(np.diff(run.trace.time), 0.4e-3, rtol=1e-9)
     assert run.trace.time[-1] == pytest.approx(run.result.time_end, abs=0.4e-3)
-    assert run.trace.units["train.current"] == "A"
-    assert run.trace.docs["head.state"]
+    assert run.trace.units["plant.train.current"] == "A"
+    assert run.trace.docs["controller.head.state"]
     assert run.trace.attributes == {"axis": "print head", "job": "letter.txt", "seed": 1, "fidelity": "averaged"}
     assert len(run.trace) > ROWS // 2
 
 
 def test_signals_and_rows_can_be_chosen() -> None:
-    done = detent.load(AXIS).run(load_job(LETTER), signals=["head.right.*", "train.energy"], every=1000)
+    done = detent.load(AXIS).run(
+        load_job(LETTER), signals=["controller.head.right.*", "plant.train.energy"], every=1000
+    )
     assert done.trace is not None
-    assert done.trace.signals[-1] == "train.energy"
-    assert set(done.trace.signals[:-1]) >= {"head.right.slope", "head.right.friction"}
-    assert done.trace["head.right.slope"][-1] == done.result.identified["right"].slope
+    assert done.trace.signals[-1] == "plant.train.energy"
+    assert set(done.trace.signals[:-1]) >= {"controller.head.right.slope", "controller.head.right.friction"}
+    assert done.trace["controller.head.right.slope"][-1] == done.result.identified["right"].slope
     assert np.diff(done.trace.time).min() == pytest.approx(0.04)
 
 
@@ -138,16 +140,19 @@ def test_what_cannot_be_recorded_is_refused(signals: list[str] | None, every: in
 
 def test_signals_can_be_checked_before_a_run() -> None:
     axis = detent.load(AXIS)
-    axis.check_signals(["head.*", "all", "train.current"])
+    axis.check_signals(["controller.head.*", "all", "plant.train.current"])
     with pytest.raises(DetentError, match=r"did you mean 'train\.current'"):
-        axis.check_signals(["train.curent"])
+        axis.check_signals(["plant.train.curent"])
 
 
 def test_a_run_without_record_says_so_when_asked_for_it(tmp_path: Path) -> None:
     done = detent.load(AXIS).run(LETTER, every=0)
     assert done.done
     assert done.trace is None
-    for wanted in (lambda: done.save(tmp_path / "t.csv"), lambda: done.plot(["train.current"], tmp_path / "t.png")):
+    for wanted in (
+        lambda: done.save(tmp_path / "t.csv"),
+        lambda: done.plot(["plant.train.current"], tmp_path / "t.png"),
+    ):
         with pytest.raises(DetentError, match="this run recorded nothing; run with every >= 1"):
             wanted()
     assert "Printed" in done.report(tmp_path / "r.html").read_text(encoding="utf-8")
@@ -220,9 +225,9 @@ def test_the_report_is_one_file_with_its_small_print(run: detent.Run, tmp_path: 
 
 
 def test_signals_are_drawn(run: detent.Run, tmp_path: Path) -> None:
-    path = run.plot(["train.velocity", "head.*"], tmp_path / "plot.svg", (7.0, 8.5))
+    path = run.plot(["plant.train.velocity", "controller.head.*"], tmp_path / "plot.svg", (7.0, 8.5))
     text = path.read_text(encoding="utf-8")
-    for word in ("train.velocity", "head.drive_cmd", "[count]", "time [s]", "print head · letter.txt"):
+    for word in ("plant.train.velocity", "controller.head.drive_cmd", "[count]", "time [s]", "print head · letter.txt"):
         assert word in text
 
 

@@ -27,6 +27,7 @@ pytestmark = pytest.mark.compiled
 
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
 VERBS = ("examples", "check", "run", "compare", "timing", "plot", "registers")
+STATE = "controller.head.state"
 OBSTACLE = ("--set", "disturbance.obstacle.position=7 in")
 
 
@@ -143,7 +144,7 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "run: a binary job": (["run", AXIS, "--job", binary], "binary.prn: .*mean nothing to a printer"),
         "run: an empty job": (["run", AXIS, "--job", "empty.txt"], "empty.txt: came an empty file"),
         "run: a line too wide": (["run", AXIS, "--job", "wide.txt"], "wide.txt printed line 1: came ink from"),
-        "run: unknown signal": (["run", AXIS, *job, "--signals", "train.curent"], "did you mean 'train.current'"),
+        "run: unknown signal": (["run", AXIS, *job, "--signals", "plant.train.curent"], "mean 'plant.train.current'"),
         "run: unknown kind of trace": (["run", AXIS, *job, "--trace", "h5,xlsx"], "--trace: came 'xlsx'; allowed: h5,"),
         "run: output is a file": (["run", AXIS, *job, "-o", binary], "--output binary.prn: cannot be written"),
         "run: output below a file": (["run", AXIS, *job, "-o", binary + "/x"], "--output .*cannot be written"),
@@ -159,14 +160,14 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "plot: no trace": (["plot", binary], "suffix '.prn'"),
         "plot: directory": (["plot", "folder.h5"], "folder.h5"),
         "plot: not HDF5": (["plot", "text.h5"], "text.h5: came"),
-        "plot: unknown signal": (["plot", trace, "--signals", "train.curent"], "did you mean 'train.current'"),
-        "plot: no picture": (["plot", trace, "--signals", "head.state", "-o", "p.txt"], "cannot be saved as '.txt'"),
-        "plot: no folder": (["plot", trace, "--signals", "head.state", "-o", "no/p.png"], "no folder no"),
+        "plot: unknown signal": (["plot", trace, "--signals", "plant.train.curent"], "mean 'plant.train.current'"),
+        "plot: no picture": (["plot", trace, "--signals", STATE, "-o", "p.txt"], "cannot be saved as '.txt'"),
+        "plot: no folder": (["plot", trace, "--signals", STATE, "-o", "no/p.png"], "no folder no"),
         "plot: a time that is not there": (
-            ["plot", trace, "--signals", "head.state", "--from", "1e6"], "no rows from 1e.06 s to inf s; it holds",
+            ["plot", trace, "--signals", STATE, "--from", "1e6"], "no rows from 1e.06 s to inf s; it holds",
         ),
-        "plot: backwards": (["plot", trace, "--signals", "head.state", "--from", "3", "--to", "2"], "no rows from 3 s"),
-        "plot: no number": (["plot", trace, "--signals", "head.state", "--from", "nan"], "no rows from nan s"),
+        "plot: backwards": (["plot", trace, "--signals", STATE, "--from", "3", "--to", "2"], "no rows from 3 s"),
+        "plot: no number": (["plot", trace, "--signals", STATE, "--from", "nan"], "no rows from nan s"),
         "plot: an empty trace": (["plot", "empty.csv", "--signals", "x"], "no rows"),
         "examples: a file in the way": (["examples", "--copy", binary], "--copy binary.prn: cannot be written"),
         "registers: too much": (["registers", "head"], "head"),
@@ -339,7 +340,11 @@ def test_every_kind_of_trace_holds_the_same_with_units(tmp_path: Path) -> None:
     traces = [load_trace(tmp_path / "out" / f"trace.{kind}") for kind in ("h5", "csv", "parquet")]
     for trace in traces:
         assert trace.signals == tuple(default_signals())
-        assert (trace.units["t"], trace.units["train.current"], trace.units["train.energy"]) == ("s", "A", "J")
+        assert (trace.units["t"], trace.units["plant.train.current"], trace.units["plant.train.energy"]) == (
+            "s",
+            "A",
+            "J",
+        )
         for name in trace:
             np.testing.assert_array_equal(trace[name], traces[0][name])
     with (tmp_path / "out" / "trace.csv").open(encoding="utf-8", newline="") as stream:
@@ -371,9 +376,9 @@ def test_other_files_of_the_folder_are_left_alone(tmp_path: Path) -> None:
 def test_signals_come_beside_the_usual_ones(tmp_path: Path) -> None:
     words = (
         "--signals",
-        "head.right.slope,encoder.edge",
+        "controller.head.right.slope,plant.encoder.edge",
         "--signals",
-        "head.queue.*",
+        "controller.head.queue.*",
         "--every",
         "100",
         "--trace",
@@ -381,7 +386,12 @@ def test_signals_come_beside_the_usual_ones(tmp_path: Path) -> None:
     )
     assert call("run", AXIS, "--job", LETTER, "-o", "out", *words).status == 0
     trace = load_trace(tmp_path / "out" / "trace.h5")
-    assert set(trace.signals) >= {*default_signals(), "head.right.slope", "encoder.edge", "head.queue.waiting"}
+    assert set(trace.signals) >= {
+        *default_signals(),
+        "controller.head.right.slope",
+        "plant.encoder.edge",
+        "controller.head.queue.waiting",
+    }
     assert np.diff(trace.time).min() == pytest.approx(4e-3)
     assert "profile-drive" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
@@ -517,20 +527,27 @@ def test_plot_without_signals_lists_them(trace: Path) -> None:
 
 @pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_plot_draws_what_was_asked_for(trace: Path, tmp_path: Path, suffix: str, magic: bytes) -> None:
-    words = ("--signals", "train.velocity,head.dr*", "--signals", "train.current", "-o", f"p.{suffix}")
+    words = (
+        "--signals",
+        "plant.train.velocity,controller.head.dr*",
+        "--signals",
+        "plant.train.current",
+        "-o",
+        f"p.{suffix}",
+    )
     assert call("plot", trace, *words, "--from", "7.5", "--to", "8") == Answer(0, f"figure: p.{suffix}\n", "")
     drawn = (tmp_path / f"p.{suffix}").read_bytes()
     assert drawn.startswith(magic)
     if suffix == "svg":
         text = drawn.decode()
-        for word in ("train.velocity", "head.drive_cmd", "train.current", "[A]", "time [ms]"):
+        for word in ("plant.train.velocity", "controller.head.drive_cmd", "plant.train.current", "[A]", "time [ms]"):
             assert word in text
 
 
 def test_plot_takes_one_end_of_the_time_and_a_default_file(trace: Path, tmp_path: Path) -> None:
-    assert call("plot", trace, "--signals", "head.state", "--to", "5", "--json").data == {"files": ["plot.png"]}
+    assert call("plot", trace, "--signals", STATE, "--to", "5", "--json").data == {"files": ["plot.png"]}
     assert (tmp_path / "plot.png").is_file()
-    assert call("plot", trace, "--signals", "head.state", "--from", "5").status == 0
+    assert call("plot", trace, "--signals", STATE, "--from", "5").status == 0
 
 
 def test_registers_lists_what_can_be_recorded() -> None:
@@ -540,8 +557,8 @@ def test_registers_lists_what_can_be_recorded() -> None:
     assert set(default_signals()) <= set(names)
     rows = call("registers", "--json").data
     assert [row["name"] for row in rows] == names
-    assert {"name": "train.current", "width": "f8", "unit": "A"}.items() <= next(
-        row for row in rows if row["name"] == "train.current"
+    assert {"name": "plant.train.current", "width": "f8", "unit": "A"}.items() <= next(
+        row for row in rows if row["name"] == "plant.train.current"
     ).items()
 
 

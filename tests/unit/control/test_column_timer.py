@@ -10,7 +10,7 @@ from detent.control.column_timer import (
     ColumnTimer,
     ColumnTimerParams,
     LineBuffer,
-    fire,
+    fired,
     next_column,
     schedule,
     set_lead,
@@ -19,7 +19,6 @@ from detent.control.column_timer import (
 )
 
 PITCH = 640  # 1/120 in = 2.5 emitters
-UNIT = EMITTER / 256
 
 
 @pytest.fixture
@@ -28,8 +27,6 @@ def p():
         column_zero=100 * 256,
         column_pitch=PITCH,
         lead_per_speed=1147,
-        flight_time=350e-6,
-        metres_per_unit=UNIT,
     )
 
 
@@ -132,23 +129,22 @@ def test_columns_behind_the_head_or_without_an_interval_are_missed(p):
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_a_fired_column_lands_after_its_flight(p, direction):
+def test_behind_a_fired_column_the_next_one_waits_for_its_emitter(p, direction):
     b = inked(4, 8)
     r = started(b, *((0, 20) if direction > 0 else (20, 0)), direction)
     column = r.column
-    speed = 0.5 * direction
-    fire(p, r, b, (100 + 2.5 * column) * EMITTER - speed * 350e-6 + 5e-6, speed, direction)
-    assert r.offset == pytest.approx(5e-6)
-    assert b.landed[column] == pytest.approx(5000, abs=1)
+    schedule(p, r, b, 100 + column * 5 // 2, direction, 1000, 200)
+    assert r.fire_us == 1000
+    fired(r, b, direction)
     assert (r.fired, r.column, r.fire_us, r.active) == (1, 12 - column, NEVER, 1)
-    fire(p, r, b, 0.0, 0.0, direction)
+    fired(r, b, direction)
     assert (r.fired, r.active) == (2, 0)
 
 
 def printed(rig, start, end):
     """Run a print, recorded at every tick."""
     rig.send_print(start, end)
-    rows = rig.record(5, ["head.columns.fired", "head.columns.column", "train.velocity"])
+    rows = rig.record(5, ["controller.head.columns.fired", "controller.head.columns.column", "plant.train.velocity"])
     assert rig.read_status() == 0
     return rows
 
@@ -164,24 +160,24 @@ def test_every_inked_column_of_a_line_is_fired_once_and_in_order(s):
         (450 + 765 * 2.5, 450 + 475 * 2.5, columns[::-1]),
     ):
         bank = 1 - rig.head.columns.bank
-        rig.r.buffer.ink[:] = [0] * (2 * COLUMNS)
+        rig.head.buffer.ink[:] = [0] * (2 * COLUMNS)
         for column in columns:
-            rig.r.buffer.ink[bank * COLUMNS + int(column)] = 1
-            rig.r.buffer.landed[bank * COLUMNS + int(column)] = 1 << 30
+            rig.head.buffer.ink[bank * COLUMNS + int(column)] = 1
+            rig.r.plant.paper.landed[bank * COLUMNS + int(column)] = 1 << 30
         rows = printed(rig, start, round(end))
         assert rig.head.speed == s
         c = rig.head.columns
         assert (c.bank, c.active, c.missed, c.fired - fired_before) == (bank, 0, 0, 150)
-        steps = np.flatnonzero(np.diff(rows["head.columns.fired"], prepend=fired_before))
+        steps = np.flatnonzero(np.diff(rows["controller.head.columns.fired"], prepend=fired_before))
         assert len(steps) == 150, "two columns in one period"
-        np.testing.assert_array_equal(rows["head.columns.column"][steps - 1], order)
+        np.testing.assert_array_equal(rows["controller.head.columns.column"][steps - 1], order)
         fired_before = c.fired
-        landed = np.array(rig.r.buffer.landed[bank * COLUMNS : (bank + 1) * COLUMNS])
+        landed = np.array(rig.r.plant.paper.landed[bank * COLUMNS : (bank + 1) * COLUMNS])
         assert np.all(landed[columns] != 1 << 30)
         # What is left is speed error x flight time, the extrapolation, and the microseconds of the times.
         direction = 1 if order is columns else -1
-        speed_error = rows["train.velocity"][steps - 1] - direction * s / 6 * 0.0254
+        speed_error = rows["plant.train.velocity"][steps - 1] - direction * s / 6 * 0.0254
         rounding = EMITTER / 50 + 2e-6 * s / 6 * 0.0254
         np.testing.assert_allclose(landed[order] * 1e-9, speed_error * 350e-6, rtol=0, atol=rounding)
         assert np.abs(speed_error).max() < 0.1 * s / 6 * 0.0254
-        assert c.offset * 1e9 == pytest.approx(landed[order[-1]], abs=1)
+        assert rig.r.plant.paper.offset * 1e9 == pytest.approx(landed[order[-1]], abs=1)

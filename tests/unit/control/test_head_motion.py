@@ -2,7 +2,6 @@
 
 import pytest
 
-from detent.control.column_timer import LineBuffer
 from detent.control.head_computer import (
     HIGH_ACCEL,
     HIGH_REVERSE,
@@ -133,13 +132,13 @@ def test_ramp_interval_has_two_readings(p, c):
 
 @pytest.mark.parametrize(("direction", "drive"), [(1, 132), (-1, -124)])
 def test_low_speed_begins_with_friction_and_ir(p, c, direction, drive):
-    begin_move(p, plan(c, direction, 30), LineBuffer(), False)
+    begin_move(p, plan(c, direction, 30), False)
     assert (c.state, c.drive_cmd, c.start_emitters, c.moves) == (LOW_START, drive, 5, 1)
     assert (c.interval_us, c.emitter_seen, c.last_emitter_us, c.phase_start) == (0, 0, 1_000_000, 1000)
 
 
 def test_a_run_shorter_than_the_open_loop_start_ends_it_at_its_target(p, c):
-    begin_move(p, plan(c, 1, 30, 2), LineBuffer(), False)
+    begin_move(p, plan(c, 1, 30, 2), False)
     assert c.start_emitters == 2
     c.emitter = 1001
     move_emitter(p, c)
@@ -150,11 +149,11 @@ def test_a_run_shorter_than_the_open_loop_start_ends_it_at_its_target(p, c):
 
 
 def test_high_speed_begins_with_friction_and_ir_and_ramps_to_the_top(p, c):
-    begin_move(p, plan(c, -1, 240), LineBuffer(), False)
+    begin_move(p, plan(c, -1, 240), False)
     assert (c.state, c.drive_cmd, c.ramp_top, c.ramp_us) == (HIGH_ACCEL, -124, 283, 418)
     assert c.next_ramp_us == 1_000_000 + 418
     p.drive_limit = 250
-    begin_move(p, plan(c, -1, 240), LineBuffer(), False)
+    begin_move(p, plan(c, -1, 240), False)
     assert c.ramp_top == 250
 
 
@@ -162,12 +161,12 @@ def test_high_speed_begins_with_friction_and_ir_and_ramps_to_the_top(p, c):
 def test_a_turn_jumps_by_the_friction_of_both_directions(p, c, direction, old, command):
     # Before the turn V counts along the old direction, so braking is negative.
     c.drive, c.next_ramp_us = -old, 1_000_123
-    begin_move(p, plan(c, direction, 240), LineBuffer(), True)
+    begin_move(p, plan(c, direction, 240), True)
     assert (c.drive_cmd, c.turn_arounds) == (command, 1)
     assert c.next_ramp_us == 1_000_123, "the ramp goes on in its own time"
     p.friction_jump = 0
     c.drive = -old
-    begin_move(p, plan(c, direction, 240), LineBuffer(), True)
+    begin_move(p, plan(c, direction, 240), True)
     assert c.drive_cmd == direction * old
 
 
@@ -235,7 +234,7 @@ def test_braking_passes_through_zero_with_the_lines_changing_there(c, transition
 
 
 def test_the_ramp_waits_for_its_time_and_holds_its_top_for_one_interval(p, c):
-    begin_move(p, plan(c, 1, 60), LineBuffer(), False)
+    begin_move(p, plan(c, 1, 60), False)
     times = []
     for now in range(1_000_000, 1_030_000, 40):
         c.now_us, before = now, c.drive
@@ -251,7 +250,7 @@ def test_the_ramp_waits_for_its_time_and_holds_its_top_for_one_interval(p, c):
 
 @pytest.mark.parametrize(("interval", "reached"), [(0, False), (84, False), (83, True), (50, True)])
 def test_speed_exit_of_the_ramp(p, c, interval, reached):
-    begin_move(p, plan(c, 1, 240), LineBuffer(), False)
+    begin_move(p, plan(c, 1, 240), False)
     c.interval_us = interval
     assert speed_reached(c) is reached
     move_emitter(p, c)

@@ -3,7 +3,6 @@
 import pytest
 from tests.print_head_rig import EMITTER, Rig
 
-from detent.control.column_timer import LineBuffer
 from detent.control.head_computer import (
     CALCULATE,
     FAULT,
@@ -42,9 +41,9 @@ MOVING = (LOW_START, LOW_STEADY, LOW_STOP, HIGH_ACCEL, HIGH_STEADY, HIGH_TRANSIT
 def faulty():
     """An axis in FAULT: its head ran against something."""
     rig = Rig().pretend_identified(emitter=1000)
-    rig.p.train.right_end = 1500 * EMITTER
+    rig.p.plant.train.right_end = 1500 * EMITTER
     assert rig.run_to(3000) == OBSTRUCTION
-    rig.p.train.right_end = rig.spec.limits.travel
+    rig.p.plant.train.right_end = rig.spec.limits.travel
     assert rig.head.state == FAULT
     return rig
 
@@ -62,12 +61,12 @@ MOTIONS = ((0x92, 0x08, 0x00), (0xA2, 0x08, 0x00), (0x8D, 0x05, 0x00, 0x00, 0x08
 @pytest.mark.parametrize("command", MOTIONS)
 def test_no_motion_before_calibration_or_after_a_fault(make, command):
     rig = make()
-    state, moves, x = rig.head.state, rig.head.moves, rig.r.train.position
+    state, moves, x = rig.head.state, rig.head.moves, rig.r.plant.train.position
     rig.send(*command)
     assert rig.next_status() == NOT_CALIBRATED
     rig.run(5000)
     assert (rig.head.state, rig.head.moves, rig.head.drive_cmd, rig.head.out.count) == (state, moves, 0, 0)
-    assert rig.r.train.position == pytest.approx(x, abs=1e-4)
+    assert rig.r.plant.train.position == pytest.approx(x, abs=1e-4)
 
 
 @pytest.mark.parametrize("make", [powered, faulty])
@@ -120,8 +119,8 @@ def test_an_obstacle_ends_every_move_in_fault_with_the_drive_off(s, states, dire
         rig.set_speed(s)
         rig.controlled_run_to(2175 + 2000 * direction, wait=False)
         assert rig.in_state(state)
-        here = rig.r.train.position
-        rig.p.train.left_end, rig.p.train.right_end = here - EMITTER, here + EMITTER
+        here = rig.r.plant.train.position
+        rig.p.plant.train.left_end, rig.p.plant.train.right_end = here - EMITTER, here + EMITTER
         assert rig.next_status(3) == OBSTRUCTION
         assert (rig.head.state, rig.head.drive_cmd, rig.head.out.count, rig.head.out.transition) == (FAULT, 0, 0, 0)
         assert rig.head.homed == 0
@@ -136,10 +135,10 @@ def test_a_head_that_is_pushed_back_to_the_frame_ends_in_fault(s):
     rig.set_speed(s)
     rig.controlled_run_to(4000, wait=False)
     rig.run(2500)
-    rig.p.push.force, rig.p.push.begin, rig.p.push.end = -80.0, rig.r.tick, rig.r.tick + 100_000
+    rig.p.plant.push.force, rig.p.plant.push.begin, rig.p.plant.push.end = -80.0, rig.r.tick, rig.r.tick + 100_000
     assert rig.next_status(3) == OBSTRUCTION
     assert (rig.head.state, rig.head.drive_cmd, rig.head.out.count) == (FAULT, 0, 0)
-    assert rig.r.tick < rig.p.push.end
+    assert rig.r.tick < rig.p.plant.push.end
 
 
 @pytest.mark.parametrize("s", [30, 60, 120])
@@ -149,7 +148,7 @@ def test_a_short_push_is_no_fault_and_the_move_is_finished(s, force):
     rig.set_speed(s)
     rig.controlled_run_to(4000, wait=False)
     rig.run(5000)
-    rig.p.push.force, rig.p.push.begin, rig.p.push.end = force, rig.r.tick, rig.r.tick + 500
+    rig.p.plant.push.force, rig.p.plant.push.begin, rig.p.plant.push.end = force, rig.r.tick, rig.r.tick + 500
     assert rig.next_status() == OK
     assert rig.head.emitter == pytest.approx(4000, abs=12)
 
@@ -160,14 +159,14 @@ def test_a_standing_head_is_found_even_when_no_drive_is_to_spare():
     rig.set_speed(18)
     rig.controlled_run_to(3000, wait=False)
     assert rig.in_state(LOW_STEADY)
-    rig.p.train.right_end = rig.r.train.position + EMITTER
+    rig.p.plant.train.right_end = rig.r.plant.train.position + EMITTER
     assert rig.next_status(2) == OBSTRUCTION
     assert rig.head.now_us - rig.head.last_emitter_us == pytest.approx(1_000_000, abs=40)
 
 
 def test_a_fault_answers_the_running_and_all_waiting_commands_in_order():
     rig = Rig().pretend_identified(emitter=1000)
-    rig.p.train.right_end = 1500 * EMITTER
+    rig.p.plant.train.right_end = 1500 * EMITTER
     rig.run_to(3000, wait=False)
     for command in ((0x99, 100), (0x92, 0x05, 0x00), (0x40,), (0x41,), (0x41,)):
         rig.send(*command)
@@ -184,7 +183,7 @@ def test_a_runaway_is_a_fault():
     assert rig.head.state == FAULT
     assert rig.speed_value > 300
     rig.run(12500)
-    assert rig.r.train.velocity == 0
+    assert rig.r.plant.train.velocity == 0
     assert rig.head.out.count == 0
 
 
@@ -195,7 +194,7 @@ def test_the_fastest_plausible_overshoot_is_no_runaway():
 
 def test_fault_at_rest_answers_nothing():
     rig = Rig().pretend_identified()
-    fault(rig.p.head, rig.head, OBSTRUCTION)
+    fault(rig.p.controller, rig.head, OBSTRUCTION)
     assert rig.next_status(0.1) is None
     assert rig.head.state == FAULT
 
@@ -276,21 +275,21 @@ def test_homing_never_exceeds_its_drive_limit():
     # The drive rises by a count per millisecond at a frame: with 100 ms to recognise it, it would go beyond the limit.
     rig = Rig(overrides=["homing.contact_timeout=100 ms"])
     rig.send(0x01)
-    rows = rig.record(6, ["head.drive_cmd", "head.state", "train.current"])
-    homing = (rows["head.state"] == HOME_LEFT) | (rows["head.state"] == HOME_RIGHT)
+    rows = rig.record(6, ["controller.head.drive_cmd", "controller.head.state", "plant.train.current"])
+    homing = (rows["controller.head.state"] == HOME_LEFT) | (rows["controller.head.state"] == HOME_RIGHT)
     assert not homing[-1]
     # 110/300 x 38 V through 12 ohm
-    drive = abs(rows["head.drive_cmd"][homing])
+    drive = abs(rows["controller.head.drive_cmd"][homing])
     assert (drive[0], drive.max()) == (49, 110)
-    assert 1.1 < abs(rows["train.current"][homing]).max() < 1.2
+    assert 1.1 < abs(rows["plant.train.current"][homing]).max() < 1.2
 
 
 @pytest.mark.parametrize("state", MOVING)
 def test_a_reversed_sequence_ends_a_stop_and_nothing_else(state):
     rig = Rig().pretend_identified()
-    c, b = rig.head, LineBuffer()
+    c = rig.head
     c.state, c.direction, c.operation, c.interval_us = state, 1, RUN, 2000
-    on_reverse_edge(rig.p.head, c, b)
+    on_reverse_edge(rig.p.controller, c)
     assert c.state == (IDLE if state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE) else state)
 
 
@@ -299,7 +298,7 @@ def test_a_reversal_at_speed_is_a_missing_pulse(interval, ends):
     rig = Rig().pretend_identified()
     c = rig.head
     c.state, c.direction, c.operation, c.interval_us = HIGH_TRANSITION, -1, RUN, interval
-    on_reverse_edge(rig.p.head, c, LineBuffer())
+    on_reverse_edge(rig.p.controller, c)
     assert (c.state == IDLE) is ends
 
 
@@ -314,39 +313,39 @@ def test_stops_survive_missing_encoder_pulses():
 @pytest.mark.parametrize("command", ["run", "calculate"])
 def test_swapped_motor_leads_end_in_a_fault_within_a_finger_of_travel(command):
     rig = Rig(start=0.2).pretend_identified(emitter=2000)
-    rig.p.train.force_constant *= -1
-    rig.p.train.emf_constant *= -1
-    fill_period(rig.p.train)
-    begin = rig.r.train.position
+    rig.p.plant.train.force_constant *= -1
+    rig.p.plant.train.emf_constant *= -1
+    fill_period(rig.p.plant.train)
+    begin = rig.r.plant.train.position
     code = rig.run_to(3900) if command == "run" else rig.calculate()
     assert code == OBSTRUCTION
     assert rig.head.state == FAULT
     assert rig.head.out.count == 0
     rig.run(25000)
-    assert rig.r.train.velocity == 0
-    assert 60 <= abs(rig.r.train.position - begin) / EMITTER < 350
+    assert rig.r.plant.train.velocity == 0
+    assert 60 <= abs(rig.r.plant.train.position - begin) / EMITTER < 350
 
 
 @pytest.mark.parametrize("state", [POWER_ON, IDLE, FAULT])
 def test_a_head_that_is_pushed_keeps_its_position(state):
     rig = Rig().pretend_identified(emitter=1000)
     rig.head.state = state
-    rig.p.push.force, rig.p.push.begin, rig.p.push.end = 40.0, rig.r.tick, rig.r.tick + 5000
+    rig.p.plant.push.force, rig.p.plant.push.begin, rig.p.plant.push.end = 40.0, rig.r.tick, rig.r.tick + 5000
     rig.run(30000)
     assert rig.head.state == state
-    assert rig.r.train.velocity == 0
-    moved = (rig.r.train.position - rig.p.encoder.origin) / EMITTER
+    assert rig.r.plant.train.velocity == 0
+    moved = (rig.r.plant.train.position - rig.p.plant.encoder.origin) / EMITTER
     assert moved > 1100
     assert rig.head.emitter == int(moved)
 
 
 def test_emitter_interval_is_unknown_after_a_start_and_after_a_reversal():
     rig = Rig().pretend_identified()
-    p, c, b = rig.p.head, rig.head, LineBuffer()
+    p, c = rig.p.controller, rig.head
     c.state = IDLE
     seen = []
     for when, change in ((100, 1), (200, 1), (350, 1), (500, -1), (600, -1)):
-        on_emitter(p, c, b, when, change)
+        on_emitter(p, c, when, change)
         seen.append((c.interval_us, c.emitter - 1000))
     assert seen == [(0, 1), (100, 2), (150, 3), (0, 2), (100, 1)]
 
@@ -368,7 +367,7 @@ def test_fast_windows_keep_the_last_and_slow_ones_add_up():
 
 def test_the_computer_wakes_for_its_earliest_timer():
     rig = Rig().pretend_identified()
-    p, c = rig.p.head, rig.head
+    p, c = rig.p.controller, rig.head
     c.last_emitter_us, c.next_ramp_us, c.next_trim_us, c.window_us = 1000, 5000, 4000, 3000
     table = {
         LOW_STOP: 1000 + 5000, HIGH_TRANSITION: 5000, HIGH_REVERSE: 5000, LOW_START: 51_000, HIGH_ACCEL: 5000,

@@ -112,7 +112,7 @@ def test_each_clock_of_the_decoder_shows_and_a_pulse_is_one_clock_long():
     assert all(int(t) in count.times for t in falls)  # the counter takes the pulse at the next clock
 
 
-WATCHED = ("train.position", "train.velocity", "train.current")
+WATCHED = ("plant.train.position", "plant.train.velocity", "plant.train.current")
 
 
 @pytest.mark.parametrize(

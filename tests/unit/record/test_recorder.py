@@ -116,7 +116,7 @@ def test_a_recorded_axis_shows_its_registers_as_they_were(every: int) -> None:
     spec = load_spec(
         EXAMPLE, ["disturbance.push.force=20 N", "disturbance.push.at=0 s", "disturbance.push.duration=9 s"]
     )
-    names = ["train.position", "train.velocity", "head.state", "encoder.edge"]
+    names = ["plant.train.position", "plant.train.velocity", "controller.head.state", "plant.encoder.edge"]
     recorder = Recorder(PrintHead, names, every=every, period=TICK)
     recorded, stepped = print_head_machine(spec, recorder), print_head_machine(spec)
     recorded.pass_time(200 * TICK)
@@ -128,5 +128,5 @@ def test_a_recorded_axis_shows_its_registers_as_they_were(every: int) -> None:
         values = stepped.state.values()
         assert trace.time[row] == stepped.time
         assert {name: trace[name][row] for name in names} == {name: values[name] for name in names}
-    assert trace["train.velocity"][-1] > 0
+    assert trace["plant.train.velocity"][-1] > 0
     assert recorded.state.snapshot() == stepped.state.snapshot()

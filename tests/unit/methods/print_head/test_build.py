@@ -137,13 +137,23 @@ def test_the_largest_current_is_warned_about() -> None:
 
 def test_the_parameters_of_the_default_axis_are_those_of_the_specification() -> None:
     p = build_print_head(load_spec(EXAMPLE))
-    assert (p.head.ir, p.head.slope_default, p.head.friction_default, p.head.drive_limit) == (96, 152, 32, 300)
-    assert (p.head.run_speed, p.head.print_speed, p.head.homing_speed, p.head.homing_limit) == (240, 240, 30, 110)
-    assert (p.head.expected_width, p.head.width_tolerance) == (4350, 15)
-    assert (p.head.columns.column_zero, p.head.columns.column_pitch) == (450 * 256, 640)
-    assert p.encoder.edge_pitch == pytest.approx(EMITTER / 4, rel=1e-12)
+    assert (p.controller.ir, p.controller.slope_default, p.controller.friction_default, p.controller.drive_limit) == (
+        96,
+        152,
+        32,
+        300,
+    )
+    assert (p.controller.run_speed, p.controller.print_speed, p.controller.homing_speed, p.controller.homing_limit) == (
+        240,
+        240,
+        30,
+        110,
+    )
+    assert (p.controller.expected_width, p.controller.width_tolerance) == (4350, 15)
+    assert (p.controller.columns.column_zero, p.controller.columns.column_pitch) == (450 * 256, 640)
+    assert p.plant.encoder.edge_pitch == pytest.approx(EMITTER / 4, rel=1e-12)
     # A wire at 40 in/s is fired 350 us x 40 in/s = 4.2 emitters early.
-    assert p.head.columns.lead_per_speed * 240 / 65536 == pytest.approx(4.2, rel=1e-3)
+    assert p.controller.columns.lead_per_speed * 240 / 65536 == pytest.approx(4.2, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -151,8 +161,8 @@ def test_the_parameters_of_the_default_axis_are_those_of_the_specification() -> 
 )  # fmt: skip
 def test_the_effort_limits_the_drive_and_is_never_passed(effort: str, counts: int) -> None:
     p = build_print_head(load_spec(EXAMPLE, [f"limits.effort={effort}"]))
-    assert p.head.drive_limit == counts
-    assert p.head.homing_limit == min(110, counts)
+    assert p.controller.drive_limit == counts
+    assert p.controller.homing_limit == min(110, counts)
 
 
 def test_drift_is_known_to_the_machine_and_not_to_the_computer() -> None:
@@ -162,21 +172,23 @@ def test_drift_is_known_to_the_machine_and_not_to_the_computer() -> None:
             EXAMPLE, ["disturbance.motor_constant=10 %", "disturbance.friction_right=20 %", "disturbance.supply=34 V"]
         )
     )
-    assert bytes(drifted.head) == bytes(stated.head)
-    assert drifted.supply == 34.0
-    assert drifted.train.force_constant == pytest.approx(1.1 * stated.train.force_constant)
-    assert drifted.train.emf_constant == pytest.approx(1.1 * stated.train.emf_constant)
+    assert bytes(drifted.controller) == bytes(stated.controller)
+    assert drifted.plant.supply == 34.0
+    assert drifted.plant.train.force_constant == pytest.approx(1.1 * stated.plant.train.force_constant)
+    assert drifted.plant.train.emf_constant == pytest.approx(1.1 * stated.plant.train.emf_constant)
     # The drift is that of the drive that overcomes friction, F R / k: the force drifts by both.
-    assert drifted.train.friction.coulomb_right == pytest.approx(1.1 * 1.2 * stated.train.friction.coulomb_right)
-    assert drifted.train.friction.coulomb_left == pytest.approx(1.1 * stated.train.friction.coulomb_left)
+    assert drifted.plant.train.friction.coulomb_right == pytest.approx(
+        1.1 * 1.2 * stated.plant.train.friction.coulomb_right
+    )
+    assert drifted.plant.train.friction.coulomb_left == pytest.approx(1.1 * stated.plant.train.friction.coulomb_left)
 
 
 @pytest.mark.parametrize(("place", "left", "right"), [("7 in", 0.0, 7.0), ("2 in", 2.0, 14.5)])
 def test_an_obstacle_bounds_the_side_the_head_does_not_stand_on(place: str, left: float, right: float) -> None:
     p = build_print_head(load_spec(EXAMPLE, [f"disturbance.obstacle.position={place}"]))
-    assert p.train.left_end == pytest.approx(left * 0.0254)
-    assert p.train.right_end == pytest.approx(right * 0.0254)
-    assert p.head.expected_width == 4350
+    assert p.plant.train.left_end == pytest.approx(left * 0.0254)
+    assert p.plant.train.right_end == pytest.approx(right * 0.0254)
+    assert p.controller.expected_width == 4350
 
 
 def test_a_push_begins_and_ends_with_its_ticks() -> None:
@@ -189,7 +201,7 @@ def test_a_push_begins_and_ends_with_its_ticks() -> None:
 
 def test_jitter_is_counted_in_quarter_cycles() -> None:
     p = build_print_head(load_spec(EXAMPLE, ["encoder.jitter=9 deg"]))
-    assert p.encoder.jitter == pytest.approx(math.radians(9) / (math.pi / 2)) == pytest.approx(0.1)
+    assert p.plant.encoder.jitter == pytest.approx(math.radians(9) / (math.pi / 2)) == pytest.approx(0.1)
 
 
 def test_a_substep_is_short_against_the_fastest_time_constant() -> None:

@@ -116,7 +116,7 @@ def test_white_space_is_skipped() -> None:
     run, trace, _ = play_recorded(far)
     assert [line.number for line in run.lines] == [1, 2]
     assert [line.characters for line in run.lines] == [3, 4]
-    second = trace.between(run.lines[1].start, run.lines[1].stop)["train.position"]
+    second = trace.between(run.lines[1].start, run.lines[1].stop)["plant.train.position"]
     # Column 0 is 1.5 in from the frame and the words stand 6 in to the right of it; a ramp to 40 in/s takes 1.33 in.
     assert second.min() > (7.5 - 2) * INCH
     assert second.max() < (7.5 + 0.4 + 3) * INCH
@@ -213,7 +213,7 @@ def test_an_obstacle_before_homing_is_met_and_said(place: str, found: str) -> No
 def test_an_obstacle_after_homing_stops_the_job_where_it_stands() -> None:
     runner = _Runner(load_spec(EXAMPLE), LETTER, None, untold)
     runner.prepare()
-    runner.machine.params.train.left_end = 4 * INCH
+    runner.machine.params.plant.train.left_end = 4 * INCH
     runner.print_all()
     run = runner.finish()
     assert not run.done
@@ -221,7 +221,7 @@ def test_an_obstacle_after_homing_stops_the_job_where_it_stands() -> None:
     assert f"(line {run.lines[-1].number + 1 if run.lines else 1})" in run.failure
     assert "= 4.00 in from the left frame" in run.failure
     assert len(run.lines) < len(LETTER.lines)
-    assert runner.state.head.drive_cmd == 0
+    assert runner.state.controller.head.drive_cmd == 0
     assert len(run.strikes) == run.characters == sum(line.characters for line in run.lines)
 
 
@@ -266,7 +266,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_one_does_not() -> None:
     assert [trace[name].tobytes() for name in trace] == [trace_again[name].tobytes() for name in trace_again]
     assert run.to_dict() == again.to_dict()
     assert registers != registers_other
-    assert trace["train.position"].tobytes() != trace_other["train.position"].tobytes()
+    assert trace["plant.train.position"].tobytes() != trace_other["plant.train.position"].tobytes()
     assert run.rms_error != other.rms_error
 
 
@@ -279,7 +279,7 @@ def test_column_errors_agree_wherever_they_are_counted() -> None:
     runner = _Runner(load_spec(EXAMPLE, ["disturbance.push.force=6 N", *PUSH]), LETTER, None, untold)
     runner.prepare()
     runner.print_all()
-    run, columns = runner.finish(), runner.state.head.columns
+    run, columns = runner.finish(), runner.state.controller.head.columns
     # The run's figures, its lines, its bins, the axis computer's own count: one set of columns.
     assert run.columns == sum(line.columns for line in run.lines) == columns.fired
     assert run.errors_right.sum() + run.errors_left.sum() == run.columns
@@ -328,7 +328,7 @@ def test_progress_rises_to_one_and_says_what_is_done() -> None:
 
 
 def test_a_recording_is_closed_also_when_the_axis_failed() -> None:
-    recorder = Recorder(PrintHead, ["head.state"], every=1, period=TICK)
+    recorder = Recorder(PrintHead, ["controller.head.state"], every=1, period=TICK)
     run = print_job(load_spec(EXAMPLE, ["disturbance.obstacle.position=7 in"]), LETTER, recorder=recorder)
     trace = recorder.trace()
     assert trace.time[-1] == pytest.approx(run.time_end)

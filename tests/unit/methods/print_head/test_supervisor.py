@@ -4,9 +4,10 @@ from collections.abc import Callable
 import pytest
 from tests.print_head_rig import TICK, Rig
 
-from detent.control.head_computer import IDLE, HeadComputer
+from detent.control.head_computer import IDLE
 from detent.control.latch import read_latch, write_latch
 from detent.errors import AxisError
+from detent.methods.print_head.controller import PrintHeadController
 from detent.methods.print_head.supervisor import (
     MOST_OUTSTANDING,
     Answer,
@@ -27,7 +28,8 @@ class Axis:
     """The axis computer as the supervisor sees it: two latches, bytes taken and answered one per tick."""
 
     def __init__(self, *, ack_last: bool = False) -> None:
-        self.head = HeadComputer()
+        self.controller = PrintHeadController()
+        self.head = self.controller.head
         self.ack_last = ack_last
         self.taken: list[int] = []
         self.status: deque[int] = deque()
@@ -56,7 +58,7 @@ class Axis:
 
 def connect(axis: Axis, *, ack_last: bool = False) -> tuple[Supervisor, list[Answer]]:
     answers: list[Answer] = []
-    return Supervisor(axis.head, axis.pass_time, answers.append, patience=1.0, ack_last=ack_last), answers
+    return Supervisor(axis.controller, axis.pass_time, answers.append, patience=1.0, ack_last=ack_last), answers
 
 
 @pytest.mark.parametrize(
@@ -206,7 +208,7 @@ def test_the_real_axis_computer_and_the_supervisor_agree(ack_last: str) -> None:
     def pass_time(seconds: float) -> None:
         rig.run(max(1, round(seconds / TICK)))
 
-    supervisor = Supervisor(rig.head, pass_time, answers.append, ack_last=ack_last == "true")
+    supervisor = Supervisor(rig.r.controller, pass_time, answers.append, ack_last=ack_last == "true")
     for command in (position_high(), position_low(), set_speed(120), run_to(2000, tag=1), set_speed(44)):
         supervisor.send(command)
     supervisor.send(print_from(9 << 8, 1500, tag=2))  # no room for the run-up
