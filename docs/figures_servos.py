@@ -14,14 +14,15 @@ from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, pictur
 
 PINK = "#CC79A7"
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
+TRACKING = ("reference", "ps_first", "ps_second", "msb_first", "msb_second", "gate", "plus")
 PULSE_SIGNALS = (
-    "converters.carrier.count", "detector.ps", "converters.tracking.reference", "converters.tracking.ps_first",
-    "converters.tracking.ps_second", "converters.tracking.msb_first", "converters.tracking.msb_second",
-    "converters.tracking.gate", "converters.tracking.plus", "sequencer.distance", "speed.count",
+    "lines.carrier", "lines.ps", *(f"controller.converters.tracking.{name}" for name in TRACKING),
+    "controller.sequencer.distance", "controller.speed.count",
 )  # fmt: skip
 MOVE_SIGNALS = (
-    "train.position", "train.velocity", "sequencer.distance", "sequencer.mode", "sequencer.ready", "sequencer.stop",
-    "law.setpoint", "speed.word",
+    "plant.train.position", "plant.train.velocity",
+    *(f"controller.sequencer.{name}" for name in ("distance", "mode", "ready", "stop")),
+    "controller.law.setpoint", "controller.speed.word",
 )  # fmt: skip
 STRAIGHT = tuple(
     f"mechanics.friction.{side}.{kind}=0 N" for side in ("right", "left") for kind in ("coulomb", "static")
@@ -56,7 +57,7 @@ def plus_pulse() -> None:
     from detent.page.timing import plot_timing
 
     axis = phase_axis()
-    plus = axis.timing(4e-3, 2e-3, signals=["converters.tracking.plus"]).waveforms.signals[-1]
+    plus = axis.timing(4e-3, 2e-3, signals=["controller.converters.tracking.plus"]).waveforms.signals[-1]
     third = int(plus.times[np.flatnonzero(plus.values)[2]])
     tick = round(axis.simulated.tick * 1e12)
     shown = axis.timing((third // tick - 4) * tick * 1e-12, 9 * tick * 1e-12, signals=PULSE_SIGNALS).waveforms
@@ -66,21 +67,22 @@ def plus_pulse() -> None:
 def absolute_word() -> None:
     """Absolute word, and the error made of it, against the displacement from a positioning point."""
     from detent.methods.phase_servo.build import build_phase_servo
-    from detent.methods.phase_servo.system import Converters, run_converters
+    from detent.methods.phase_servo.controller import Converters, run_converters
     from detent.sensing.absolute_converter import absolute_error
     from detent.sensing.carrier import reset_carrier
 
     spec = phase_axis().spec
     n, p = spec.detector.counts, build_phase_servo(spec)
+    converters, detector = p.controller.converters, p.plant.detector
     steps = np.arange(-n - 8, n + 8, 0.25) + 0.125
     words, errors = [], []
     for d in steps:
         r = Converters()
         reset_carrier(r.carrier)
-        phase = p.detector.offset + round(float(d) * p.detector.turns_per_metre * spec.step)
-        run_converters(p.converters, r, p.detector, phase, 0, 3 * n)
+        phase = detector.offset + round(float(d) * detector.turns_per_metre * spec.step)
+        run_converters(converters, r, phase, 0, 3 * n)
         words.append(r.absolute.word)
-        errors.append(absolute_error(p.converters.absolute, r.absolute))
+        errors.append(absolute_error(converters.absolute, r.absolute))
     with picture("absolute-word.svg", 2, 5.2) as (word, error):
         word.plot(steps, words, color=BLUE, drawstyle="steps-mid")
         word.set_ylabel("absolute word R604")
@@ -114,23 +116,25 @@ def phase_move() -> None:
     in_speed = (t > 0.05) & (t < switched)
     with picture("phase-move.svg", 4, 8.4) as (speed, way, end, lines):
         one = spec.step / spec.sample_period
-        speed.plot(t, part["train.velocity"] / one, color=GREY, linewidth=1, label="true speed")
-        speed.step(t, part["speed.word"], where="post", color=BLUE, label="speed word")
-        speed.step(t[in_speed], part["law.setpoint"][in_speed], where="post", color=ORANGE, label="velocity table")
+        speed.plot(t, part["plant.train.velocity"] / one, color=GREY, linewidth=1, label="true speed")
+        speed.step(t, part["controller.speed.word"], where="post", color=BLUE, label="speed word")
+        speed.step(
+            t[in_speed], part["controller.law.setpoint"][in_speed], where="post", color=ORANGE, label="velocity table"
+        )
         speed.set_ylabel(f"pulses per {spec.sample_period * 1e6:.0f} µs")
         speed.legend(**LEGEND, ncols=3)
-        way.plot(t[in_speed], part["sequencer.distance"][in_speed], color=BLUE)
+        way.plot(t[in_speed], part["controller.sequencer.distance"][in_speed], color=BLUE)
         way.set_ylabel("distance counter\n[steps]")
         threshold = spec.method.threshold
         way.axhline(threshold, color=ORANGE, linewidth=1, linestyle="--")
         label(way, f"threshold {threshold}: position mode", (switched, threshold), (8, 22))
-        displacement = (part["train.position"] - move.target) / spec.step
+        displacement = (part["plant.train.position"] - move.target) / spec.step
         end.plot(t, displacement, color=BLUE)
         end.set_ylabel("position − target\n[steps]")
         end.set_ylim(-12, 4)
         zero_line(end)
         for place, name in enumerate(("stop", "ready", "mode")):
-            level = part[f"sequencer.{name}"].astype(float)
+            level = part[f"controller.sequencer.{name}"].astype(float)
             lines.step(t, 1.5 * place + level, where="post", color=BLUE)
             lines.fill_between(t, 1.5 * place, 1.5 * place + level, step="post", color=BLUE, alpha=0.12, linewidth=0)
         lines.set_yticks([0.5, 2.0, 3.5], ["stop", "ready", "mode"])

@@ -12,17 +12,16 @@ from detent.kernel.loop import advance
 from detent.kernel.turn_table import TURN
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.methods.phase_servo.system import (
+from detent.methods.phase_servo.controller import (
     ConverterParams,
     Converters,
-    PhaseServo,
-    PhaseServoParams,
-    be_ready,
+    command,
     convert,
     run_converters,
-    switch_on,
+    take_ready,
 )
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready, switch_on
 from detent.sensing.absolute_converter import AbsoluteConverter
 from detent.sensing.carrier import count_carrier, reset_carrier
 from detent.sensing.gauge import set_gauge
@@ -60,7 +59,7 @@ class Rig:
         switch_on(self.p, self.r, self.origin, self.spec.detector.seed)
         be_ready(self.p, self.r)
         if not locked:
-            self.r.converters.tracking.reference = 0
+            self.r.controller.converters.tracking.reference = 0
         self.target = self.origin
 
     @property
@@ -71,7 +70,7 @@ class Rig:
     @property
     def error(self) -> float:
         """Target less position [steps]."""
-        return (self.target - self.r.train.position) / self.step
+        return (self.target - self.r.plant.train.position) / self.step
 
     def run(self, seconds: float) -> None:
         """Let time pass, whatever the axis says."""
@@ -82,7 +81,7 @@ class Rig:
         left = ticks
         while left > 0:
             left -= advance(self.p, self.r, left, *NO_TRACE)
-            self.r.sequencer.event = 0
+            self.acknowledge()
 
     def run_until(self, seconds: float) -> None:
         """Let time pass up to a moment since power-on [s]."""
@@ -91,13 +90,16 @@ class Rig:
     def command(self, pitches: int) -> None:
         """Set strobe for a move by whole pitches."""
         self.target += pitches * self.pitch
-        set_gauge(self.r.gauge, self.r.tick, self.r.train.position, self.target, 2 * self.step)
-        s = self.r.sequencer
-        s.command, s.backward, s.strobe = abs(pitches) * self.counts, pitches < 0, 1
+        set_gauge(self.r.plant.gauge, self.r.tick, self.r.plant.train.position, self.target, 2 * self.step)
+        command(self.r.controller, abs(pitches) * self.counts, int(pitches < 0))
+
+    def acknowledge(self) -> None:
+        """What the host does when the axis waits for it."""
+        take_ready(self.r.controller)
 
     def disturb(self, kind: int, ticks: Sequence[int]) -> None:
         """Events of one kind on the lines at these ticks, none of them past; they replace the list so far."""
-        p, r = self.p.interference, self.r.interference
+        p, r = self.p.plant.interference, self.r.plant.interference
         p.entries = len(ticks)
         for k, moment in enumerate(ticks):
             p.tick[k], p.kind[k] = moment, kind
@@ -122,7 +124,7 @@ class Rig:
         left = ticks
         while left > 0:
             left -= advance(self.p, self.r, left, rows, picks, every)
-            self.r.sequencer.event = 0
+            self.acknowledge()
         index = np.arange(first // every + 1, self.r.tick // every + 1)
         table = rows[index % len(rows)].view(dtype)[:, 0]
         return {name: table[name].copy() for name in names} | {"t": index * every * self.tick}
@@ -147,7 +149,7 @@ class ConverterBench:
         reset_carrier(self.r.carrier)
         self.spare = AbsoluteConverter()
         """A second absolute converter for a test to clock otherwise."""
-        self.tick = 0
+        self.tick = self.ps = 0
         self.phase = self.d.offset
 
     def copy(self) -> "ConverterBench":
@@ -165,9 +167,8 @@ class ConverterBench:
     def clock(self, steps: float, *, corrupt: bool = False) -> int:
         """One tick with the carriage at `steps`; returns the pulse: 1, -1 or 0."""
         count_carrier(self.p.carrier, self.r.carrier)
-        compare(self.d, self.detector, self.r.carrier.count, steps)
-        self.detector.ps ^= corrupt
-        convert(self.p, self.r, self.detector.ps)
+        self.ps = compare(self.d, self.detector, self.r.carrier.count, steps) ^ corrupt
+        convert(self.p, self.r, self.ps)
         self.tick += 1
         return self.r.tracking.plus - self.r.tracking.minus
 
@@ -179,7 +180,7 @@ class ConverterBench:
     def travel(self, steps_per_cycle: float, ticks: int) -> int:
         """Net pulses of uniform motion, from where the last call has left the carriage (at first at 0)."""
         rate = round(steps_per_cycle * self.step / self.counts)
-        net = run_converters(self.p, self.r, self.d, self.phase, rate, ticks)
+        net = run_converters(self.p, self.r, self.phase, rate, ticks)
         self.phase += rate * ticks
         self.tick += ticks
         return net

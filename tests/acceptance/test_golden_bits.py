@@ -79,7 +79,8 @@ def phase_servo() -> Job:
     from tests.phase_servo_rig import Rig
 
     rig = Rig("detector.jitter=0.5 us", "detector.gain_error=2 %", "detector.offset_error=1 %", locked=True)
-    return Job({"": rig.p}, {"": rig.r}, (lambda: rig.command(1), lambda: rig.command(-1)), rig.run_ticks)
+    commands = (lambda: rig.command(1), lambda: rig.command(-1))
+    return Job({"": rig.p}, {"": rig.r}, commands, rig.run_ticks, rig.acknowledge)
 
 
 def filtered_servo() -> Job:

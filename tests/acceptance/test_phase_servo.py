@@ -24,9 +24,8 @@ from detent.control.phase_sequencer import (
     count_pulses,
     take_command,
 )
-from detent.drive.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
-from detent.drive.split_bridge import drive_two, sense_current
-from detent.methods.phase_servo.system import actuate, move
+from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
+from detent.methods.phase_servo.plant import move
 from detent.sensing.absolute_converter import absolute_error, count_absolute
 from detent.sensing.carrier import LARGE, Carrier, CarrierParams, coil_currents, count_carrier, reset_carrier
 from detent.sensing.interference import INSERT_MINUS, INSERT_PLUS
@@ -120,7 +119,7 @@ def test_03_the_square_wave_leads_the_carrier_by_the_place_in_the_pitch():
         levels = []
         for _ in range(2 * N):
             bench.clock(x)
-            levels.append((bench.r.carrier.count, bench.detector.ps))
+            levels.append((bench.r.carrier.count, bench.ps))
         wave = [ps for _, ps in sorted(levels[:N])]
         assert [ps for _, ps in sorted(levels[N:])] == wave  # period N
         assert sum(wave) == N // 2  # 50 % duty, in one piece
@@ -137,11 +136,11 @@ def test_03_the_square_wave_leads_the_carrier_by_the_place_in_the_pitch():
 
 def test_04_nothing_moves_and_no_pulse_comes():
     rig = Rig(locked=True)
-    rig.r.bridge.enabled = 0
+    rig.r.lines.enable = 0
     rig.run_ticks(10**6)
-    assert rig.r.converters.carrier.count == 10**6 % N
-    assert rig.r.sequencer.last_pulse == 0  # no pulse of either sign
-    assert (rig.r.sequencer.distance, rig.r.sequencer.position) == (0, 0)
+    assert rig.r.controller.converters.carrier.count == 10**6 % N
+    assert rig.r.controller.sequencer.last_pulse == 0  # no pulse of either sign
+    assert (rig.r.controller.sequencer.distance, rig.r.controller.sequencer.position) == (0, 0)
 
     bench = ConverterBench()
     assert bench.travel(0.0, 10**6) == 0
@@ -192,7 +191,7 @@ def gate_rows(bench: ConverterBench, ticks: int, steps: float) -> list[dict[str,
         t = bench.r.tracking
         seen = {"s1": t.ps_first & t.ps_second, "s2": 1 - (t.ps_first | t.ps_second)}
         tick, pulse = bench.tick, bench.clock(steps)
-        levels = {"ps": bench.detector.ps, "msb": t.reference >> 5, "ps_before": t.ps_second}
+        levels = {"ps": bench.ps, "msb": t.reference >> 5, "ps_before": t.ps_second}
         rows.append({"tick": tick, "gate": t.gate, "pulse": pulse} | seen | levels)
     return rows
 
@@ -357,7 +356,7 @@ def check_words(count):
         bench = ConverterBench()
         for _ in range(3 * N):
             bench.clock(-lag)  # moves carrier and comparator; its own absolute converter is not looked at
-            count(bench.p.absolute, bench.spare, bench.detector.ps)
+            count(bench.p.absolute, bench.spare, bench.ps)
         assert bench.spare.word == 2 * lag
 
 
@@ -368,7 +367,7 @@ def test_12_clearing_before_the_latch_reads_zero_and_is_found():
     bench = ConverterBench()
     for _ in range(5 * N):
         bench.clock(-24)
-        clear_then_latch(bench.p.absolute, bench.spare, bench.detector.ps)
+        clear_then_latch(bench.p.absolute, bench.spare, bench.ps)
         assert bench.spare.word == 0
     assert bench.r.absolute.word == 48
 
@@ -392,11 +391,11 @@ def test_13_the_boundary_between_0_and_minus_1_is_the_target():
 def error_at(displacement: float) -> int:
     """Error word of the axis held at rest beside a positioning point [steps]."""
     rig = Rig(locked=True)
-    rig.r.bridge.enabled = 0
-    rig.r.train.position += displacement * rig.step
+    rig.r.lines.enable = 0
+    rig.r.plant.train.position += displacement * rig.step
     rig.run_ticks(3 * N)
     assert rig.error == pytest.approx(-displacement, abs=1e-6)
-    return absolute_error(rig.p.converters.absolute, rig.r.converters.absolute)
+    return absolute_error(rig.p.controller.converters.absolute, rig.r.controller.converters.absolute)
 
 
 # ---------------------------------------------------------------------------------- speed word, sequencer, shaping
@@ -433,11 +432,11 @@ def test_14_a_pulse_in_the_tick_of_the_strobe_belongs_to_the_window_it_closes():
     words = {}
     for tick in (strobe - 1, strobe, strobe + 1):
         rig = Rig('disturbance.lines.burst.kind="+"', f"disturbance.lines.burst.ticks=[{tick}]", locked=True)
-        rig.r.bridge.enabled = 0
+        rig.r.lines.enable = 0
         rig.run_ticks(strobe + 1)
-        first, count = rig.r.speed.word, rig.r.speed.count
+        first, count = rig.r.controller.speed.word, rig.r.controller.speed.count
         rig.run_ticks(SAMPLE_TICKS)
-        words[tick - strobe] = (first, count, rig.r.speed.word)
+        words[tick - strobe] = (first, count, rig.r.controller.speed.word)
     assert words == {-1: (1, 0, 0), 0: (1, 0, 0), 1: (0, 0, 1)}
 
 
@@ -457,8 +456,8 @@ def test_16_the_mode_changes_in_the_tick_of_the_threshold_and_stays():
     rig.run(0.25e-3)
     rig.command(1)
     names = ("distance", "mode", "ready", "stop", "state")
-    table = rig.record(11e-3, [f"sequencer.{name}" for name in names])
-    distance, mode, ready, stop, state = (table[f"sequencer.{name}"].astype(int) for name in names)
+    table = rig.record(11e-3, [f"controller.sequencer.{name}" for name in names])
+    distance, mode, ready, stop, state = (table[f"controller.sequencer.{name}"].astype(int) for name in names)
     left = (distance + 0x8000 & 0xFFFF) - 0x8000  # the 16 bits of the counter as a signed number
     flip = int(np.argmax(mode == POSITION_MODE))
     assert (left[flip - 1], left[flip]) == (9, 8)
@@ -471,10 +470,10 @@ def test_16_the_mode_changes_in_the_tick_of_the_threshold_and_stays():
     assert left.min() < 0  # on through 0
     assert (mode[flip:] == POSITION_MODE).all()
     rig.run(20e-3)
-    assert rig.r.sequencer.mode == POSITION_MODE
+    assert rig.r.controller.sequencer.mode == POSITION_MODE
     rig.command(1)
     rig.run_ticks(1)
-    assert rig.r.sequencer.mode == SPEED_MODE  # only the next set clears it
+    assert rig.r.controller.sequencer.mode == SPEED_MODE  # only the next set clears it
 
 
 @pytest.mark.parametrize(
@@ -509,11 +508,11 @@ def law(**changes: int) -> tuple[LawParams, Law]:
 def held(displacement: float, *, stop: bool) -> Rig:
     """The axis beside a positioning point [steps], its bridge off; with or without the stop signal."""
     rig = Rig(locked=True)
-    rig.r.bridge.enabled = 0
-    rig.r.train.position += displacement * rig.step
-    rig.r.sequencer.stop_at = 0 if stop else NEVER
+    rig.r.lines.enable = 0
+    rig.r.plant.train.position += displacement * rig.step
+    rig.r.controller.sequencer.stop_at = 0 if stop else NEVER
     rig.run_ticks(INTEGRATE_TICKS)  # the detector's answer has come, one integration clock has passed
-    rig.r.law.integral = 0
+    rig.r.controller.law.integral = 0
     return rig
 
 
@@ -521,8 +520,8 @@ def held(displacement: float, *, stop: bool) -> Rig:
 def test_19_without_stop_the_integral_is_zero_whatever_the_error(displacement):
     rig = held(displacement, stop=False)
     rig.run_ticks(20 * INTEGRATE_TICKS)
-    assert rig.r.law.setpoint != 0 or displacement == -0.5
-    assert (rig.r.sequencer.stop, rig.r.law.integral) == (0, 0)
+    assert rig.r.controller.law.setpoint != 0 or displacement == -0.5
+    assert (rig.r.controller.sequencer.stop, rig.r.controller.law.integral) == (0, 0)
 
 
 @pytest.mark.parametrize(
@@ -530,21 +529,21 @@ def test_19_without_stop_the_integral_is_zero_whatever_the_error(displacement):
 )
 def test_19_at_stop_the_integral_counts_outside_the_band_and_holds_inside(displacement, error, per_clock):
     rig = held(displacement, stop=True)
-    assert (rig.r.sequencer.state, rig.r.law.setpoint) == (HOLD, error)
+    assert (rig.r.controller.sequencer.state, rig.r.controller.law.setpoint) == (HOLD, error)
     for n in range(1, 131):
         rig.run_ticks(INTEGRATE_TICKS)
-        assert rig.r.law.integral == per_clock * min(n, 127)  # stops at the limit
+        assert rig.r.controller.law.integral == per_clock * min(n, 127)  # stops at the limit
 
 
 def test_19_inside_the_band_the_integral_is_kept_and_a_set_strobe_clears_it_at_once():
     rig = held(-2.5, stop=True)
     rig.run_ticks(12 * INTEGRATE_TICKS)
-    rig.r.train.position += 2 * rig.step
+    rig.r.plant.train.position += 2 * rig.step
     rig.run_ticks(12 * INTEGRATE_TICKS)
-    assert (rig.r.law.setpoint, rig.r.law.integral) == (0, 12)
+    assert (rig.r.controller.law.setpoint, rig.r.controller.law.integral) == (0, 12)
     rig.command(1)
     rig.run_ticks(1)
-    assert (rig.r.sequencer.stop, rig.r.law.integral) == (0, 0)
+    assert (rig.r.controller.sequencer.stop, rig.r.controller.law.integral) == (0, 0)
 
 
 @pytest.mark.parametrize(
@@ -579,31 +578,29 @@ def test_20_the_drive_word(mode, setpoint, integral, speed, word):
 def test_21_requests_of_one_sawtooth(word, plus, minus):
     p, r = SawtoothParams(half=128), SawtoothPwm()
     for _ in range(2):
-        requests = []
-        for _ in range(256):
-            count_sawtooth(p, r, word)
-            requests.append(r.request)  # one signed request: never both
+        requests = [count_sawtooth(p, r, word) for _ in range(256)]  # one signed request: never both
         assert (requests.count(1), requests.count(-1), requests.count(0)) == (plus, minus, 1)
     if word == 0:
         assert abs(plus - minus) == 1
 
 
-def locked_rotor(word: int) -> Rig:
-    """The drive with its full word and a rotor that nothing moves."""
+def locked_rotor() -> Rig:
+    """An axis with a rotor that nothing moves."""
     rig = Rig()
-    rig.p.train.friction.static_right = rig.p.train.friction.static_left = 1e9
-    rig.r.law.word = word
+    rig.p.plant.train.friction.static_right = rig.p.plant.train.friction.static_left = 1e9
     return rig
 
 
 @pytest.mark.parametrize(("word", "sign"), [(127, 1), (-128, -1)])
 def test_22_the_current_of_a_locked_rotor_is_clamped_at_its_limit(word, sign):
-    rig = locked_rotor(word)
-    bridge, train = rig.r.bridge, rig.r.train
+    rig = locked_rotor()
+    lines, bridge, train = rig.r.lines, rig.r.plant.bridge, rig.r.plant.train
     currents, limited, resumed = [0.0], [], 0
     for _ in range(6000):
-        actuate(rig.p, rig.r, train.current)
-        move(rig.p, rig.r, train)
+        lines.first_request, lines.request = (
+            count_sawtooth(rig.p.controller.pwm, rig.r.controller.pwm, word) for _ in range(2)
+        )
+        move(rig.p.plant, rig.r.plant, train, lines, 0)
         currents.append(sign * train.current)
         limited.append(bridge.over if sign > 0 else bridge.under)
         assert (bridge.under if sign > 0 else bridge.over) == 0
@@ -622,16 +619,14 @@ def test_22_the_current_of_a_locked_rotor_is_clamped_at_its_limit(word, sign):
     assert resumed > 100
 
 
-@pytest.mark.parametrize(("word", "sign"), [(127, 1), (-128, -1)])
-def test_22_without_a_request_the_current_decays_to_zero_and_does_not_reverse(word, sign):
-    rig = locked_rotor(word)
-    bridge, train = rig.r.bridge, rig.r.train
+@pytest.mark.parametrize("sign", [1, -1])
+def test_22_without_a_request_the_current_decays_to_zero_and_does_not_reverse(sign):
+    rig = locked_rotor()
+    train = rig.r.plant.train
     train.current = sign * 6.0
     currents = [6.0]
     for _ in range(1000):
-        sense_current(rig.p.bridge, bridge, train.current)
-        drive_two(rig.p.bridge, bridge, 0, 0)
-        move(rig.p, rig.r, train)
+        move(rig.p.plant, rig.r.plant, train, rig.r.lines, 0)
         currents.append(sign * train.current)
     assert (np.diff(currents) <= 0).all()
     assert min(currents) == 0.0
@@ -664,17 +659,17 @@ class Recorded:
     @property
     def switched(self) -> float:
         """Time of the mode switch [s]."""
-        return self.rig.r.sequencer.switched * self.rig.tick
+        return self.rig.r.controller.sequencer.switched * self.rig.tick
 
     @property
     def settled(self) -> float:
         """Last time outside +-2 steps [s]."""
-        return self.rig.r.gauge.outside * self.rig.tick
+        return self.rig.r.plant.gauge.outside * self.rig.tick
 
     @property
     def overshoot(self) -> float:
         """Farthest beyond the target [steps]."""
-        return self.rig.r.gauge.beyond / self.rig.step
+        return self.rig.r.plant.gauge.beyond / self.rig.step
 
 
 @cache
@@ -685,7 +680,13 @@ def recorded_move(pitches: int, *, locked: bool = False) -> Recorded:
     rig.command(pitches)
     # The longest move spends 423.3 um / 0.345 m/s = 1.23 ms on a pitch, a short one needs up to 7.6 ms for its first.
     duration = 30e-3 + 1.3e-3 * abs(pitches)
-    names = ("train.velocity", "sequencer.mode", "sequencer.distance", "speed.word", "law.setpoint")
+    names = (
+        "plant.train.velocity",
+        "controller.sequencer.mode",
+        "controller.sequencer.distance",
+        "controller.speed.word",
+        "controller.law.setpoint",
+    )
     return Recorded(rig, rig.record(duration, names, CYCLE))
 
 
@@ -693,7 +694,7 @@ def test_17_timeline_of_a_move_of_six_pitches():
     rig = Rig()
     rig.run_until(START)
     rig.command(6)
-    names = ("sequencer.mode", "sequencer.ready", "sequencer.stop")
+    names = ("controller.sequencer.mode", "controller.sequencer.ready", "controller.sequencer.stop")
     lines = rig.record(45e-3, names, 1)
     mode, ready, stop = (int(np.argmax(lines[name] == 1)) for name in names)
     for line, moment, milliseconds in (("mode", mode, 21.5), ("ready", ready, 24.5), ("stop", stop, 41.5)):
@@ -722,11 +723,11 @@ def test_23_times_and_overshoot_of_moves(pitches, switch_ms, settled_ms):
     assert move.switched * 1e3 == pytest.approx(switch_ms, rel=0.05)
     assert move.settled * 1e3 == pytest.approx(settled_ms, rel=0.05)
     assert 0.0 < move.overshoot < 3.0
-    after = np.argmax(move.registers["sequencer.mode"] == POSITION_MODE)
-    assert 0.040 <= abs(move.registers["train.velocity"][after]) <= 0.045
+    after = np.argmax(move.registers["controller.sequencer.mode"] == POSITION_MODE)
+    assert 0.040 <= abs(move.registers["plant.train.velocity"][after]) <= 0.045
     if abs(pitches) >= 30:
-        assert move.registers["train.velocity"].max() == pytest.approx(0.346, rel=0.01)
-        assert move.registers["speed.word"].max() in (27, 28)
+        assert move.registers["plant.train.velocity"].max() == pytest.approx(0.346, rel=0.01)
+        assert move.registers["controller.speed.word"].max() in (27, 28)
 
 
 @pytest.mark.parametrize("pitches", [1, 6])
@@ -743,16 +744,16 @@ def test_23_why_the_specified_moves_to_the_left_take_longer():
     started, locked = Rig(), Rig(locked=True)
     for rig in (started, locked):
         rig.run_until(START)
-    assert started.r.sequencer.position == -15
-    assert abs(locked.r.sequencer.position) <= 1  # the target is the boundary of two steps (trap 5)
+    assert started.r.controller.sequencer.position == -15
+    assert abs(locked.r.controller.sequencer.position) <= 1  # the target is the boundary of two steps (trap 5)
     for rig in (started, locked):
         rig.command(-1)
         rig.run_until(0.6e-3)  # behind the first sample at 0.512 ms
     # u = 16 * (-7 - word), vref(64) = 7: a word of -15 or beyond drives to the right, 0 or -1 to the left.
-    assert started.r.law.setpoint == locked.r.law.setpoint == -7
-    assert started.r.speed.word in (-15, -16)
-    assert started.r.law.word == min(127, 16 * (-7 - started.r.speed.word)) > 0
-    assert locked.r.law.word == 16 * (-7 - locked.r.speed.word) < 0
+    assert started.r.controller.law.setpoint == locked.r.controller.law.setpoint == -7
+    assert started.r.controller.speed.word in (-15, -16)
+    assert started.r.controller.law.word == min(127, 16 * (-7 - started.r.controller.speed.word)) > 0
+    assert locked.r.controller.law.word == 16 * (-7 - locked.r.controller.speed.word) < 0
     # One sample period backward and one to make good for it: 2 * 512 us.
     lost = recorded_move(-1).switched - recorded_move(-1, locked=True).switched
     assert lost == pytest.approx(2 * 0.512e-3, rel=0.2)
@@ -761,10 +762,12 @@ def test_23_why_the_specified_moves_to_the_left_take_longer():
 @pytest.mark.parametrize("pitches", [6, -6, 30, 792])
 def test_24_speed_word_stays_near_the_table_and_the_reference_falls_with_the_distance(pitches):
     move = recorded_move(pitches)
-    speed_mode = move.registers["sequencer.mode"] == SPEED_MODE
+    speed_mode = move.registers["controller.sequencer.mode"] == SPEED_MODE
     direction = 1 if pitches > 0 else -1
-    word, reference = (direction * move.registers[name][speed_mode] for name in ("speed.word", "law.setpoint"))
-    distance = move.registers["sequencer.distance"][speed_mode].astype(int)
+    word, reference = (
+        direction * move.registers[name][speed_mode] for name in ("controller.speed.word", "controller.law.setpoint")
+    )
+    distance = move.registers["controller.sequencer.distance"][speed_mode].astype(int)
     excess = word - reference
     accelerated = int(np.argmax(excess[2048 // CYCLE :] >= 0)) + 2048 // CYCLE  # behind the word of the acquisition
     assert excess[accelerated:].max() == 2  # allowed: 4
@@ -772,8 +775,11 @@ def test_24_speed_word_stays_near_the_table_and_the_reference_falls_with_the_dis
     assert falling.sum() > 40 * abs(pitches)
     assert (np.diff(reference) <= 0).all()
     assert (np.diff(reference)[~falling] == 0).all()
-    assert reference[0] == move.rig.p.sequencer.table[min(64 * abs(pitches), move.rig.p.sequencer.last)]
-    assert reference[-1] == move.rig.p.sequencer.table[9]
+    assert (
+        reference[0]
+        == move.rig.p.controller.sequencer.table[min(64 * abs(pitches), move.rig.p.controller.sequencer.last)]
+    )
+    assert reference[-1] == move.rig.p.controller.sequencer.table[9]
 
 
 # ------------------------------------------------------------------------------------------------- spurious pulses
@@ -789,8 +795,8 @@ def rest_after_burst(pulses: int, kind: str, pitches: int, *, final: str = "abso
         "disturbance.lines.burst.spacing=24 us",
     )
     rig = Rig(f"method.final={final}", *(burst if pulses else ()), locked=locked).move(pitches, 0.25)
-    assert rig.r.interference.inserted == pulses
-    assert abs(rig.r.train.velocity) < 1e-5  # the ripple of the current only
+    assert rig.r.plant.interference.inserted == pulses
+    assert abs(rig.r.plant.train.velocity) < 1e-5  # the ripple of the current only
     return offset(rig)
 
 
@@ -820,7 +826,7 @@ def rests_after_any_burst(kind: int, pitches: int) -> dict[int, float]:
         rig = Rig()
         rig.disturb(kind, [BURST_AT + k * BURST_SPACING for k in range(pulses)])
         rig.move(pitches, 0.12)
-        assert rig.r.interference.inserted == pulses
+        assert rig.r.plant.interference.inserted == pulses
         found[pulses] = offset(rig) * (1 if pitches > 0 else -1)
     return found
 
@@ -853,13 +859,13 @@ def chain_of_moves(final: str, seed: int) -> tuple[int, list[float]]:
         rig.disturb(kind, [begin + k * BURST_SPACING for k in range(8)])
         net += 1 if pitches > 0 else -1
         rig.run_ticks(1)
-        while not rig.r.sequencer.ready:
+        while not rig.r.controller.sequencer.ready:
             rig.run_ticks(CYCLE)
             assert rig.time < 6.0
         rig.run(8e-3 + 20e-3 * dice.random())  # the host prints; now and then the axis comes to hold
         offsets.append(offset(rig))
-    assert rig.r.interference.inserted == 480
-    assert rig.r.sequencer.refused == 0
+    assert rig.r.plant.interference.inserted == 480
+    assert rig.r.controller.sequencer.refused == 0
     return net, offsets
 
 
@@ -878,8 +884,8 @@ def test_27_a_chain_of_moves_ends_on_its_target_and_the_incremental_servo_drifts
 
 def watch(rig: Rig, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time [s], offset [steps] and integral, every carrier cycle."""
-    found = rig.record(seconds, ("train.position", "law.integral"), CYCLE)
-    return found["t"], (found["train.position"] - rig.target) / rig.step, found["law.integral"]
+    found = rig.record(seconds, ("plant.train.position", "controller.law.integral"), CYCLE)
+    return found["t"], (found["plant.train.position"] - rig.target) / rig.step, found["controller.law.integral"]
 
 
 def test_28_without_stop_the_servo_oscillates_about_the_target():
@@ -890,7 +896,7 @@ def test_28_without_stop_the_servo_oscillates_about_the_target():
         assert abs(0.5 * (offsets.max() + offsets.min())) <= 0.5
         crossings = np.count_nonzero(np.diff(np.sign(offsets - offsets.mean())))
         assert crossings > 20
-    assert rig.r.sequencer.stop == 0
+    assert rig.r.controller.sequencer.stop == 0
 
 
 @pytest.mark.parametrize("pitches", [1, -1, 2, 6, -6, 30])
@@ -924,7 +930,7 @@ def test_29_the_integral_takes_over_an_external_force(force):
     run = pushed(force)
     assert (np.abs(run.offset[run.t >= 80e-3]) <= 1).all()
     assert np.ptp(run.offset[run.t >= 300e-3]) < 0.2
-    stop = run.t < run.rig.r.sequencer.stop_at * run.rig.tick
+    stop = run.t < run.rig.r.controller.sequencer.stop_at * run.rig.tick
     assert not run.integral[stop].any()
     # At rest inside the dead band u = I, a mean of 24 V (2 I + 1) / 256 with half a unit to either side while the
     # bridge is undriven; with the force it is below the static friction of 1.2 N.
@@ -936,7 +942,7 @@ def test_29_the_integral_takes_over_an_external_force(force):
 
 def test_29_three_newtons_push_a_step_off_until_the_integral_has_counted_to_about_minus_six():
     run = pushed(3)
-    before_stop = run.offset[run.t < run.rig.r.sequencer.stop_at * run.rig.tick]
+    before_stop = run.offset[run.t < run.rig.r.controller.sequencer.stop_at * run.rig.tick]
     assert 1.0 < before_stop.max() <= 1.3
     assert run.integral.min() == run.integral[-1]
     assert run.integral[-1] == pytest.approx(-6, abs=1)
@@ -970,7 +976,7 @@ def test_31_without_corrector_and_integrator(pitches):
     _, offsets, integral = watch(rig, 0.1)
     assert np.abs(offsets).max() <= 2
     assert not integral.any()
-    with_both, without = recorded_move(pitches).rig.r.sequencer, rig.r.sequencer
+    with_both, without = recorded_move(pitches).rig.r.controller.sequencer, rig.r.controller.sequencer
     for name in ("switched", "ready_at", "stop_at", "refused"):
         assert getattr(without, name) == getattr(with_both, name), name
     assert without.ready == without.stop == 1
@@ -984,12 +990,12 @@ def at_switch(pitches: int, *overrides: str, frozen: int | None = None) -> Rig:
     rig = Rig(*overrides, locked=True)
     rig.run_until(START)
     if frozen is not None:
-        rig.p.converters.absolute.top = 16  # above the counter: its latch is never clocked
-        rig.r.converters.absolute.word = frozen
+        rig.p.controller.converters.absolute.top = 16  # above the counter: its latch is never clocked
+        rig.r.controller.converters.absolute.word = frozen
     rig.command(pitches)
     rig.run_ticks(1)
-    while rig.r.sequencer.mode == SPEED_MODE:
-        rig.run_ticks(1 if rig.r.sequencer.distance == 9 else CYCLE)
+    while rig.r.controller.sequencer.mode == SPEED_MODE:
+        rig.run_ticks(1 if rig.r.controller.sequencer.distance == 9 else CYCLE)
         assert rig.time < 0.1
     return rig
 
@@ -999,18 +1005,18 @@ def at_switch(pitches: int, *overrides: str, frozen: int | None = None) -> Rig:
 def test_32_with_the_absolute_word_frozen_the_threshold_is_reached_but_not_the_target(error, pitches):
     frozen = at_switch(pitches, frozen=2 * (error + 16))
     normal = at_switch(pitches)
-    assert frozen.r.sequencer.switched == normal.r.sequencer.switched
-    assert frozen.r.train.snapshot() == normal.r.train.snapshot()
+    assert frozen.r.controller.sequencer.switched == normal.r.controller.sequencer.switched
+    assert frozen.r.plant.train.snapshot() == normal.r.plant.train.snapshot()
     for rig in (frozen, normal):
         rig.run_until(0.1)
-    assert frozen.r.law.setpoint == error
+    assert frozen.r.controller.law.setpoint == error
     assert abs(offset(frozen)) > 1
     assert abs(offset(normal)) < 1
 
 
 def run_without_counts(rig: Rig, seconds: float) -> None:
     """Let time pass with every count of the incremental path held at zero, the speed counter's apart."""
-    s = rig.r.sequencer
+    s = rig.r.controller.sequencer
     while rig.time < seconds:
         s.distance = s.remaining = s.position = 0
         rig.run_ticks(CYCLE - 1)  # no more than one pulse comes in this time
@@ -1023,7 +1029,7 @@ def test_32_without_the_incremental_path_after_the_switch_the_stop_is_the_same(p
         normal, cut = (at_switch(pitches, f"method.final={final}") for _ in range(2))
         run_without_counts(cut, 0.1)
         normal.run_until(cut.time)
-        stops[final] = offset(normal), offset(cut), normal.r.train.snapshot() == cut.r.train.snapshot()
+        stops[final] = offset(normal), offset(cut), normal.r.plant.train.snapshot() == cut.r.plant.train.snapshot()
     assert stops["absolute"][2]  # to the last bit of position, velocity and current
     assert abs(stops["absolute"][1]) <= 1
     # The same cut moves the stop of the servo that ends by counting: the cut is real.
@@ -1040,8 +1046,8 @@ def test_23_29_the_literal_order_of_the_taps_settles_later_and_holds_the_force()
     assert (rig.spec.clock.integrate_tap, rig.spec.clock.sample_tap, rig.spec.peak_count) == (12, 13, 54)
     assert (rig.spec.method.speed_gains, rig.spec.method.position_gains) == ([1, 1, 8], [3, 6, 1])
     rig.move(6, 0.2)
-    assert 23e-3 <= rig.r.gauge.outside * rig.tick <= 24e-3
-    assert rig.r.gauge.beyond < rig.step
+    assert 23e-3 <= rig.r.plant.gauge.outside * rig.tick <= 24e-3
+    assert rig.r.plant.gauge.beyond < rig.step
     assert abs(rig.error) < 1
     for force in (3, -3):
         run = pushed(force, literal)

@@ -1,4 +1,4 @@
-/* Both converters of the phase servo by hand: what `detent.methods.phase_servo.system.run_converters` is measured against.
+/* Both converters of the phase servo by hand: what `run_converters` of its controller.py is measured against.
  *
  * The same logic in the same order, so that both end on the same bits; everything that changes lives in local variables
  * of the machine's own width, and the pulses are worked out only where the gate is open. converters_registers.h, the
@@ -8,11 +8,11 @@
 
 #include "converters_registers.h"
 
-int64_t run_converters(const ConverterParams *restrict p, Converters *restrict r, const DetectorParams *restrict d,
+int64_t run_converters(const ConverterParams *restrict p, Converters *restrict r,
                        int64_t start, int64_t rate, int64_t ticks)
 {
     const uint32_t carrier_mask = (uint32_t)p->carrier.mask, slot_shift = (uint32_t)p->carrier.shift;
-    const uint32_t slot_mask = (1u << slot_shift) - 1, phase_shift = (uint32_t)d->carrier_shift;
+    const uint32_t slot_mask = (1u << slot_shift) - 1, phase_shift = 29 - slot_shift;
     const uint32_t tracking_mask = (uint32_t)p->tracking.mask, tracking_top = (uint32_t)p->tracking.top;
     const uint32_t absolute_mask = (uint32_t)p->absolute.mask, absolute_top = (uint32_t)p->absolute.top;
     const uint32_t leave_antiphase = p->tracking.leave_antiphase;

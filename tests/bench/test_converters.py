@@ -17,7 +17,7 @@ from tests.bench.race import COMPILER, OPTIMISED, Race, compile_c, first_line, n
 from tests.phase_servo_rig import make_spec
 
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.system import ConverterParams, Converters, DetectorParams, run_converters
+from detent.methods.phase_servo.controller import ConverterParams, Converters, run_converters
 from detent.sensing.carrier import reset_carrier
 
 C_BAR = 2.0
@@ -68,7 +68,7 @@ LENGTHS = (1, 2, 32, 33, 64, 977, 20_011)
 
 def params(*overrides):
     p = build_phase_servo(make_spec(overrides))
-    return p.converters, p.detector
+    return p.controller.converters
 
 
 def cleared():
@@ -77,16 +77,14 @@ def cleared():
     return r
 
 
-def compiled(p, d, stimulus, ticks):
+def compiled(p, stimulus, ticks):
     """Net pulses and end state from power-on."""
     r = cleared()
-    return run_converters(p, r, d, *stimulus, ticks), r.snapshot()
+    return run_converters(p, r, *stimulus, ticks), r.snapshot()
 
 
 def declare(folder):
-    (folder / "converters_registers.h").write_text(
-        DetectorParams.c_struct() + ConverterParams.c_struct() + Converters.c_struct()
-    )
+    (folder / "converters_registers.h").write_text(ConverterParams.c_struct() + Converters.c_struct())
 
 
 @pytest.fixture(scope="module")
@@ -96,13 +94,11 @@ def in_c(tmp_path_factory):
 
     def engine(flags):
         function = compile_c(HERE / "converters.c", folder, *flags.split()).run_converters
-        function.argtypes, function.restype = [ctypes.c_void_p] * 3 + [ctypes.c_int64] * 3, ctypes.c_int64
+        function.argtypes, function.restype = [ctypes.c_void_p] * 2 + [ctypes.c_int64] * 3, ctypes.c_int64
 
-        def run(p, d, stimulus, ticks):
+        def run(p, stimulus, ticks):
             r = cleared()
-            return function(
-                ctypes.addressof(p), ctypes.addressof(r), ctypes.addressof(d), *stimulus, ticks
-            ), r.snapshot()
+            return function(ctypes.addressof(p), ctypes.addressof(r), *stimulus, ticks), r.snapshot()
 
         return run
 
@@ -130,7 +126,7 @@ class Circuit:
 
 def compile_circuit(folder, top, clocks):
     """What Verilator and the compiler offer for speed; no trace, no assertion, no thread."""
-    bits = params()[0].tracking.top + 1
+    bits = params().tracking.top + 1
     driver = f"-DBITS={bits} -DCLOCKS={clocks} -I{shlex.quote(str(folder))}"
     words = [
         "verilator", "--cc", "--exe", "--build", "-j", str(os.cpu_count()), "-O3", "--x-assign", "fast",
@@ -158,26 +154,26 @@ def circuits(tmp_path_factory):
 @pytest.mark.parametrize("overrides", [(), ("method.leave_antiphase=true",)], ids=["as shipped", "leave antiphase"])
 @pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
 def test_c_ends_on_the_same_bits(in_c, motion, overrides):
-    p, d = params(*overrides)
+    p = params(*overrides)
     for ticks in LENGTHS:
-        expected = compiled(p, d, motion.stimulus, ticks)
-        assert {name: run(p, d, motion.stimulus, ticks) for name, run in in_c.items()} == dict.fromkeys(in_c, expected)
+        expected = compiled(p, motion.stimulus, ticks)
+        assert {name: run(p, motion.stimulus, ticks) for name, run in in_c.items()} == dict.fromkeys(in_c, expected)
 
 
 @needs_verilator
 @pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS)
 def test_circuit_ends_on_the_same_bits(circuits, motion):
-    p, d = params()
+    p = params()
     for ticks in LENGTHS:
-        expected = compiled(p, d, motion.stimulus, ticks)
+        expected = compiled(p, motion.stimulus, ticks)
         for top, circuit in circuits.items():
             _, *end = circuit.run(motion.stimulus, ticks)
             assert tuple(end) == expected, (top, ticks)
 
 
 def test_the_stimulus_moves_the_converters():
-    p, d = params()
-    nets = {name: compiled(p, d, motion.stimulus, 64 * 1000)[0] for name, motion in MOTIONS.items()}
+    p = params()
+    nets = {name: compiled(p, motion.stimulus, 64 * 1000)[0] for name, motion in MOTIONS.items()}
     assert nets["31 steps ahead"] == 31
     assert nets["antiphase"] == 0
     assert nets["forward"] == pytest.approx(900, abs=1)
@@ -187,10 +183,10 @@ def test_the_stimulus_moves_the_converters():
 
 def in_process(engine):
     """A million ticks forward."""
-    p, d = params()
+    p = params()
 
     def run():
-        engine(p, d, FORWARD.stimulus, TICKS)
+        engine(p, FORWARD.stimulus, TICKS)
         return TICKS
 
     return timed(run)

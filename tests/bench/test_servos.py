@@ -7,7 +7,7 @@ from tests.filtered_servo_rig import NO_TRACE
 from tests.phase_servo_rig import START, Rig
 
 from detent.control.pulse_generator import PER_PULSE
-from detent.drive.sawtooth_pwm import SawtoothPwm, count_sawtooth
+from detent.control.sawtooth_pwm import SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import advance
@@ -16,7 +16,7 @@ from detent.methods.filtered_servo.build import build_filtered_servo, sample_mic
 from detent.methods.filtered_servo.controller import RUN, go_to
 from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 from detent.methods.load import load_spec
-from detent.methods.phase_servo.system import run_converters
+from detent.methods.phase_servo.controller import run_converters
 from detent.plant.drive_train import move_averaged
 from detent.sensing.gauge import read_gauge
 from detent.sensing.phase_detector import compare
@@ -49,9 +49,9 @@ class Moves:
         for pitches in self.pitches:
             rig.command(pitches)
             ticks += advance(rig.p, rig.r, LONGEST, *NO_TRACE)
-            assert rig.r.sequencer.event == 1
+            assert rig.r.controller.sequencer.event == 1
             assert abs(rig.error) < 2
-            rig.r.sequencer.event = 0
+            rig.acknowledge()
         return ticks
 
 
@@ -113,11 +113,11 @@ def test_filtered_servo_in_real_time(benchmark, rate):
 @step
 def run_comparator(p, r, step_per_tick, ticks):
     """Detector and comparator, the carriage moving evenly."""
-    x = 0.0
+    x, high = 0.0, 0
     for k in range(ticks):
-        compare(p, r, k & 63, x)
+        high += compare(p, r, k & 63, x)
         x += step_per_tick
-    return r.ps
+    return high
 
 
 @step
@@ -125,11 +125,9 @@ def run_drive(pwm_p, pwm_r, bridge_p, bridge_r, ticks):
     """Sawtooth and bridge, the current below the limit."""
     pwm, bridge = local_copy(pwm_r), local_copy(bridge_r)
     for k in range(ticks):
-        count_sawtooth(pwm_p, pwm, 40)
-        first = pwm.request
-        count_sawtooth(pwm_p, pwm, 40)
+        first, second = count_sawtooth(pwm_p, pwm, 40), count_sawtooth(pwm_p, pwm, 40)
         sense_current(bridge_p, bridge, (k & 255) * 0.01)
-        drive_two(bridge_p, bridge, first, pwm.request)
+        drive_two(bridge_p, bridge, first, second)
     copy_back(pwm_r, pwm)
     copy_back(bridge_r, bridge)
 
@@ -155,12 +153,12 @@ def run_gauge(r, ticks):
 
 def parts_of(rig):
     """Runners of the blocks of the tick, each in a loop of its own."""
-    p, r = rig.p, rig.r.copy()
-    n = PARTS_TICKS
+    axis, state = rig.p, rig.r.copy()
+    c, p, r, n = axis.controller, axis.plant, state.plant, PARTS_TICKS
     return {
-        "converters": lambda: run_converters(p.converters, r.converters, p.detector, 0, 1 << 20, n),
+        "converters": lambda: run_converters(c.converters, state.controller.converters, 0, 1 << 20, n),
         "comparator": lambda: run_comparator(p.detector, r.detector, 5e-8, n),
-        "PWM and bridge": lambda: run_drive(p.pwm, SawtoothPwm(), p.bridge, SplitBridge(enabled=1), n),
+        "PWM and bridge": lambda: run_drive(c.pwm, SawtoothPwm(), p.bridge, SplitBridge(), n),
         "motor and carriage": lambda: run_drive_train(p.train, r.train, p.bridge.supply, n),
         "gauge": lambda: run_gauge(r.gauge, n),
     }

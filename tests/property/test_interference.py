@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from tests.phase_servo_rig import START, Rig, make_spec
 
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, receive_pulses, sample_speed
+from detent.methods.phase_servo.controller import PhaseController, PhaseLines, receive_pulses, sample_speed
+from detent.methods.phase_servo.plant import PhasePlant, move, sense
+from detent.methods.phase_servo.system import PhaseServoParams
 from detent.sensing.interference import (
     CORRUPT,
     INSERT,
@@ -107,31 +109,33 @@ def test_no_two_random_events_of_a_kind_share_a_tick(mean, seed):
     window=st.integers(5, 40),
 )
 def test_the_counters_hold_what_came_on_the_lines_and_what_was_put_in_less_what_was_taken_away(events, pulses, window):
-    p, r = default_servo().copy(), PhaseServo()
-    fill_list(p.interference, events)
-    start_interference(p.interference, r.interference, 1)
-    n, s = r.interference, r.sequencer
+    p, plant, lines, c = default_servo().copy(), PhasePlant(), PhaseLines(), PhaseController()
+    fill_list(p.plant.interference, events)
+    start_interference(p.plant.interference, plant.interference, 1)
+    n, s = plant.interference, c.sequencer
     s.distance = 1000
     came, put_in, taken, words = 0, 0, 0, 0
     to_take, to_lose = 0, 0
     for tick, pulse in enumerate(pulses):
-        if tick >= n.next_tick:
-            interfere(p.interference, n, tick)
+        sense(p.plant, plant, plant.train.position, lines, tick)
+        lines.swallowed = lines.missed = 0
         to_take += events.count((tick, REMOVE))
         to_lose += events.count((tick, LOSE_SAMPLE))
-        receive_pulses(p, r, int(pulse > 0), int(pulse < 0))
+        c.converters.tracking.plus, c.converters.tracking.minus = pulse > 0, pulse < 0
+        receive_pulses(p.controller, c, lines)
         came, put_in = came + pulse, put_in + n.plus - n.minus
         if pulse and to_take:
             taken, to_take = taken + pulse, to_take - 1
         if tick % window == 0:
-            sample_speed(p, r)
-            words += 0 if to_lose else r.speed.word
+            sample_speed(p.controller, c, lines)
+            words += 0 if to_lose else c.speed.word
             to_lose -= 1 if to_lose else 0
+        move(p.plant, plant, plant.train, lines, tick)
         assert (n.remove, n.lose_sample) == (to_take, to_lose)
     assert s.position == came + put_in - taken
     assert 1000 - s.distance == sum(map(abs, pulses)) + n.inserted - n.removed
     assert s.remaining == -s.position
-    assert words + r.speed.count == s.position  # a lost sample delays its pulses, it does not lose them
+    assert words + c.speed.count == s.position  # a lost sample delays its pulses, it does not lose them
     assert n.removed + n.remove == sum(kind == REMOVE for _, kind in events)
     assert n.lost + n.lose_sample == sum(kind == LOSE_SAMPLE for _, kind in events)
 
@@ -149,10 +153,10 @@ def noisy_rig(seed: int, *overrides: str) -> Rig:
 @given(seed=seeds)
 def test_one_seed_gives_one_run_to_the_byte_and_another_seed_another_run(seed):
     first, same, other = (noisy_rig(n, "detector.jitter=20 ns").move(6, 25e-3) for n in (seed, seed, seed ^ 1))
-    assert first.r.interference.inserted > 0
+    assert first.r.plant.interference.inserted > 0
     assert first.r.snapshot() == same.r.snapshot()
     # The generator's state differs in any case; what counts is that the axis has moved otherwise.
-    assert first.r.train.snapshot() != other.r.train.snapshot()
+    assert first.r.plant.train.snapshot() != other.r.plant.train.snapshot()
 
 
 @pytest.mark.compiled
@@ -164,15 +168,20 @@ def test_the_distance_counter_misses_what_was_taken_away_and_holds_what_was_put_
     rig.command(12)
     rig.run_ticks(1)
     before = rig.r.copy()
-    names = ("converters.tracking.plus", "converters.tracking.minus", "interference.plus", "interference.minus")
+    names = (
+        "controller.converters.tracking.plus",
+        "controller.converters.tracking.minus",
+        "plant.interference.plus",
+        "plant.interference.minus",
+    )
     lines = rig.record(10e-3, names, 1)
     plus, minus, put_plus, put_minus = (int(lines[name].sum()) for name in names)
-    s, n = rig.r.sequencer, rig.r.interference
-    removed = n.removed - before.interference.removed
+    s, n = rig.r.controller.sequencer, rig.r.plant.interference
+    removed = n.removed - before.plant.interference.removed
     assert plus > 100
-    assert put_plus + put_minus == n.inserted - before.interference.inserted > 0
-    assert (before.sequencer.distance - s.distance) % 2**16 == plus + minus + put_plus + put_minus - removed
-    moved = s.position - before.sequencer.position
+    assert put_plus + put_minus == n.inserted - before.plant.interference.inserted > 0
+    assert (before.controller.sequencer.distance - s.distance) % 2**16 == plus + minus + put_plus + put_minus - removed
+    moved = s.position - before.controller.sequencer.position
     assert abs(moved - (plus - minus + put_plus - put_minus)) <= removed
     # Nothing backward came but the first step's dither: then all that was taken away was forward.
     if minus == 0:
@@ -189,8 +198,8 @@ def test_a_list_strikes_the_running_axis_at_its_ticks(moments, kind):
     rig.command(6)
     rig.run_until(3_000 * rig.tick)
     shown = ("plus", "minus", "corrupt", "remove", "lose_sample", "removed", "lost")
-    rows = rig.record(9_001 * rig.tick, [f"interference.{name}" for name in shown], 1)
-    plus, minus, corrupt, remove, lose_sample, removed, lost = (rows[f"interference.{name}"] for name in shown)
+    rows = rig.record(9_001 * rig.tick, [f"plant.interference.{name}" for name in shown], 1)
+    plus, minus, corrupt, remove, lose_sample, removed, lost = (rows[f"plant.interference.{name}"] for name in shown)
     stock = {REMOVE: remove + removed, LOSE_SAMPLE: lose_sample + lost}
     if kind in stock:
         struck = np.diff(stock[kind], prepend=0)

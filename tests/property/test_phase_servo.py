@@ -54,13 +54,13 @@ def make_move(rig: Rig, move: Move) -> float:
     begin = rig.r.tick + round(move.delay * TICKS_PER_MS)
     rig.disturb(move.kind, [begin + 96 * k for k in range(move.pulses)])
     rig.run_ticks(1)
-    while rig.r.sequencer.mode == SPEED_MODE:
+    while rig.r.controller.sequencer.mode == SPEED_MODE:
         rig.run_ticks(N)
         assert rig.time < 1.0
     before = rig.error * (1 if move.pitches > 0 else -1)
     if move.pulses and rig.r.tick - (begin + 96 * (move.pulses - 1)) < 4096:
         before = math.inf
-    while not rig.r.sequencer.ready:
+    while not rig.r.controller.sequencer.ready:
         rig.run_ticks(1000)
         assert rig.time < 1.0
     rig.run(move.pause * 1e-3)
@@ -69,12 +69,12 @@ def make_move(rig: Rig, move: Move) -> float:
 
 def assert_within_limits(rig: Rig) -> None:
     """Current, numbers, energy."""
-    train, p = rig.r.train, rig.p
-    rise = (p.bridge.supply + p.train.emf_constant * 0.45) * rig.tick / p.train.inductance
-    assert train.peak_current <= p.bridge.limit + rise
+    train, p = rig.r.plant.train, rig.p
+    rise = (p.plant.bridge.supply + p.plant.train.emf_constant * 0.45) * rig.tick / p.plant.train.inductance
+    assert train.peak_current <= p.plant.bridge.limit + rise
     for value in (train.position, train.velocity, train.current, train.energy):
         assert math.isfinite(value)
-    assert abs(train.energy) <= p.bridge.supply * (p.bridge.limit + rise) * rig.time
+    assert abs(train.energy) <= p.plant.bridge.supply * (p.plant.bridge.limit + rise) * rig.time
 
 
 def offset(rig: Rig) -> float:
@@ -97,8 +97,8 @@ def test_pulses_within_the_protection_never_move_the_end_of_a_move(chain):
         make_move(rig, move)
     rig.run(0.15)
     assert abs(offset(rig)) <= farthest_rest(0)
-    assert rig.r.sequencer.stop == 1
-    assert rig.r.sequencer.refused == 0
+    assert rig.r.controller.sequencer.stop == 1
+    assert rig.r.controller.sequencer.refused == 0
     assert_within_limits(rig)
 
 
@@ -134,12 +134,19 @@ def test_whatever_comes_on_the_lines_a_move_ends_whole_pitches_from_its_target(c
 def test_from_any_state_no_tick_exceeds_the_limits(velocity, current, place, distance, mode, backward):
     rig = Rig(locked=True)
     r = rig.r
-    r.train.position += place * rig.pitch
-    r.train.velocity, r.train.current = velocity, current
-    r.sequencer.distance, r.sequencer.direction, r.sequencer.mode = distance, -1 if backward else 1, mode
+    r.plant.train.position += place * rig.pitch
+    r.plant.train.velocity, r.plant.train.current = velocity, current
+    r.controller.sequencer.distance, r.controller.sequencer.direction, r.controller.sequencer.mode = (
+        distance,
+        -1 if backward else 1,
+        mode,
+    )
     for _ in range(4):
         rig.run_ticks(70)
         assert_within_limits(rig)
-        assert abs(r.law.word + 0.5) <= 127.5
+        assert abs(r.controller.law.word + 0.5) <= 127.5
         # Nothing accelerates the carriage but the motor at its limit: in 70 us by at most 2.5 mm/s.
-        assert abs(r.train.velocity) <= 0.4 + rig.time * 6.1 * rig.p.train.force_constant / rig.p.train.mass
+        assert (
+            abs(r.plant.train.velocity)
+            <= 0.4 + rig.time * 6.1 * rig.p.plant.train.force_constant / rig.p.plant.train.mass
+        )

@@ -96,9 +96,9 @@ def test_timing_draws_and_writes_signals_that_read_back(axis: str, at: str) -> N
 
 
 def test_timing_takes_a_job_a_length_and_signals() -> None:
-    words = ("--job", MOVES, "--at", "40 ms", "--for", "12 us", "--signals", "detector.ps,law.*")
+    words = ("--job", MOVES, "--at", "40 ms", "--for", "12 us", "--signals", "lines.ps,controller.law.*")
     data = call("timing", PHASE, *words, "--json").data
-    assert data["signals"][:3] == ["clocks.CK1", "clocks.CK2", "detector.ps"]
+    assert data["signals"][:3] == ["controller.clocks.CK1", "controller.clocks.CK2", "lines.ps"]
     found = load_vcd(Path("timing.vcd"))
     assert (found.begin, found.end) == (0, 12_000_000) or found.end - found.begin <= 12_000_000
 
@@ -122,7 +122,10 @@ BAD = {
     "timing: too late": (["timing", PHASE, "--at", "9 s"], "the run ends before"),
     "timing: too long": (["timing", PHASE, "--at", "1 ms", "--for", "1 s"], "up to 50 ms"),
     "timing: no picture": (["timing", PHASE, "--at", "1 ms", "--figure", "a.txt"], "cannot be saved as '.txt'"),
-    "timing: no signal": (["timing", PHASE, "--at", "1 ms", "--signals", "law.wrod"], "did you mean 'law.word'"),
+    "timing: no signal": (
+        ["timing", PHASE, "--at", "1 ms", "--signals", "controller.law.wrod"],
+        "did you mean 'controller.law.word'",
+    ),
     "registers: no method": (["registers", "robot"], "rotary_table, stepper_envelope, or an axis"),
 }
 

@@ -30,6 +30,12 @@ def next_period(r: ClockChain) -> None:
 
 
 @hot_step
+def reference_period(r: ClockChain) -> int:
+    """Number of the present period of the reference clocks, two of the oscillator; the first is 0."""
+    return (r.divider - 1) >> 1
+
+
+@hot_step
 def integrate_strobe(p: ClockParams, r: ClockChain) -> bool:
     """The tap of the integration clock has just fallen."""
     return r.divider & p.integrate_mask == 0

@@ -18,7 +18,6 @@ class SplitBridgeParams(Registers):
 class SplitBridge(Registers):
     """Comparators of the current, and the voltage that the motor sees during the tick."""
 
-    enabled: u1 = register("1 once the axis may drive")
     over: u1 = register("comparator 309: current above the limit")
     under: u1 = register("comparator 310: current below the negative limit")
     positive: f8 = register("mean terminal voltage while the current is positive", unit="V")
@@ -35,8 +34,6 @@ def sense_current(p: SplitBridgeParams, r: SplitBridge, current: float) -> None:
 @hot_step
 def side_on(r: SplitBridge, request: int) -> int:
     """Transistor that conducts: 1 upper, -1 lower, 0 none."""
-    if r.enabled == 0:
-        return 0
     if request > 0:
         return 0 if r.over else 1
     if request < 0:

@@ -5,7 +5,7 @@ capacitor across each coil keeps the fundamental: what the detector sees is that
 """
 
 from detent.kernel.registers import Registers, i8, register, u1, u2
-from detent.kernel.step import hot_step
+from detent.kernel.step import hot_step, step
 
 LARGE = 3.0
 """Current through the small resistor R461, in units of the other's (1/R462): about 3 (block 461)."""
@@ -56,6 +56,7 @@ def coil_currents(r: Carrier, large: float) -> tuple[float, float]:
     return large * (s & 1) + (s >> 1 & 1), large * (s >> 2 & 1) + (s >> 3 & 1)
 
 
+@step
 def reset_carrier(r: Carrier) -> None:
     """Power-on clear, common with the counters of both converters."""
     r.count = 0

@@ -33,27 +33,25 @@ class DetectorParams(Registers):
 
 
 class Detector(Registers):
-    """What the comparator shows."""
+    """What the comparator works with."""
 
     phase: i8 = register("phase of the secondary against the carrier", unit="turn/2^32")
-    ps: u1 = register("digital position signal PS")
     half: u1 = register("which edge the present displacement belongs to")
     shake: i8 = register("displacement of the next edge by noise", unit="turn/2^32")
     noise: NoiseSource = block("noise of the comparator")
 
 
 @hot_step
-def compare(p: DetectorParams, r: Detector, count: int, x: float) -> None:
-    """Comparator at carrier count `count` with the carriage at `x` [m]: PS is high in the second half of a turn."""
+def compare(p: DetectorParams, r: Detector, count: int, x: float) -> int:
+    """PS at carrier count `count` with the carriage at `x` [m]: high in the second half of a turn."""
     r.phase = (math.floor(x * p.turns_per_metre + 0.5) + p.offset) & FRACTION
     if p.rise.used == 0 and p.jitter == 0.0:
-        r.ps = ((r.phase + (count << p.carrier_shift)) & FRACTION) >> 31
-    else:
-        compare_imperfect(p, r, count)
+        return ((r.phase + (count << p.carrier_shift)) & FRACTION) >> 31
+    return compare_imperfect(p, r, count)
 
 
 @step
-def compare_imperfect(p: DetectorParams, r: Detector, count: int) -> None:
+def compare_imperfect(p: DetectorParams, r: Detector, count: int) -> int:
     """The same with displaced edges."""
     angle = (r.phase + (count << p.carrier_shift)) & FRACTION
     if p.jitter > 0.0:
@@ -66,7 +64,7 @@ def compare_imperfect(p: DetectorParams, r: Detector, count: int) -> None:
     rise = min(max(at_phase(p.rise, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
     fall = min(max(at_phase(p.fall, r.phase) + r.shake, 1 - QUARTER), QUARTER - 1)
     from_middle = ((angle - HALF - QUARTER + HALF) & FRACTION) - HALF
-    r.ps = 1 if -QUARTER - rise <= from_middle < QUARTER - fall else 0
+    return 1 if -QUARTER - rise <= from_middle < QUARTER - fall else 0
 
 
 def fill_errors(p: DetectorParams, gain: float, quadrature: float, offset: float) -> None:

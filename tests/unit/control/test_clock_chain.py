@@ -1,6 +1,13 @@
 import pytest
 
-from detent.control.clock_chain import ClockChain, ClockParams, integrate_strobe, next_period, sample_strobe
+from detent.control.clock_chain import (
+    ClockChain,
+    ClockParams,
+    integrate_strobe,
+    next_period,
+    reference_period,
+    sample_strobe,
+)
 
 
 def test_each_clock_has_half_the_oscillators_periods_and_the_first_begins():
@@ -8,8 +15,8 @@ def test_each_clock_has_half_the_oscillators_periods_and_the_first_begins():
     seen = []
     for _ in range(6):
         next_period(r)
-        seen.append((r.divider, r.ck1, r.ck2))
-    assert seen == [(1, 1, 0), (2, 0, 1), (3, 1, 0), (4, 0, 1), (5, 1, 0), (6, 0, 1)]
+        seen.append((r.divider, reference_period(r), r.ck1, r.ck2))
+    assert seen == [(1, 0, 1, 0), (2, 0, 0, 1), (3, 1, 1, 0), (4, 1, 0, 1), (5, 2, 1, 0), (6, 2, 0, 1)]
 
 
 @pytest.mark.parametrize(("integrate_tap", "sample_tap"), [(5, 4), (4, 5), (4, 4)])

@@ -18,11 +18,9 @@ def test_comparators(current, over, under):
 @pytest.mark.parametrize("request_", [-1, 0, 1])
 @pytest.mark.parametrize(("over", "under"), [(0, 0), (1, 0), (0, 1)])
 def test_the_limit_drops_the_requested_side_only(request_, over, under):
-    r = SplitBridge(enabled=1, over=over, under=under)
+    r = SplitBridge(over=over, under=under)
     blocked = (request_ > 0 and over) or (request_ < 0 and under)
     assert side_on(r, request_) == (0 if blocked else request_)
-    r.enabled = 0
-    assert side_on(r, request_) == 0
 
 
 @pytest.mark.parametrize(
@@ -39,7 +37,7 @@ def test_the_limit_drops_the_requested_side_only(request_, over, under):
     ],
 )
 def test_mean_voltage_of_two_halves_for_either_sign_of_the_current(first, second, positive, negative):
-    r = SplitBridge(enabled=1)
+    r = SplitBridge()
     drive_two(P, r, first, second)
     assert (r.positive, r.negative) == (positive, negative)
 
@@ -54,13 +52,6 @@ def test_mean_voltage_of_two_halves_for_either_sign_of_the_current(first, second
     ],
 )
 def test_beyond_the_limit_the_current_is_driven_back(over, under, first, second, positive, negative):
-    r = SplitBridge(enabled=1, over=over, under=under)
+    r = SplitBridge(over=over, under=under)
     drive_two(P, r, first, second)
     assert (r.positive, r.negative) == (positive, negative)
-
-
-def test_a_bridge_that_is_off_only_lets_a_current_die():
-    r = SplitBridge(enabled=0)
-    for requests in ((1, 1), (-1, -1), (1, -1)):
-        drive_two(P, r, *requests)
-        assert (r.positive, r.negative) == (-24.0, 24.0)

@@ -67,11 +67,11 @@ def test_a_vcd_file_of_a_capture_reads_back_as_it_was(name, tmp_path):
 
 def test_the_clocks_of_the_phase_servo_alternate_and_its_reference_counts_with_them():
     found = captured("phase_servo.toml")
-    one, two = found["clocks.CK1"], found["clocks.CK2"]
+    one, two = found["controller.clocks.CK1"], found["controller.clocks.CK2"]
     rises = [w.times[w.values == 1] for w in (one, two)]
     assert np.all(np.diff(rises[0]) == 250_000)
     np.testing.assert_array_equal(rises[0] + 125_000, rises[1])
-    reference, plus = found["converters.tracking.reference"], found["converters.tracking.plus"]
+    reference, plus = (found[f"controller.converters.tracking.{name}"] for name in ("reference", "plus"))
     steps = np.diff(reference.values.astype(int)) % 64
     assert set(steps.tolist()) == {1}
     # One step per first clock, and one more where a + pulse comes with the second.
@@ -82,20 +82,21 @@ def test_the_clocks_of_the_phase_servo_alternate_and_its_reference_counts_with_t
 
 def test_a_plus_pulse_lies_in_the_second_clock_after_the_gate():
     found = captured("phase_servo.toml")
-    plus, two = found["converters.tracking.plus"], found["clocks.CK2"]
+    plus, two = found["controller.converters.tracking.plus"], found["controller.clocks.CK2"]
     pulses = plus.times[plus.values == 1]
     assert np.all(at_times(two, pulses) == 1)
-    assert np.all(at_times(found["converters.tracking.gate"], pulses) == 1)
-    assert np.all(at_times(found["converters.tracking.ps_first"], pulses) == 1)
+    assert np.all(at_times(found["controller.converters.tracking.gate"], pulses) == 1)
+    assert np.all(at_times(found["controller.converters.tracking.ps_first"], pulses) == 1)
 
 
 def test_the_request_of_the_pwm_follows_sawtooth_and_word_in_both_halves_of_a_tick():
-    found = captured("phase_servo.toml", at=30e-3, duration=64e-6, signals=("pwm.sawtooth", "pwm.request", "law.word"))
-    sawtooth, request = found["pwm.sawtooth"], found["pwm.request"]
+    names = ("controller.pwm.sawtooth", "lines.request", "controller.law.word")
+    found = captured("phase_servo.toml", at=30e-3, duration=64e-6, signals=names)
+    sawtooth, request, words = (found[name] for name in names)
     moments = np.arange(found.begin, found.end, 125_000)
     s = at_times(sawtooth, moments).astype(int)
     assert set(np.diff(s).tolist()) == {1, -255}
-    word = at_times(found["law.word"], moments + 124_999).astype(int)
+    word = at_times(words, moments + 124_999).astype(int)
     # The word of a tick is worked out before its first period; the moments within a tick at which it shows differ.
     steady = word == np.roll(word, 2)
     np.testing.assert_array_equal(np.sign(word - s)[steady], at_times(request, moments)[steady])

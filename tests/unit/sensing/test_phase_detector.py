@@ -30,11 +30,7 @@ def params(counts: int = COUNTS, **changes: float) -> DetectorParams:
 def cycle(p: DetectorParams, x: float, counts: int = COUNTS) -> np.ndarray:
     """PS at each count of a carrier cycle; the cycle before it has let the noise settle."""
     r = Detector()
-    levels = []
-    for n in range(2 * counts):
-        compare(p, r, n % counts, x)
-        levels.append(r.ps)
-    return np.array(levels[counts:])
+    return np.array([compare(p, r, n % counts, x) for n in range(2 * counts)][counts:])
 
 
 @pytest.mark.parametrize("x", [0.0, 0.1, 0.25, 0.5, 0.77, 1.0, -0.3, 12345.6])
@@ -113,10 +109,7 @@ def test_displaced_edges_are_those_of_the_voltage(gain, quadrature, offset, x):
     near = np.zeros(counts, bool)
     for shift in (-bend, bend):
         near |= np.sign(voltage(gain, quadrature, 2 * np.pi * (turn + shift), x) - offset) != np.sign(v)
-    levels = []
-    for n in range(counts):
-        compare(p, r, n, x / (2 * math.pi) * PITCH)
-        levels.append(r.ps)
+    levels = [compare(p, r, n, x / (2 * math.pi) * PITCH) for n in range(counts)]
     wrong = (np.array(levels) == 1) != (v < 0)
     assert not (wrong & ~near).any()
     assert bend < 1 / counts
@@ -165,10 +158,7 @@ def edges(p: DetectorParams, cycles: int, counts: int) -> tuple[np.ndarray, np.n
     """Displacement of every rising and falling edge at position 0 [turn], early is positive."""
     r = Detector()
     r.noise.state = 7
-    levels = []
-    for n in range(cycles * counts):
-        compare(p, r, n % counts, 0.0)
-        levels.append(r.ps)
+    levels = [compare(p, r, n % counts, 0.0) for n in range(cycles * counts)]
     first = counts // 4  # in the middle of a low half
     change = np.diff(np.array(levels[first:]))
     at = {sign: np.flatnonzero(change == sign) + first + 1 for sign in (1, -1)}

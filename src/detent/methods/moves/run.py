@@ -193,5 +193,5 @@ def _finish(host: Host, result: MoveRun) -> None:
     plant = host.machine.state.plant
     result.time_end = host.machine.time
     result.peak_current, result.energy = float(plant.train.peak_current), float(plant.train.energy)
-    result.faults = line_faults(plant.interference) if "interference" in plant.__fields__ else {}
+    result.faults = line_faults(plant.interference) if hasattr(plant, "interference") else {}
     result.done = not result.failure and len(result.moves) == len(result.job.moves)

@@ -7,8 +7,9 @@ from detent.axisfile.interference import fill_interference, fill_push
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN
+from detent.methods.phase_servo.controller import ConverterParams
 from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.methods.phase_servo.system import ConverterParams, PhaseServoParams
+from detent.methods.phase_servo.system import PhaseServoParams
 from detent.sensing.phase_detector import DetectorParams, fill_errors
 
 SUBSTEP = 1e-5
@@ -18,23 +19,24 @@ SUBSTEP = 1e-5
 def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
     """Parameters of the phase servo."""
     p = PhaseServoParams()
-    p.clocks.integrate_mask = (1 << spec.clock.integrate_tap) - 1
-    p.clocks.sample_mask = (1 << spec.clock.sample_tap) - 1
-    _fill_converters(p.converters, spec)
-    _fill_detector(p.detector, spec)
-    _fill_sequencer(p.sequencer, spec)
-    _fill_law(p.law, spec)
-    p.speed.half = 1 << (spec.method.speed_bits - 1)
-    p.pwm.half = 1 << (spec.drive.pwm_bits - 1)
-    p.bridge.supply, p.bridge.limit = spec.drive.supply, spec.limits.effort
+    c, plant = p.controller, p.plant
+    c.clocks.integrate_mask = (1 << spec.clock.integrate_tap) - 1
+    c.clocks.sample_mask = (1 << spec.clock.sample_tap) - 1
+    _fill_converters(c.converters, spec)
+    _fill_sequencer(c.sequencer, spec)
+    _fill_law(c.law, spec)
+    c.speed.half = 1 << (spec.method.speed_bits - 1)
+    c.pwm.half = 1 << (spec.drive.pwm_bits - 1)
+    _fill_detector(plant.detector, spec)
+    plant.bridge.supply, plant.bridge.limit = spec.drive.supply, spec.limits.effort
     radius, mechanics = spec.mechanics.pulley_circumference / (2 * math.pi), spec.mechanics
     fill_drive_train(
-        p.train, spec.motor, mechanics.friction, radius=radius, travel=spec.limits.travel, period=spec.tick,
+        plant.train, spec.motor, mechanics.friction, radius=radius, travel=spec.limits.travel, period=spec.tick,
         mass=mechanics.carriage_mass + (spec.motor.rotor_inertia + mechanics.pulley_inertia) / radius**2,
         bridge_resistance=spec.drive.bridge_resistance, substep=SUBSTEP,
     )  # fmt: skip
-    fill_interference(p.interference, spec.disturbance.lines, spec.tick)
-    fill_push(p.push, spec.disturbance.push, spec.tick)
+    fill_interference(plant.interference, spec.disturbance.lines, spec.tick)
+    fill_push(plant.push, spec.disturbance.push, spec.tick)
     return p
 
 

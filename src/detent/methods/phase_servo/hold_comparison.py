@@ -45,7 +45,7 @@ ROW_TIME = 50e-6
 LAST = 0.1
 """Stretch at the end of the record that the figures of a case are taken from [s]."""
 
-SIGNALS = ("train.position", "law.integral", "law.word")
+SIGNALS = ("plant.train.position", "controller.law.integral", "controller.law.word")
 
 Numbers = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -271,7 +271,7 @@ def _record(spec: PhaseServoSpec, variant: Variant, disturbance: DisturbanceTabl
         name=name,
         about=about,
         t=trace.time[kept],
-        displacement=(trace["train.position"][kept] - bench.target) / bench.spec.step,
-        integral=trace["law.integral"][kept].astype(np.int64),
-        word=trace["law.word"][kept].astype(np.int64),
+        displacement=(trace["plant.train.position"][kept] - bench.target) / bench.spec.step,
+        integral=trace["controller.law.integral"][kept].astype(np.int64),
+        word=trace["controller.law.word"][kept].astype(np.int64),
     )

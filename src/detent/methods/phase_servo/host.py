@@ -1,14 +1,14 @@
 """The host of a phase servo: set strobe with direction and distance, ready, stop."""
 
 import math
-from typing import Any
 
 from detent.errors import AxisError, FileProblem
 from detent.kernel.loop import advance
-from detent.methods.moves.host import Destination, Host, Problem, line_faults, refused_words
+from detent.methods.moves.host import Destination, Host, Problem, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
+from detent.methods.phase_servo.controller import command, take_ready
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
@@ -36,20 +36,18 @@ class PhaseHost(Host):
         self.spec = spec
         self.machine = phase_servo_machine(spec, recorder)
         self.grid, self.tolerance = spec.pitch, 2 * spec.step
-        self.state: Any = self.machine.state
+        self.controller = self.machine.state.controller
         self.home = round(spec.mechanics.start_position / spec.pitch) * spec.pitch
         self._counts = 0
 
     def start(self) -> None:
         """Wait until the axis has locked, settled on the nearest positioning point and is ready."""
         self.machine.pass_time(ACQUISITION)
-        s = self.state.sequencer
-        if not s.event:
+        if not take_ready(self.controller):
             raise AxisError(
                 f"the axis did not become ready within {format_quantity(ACQUISITION, 's')} of power-on: the tracker is "
                 "never silent; look for noise on the detector (detector.jitter, disturbance.lines)"
             )
-        s.event = 0
 
     def place(self, move: Move, position: float) -> Destination:
         """Where a move to `position` [m] ends."""
@@ -58,21 +56,20 @@ class PhaseHost(Host):
 
     def command(self, to: Destination) -> None:
         """Set strobe."""
-        s, distance = self.state.sequencer, to.counts - self._counts
-        s.command, s.backward, s.strobe = abs(distance), distance < 0, 1
+        distance = to.counts - self._counts
+        command(self.controller, abs(distance), int(distance < 0))
         self._counts = to.counts
 
     def time_limit(self, to: Destination) -> float:
         """Time after which a move that is not ready has failed [s]: twice what its way can take, and half a second."""
-        way = abs(to.position - self.state.train.position)
+        del to  # the distance word is its way
+        way = self.controller.sequencer.command * self.spec.step
         return 0.5 + 2 * (way / self.spec.limits.speed + 2 * math.sqrt(way / self.spec.method.table_acceleration))
 
     def wait(self, seconds: float) -> bool:
         """Wait until ready; False when it is not within `seconds`."""
         self.machine.pass_time(seconds)
-        arrived = bool(self.state.sequencer.event)
-        self.state.sequencer.event = 0
-        return arrived
+        return bool(take_ready(self.controller))
 
     def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
         """Targets off the positioning points, and words that this axis does not take."""
@@ -96,9 +93,4 @@ class PhaseHost(Host):
     @property
     def switched(self) -> float:
         """When position mode was entered [s]."""
-        return self.state.sequencer.switched * self.machine.tick
-
-    @property
-    def faults(self) -> dict[str, int]:
-        """What interference has done."""
-        return line_faults(self.state.interference)
+        return self.controller.sequencer.switched * self.machine.tick

@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 SIGNALS = (
-    "train.position", "train.velocity", "train.current", "sequencer.mode", "sequencer.state", "sequencer.distance",
-    "sequencer.ready", "sequencer.stop", "law.setpoint", "law.integral", "law.word", "speed.word",
-    "converters.absolute.word", "gauge.target",
+    "plant.train.position", "plant.train.velocity", "plant.train.current",
+    *(f"controller.sequencer.{name}" for name in ("mode", "state", "distance", "ready", "stop")),
+    *(f"controller.law.{name}" for name in ("setpoint", "integral", "word")),
+    "controller.speed.word", "controller.converters.absolute.word", "plant.gauge.target",
 )  # fmt: skip
+TRACKING = ("reference", "ps_first", "ps_second", "msb_first", "msb_second", "gate", "plus", "minus")
 TIMING = (
-    "converters.carrier.count", "detector.ps", "converters.tracking.reference", "converters.tracking.ps_first",
-    "converters.tracking.ps_second", "converters.tracking.msb_first", "converters.tracking.msb_second",
-    "converters.tracking.gate", "converters.tracking.plus", "converters.tracking.minus", "converters.absolute.gated",
-    "converters.absolute.word", "speed.count", "sequencer.distance", "sequencer.mode", "law.word", "pwm.request",
-    "train.current",
+    "lines.carrier", "lines.ps", *(f"controller.converters.tracking.{name}" for name in TRACKING),
+    "controller.converters.absolute.gated", "controller.converters.absolute.word", "controller.speed.count",
+    "controller.sequencer.distance", "controller.sequencer.mode", "controller.law.word", "lines.request",
+    "plant.train.current",
 )  # fmt: skip
 
 

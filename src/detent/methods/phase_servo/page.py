@@ -20,8 +20,9 @@ from detent.page.run_page import Stretch
 from detent.page.words import CountUnit, count, number
 from detent.record.trace import Trace
 
-MODE, STOP = "sequencer.mode", "sequencer.stop"
-SETPOINT, INTEGRAL, WORD, SPEED = "law.setpoint", "law.integral", "law.word", "speed.word"
+MODE, STOP = "controller.sequencer.mode", "controller.sequencer.stop"
+SETPOINT, SPEED = "controller.law.setpoint", "controller.speed.word"
+INTEGRAL, WORD = "controller.law.integral", "controller.law.word"
 
 PAGE_ROWS = 66
 """Lines of text on a page of paper: 11 in of 1/6 in each."""

@@ -7,6 +7,7 @@ runs differ in what is compared and in nothing else.
 import math
 
 from detent.control.phase_sequencer import POSITION_MODE
+from detent.methods.phase_servo.controller import command, take_ready
 from detent.methods.phase_servo.host import phase_servo_machine
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready
@@ -51,25 +52,25 @@ class PhaseBench:
     @property
     def displacement(self) -> float:
         """Position less target [steps]."""
-        return (self.machine.state.train.position - self.target) / self.spec.step
+        return (self.machine.state.plant.train.position - self.target) / self.spec.step
 
     def run_until(self, moment: float) -> None:
         """Let time pass up to a moment since power-on [s], whatever the axis says."""
         left = round(moment / self.machine.tick) - self.machine.state.tick
         while left > 0:
             left -= self.machine.pass_ticks(left)
-            self.machine.state.sequencer.event = 0
+            take_ready(self.machine.state.controller)
 
     def move(self) -> float:
         """Make the move up to the beginning of position mode; gives its time [s], NaN where it is not reached."""
         self.run_until(START)
-        s = self.machine.state.sequencer
-        s.command, s.backward, s.strobe = abs(self.pitches) * self.spec.detector.counts, self.pitches < 0, 1
+        c = self.machine.state.controller
+        command(c, abs(self.pitches) * self.spec.detector.counts, int(self.pitches < 0))
         limit = self._time_limit()
         while self.machine.time < limit:
             self.run_until(self.machine.time + LOOK)
-            if s.mode == POSITION_MODE:
-                return s.switched * self.machine.tick
+            if c.sequencer.mode == POSITION_MODE:
+                return c.sequencer.switched * self.machine.tick
         return math.nan
 
     def _time_limit(self) -> float:

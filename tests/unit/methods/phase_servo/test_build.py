@@ -114,7 +114,7 @@ def registers_after(overrides: tuple[str, ...]) -> tuple[bytes, ...]:
     """Registers each millisecond while the axis of `overrides` acquires, goes a pitch to the right, and back."""
     spec = load_spec(EXAMPLE, overrides)
     machine = phase_servo_machine(spec)
-    s, states, moves = machine.state.sequencer, [], [0, 1]
+    s, states, moves = machine.state.controller.sequencer, [], [0, 1]
     while machine.time < 0.07:
         machine.pass_time(1e-3)
         states.append(bytes(machine.state))
@@ -141,10 +141,10 @@ def test_the_machine_does_not_know(text: str) -> None:
 
 def test_the_parameters_of_the_default_axis_are_those_of_the_specification() -> None:
     p = build_phase_servo(load_spec(EXAMPLE))
-    c, s, law = p.converters, p.sequencer, p.law
+    c, s, law = p.controller.converters, p.controller.sequencer, p.controller.law
     assert (c.carrier.mask, c.tracking.mask, c.absolute.mask) == (63, 63, 63)
     assert (c.tracking.top, c.absolute.top, c.carrier.shift, c.tracking.leave_antiphase) == (5, 5, 3, 0)
-    assert (p.clocks.integrate_mask, p.clocks.sample_mask) == (8191, 4095)
+    assert (p.controller.clocks.integrate_mask, p.controller.clocks.sample_mask) == (8191, 4095)
     assert (s.threshold, s.last, s.ready_ticks, s.stop_ticks, s.incremental) == (8, 886, 12_000, 80_000, 0)
     entries = {1: 1, 8: 3, 9: 3, 16: 4, 32: 5, 64: 7, 128: 10, 256: 14, 512: 20, 886: 27}
     assert {n: s.table[n] for n in entries} == entries
@@ -152,8 +152,8 @@ def test_the_parameters_of_the_default_axis_are_those_of_the_specification() -> 
     assert (law.speed_k1, law.speed_k2, law.speed_k3) == (1, 1, 16)
     assert (law.position_k1, law.position_k2, law.position_k3) == (4, 16, 1)
     assert (law.dead_band, law.integral_limit, law.corrector, law.integrator) == (1, 127, 1, 1)
-    assert (law.word_limit, p.pwm.half, p.speed.half) == (128, 128, 128)
-    assert (p.bridge.supply, p.bridge.limit) == (24.0, 6.0)
+    assert (law.word_limit, p.controller.pwm.half, p.controller.speed.half) == (128, 128, 128)
+    assert (p.plant.bridge.supply, p.plant.bridge.limit) == (24.0, 6.0)
 
 
 def test_a_catalogue_motor_gives_its_constants(tmp_path: Path) -> None:
@@ -161,20 +161,20 @@ def test_a_catalogue_motor_gives_its_constants(tmp_path: Path) -> None:
     begin, end = text.index("torque_constant"), text.index("[drive]")
     file = tmp_path / "axis.toml"
     file.write_text(text[:begin] + 'catalogue = "maxon RE 40 148877"\n\n' + text[end:], encoding="utf-8")
-    named, stated = (build_phase_servo(load_spec(path)).train for path in (file, EXAMPLE))
+    named, stated = (build_phase_servo(load_spec(path)).plant.train for path in (file, EXAMPLE))
     assert (named.resistance, named.inductance) == (1.13, 0.33e-3)
     assert bytes(named) != bytes(stated)
 
 
 def test_the_literal_order_is_that_of_the_specification() -> None:
     p = build_phase_servo(load_spec(EXAMPLE, ["clock.order=literal"]))
-    assert (p.clocks.integrate_mask, p.clocks.sample_mask) == (4095, 8191)
-    assert (p.law.speed_k3, p.law.position_k1, p.law.position_k2) == (8, 3, 6)
-    assert p.sequencer.table[p.sequencer.last] == 54
+    assert (p.controller.clocks.integrate_mask, p.controller.clocks.sample_mask) == (4095, 8191)
+    assert (p.controller.law.speed_k3, p.controller.law.position_k1, p.controller.law.position_k2) == (8, 3, 6)
+    assert p.controller.sequencer.table[p.controller.sequencer.last] == 54
 
 
 def test_the_plant_is_seen_from_the_carriage() -> None:
-    t = build_phase_servo(load_spec(EXAMPLE, ["drive.bridge_resistance=0.3 ohm"])).train
+    t = build_phase_servo(load_spec(EXAMPLE, ["drive.bridge_resistance=0.3 ohm"])).plant.train
     radius = 50.8e-3 / (2 * math.pi)
     assert t.resistance == pytest.approx(2.3)
     assert t.force_constant == pytest.approx(0.05 / radius) == pytest.approx(t.emf_constant)
@@ -184,7 +184,7 @@ def test_the_plant_is_seen_from_the_carriage() -> None:
 
 
 def test_the_detector_lags_at_the_positioning_points() -> None:
-    d = build_phase_servo(load_spec(EXAMPLE, ["detector.jitter=100 ns", "detector.gain_error=2 %"])).detector
+    d = build_phase_servo(load_spec(EXAMPLE, ["detector.jitter=100 ns", "detector.gain_error=2 %"])).plant.detector
     assert d.offset == TURN - 15 * TURN // 64
     assert d.carrier_shift == 26
     assert d.turns_per_metre * 0.0254 / 60 == pytest.approx(TURN)
@@ -204,22 +204,25 @@ def test_every_number_of_steps_fits_its_registers(counts: int) -> None:
         ],
     )  # fmt: skip
     p = build_phase_servo(spec)
-    c, s = p.converters, p.sequencer
-    assert c.carrier.mask + 1 == 1 << (c.tracking.top + 1) == 1 << (32 - p.detector.carrier_shift) == counts
+    c, s = p.controller.converters, p.controller.sequencer
+    assert c.carrier.mask + 1 == 1 << (c.tracking.top + 1) == 1 << (32 - p.plant.detector.carrier_shift) == counts
     assert c.carrier.shift == c.tracking.top - 2
-    assert p.detector.offset == TURN - (quarter - 1) * TURN // counts
+    assert p.plant.detector.offset == TURN - (quarter - 1) * TURN // counts
     assert 2 * counts * counts // 4 == s.quiet_ticks
     assert s.table[s.last] == spec.peak_count
 
 
 def test_a_stop_that_never_comes_is_later_than_any_run() -> None:
-    assert build_phase_servo(load_spec(EXAMPLE, ["method.stop_always_off=true"])).sequencer.stop_ticks == NEVER // 2
+    assert (
+        build_phase_servo(load_spec(EXAMPLE, ["method.stop_always_off=true"])).controller.sequencer.stop_ticks
+        == NEVER // 2
+    )
 
 
 def test_noise_and_push_count_in_base_ticks() -> None:
     p = build_phase_servo(load_spec(EXAMPLE, [*PUSH, *BURST]))
-    assert (p.push.begin, p.push.end) == (60_000, 4_060_000)
-    assert [p.interference.tick[k] for k in range(2)] == [16_000, 16_096]
+    assert (p.plant.push.begin, p.plant.push.end) == (60_000, 4_060_000)
+    assert [p.plant.interference.tick[k] for k in range(2)] == [16_000, 16_096]
 
 
 def test_a_weak_secondary_lets_offset_and_noise_displace_the_edges_farther() -> None:

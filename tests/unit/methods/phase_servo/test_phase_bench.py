@@ -27,12 +27,12 @@ def test_a_move_ends_with_position_mode_eight_steps_before_the_target(pitches, s
     assert bench.displacement == pytest.approx(-64 * pitches)
     moment = bench.move()
     assert moment == pytest.approx(switched, rel=0.05)
-    assert bench.machine.state.sequencer.mode == POSITION_MODE
+    assert bench.machine.state.controller.sequencer.mode == POSITION_MODE
     # Of the whole looks of 1 ms, the one in which it happened.
     assert 0 < bench.machine.time - moment <= 1e-3 + 1e-9
     bench.run_until(0.06)
     assert bench.machine.time == pytest.approx(0.06)
-    assert bench.machine.state.sequencer.state == HOLD
+    assert bench.machine.state.controller.sequencer.state == HOLD
     assert abs(bench.displacement) < 1
 
 
@@ -40,7 +40,7 @@ def test_it_stands_in_lock_until_the_strobe():
     bench = PhaseBench(make_spec(), 6)
     bench.run_until(START)
     assert bench.machine.state.tick == 1000
-    assert abs(bench.machine.state.sequencer.position) <= 1  # the target is the boundary of two steps
+    assert abs(bench.machine.state.controller.sequencer.position) <= 1  # the target is the boundary of two steps
     assert abs(bench.displacement + 384) < 1
 
 
@@ -69,9 +69,9 @@ def test_a_chosen_disturbance_alone_acts():
     burst = BurstTable.model_construct(kind="+", at=5e-3, count=3)
     bench = PhaseBench(make_spec(), 6, DisturbanceTable(lines=InterferenceTable(burst=burst)))
     bench.run_until(5e-3)
-    assert bench.machine.state.interference.inserted == 0
+    assert bench.machine.state.plant.interference.inserted == 0
     bench.run_until(6e-3)
-    assert bench.machine.state.interference.inserted == 3
+    assert bench.machine.state.plant.interference.inserted == 3
 
 
 def test_an_axis_that_cannot_move_never_gets_to_position_mode():
@@ -84,11 +84,11 @@ def test_an_axis_that_cannot_move_never_gets_to_position_mode():
 
 def test_a_recorder_sees_the_whole_run():
     spec = make_spec()
-    recorder = Recorder(PhaseServo, ("train.position",), every=400, period=spec.tick)
+    recorder = Recorder(PhaseServo, ("plant.train.position",), every=400, period=spec.tick)
     bench = PhaseBench(spec, 2, recorder=recorder)
     bench.move()
     bench.run_until(0.02)
     bench.machine.close()
     trace = recorder.trace()
     assert len(trace) == 200
-    assert (trace["train.position"][-1] - bench.target) / spec.step == pytest.approx(bench.displacement)
+    assert (trace["plant.train.position"][-1] - bench.target) / spec.step == pytest.approx(bench.displacement)

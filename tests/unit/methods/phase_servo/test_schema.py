@@ -165,15 +165,15 @@ def test_the_bounds_fit_the_registers():
 
     # Register: the largest value that the keys of the schema can put there, and the smallest.
     largest = {
-        (PhaseServo, "converters.tracking.reference"): (1023, 0),
-        (PhaseServo, "converters.absolute.word"): (1024, 0),
-        (PhaseServo, "sequencer.command"): (65535, 0),
-        (PhaseServo, "speed.word"): (2**15 - 1, -(2**15)),
-        (PhaseServo, "law.word"): (2**11 - 1, -(2**11)),
-        (PhaseServo, "law.integral"): (32767, -32767),
-        (PhaseServo, "pwm.sawtooth"): (2**11 - 1, -(2**11)),
-        (PhaseServoParams, "sequencer.table"): (2**15 - 1, 0),
-        (PhaseServoParams, "law.speed_k1"): (1000, 1),
+        (PhaseServo, "controller.converters.tracking.reference"): (1023, 0),
+        (PhaseServo, "controller.converters.absolute.word"): (1024, 0),
+        (PhaseServo, "controller.sequencer.command"): (65535, 0),
+        (PhaseServo, "controller.speed.word"): (2**15 - 1, -(2**15)),
+        (PhaseServo, "controller.law.word"): (2**11 - 1, -(2**11)),
+        (PhaseServo, "controller.law.integral"): (32767, -32767),
+        (PhaseServo, "controller.pwm.sawtooth"): (2**11 - 1, -(2**11)),
+        (PhaseServoParams, "controller.sequencer.table"): (2**15 - 1, 0),
+        (PhaseServoParams, "controller.law.speed_k1"): (1000, 1),
     }
     for (registers, path), values in largest.items():
         assert issubclass(registers, Registers)

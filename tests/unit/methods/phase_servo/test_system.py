@@ -38,28 +38,32 @@ def power_on(displacement: float, *overrides: str) -> tuple[PhaseServoParams, Ph
 
 def lead(r: PhaseServo) -> int:
     """What the tracker's counter is ahead of the carrier's [steps], modulo N."""
-    return (r.converters.tracking.reference - r.converters.carrier.count) % N
+    return (r.controller.converters.tracking.reference - r.controller.converters.carrier.count) % N
 
 
 def unmoved(*overrides: str) -> Rig:
     """The axis in lock at a positioning point, its bridge off."""
     rig = Rig(*overrides, locked=True)
-    rig.r.bridge.enabled = 0
+    rig.r.lines.enable = 0
     return rig
 
 
 def acquire(p: PhaseServoParams, r: PhaseServo) -> list[int]:
     """Tick by tick to the end of the acquisition; returns the speed words of the strobes on the way."""
-    place, words = r.train.position, []
-    while r.sequencer.state == ACQUIRE:
+    place, words = r.plant.train.position, []
+    while r.controller.sequencer.state == ACQUIRE:
         advance(p, r, 1, *NO_TRACE)
         if r.tick % SAMPLE_TICKS == 0:
-            words.append(r.speed.word)
+            words.append(r.controller.speed.word)
         assert r.tick <= 4 * SAMPLE_TICKS
-        if r.sequencer.state == ACQUIRE:
-            assert (r.bridge.enabled, r.bridge.positive, r.bridge.negative) == (0, -24.0, 24.0)
-            assert (r.sequencer.mode, r.sequencer.ready, r.sequencer.stop) == (POSITION_MODE, 0, 0)
-            assert (r.train.position, r.train.current) == (place, 0.0)
+        if r.controller.sequencer.state == ACQUIRE:
+            assert (r.lines.enable, r.plant.bridge.positive, r.plant.bridge.negative) == (0, -24.0, 24.0)
+            assert (r.controller.sequencer.mode, r.controller.sequencer.ready, r.controller.sequencer.stop) == (
+                POSITION_MODE,
+                0,
+                0,
+            )
+            assert (r.plant.train.position, r.plant.train.current) == (place, 0.0)
     return words
 
 
@@ -67,13 +71,13 @@ def acquire(p: PhaseServoParams, r: PhaseServo) -> list[int]:
 def test_the_bridge_waits_until_the_tracker_is_silent_and_a_sample_is_discarded(displacement):
     p, r, _ = power_on(displacement)
     words = acquire(p, r)
-    s, last = r.sequencer, r.tick - 1
+    s, last = r.controller.sequencer, r.tick - 1
     assert last - s.last_pulse > N // 2 * N  # silent for more than half a turn against the carrier
     assert r.tick % SAMPLE_TICKS == 0
     assert len(words) >= 2  # the strobe that enables is not the first
-    assert (r.bridge.enabled, s.state, s.switched, s.ready_at) == (1, SETTLE_BUSY, last, last + READY_TICKS)
+    assert (r.lines.enable, s.state, s.switched, s.ready_at) == (1, SETTLE_BUSY, last, last + READY_TICKS)
     # Nothing is left of the pulses of the acquisition.
-    assert (words[-1], r.speed.word, r.speed.count) == (0, 0, 0)
+    assert (words[-1], r.controller.speed.word, r.controller.speed.count) == (0, 0, 0)
     assert (s.distance, s.remaining, s.position) == (0, 0, 0)
     # In lock: the counter is ahead by the whole steps of the lead of the square wave.
     assert lead(r) == int(np.floor(displacement - LAG)) % N
@@ -85,12 +89,14 @@ def test_the_bridge_waits_until_the_tracker_is_silent_and_a_sample_is_discarded(
 def test_the_bridge_waits_for_the_first_strobe_after_the_silence(displacement):
     strobe = 256
     p, r, _ = power_on(displacement)
-    p.clocks.sample_mask = 2 * strobe - 1  # of the oscillator; with 2048 ticks the second strobe is always late enough
-    while r.sequencer.state == ACQUIRE:
+    p.controller.clocks.sample_mask = (
+        2 * strobe - 1
+    )  # of the oscillator; with 2048 ticks the second strobe is always late enough
+    while r.controller.sequencer.state == ACQUIRE:
         advance(p, r, 1, *NO_TRACE)
     steps = abs(int(np.floor(displacement - LAG)))
     last = 32 + (steps - 1) * (N - 1 if displacement > LAG else N + 1)
-    assert r.sequencer.last_pulse == last
+    assert r.controller.sequencer.last_pulse == last
     assert r.tick == ((last + N // 2 * N + 1) // strobe + 1) * strobe
 
 
@@ -99,15 +105,15 @@ def test_the_sample_that_holds_the_acquisition_is_discarded():
     acquire(p, r)
     assert r.tick == 2 * SAMPLE_TICKS
     assert lead(r) == 5
-    assert (r.speed.word, r.speed.count, r.law.setpoint) == (0, 0, -11)
-    assert r.law.word == 3 * -11  # no kick by the damping term
+    assert (r.controller.speed.word, r.controller.speed.count, r.controller.law.setpoint) == (0, 0, -11)
+    assert r.controller.law.word == 3 * -11  # no kick by the damping term
 
 
 def test_a_start_in_lock_still_waits_for_its_silence():
     p, r, _ = power_on(LAG + 0.5)
     words = acquire(p, r)
     assert words == [0, 0]
-    assert r.sequencer.last_pulse == 0
+    assert r.controller.sequencer.last_pulse == 0
 
 
 @pytest.mark.parametrize("repaired", [False, True])
@@ -123,22 +129,22 @@ def test_from_any_start_the_axis_comes_to_rest_at_the_nearest_positioning_point(
     for displacement in rng.uniform(-31, 31, 12):
         p, r, point = power_on(displacement)
         done = advance(p, r, 60_000, *NO_TRACE)
-        s = r.sequencer
+        s = r.controller.sequencer
         assert (s.state, s.ready, s.event) == (SETTLE_READY, 1, 1)
         assert done == r.tick == s.ready_at + 1  # the loop stops for its host
         assert advance(p, r, 1000, *NO_TRACE) == 0
         s.event = 0
         assert advance(p, r, 300_000, *NO_TRACE) == 300_000  # 75 ms: stop, and the time to die away
         assert (s.state, s.stop) == (HOLD, 1)
-        rest = r.train.position
+        rest = r.plant.train.position
         assert abs(rest - point) < step
         assert advance(p, r, 40_000, *NO_TRACE) == 40_000
-        assert r.train.position == pytest.approx(rest, abs=0.01 * step)  # the ripple of the PWM stirs it a little
+        assert r.plant.train.position == pytest.approx(rest, abs=0.01 * step)  # the ripple of the PWM stirs it a little
 
 
 def test_a_set_strobe_before_ready_is_refused():
     p, r, _ = power_on(0.5, *SHORT)
-    s = r.sequencer
+    s = r.controller.sequencer
     for state in (ACQUIRE, SETTLE_BUSY):
         while s.state != state:
             advance(p, r, 1, *NO_TRACE)
@@ -161,7 +167,7 @@ def test_a_set_strobe_before_ready_is_refused():
 def test_a_distance_up_to_the_threshold_is_left_to_the_absolute_loop_at_once():
     rig = Rig(locked=True)
     rig.run_ticks(10)
-    s = rig.r.sequencer
+    s = rig.r.controller.sequencer
     s.command, s.strobe = 8, 1
     rig.run_ticks(1)
     assert (s.state, s.mode, s.switched, s.ready, s.stop) == (SETTLE_BUSY, POSITION_MODE, 10, 0, 0)
@@ -170,11 +176,11 @@ def test_a_distance_up_to_the_threshold_is_left_to_the_absolute_loop_at_once():
 def test_a_bench_made_ready_is_in_lock_and_enabled():
     rig = Rig(locked=True)
     r = rig.r
-    assert r.bridge.enabled == 1
-    r.bridge.enabled = 0  # before the first absolute word it would drive
+    assert r.lines.enable == 1
+    r.lines.enable = 0  # before the first absolute word it would drive
     rig.run_ticks(2 * SAMPLE_TICKS)
-    assert r.sequencer.last_pulse == 0
-    assert (r.sequencer.state, r.sequencer.mode) == (HOLD, POSITION_MODE)
+    assert r.controller.sequencer.last_pulse == 0
+    assert (r.controller.sequencer.state, r.controller.sequencer.mode) == (HOLD, POSITION_MODE)
     assert lead(r) == -LAG % N
     be_ready(rig.p, r)
     assert lead(r) == -LAG % N
@@ -202,9 +208,9 @@ def test_rows_are_the_registers_after_every_so_many_ticks():
 def test_a_row_holds_the_bytes_that_were_picked():
     leaves = {leaf.path: leaf for leaf in PhaseServo.leaves()}
     rig = Rig()
-    columns = rig.record(50 * rig.tick, ["tick", "converters.carrier.count"], every=5)
+    columns = rig.record(50 * rig.tick, ["tick", "controller.converters.carrier.count"], every=5)
     assert columns["tick"].tolist() == list(range(5, 51, 5))
-    assert columns["converters.carrier.count"].tolist() == [tick % N for tick in range(5, 51, 5)]
+    assert columns["controller.converters.carrier.count"].tolist() == [tick % N for tick in range(5, 51, 5)]
     assert leaves["tick"].offset == 0
 
 
@@ -224,15 +230,15 @@ def burst(kind: str, *ticks: int) -> tuple[str, str]:
 @pytest.mark.parametrize(("kind", "sign"), [("+", 1), ("-", -1)])
 def test_a_pulse_put_in_is_counted_but_does_not_move_the_tracker(kind, sign):
     rig = unmoved(*burst(kind, 100, 101))
-    rig.r.sequencer.distance = 50
+    rig.r.controller.sequencer.distance = 50
     rig.run_ticks(101)
-    s = rig.r.sequencer
+    s = rig.r.controller.sequencer
     assert (s.distance, s.position, s.remaining) == (49, sign, -sign)
     rig.run_ticks(1)
-    assert (s.distance, s.position, rig.r.speed.count) == (48, 2 * sign, 2 * sign)
+    assert (s.distance, s.position, rig.r.controller.speed.count) == (48, 2 * sign, 2 * sign)
     assert (lead(rig.r), s.last_pulse) == (-LAG % N, 0)
     rig.run_ticks(1000)
-    assert (s.distance, rig.r.interference.inserted) == (48, 2)
+    assert (s.distance, rig.r.plant.interference.inserted) == (48, 2)
 
 
 def test_a_pulse_taken_away_moves_the_tracker_but_is_not_counted():
@@ -240,17 +246,17 @@ def test_a_pulse_taken_away_moves_the_tracker_but_is_not_counted():
     for _ in range(400):
         advance(p, r, 1, *NO_TRACE)
     assert lead(r) == 3
-    assert (r.sequencer.position, r.speed.count, r.interference.removed) == (2, 2, 1)
-    assert r.sequencer.last_pulse == 32 + 2 * (N - 1)
+    assert (r.controller.sequencer.position, r.controller.speed.count, r.plant.interference.removed) == (2, 2, 1)
+    assert r.controller.sequencer.last_pulse == 32 + 2 * (N - 1)
 
 
 def test_a_lost_sample_leaves_word_and_count():
     rig = unmoved(*burst("lose sample", 5))
-    rig.r.speed.count, rig.r.speed.word = 3, 9
+    rig.r.controller.speed.count, rig.r.controller.speed.word = 3, 9
     rig.run_ticks(SAMPLE_TICKS)
-    assert (rig.r.speed.word, rig.r.speed.count) == (9, 3)
+    assert (rig.r.controller.speed.word, rig.r.controller.speed.count) == (9, 3)
     rig.run_ticks(SAMPLE_TICKS)
-    assert (rig.r.speed.word, rig.r.speed.count) == (3, 0)
+    assert (rig.r.controller.speed.word, rig.r.controller.speed.count) == (3, 0)
 
 
 def test_a_corrupted_sample_turns_the_comparator_for_one_tick():
@@ -258,7 +264,7 @@ def test_a_corrupted_sample_turns_the_comparator_for_one_tick():
     for n in range(80):
         rig.run_ticks(1)
         clean.run_ticks(1)
-        assert (rig.r.detector.ps != clean.r.detector.ps) == (n == 70)
+        assert (rig.r.lines.ps != clean.r.lines.ps) == (n == 70)
 
 
 def test_a_push_acts_on_the_carriage_in_its_ticks():
@@ -266,32 +272,32 @@ def test_a_push_acts_on_the_carriage_in_its_ticks():
     forces = []
     for _ in range(40):
         rig.run_ticks(1)
-        forces.append(rig.r.train.force)
+        forces.append(rig.r.plant.train.force)
     assert forces == [0.0] * 20 + [-4.0] * 8 + [0.0] * 12
 
 
 def test_the_integral_counts_at_stop_with_every_integration_clock():
     rig = unmoved()
-    rig.r.train.position -= 5.5 * rig.step
+    rig.r.plant.train.position -= 5.5 * rig.step
     integrals = []
     for _ in range(3):
         rig.run_ticks(INTEGRATE_TICKS)
-        integrals.append(rig.r.law.integral)
+        integrals.append(rig.r.controller.law.integral)
     assert integrals == [1, 2, 3]
-    assert rig.r.law.word == 4 * 5 + 3  # F_1(5) = 5
+    assert rig.r.controller.law.word == 4 * 5 + 3  # F_1(5) = 5
 
 
 def test_without_the_integrator_it_stays_at_zero():
     rig = unmoved("method.integrator=false")
-    rig.r.train.position -= 5.5 * rig.step
+    rig.r.plant.train.position -= 5.5 * rig.step
     rig.run_ticks(2 * INTEGRATE_TICKS)
-    assert (rig.r.law.integral, rig.r.law.setpoint) == (0, 5)
+    assert (rig.r.controller.law.integral, rig.r.controller.law.setpoint) == (0, 5)
 
 
 def test_the_machine_switches_on_as_its_file_says():
     spec = make_spec()
     machine = phase_servo_machine(spec)
-    assert machine.state.train.position == spec.mechanics.start_position
+    assert machine.state.plant.train.position == spec.mechanics.start_position
     machine.pass_ticks(10)
     assert machine.time == pytest.approx(2.5e-6)
 
@@ -314,7 +320,7 @@ def run_hash() -> str:
     push = ("disturbance.push.force=3 N", "disturbance.push.at=2 ms", "disturbance.push.duration=1 s")
     p, r, _ = power_on(-11.3, *SHORT, *faults, *push, *(f"disturbance.lines.{line}" for line in lines))
     digest = hashlib.sha256(p.snapshot())
-    s = r.sequencer
+    s = r.controller.sequencer
     acquired = advance(p, r, 40_000, *NO_TRACE)
     digest.update(r.snapshot())
     s.event, s.command, s.backward, s.strobe = 0, 128, 1, 1
@@ -336,9 +342,9 @@ def run_hash() -> str:
 def advance_eagerly(p: PhaseServoParams, r: PhaseServo, ticks: int) -> None:
     """The same ticks with every word of the logic worked out in each of them."""
     for _ in range(ticks):
-        r.changed = 1
-        r.sequencer.event = 0  # the host has looked
-        tick(p, r, r.train)
+        r.controller.changed = 1
+        r.controller.sequencer.event = 0  # the host has looked
+        tick(p, r, r.plant.train)
 
 
 @pytest.mark.compiled
@@ -351,9 +357,9 @@ def test_words_worked_out_in_every_tick_are_the_same_bits(overrides):
         rig.command(2)
     lazy.run_ticks(120_000)
     advance_eagerly(eager.p, eager.r, 120_000)
-    eager.r.sequencer.event = 0
+    eager.r.controller.sequencer.event = 0
     assert lazy.r.snapshot() == eager.r.snapshot(), lazy.r.diff(eager.r)
-    assert lazy.r.sequencer.position != 0
+    assert lazy.r.controller.sequencer.position != 0
 
 
 @pytest.mark.compiled
@@ -362,6 +368,6 @@ def test_an_axis_at_the_boundary_of_two_steps_comes_out_of_its_acquisition_in_sp
     """Pairs of opposite pulses came for ever there (trap 5), and the axis waited for silence in vain."""
     p, r, point = power_on(0.0, f"detector.jitter={jitter}", *SHORT)
     advance(p, r, round(20e-3 * 4e6), *NO_TRACE)
-    assert r.sequencer.event == 1
-    assert r.sequencer.state == SETTLE_READY
-    assert abs(r.train.position - point) < 2 * 0.0254 / 60 / 64
+    assert r.controller.sequencer.event == 1
+    assert r.controller.sequencer.state == SETTLE_READY
+    assert abs(r.plant.train.position - point) < 2 * 0.0254 / 60 / 64

@@ -1,15 +1,11 @@
 import pytest
 
-from detent.drive.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
+from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 
 
 def period(p: SawtoothParams, r: SawtoothPwm, word: int) -> list[int]:
     """Requests of one sawtooth."""
-    requests = []
-    for _ in range(2 * p.half):
-        count_sawtooth(p, r, word)
-        requests.append(r.request)
-    return requests
+    return [count_sawtooth(p, r, word) for _ in range(2 * p.half)]
 
 
 @pytest.mark.parametrize("half", [8, 128, 2048])

@@ -1,0 +1,66 @@
+"""The machine of a phase servo: resolver and comparator, bridge, motor and carriage, and the noise on the lines."""
+
+from detent.drive.split_bridge import SplitBridge, SplitBridgeParams, drive_two, sense_current
+from detent.kernel.registers import Registers, block
+from detent.kernel.step import hot_step, step
+from detent.methods.phase_servo.controller import PhaseLines
+from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
+from detent.plant.push import Push, push_force
+from detent.sensing.gauge import Gauge, read_gauge
+from detent.sensing.interference import Interference, InterferenceParams, interfere, lose, take_away
+from detent.sensing.phase_detector import Detector, DetectorParams, compare
+
+
+class PhasePlantParams(Registers):
+    """What the machine is like."""
+
+    detector: DetectorParams = block("detector and comparator")
+    interference: InterferenceParams = block("noise on the lines")
+    bridge: SplitBridgeParams = block("bridge")
+    push: Push = block("disturbing force")
+    train: DriveTrainParams = block("motor and mechanics")
+
+
+class PhasePlant(Registers):
+    """State of the machine."""
+
+    detector: Detector = block("detector and comparator")
+    interference: Interference = block("noise on the lines")
+    bridge: SplitBridge = block("bridge")
+    train: DriveTrain = block("motor and carriage")
+    gauge: Gauge = block("what an observer sees of the move")
+
+
+@step
+def disturb(p: PhasePlantParams, plant: PhasePlant, lines: PhaseLines, tick: int) -> None:
+    """Noise of this tick: what it flips, and what it puts on the counting lines."""
+    n = plant.interference
+    interfere(p.interference, n, tick)
+    lines.ps ^= n.corrupt
+    lines.plus = n.plus
+    lines.minus = n.minus
+
+
+@hot_step
+def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, tick: int) -> None:
+    """What the electronics see in this tick; the comparator answers to the carrier's next count, that of this CK1."""
+    n = plant.interference
+    lines.ps = compare(p.detector, plant.detector, lines.carrier + 1, x)
+    if tick >= n.next_tick:
+        disturb(p, plant, lines, tick)
+    lines.swallow = n.remove > 0
+    lines.mask = n.lose_sample > 0
+
+
+@hot_step
+def move(p: PhasePlantParams, plant: PhasePlant, train: DriveTrain, lines: PhaseLines, tick: int) -> None:
+    """The machine moves through the tick; what the lines have lost in it noise need not take any more."""
+    if lines.swallowed:
+        take_away(plant.interference)
+    if lines.missed:
+        lose(plant.interference)
+    sense_current(p.bridge, plant.bridge, train.current)
+    drive_two(p.bridge, plant.bridge, lines.enable * lines.first_request, lines.enable * lines.request)
+    train.force = push_force(p.push, tick)
+    move_averaged(p.train, train, plant.bridge.positive, plant.bridge.negative)
+    read_gauge(plant.gauge, tick, train.position, train.velocity)
