@@ -41,51 +41,47 @@ def standing(way: int, *overrides: str) -> Any:
 
 def compute(motor: Any, method: int, way: int, hz: float | None = None) -> Any:
     """Let another method drive the motor upwards over `way` steps; it begins at `hz`, or at the start frequency."""
-    c, zones = motor.p.comparison, motor.tables.up.zones
-    c.method, c.begin, c.steps = method, 0, way
-    c.start_hz = float(motor.tables.ramp.hz[0]) if hz is None else hz
-    c.acceleration = motor.table.limits.acceleration / motor.table.step
-    c.zones = len(zones.numbers)
-    for k, number in enumerate(zones.numbers.tolist()):
-        c.edge[k], c.limit[k] = int(zones.edges[k + 1]), max(zones.limits[number], c.start_hz if hz else 0.0)
-    motor.p.timer.reload = 0  # these methods work frequencies out
+    motor.compare(method, range(way), float(motor.tables.ramp.hz[0]) if hz is None else hz)
+    c = motor.p.comparison
+    c.limit[: c.zones] = [max(limit, hz or 0.0) for limit in c.limit[: c.zones]]
     return motor
 
 
 def lost(motor: Any) -> int:
     """Run to rest; steps lost then."""
     from detent.control.step_rule import start_move
+    from detent.plant.stepper_rotor import lost_steps
 
-    start_move(motor.r.rule, 1)
+    start_move(motor.controller.rule, 1)
     motor.advance_to(FOREVER, 0, until_event=True)
-    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
-    return motor.lost
+    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
+    return lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
 
 
 def watch(motor: Any, names: Sequence[str], seconds: float, every: int) -> tuple[Any, Any]:
     """Start upwards and record registers: time [s], and the registers by name."""
-    from detent.control.step_rule import start_move
+    from detent.control.step_rule import acknowledge, start_move
     from detent.kernel.loop import advance
-    from detent.methods.stepper_envelope.system import Stepper, tables
+    from detent.methods.stepper_envelope.system import Stepper
     from detent.record.recorder import choose_leaves
 
     leaves = choose_leaves(Stepper, names)
     picks = np.concatenate([np.arange(leaf.offset, leaf.offset + leaf.width.size) for leaf in leaves]).astype(np.int64)
-    count = round(seconds / motor.p.rotor.dt / every)
+    count = round(seconds / motor.p.plant.rotor.dt / every)
     rows = np.zeros((count + 1, len(picks)), np.uint8)
-    start_move(motor.r.rule, 1)
-    left, feed = count * every, tables(motor.tables.up.entries, motor.tables.down.entries)
+    start_move(motor.controller.rule, 1)
+    left, feed = count * every, motor.feed
     while left > 0:
         left -= advance(motor.p, motor.r, left, rows, picks, every, *feed)
-        motor.r.rule.event = 0  # at rest time passes on
+        acknowledge(motor.controller.rule)  # at rest time passes on
     found = rows.view(np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in leaves]))[1:, 0]
-    return np.arange(1, count + 1) * every * motor.p.rotor.dt, found
+    return np.arange(1, count + 1) * every * motor.p.plant.rotor.dt, found
 
 
 def step_hz(motor: Any, period: Any) -> Any:
     """Step frequency of periods of the timer [Hz]; not a number at rest."""
     period = np.where(period > 0, period, np.nan)
-    return motor.p.timer.clock_hz / period
+    return motor.p.controller.timer.clock_hz / period
 
 
 @cache
@@ -223,7 +219,7 @@ def boundary() -> None:
     """Into a zone and out of it: the envelope, and two methods that know the zone's limit only."""
     from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 
-    names = ("rule.position", "timer.period", "rotor.lag")
+    names = ("controller.rule.position", "controller.timer.period", "plant.rotor.lag")
     cases = (
         ("envelope", BLUE, 0, "-"), ("A: braking distance", GREEN, BRAKING_DISTANCE, "-"),
         ("B: speed per step", ORANGE, PERMISSIBLE_FREQUENCY, "--"),
@@ -234,12 +230,14 @@ def boundary() -> None:
             if method:
                 compute(motor, method, 8000)
             _, found = watch(motor, names, 1.6, 10)
-            shown = found[(found["rule.position"] > 1700) & (found["rule.position"] <= 2950)]
-            place = shown["rule.position"]
-            speed.plot(place, step_hz(motor, shown["timer.period"]), color=colour, linestyle=style, label=text)
+            shown = found[(found["controller.rule.position"] > 1700) & (found["controller.rule.position"] <= 2950)]
+            place = shown["controller.rule.position"]
+            speed.plot(
+                place, step_hz(motor, shown["controller.timer.period"]), color=colour, linestyle=style, label=text
+            )
             # One value per step, at the end of its period: what the rotor is behind when the next pulse comes.
             last = np.flatnonzero(np.diff(place))
-            lag.plot(place[last], shown["rotor.lag"][last], color=colour, linestyle=style)
+            lag.plot(place[last], shown["plant.rotor.lag"][last], color=colour, linestyle=style)
         speed.set_ylabel("step frequency [Hz]")
         speed.legend(**LEGEND, ncols=3)
         lag.set_ylim(-9, 9)
@@ -257,7 +255,10 @@ def stop_moved() -> None:
     from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove
 
     cases = ((15.5e-3, ORANGE, 3.5), (16.135e-3, GREEN, 1.4), (20e-3, BLUE, 1.4))
-    signals = tuple(f"{MOTOR}.{name}" for name in ("rule.position", "rule.direction", "timer.period"))
+    signals = tuple(
+        f"{MOTOR}.{name}"
+        for name in ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
+    )
     axis = zoom(*OPEN)
     with picture("stop-moved.svg", 1, 3.8) as (area,):
         area.axhline(0, color=GREY, linewidth=0.8)
@@ -266,9 +267,9 @@ def stop_moved() -> None:
             move = StageMove(1, 1, {MOTOR: 40e-3}, change=change)
             done = axis.run(StageJob("moved", "moves", (move,), (MOTOR,)), signals=signals, every=25)
             trace = done.trace
-            period = trace[f"{MOTOR}.timer.period"]
-            hz = np.where(period > 0, 1e6 / np.maximum(period, 1), 0) * trace[f"{MOTOR}.rule.direction"]
-            place = trace[f"{MOTOR}.rule.position"] * 5e-3
+            period = trace[f"{MOTOR}.controller.timer.period"]
+            hz = np.where(period > 0, 1e6 / np.maximum(period, 1), 0) * trace[f"{MOTOR}.controller.rule.direction"]
+            place = trace[f"{MOTOR}.controller.rule.position"] * 5e-3
             area.plot(place, hz, color=colour, linewidth=width, label=f"stop moved to {to * 1e3:g} mm")
         area.axvline(15, color=GREY, linestyle="--", linewidth=1)
         label(area, "stop moved here", (15, 2000), (-92, 0))
@@ -284,11 +285,14 @@ def by_hand() -> None:
     from detent.methods.stepper_envelope.stage_job import StageJob, StageJog
 
     jogs = (StageJog(1, 1, MOTOR, 20e-3, 3.6, dwell=0.2), StageJog(2, 2, MOTOR, -10e-3, 1.5, dwell=0.2))
-    signals = tuple(f"{MOTOR}.{name}" for name in ("rule.position", "rule.direction", "timer.period"))
+    signals = tuple(
+        f"{MOTOR}.{name}"
+        for name in ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
+    )
     done = zoom().run(StageJob("by hand", "moves", jogs, (MOTOR,)), signals=signals, every=250)
     trace, t = done.trace, done.trace.time
-    period = trace[f"{MOTOR}.timer.period"]
-    hz = np.where(period > 0, 1e6 / np.maximum(period, 1), 0) * trace[f"{MOTOR}.rule.direction"]
+    period = trace[f"{MOTOR}.controller.timer.period"]
+    hz = np.where(period > 0, 1e6 / np.maximum(period, 1), 0) * trace[f"{MOTOR}.controller.rule.direction"]
     asked = np.zeros_like(t)
     for move, jog in zip(done.result.moves, jogs, strict=True):
         asked[(t >= move.begin) & (t < move.begin + jog.duration)] = jog.speed / 5e-6
@@ -297,7 +301,7 @@ def by_hand() -> None:
         speed.plot(t, hz, color=BLUE, label="motor")
         speed.set_ylabel("step frequency [Hz]")
         speed.legend(**LEGEND, ncols=2)
-        place.plot(t, trace[f"{MOTOR}.rule.position"] * 5e-3, color=BLUE)
+        place.plot(t, trace[f"{MOTOR}.controller.rule.position"] * 5e-3, color=BLUE)
         for low, high in ((10, 13), (25, 30)):
             place.axhspan(low, high, color=GREY, alpha=0.16, linewidth=0)
         place.axhline(40, color="black", linewidth=0.9)
@@ -312,7 +316,7 @@ def by_hand() -> None:
 def still_follows(inertia: float, friction: float) -> bool:
     """Whether the rotor loses nothing over 1000 steps with so many times its inertia, and a friction [N m]."""
     motor = standing(1000, *OPEN)
-    rotor = motor.p.rotor
+    rotor = motor.p.plant.rotor
     rotor.inertia *= inertia
     rotor.damping *= math.sqrt(inertia)
     rotor.friction = friction
@@ -368,26 +372,28 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 def jerk() -> None:
     """Start by the envelope and by a profile of limited jerk, each as a ramp list, on the rotor."""
+    from detent.methods.stepper_envelope.controller import load_rule
     from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
-    from detent.methods.stepper_envelope.system import load_rule
+    from detent.methods.stepper_envelope.system import tables
     from detent.planning.step_envelope import StepEnvelope
 
     way = 1000
     spec = zoom(*OPEN).spec
     listed = smooth_ramp(compare_jerk(spec, MOTOR), spec.stepper[MOTOR].step)
-    names = ("timer.period", "rotor.angle", "rotor.commanded")
+    names = ("controller.timer.period", "plant.rotor.angle", "plant.rotor.commanded")
     with picture("jerk.svg", 1, 3.8, columns=2, share_x=False) as (speed, start):
         for text, colour, ramp_list in (("envelope", BLUE, None), ("limited jerk", ORANGE, listed)):
             motor = standing(way, *OPEN)
             if ramp_list is not None:
                 table = motor.tables.up.zones
-                load_rule(motor.p, ramp_list, table.limits, motor.p.timer.clock_hz, reload=True)
+                load_rule(motor.p.controller, ramp_list, table.limits, motor.p.controller.timer.clock_hz, reload=True)
                 motor.tables.ramp, motor.tables.up = ramp_list, StepEnvelope(ramp_list, table, 1, 0, way)
+                motor.feed = tables(motor.tables.up.entries, motor.tables.down.entries)
             t, found = watch(motor, names, 0.13, 5)
-            speed.plot(t * 1e3, step_hz(motor, found["timer.period"]), color=colour, label=text)
+            speed.plot(t * 1e3, step_hz(motor, found["controller.timer.period"]), color=colour, label=text)
             first = t < 25e-3
-            start.plot(t[first] * 1e3, found["rotor.commanded"][first], color=colour, linewidth=1, alpha=0.6)
-            rotor = found["rotor.angle"][first] / motor.p.rotor.step_angle
+            start.plot(t[first] * 1e3, found["plant.rotor.commanded"][first], color=colour, linewidth=1, alpha=0.6)
+            rotor = found["plant.rotor.angle"][first] / motor.p.plant.rotor.step_angle
             start.plot(t[first] * 1e3, rotor, color=colour, linewidth=1.8)
         speed.set_ylabel("step frequency [Hz]")
         speed.set_xlim(0, 130)

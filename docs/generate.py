@@ -136,7 +136,8 @@ the last was not.
 """
 STEP_FAULTS = """## Stepper envelope: faults
 
-The cause stands in the register `rule.cause` of the motor. `rule.reset`, once the motor stands, leaves the fault.
+The cause stands in the register `controller.rule.cause` of the motor. `controller.rule.reset`, once the motor stands,
+leaves the fault.
 """
 
 

@@ -9,18 +9,12 @@ from typing import Any
 import numpy as np
 
 from detent.control.step_comparison import CONSTANT_FREQUENCY
-from detent.control.step_rule import FAULT, REST, deflect, start_move
+from detent.control.step_rule import FAULT, REST, acknowledge, deflect, start_move
 from detent.kernel.loop import advance
 from detent.kernel.registers import Leaf
-from detent.methods.stepper_envelope.system import (
-    NOWHERE,
-    Stepper,
-    StepperParams,
-    alone,
-    load_rule,
-    switch_on,
-    tables,
-)
+from detent.methods.stepper_envelope.compared import ComparedParams, compared_alone, take_over
+from detent.methods.stepper_envelope.controller import NOWHERE, call_at, load_rule
+from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone, switch_on, tables
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
 from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
@@ -114,12 +108,14 @@ class Rig:
         self.down_zones = ZoneMap(steps, max_hz, other, self.zones.limits)
         self.up = StepEnvelope(ramp, self.zones, 1, 0, turn)
         self.down = StepEnvelope(ramp, self.down_zones, -1, turn, stop)
-        self.p, self.r = StepperParams(pause=pause), Stepper()
+        self.p: Any = StepperParams()
+        self.r: Any = Stepper()
         self.clock_hz = RELOAD_CLOCK_HZ if reload else CLOCK_HZ
-        load_rule(self.p, ramp, self.zones.limits, self.clock_hz, reload=reload)
-        self.p.rule.literal = literal
-        self.p.instant_ticks = round(DT * self.clock_hz)
-        self.p.rotor = rotor_params(motor, load, inertia, max(max_hz, float(ramp.hz[-1])))
+        load_rule(self.p.controller, ramp, self.zones.limits, self.clock_hz, reload=reload)
+        self.p.controller.rule.literal, self.p.controller.pause = literal, pause
+        self.p.controller.instant_ticks = round(DT * self.clock_hz)
+        self.p.plant.clock_hz = self.clock_hz
+        self.p.plant.rotor = rotor_params(motor, load, inertia, max(max_hz, float(ramp.hz[-1])))
         switch_on(self.r, at, motor.step_angle)
         self.seconds = 0.0
         """Time of all runs so far, up to the end of the last period [s]."""
@@ -127,34 +123,55 @@ class Rig:
         self._rows: list[np.ndarray] = []
 
     @property
+    def rule(self) -> Any:
+        """Registers of the control unit."""
+        return self.r.controller.rule
+
+    @property
+    def timer(self) -> Any:
+        """Registers of the step timer."""
+        return self.r.controller.timer
+
+    @property
+    def rotor(self) -> Any:
+        """Registers of the rotor."""
+        return self.r.plant.rotor
+
+    @property
     def position(self) -> int:
-        return self.r.rule.position
+        return self.rule.position
 
     @property
     def hz(self) -> float:
         """Frequency of the running step [Hz]."""
-        return self.clock_hz / self.r.timer.period if self.r.timer.period else 0.0
+        return self.clock_hz / self.timer.period if self.timer.period else 0.0
 
     @property
     def lost(self) -> int:
-        return lost_steps(self.p.rotor, self.r.rotor)
+        return lost_steps(self.p.plant.rotor, self.rotor)
 
     @property
-    def tables(self) -> tuple[Any, Any]:
-        return tables(self.up.entries, self.down.entries)
+    def tables(self) -> tuple[Any, ...]:
+        """What is laid ready: nothing where a method drives that knows no tables."""
+        return () if isinstance(self.p, ComparedParams) else tables(self.up.entries, self.down.entries)
+
+    @property
+    def alone(self) -> Any:
+        """Parameters for running without the rotor."""
+        return compared_alone(self.p) if isinstance(self.p, ComparedParams) else alone(self.p)
 
     @property
     def resting(self) -> bool:
-        return self.r.rule.index < 0 and self.r.rule.state in {REST, FAULT} and not self.r.rule.start
+        return self.rule.index < 0 and self.rule.state in {REST, FAULT} and not self.rule.start
 
     def flat(self, hz: Sequence[float] | np.ndarray, *, up: bool = True) -> "Rig":
         """Overwrite a table: the literal rule then drives each step i with hz[i], whatever the ramp."""
         limits = sorted(set(hz), reverse=True)
-        load_rule(self.p, self.ramp, limits, self.clock_hz, reload=bool(self.p.rule.reload))
+        load_rule(self.p.controller, self.ramp, limits, self.clock_hz, reload=bool(self.p.controller.rule.reload))
         top = len(self.ramp) - 1
         table = self.up.entries[:-1] if up else self.down.entries[1:]
-        table[:] = [limits.index(f) << self.p.rule.zone_shift | top for f in hz]
-        self.p.rule.literal = 1
+        table[:] = [limits.index(f) << self.p.controller.rule.zone_shift | top for f in hz]
+        self.p.controller.rule.literal = 1
         return self
 
     def constant(self, hz: float) -> "Rig":
@@ -163,41 +180,38 @@ class Rig:
 
     def compared(self, method: int, start_hz: float = START_HZ) -> "Rig":
         """Another method drives, upwards from here to the end of the travel."""
-        c = self.p.comparison
-        c.method, c.start_hz, c.acceleration = method, start_hz, A_LIN
-        c.begin, c.steps = self.position, self.zones.steps - self.position
-        c.zones = len(self.zones.numbers)
-        for k, number in enumerate(self.zones.numbers):
-            c.edge[k] = int(self.zones.edges[k + 1]) - c.begin
-            c.limit[k] = self.zones.limits[number]
+        way = range(self.position, self.zones.steps)
+        self.p, self.r = take_over(
+            self.p, self.r, self.zones, way, method=method, start_hz=start_hz, acceleration=A_LIN
+        )
         return self
 
     def start(self, heading: int = 1, turns: int = 0) -> "Rig":
-        start_move(self.r.rule, heading, turns)
+        start_move(self.rule, heading, turns)
         return self
 
     def joystick(self, hz: float, heading: int = 1) -> "Rig":
         """Deflect it as far as `hz` is of the largest frequency; 0 releases."""
-        word = hz if not self.p.rule.reload or not hz else self.clock_hz / hz
-        deflect(self.p.rule, self.r.rule, round(word), len(self.ramp) - 1, heading)
+        word = hz if not self.p.controller.rule.reload or not hz else self.clock_hz / hz
+        deflect(self.p.controller.rule, self.rule, round(word), len(self.ramp) - 1, heading)
         return self
 
     def run_to(self, position: int) -> "Rig":
         """On the rig, until the step that reaches `position` has begun."""
-        self.r.stop_at = position
-        begin = self.r.timer.expires
+        call_at(self.r.controller, position)
+        begin = self.timer.expires
         self._turn(10**9)
         assert self.position == position
-        self.seconds += (self.r.timer.expires - begin) / self.clock_hz
-        self.r.stop_at = NOWHERE
+        self.seconds += (self.timer.expires - begin) / self.clock_hz
+        call_at(self.r.controller, NOWHERE)
         return self
 
     def run_to_rest(self) -> "Rig":
         """On the rig, until the motor rests."""
-        begin = self.r.timer.expires
+        begin = self.timer.expires
         self._turn(10**9)
         assert self.resting
-        self.seconds += (self.r.timer.expires - begin) / self.clock_hz
+        self.seconds += (self.timer.expires - begin) / self.clock_hz
         return self
 
     def settle(self, seconds: float = SETTLE) -> "Rig":
@@ -210,24 +224,24 @@ class Rig:
         return self.run_to_rest().settle()
 
     def _turn(self, instants: int) -> None:
-        self.r.rule.event = 0
+        acknowledge(self.rule)
         if self._every:
             self._turn_and_log(instants)
         else:
             advance(self.p, self.r, instants, *NO_TRACE, *self.tables)
-        self.r.rule.event = 0
+        acknowledge(self.rule)
 
     def log_steps(self, fastest_hz: float) -> "Rig":
         """From here on note every step on the rig, none of them faster than `fastest_hz`."""
-        self._every = int(self.clock_hz / fastest_hz) // self.p.instant_ticks
+        self._every = int(self.clock_hz / fastest_hz) // self.p.controller.instant_ticks
         assert self._every > 0, f"{fastest_hz} Hz leave no row between two steps"
         return self
 
     def _turn_and_log(self, instants: int) -> None:
         """Row by row, often enough for every step to have one."""
-        picks, dtype = pick((*COURSE, "timer.pulses"))
+        picks, dtype = pick((*COURSE, "controller.timer.pulses"))
         rows = np.zeros((4096, dtype.itemsize), np.uint8)
-        while instants > 0 and not self.r.rule.event:
+        while instants > 0 and not self.rule.event:
             first = self.r.tick // self._every + 1
             most = min(instants, (len(rows) - 1) * self._every)
             instants -= advance(self.p, self.r, most, rows, picks, self._every, *self.tables)
@@ -237,14 +251,14 @@ class Rig:
     def logged(self) -> Course:
         """Every step on the rig since `log_steps`, each one once."""
         rows = np.concatenate(self._rows)
-        pulses, first = np.unique(rows["timer.pulses"], return_index=True)
+        pulses, first = np.unique(rows["controller.timer.pulses"], return_index=True)
         first = first[pulses > 0]
-        assert len(first) == self.r.timer.pulses, "a step has no row"
+        assert len(first) == self.timer.pulses, "a step has no row"
         return course_of(rows[first], self.clock_hz, self.seconds)
 
     def edit_stop(self, position: int) -> StopEdit:
         """Move the stop extreme of the running direction between two steps."""
-        rule = self.r.rule
+        rule = self.rule
         table = self.up if rule.direction > 0 else self.down
         return table.move_stop(position, rule.position, rule.index)
 
@@ -252,16 +266,23 @@ class Rig:
         """Run without the rotor until the motor rests or an event comes; one row per step."""
         picks, dtype = pick(COURSE)
         rows = np.zeros((min(most, 3 * self.zones.steps + 10), dtype.itemsize), np.uint8)
-        begin, first = self.r.timer.expires, self.r.tick
-        self.r.rule.event = 0
-        done = advance(alone(self.p), self.r, min(most, len(rows)), rows, picks, 1, *self.tables)
-        self.r.rule.event = 0
+        begin, first = self.timer.expires, self.r.tick
+        acknowledge(self.rule)
+        done = advance(self.alone, self.r, min(most, len(rows)), rows, picks, 1, *self.tables)
+        acknowledge(self.rule)
         found = rows[np.arange(first + 1, first + done + 1) % len(rows)].view(dtype)[:, 0]
-        return course_of(found, self.clock_hz, (self.r.timer.expires - begin) / self.clock_hz)
+        return course_of(found, self.clock_hz, (self.timer.expires - begin) / self.clock_hz)
 
 
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
-COURSE = ("rule.position", "rule.direction", "timer.period", "rule.index", "rule.relation", "rule.state")
+COURSE = (
+    "controller.rule.position",
+    "controller.rule.direction",
+    "controller.timer.period",
+    "controller.rule.index",
+    "controller.rule.relation",
+    "controller.rule.state",
+)
 
 
 @cache
@@ -275,14 +296,14 @@ def pick(names: tuple[str, ...]) -> tuple[np.ndarray, Any]:
 
 def course_of(rows: np.ndarray, clock_hz: int, seconds: float) -> Course:
     """One row per step, as a course."""
-    direction = rows["rule.direction"].astype(np.int64)
+    direction = rows["controller.rule.direction"].astype(np.int64)
     return Course(
-        position=rows["rule.position"] - direction,
+        position=rows["controller.rule.position"] - direction,
         direction=direction,
-        hz=clock_hz / rows["timer.period"],
-        index=rows["rule.index"].astype(np.int64),
-        relation=rows["rule.relation"].astype(np.int64),
-        state=rows["rule.state"].astype(np.int64),
+        hz=clock_hz / rows["controller.timer.period"],
+        index=rows["controller.rule.index"].astype(np.int64),
+        relation=rows["controller.rule.relation"].astype(np.int64),
+        state=rows["controller.rule.state"].astype(np.int64),
         seconds=seconds,
     )
 

@@ -112,6 +112,7 @@ def rotary_table() -> Job:
 
 def stepper_envelope() -> Job:
     """Both motors of a stage at once."""
+    from detent.control.step_rule import acknowledge
     from detent.methods.load import load_spec
     from detent.methods.stepper_envelope.host import Leg, StageHost
 
@@ -119,13 +120,18 @@ def stepper_envelope() -> Job:
     motors = host.stage.motors
 
     def by(steps: int) -> Callable[[], object]:
-        return lambda: host.start({n: Leg(m.position, m.position + steps) for n, m in motors.items()})
+        return lambda: host.start({n: Leg(m.position, max(m.position + steps, 0)) for n, m in motors.items()})
 
     def run(ticks: int) -> None:
         host.stage.pass_time(ticks * host.stage.tick)
 
+    def answer() -> None:
+        for motor in motors.values():
+            acknowledge(motor.controller.rule)
+
     params = {name: motor.p for name, motor in motors.items()}
-    return Job(params, {name: motor.r for name, motor in motors.items()}, (by(200), by(-150)), run)
+    state = {name: motor.r for name, motor in motors.items()}
+    return Job(params, state, (by(200), by(-150)), run, answer, lambda name: motors[name].feed)
 
 
 def cascade() -> Job:

@@ -34,7 +34,7 @@ from tests.stepper_rig import (
 from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
-from detent.drive.step_timer import reload_values
+from detent.control.step_timer import reload_values
 from detent.kernel.loop import advance
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory, turn_envelopes
 from detent.planning.step_ramp import start_frequency, total_inertia, travel_per_step
@@ -138,7 +138,7 @@ def test_04_turn_between_both_directions(pause, lag):
     assert rig.seconds == seconds(1.5839 + 1.2089 + pause * 2.5e-3)
     assert rig.seconds == pytest.approx(2.7928 + pause * 2.5e-3, abs=1e-4)
     assert rig.lost == 0
-    assert rig.r.rotor.peak_lag < lag
+    assert rig.rotor.peak_lag < lag
     for steps in (455, 1000, 4500, 6000):
         assert (1 / envelope(steps).permissible_hz()).sum() == pytest.approx(steps / MAX_HZ + 0.0839, abs=1e-4)
 
@@ -297,7 +297,7 @@ def test_10_one_read_a_step_whatever_the_travel(plain_rule, steps):
     up, down = CountingTable(rig.up.entries), CountingTable(rig.down.entries)
     rig.start()
     for made in range(1, 1001):
-        assert plain_rule(rig.p.rule, rig.r.rule, up, down) == STEP
+        assert plain_rule(rig.p.controller.rule, rig.rule, up, down) == STEP
         assert (up.reads, down.reads) == (made, 0)
 
 
@@ -342,8 +342,8 @@ def test_12_no_step_is_lost_on_the_envelope(steps, reload):
     rig = Rig(steps, reload=reload).start().run()
     assert rig.lost == 0
     assert rig.position == steps
-    assert rig.r.rotor.peak_lag + 1e-4 >= 1.0
-    assert rig.r.rotor.peak_lag < 1.1
+    assert rig.rotor.peak_lag + 1e-4 >= 1.0
+    assert rig.rotor.peak_lag < 1.1
 
 
 @pytest.mark.parametrize(("hz", "lost"), [(400, 0), (600, 0), (800, 0), (1000, 0), (2000, 4), (3000, 20), (4000, 104)])
@@ -415,7 +415,7 @@ def test_14_a_sudden_change_at_the_boundaries_loses_steps(reload):
     index[2000:2600] = index[5000:6000] = RAMP.index_of(FINE_HZ)
     numbers = np.zeros(N, np.int64)
     numbers[2000:2600] = numbers[5000:6000] = 1
-    caps.up.entries[:-1] = index | numbers << caps.p.rule.zone_shift
+    caps.up.entries[:-1] = index | numbers << caps.p.controller.rule.zone_shift
     assert caps.start().run().seconds == pytest.approx((1 / hz).sum(), rel=RELOAD_ERROR)
     assert caps.lost > 500
     assert caps.lost == pytest.approx(960, rel=0.05)
@@ -550,7 +550,7 @@ def test_20_a_table_that_ends_too_soon_is_a_fault(reload):
     rig = Rig(reload=reload).start().run_to(3000)
     rig.up.move_stop(3100)  # as if nobody were running
     rig.run()
-    assert (rig.r.rule.state, rig.r.rule.cause) == (FAULT, INFEASIBLE)
+    assert (rig.rule.state, rig.rule.cause) == (FAULT, INFEASIBLE)
     assert (rig.position, rig.lost) == (3227, 0)  # it comes down within its 227 steps, then is off
 
 
@@ -649,9 +649,9 @@ def test_27_reversal_at_full_speed(reload):
 
 def test_27_reversal_of_an_automatic_move(reload):
     rig = Rig(reload=reload).start().run_to(3000)
-    rig.r.rule.heading = -1
+    rig.rule.heading = -1
     rig.run()
-    assert (rig.position, rig.lost, rig.r.rule.state) == (0, 0, REST)
+    assert (rig.position, rig.lost, rig.rule.state) == (0, 0, REST)
 
 
 # ------------------------------------------------------------------------------------------------------ several motors
@@ -686,7 +686,7 @@ def test_28_two_motors_on_the_rig_run_as_if_alone():
             advance(rig.p, rig.r, 50, *no_trace, *rig.tables)
     for single, rig in zip(alone, rigs, strict=True):
         assert rig.lost == single.lost == 0
-        assert rig.r.rotor.peak_lag == single.r.rotor.peak_lag
+        assert rig.rotor.peak_lag == single.rotor.peak_lag
         assert rig.position == single.position
 
 
@@ -696,7 +696,7 @@ def test_29_cost_and_memory_grow_with_the_motors(plain_rule, motors):
     tables = [(CountingTable(rig.up.entries), CountingTable(rig.down.entries)) for rig in rigs]
     for _ in range(500):
         for rig, (up, down) in zip(rigs, tables, strict=True):
-            assert plain_rule(rig.p.rule, rig.r.rule, up, down) == STEP
+            assert plain_rule(rig.p.controller.rule, rig.rule, up, down) == STEP
     assert sum(up.reads + down.reads for up, down in tables) == 500 * motors
     memory = sum(envelope_memory(rig.ramp, rig.zones).tables for rig in rigs)
     assert memory == 4 * sum(600 + 10 * k for k in range(motors))

@@ -4,17 +4,17 @@ The interval between two steps follows a recurrence (D. Austin, Generate stepper
 Embedded Systems Programming, January 2005), in the form of Mike McCauley's AccelStepper library, whose equations 13, 15
 and 16 it names. Each step costs three divisions: braking distance, recurrence and speed. The interval is the timer's
 reload value. The library counts in floats of 32 bits, this in 64. Around the decision stands what stands around the
-rule in `systems.stepper`: timer and phases, the event line, a position to stop at, the rows of a trace.
+rule in the controller: timer and phases, the event line, a position to stop at, the rows of a trace.
 """
 
 import math
 
-from detent.drive.step_timer import StepTimer, StepTimerParams, load_period, pulse
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import Bytes, Offsets, until_row, write_row
 from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
 from detent.kernel.step import hot_step, step
-from detent.methods.stepper_envelope.system import NOWHERE
+from detent.methods.stepper_envelope.controller import NOWHERE
 
 
 class AccelStepperParams(Registers):

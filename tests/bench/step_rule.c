@@ -1,16 +1,14 @@
-/* The step by hand: what `detent.methods.stepper_envelope.system.advance` is measured against.
+/* The step by hand: what the controller's own steps are measured against.
  *
  * Run-time rule, literal rule, step timer and phases of one motor, in the same order, so that both end on the same
- * registers; everything that changes lives in local copies, which the compiler keeps in machine registers. The methods
- * that the rule is compared with are not covered, nor the rows of a trace. step_rule_registers.h, the declarations of
+ * registers; everything that changes lives in local copies, which the compiler keeps in machine registers. The
+ * rows of a trace are not covered. step_rule_registers.h, the declarations of
  * the structures, is generated from the register files.
  */
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "step_rule_registers.h"
-
-#define NOT_COVERED INT64_C(-1)
 
 enum { REST, ACCEL, CRUISE, DECEL, TURN, FAULT };
 enum { IDLE, STEP, PAUSE };
@@ -162,7 +160,7 @@ static inline void load_period(const StepTimerParams *p, StepTimer *r, int32_t w
     r->expires += r->period;
 }
 
-static inline void pause_motor(const StepperParams *p, StepTimer *timer)
+static inline void pause_motor(const StepperControllerParams *p, StepTimer *timer)
 {
     int64_t start = timer->expires;
     if (p->pause)
@@ -170,11 +168,9 @@ static inline void pause_motor(const StepperParams *p, StepTimer *timer)
     timer->expires = start + p->pause * timer->period;
 }
 
-int64_t advance(const StepperParams *restrict p, Stepper *restrict r, const int16_t *restrict up,
+int64_t advance(const StepperControllerParams *restrict p, StepperController *restrict r, const int16_t *restrict up,
                 const int16_t *restrict down, int64_t length, int64_t steps)
 {
-    if (p->comparison.method)
-        return NOT_COVERED;
     const Tables tables = {up, down, length};
     StepRule rule = r->rule;
     StepTimer timer = r->timer;
@@ -197,6 +193,5 @@ int64_t advance(const StepperParams *restrict p, Stepper *restrict r, const int1
     }
     r->rule = rule;
     r->timer = timer;
-    r->tick += done;
     return done;
 }

@@ -20,10 +20,11 @@ from tests.bench import accel_stepper
 from tests.bench.race import COMPILER, OPTIMISED, Race, compile_c, first_line, needs_c, timed
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, NO_TRACE, RAMP, RELOAD_CLOCK_HZ, START_HZ, Rig
 
+from detent.control import step_rule
 from detent.control.step_comparison import PERMISSIBLE_FREQUENCY
-from detent.control.step_rule import FAULT, OUT_OF_RANGE, REST
+from detent.control.step_rule import FAULT, OUT_OF_RANGE, REST, acknowledge
 from detent.kernel.loop import advance
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone
+from detent.methods.stepper_envelope.controller import StepperController, StepperControllerParams
 from detent.planning.step_envelope import SENTINEL, StepEnvelope, ZoneMap
 from detent.planning.step_ramp import make_ramp
 
@@ -68,18 +69,18 @@ def test_moving_a_stop(benchmark, steps):
 
 def compiled(rig, steps=LONGEST):
     """The composed steps; returns the steps made."""
-    return advance(alone(rig.p), rig.r, steps, *NO_TRACE, *rig.tables)
+    return advance(rig.alone, rig.r, steps, *NO_TRACE, *rig.tables)
 
 
 def rule_in_c(folder, *flags):
     """The same in C, compiled against the register files' own declarations."""
-    (folder / "step_rule_registers.h").write_text(StepperParams.c_struct() + Stepper.c_struct())
+    (folder / "step_rule_registers.h").write_text(StepperControllerParams.c_struct() + StepperController.c_struct())
     function: Any = compile_c(SOURCE, folder, *flags).advance
     function.argtypes, function.restype = [ctypes.c_void_p] * 4 + [ctypes.c_int64] * 2, ctypes.c_int64
 
     def run(rig, steps=LONGEST):
         up, down = rig.up.entries, rig.down.entries
-        state = ctypes.addressof(rig.p), ctypes.addressof(rig.r)
+        state = ctypes.addressof(rig.p.controller), ctypes.addressof(rig.r.controller)
         return function(*state, up.ctypes.data, down.ctypes.data, len(up), steps)
 
     return run
@@ -118,7 +119,7 @@ def spoil(rig):
 
 
 def reset(rig):
-    rig.r.rule.reset = 1
+    step_rule.reset(rig.rule)
 
 
 COURSES = {
@@ -159,9 +160,9 @@ def drive(course, engine, **kwargs):
     for act, steps in course.acts:
         act(rig)
         engine(rig, steps)
-        states.append(rig.r.snapshot())
-        rig.r.rule.event = 0
-    assert (rig.r.rule.state, rig.position, rig.r.rule.cause) == (*course.end, course.cause)
+        states.append(rig.r.controller.snapshot())
+        acknowledge(rig.rule)
+    assert (rig.rule.state, rig.position, rig.rule.cause) == (*course.end, course.cause)
     return states
 
 

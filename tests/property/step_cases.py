@@ -87,7 +87,7 @@ def assert_feasible(table: StepEnvelope) -> None:
 
 def fastest_hz(rig: Rig, limit: np.ndarray) -> np.ndarray:
     """What the timer makes of a limit, at most [Hz]: a word is rounded to the slower side, a period to whole ticks."""
-    return limit * (1 + 1e-9) if rig.p.rule.reload else limit / (1 - limit / (2 * rig.clock_hz))
+    return limit * (1 + 1e-9) if rig.p.controller.rule.reload else limit / (1 - limit / (2 * rig.clock_hz))
 
 
 @dataclass
@@ -102,7 +102,7 @@ class Tables:
 def tables_of(rig: Rig) -> Tables:
     """The tables as they are now."""
     up, down = (np.where(table < 0, -1, table & INDEX_MASK) for table in map(np.asarray, rig.tables))
-    return Tables(rig.r.timer.pulses, up, down)
+    return Tables(rig.timer.pulses, up, down)
 
 
 def judge_steps(rig: Rig, course: Course, rests: list[int], tables: list[Tables]) -> None:
@@ -163,7 +163,7 @@ class StepCase:
         )
         self.rig.log_steps(1.02 * top + 1)
         self.met[type(axis.motor.pull_out).__name__] += 1
-        self.met["reload"] += self.rig.p.rule.reload
+        self.met["reload"] += self.rig.p.controller.rule.reload
         self.note_tables(self.rig.up, self.rig.down)
 
     def note_tables(self, *edited: StepEnvelope) -> None:
@@ -194,7 +194,7 @@ class StepCase:
 
     def edit_running(self, heading: int) -> None:
         """Move a stop or a start between two steps of a run, to where it is asked for or as near as possible."""
-        rng, rig, rule = self.rng, self.rig, self.rig.r.rule
+        rng, rig, rule = self.rng, self.rig, self.rig.rule
         running, other = (rig.up, rig.down) if heading > 0 else (rig.down, rig.up)
         place, kind = draw_place(rng, rig.zones.steps), rng.random()
         if kind < 0.6:
@@ -210,14 +210,14 @@ class StepCase:
 
     def ahead(self, heading: int) -> int:
         """A place about where the motor could just stop, or further on."""
-        nearest = self.rig.position + heading * self.rig.r.rule.index
+        nearest = self.rig.position + heading * self.rig.rule.index
         if chance(self.rng, 0.5):
             return min(max(nearest + heading * whole(self.rng, -3, 3), 0), self.rig.zones.steps)
         return whole(self.rng, *sorted((nearest, self.rig.zones.steps if heading > 0 else 0)))
 
     def move_stop(self, heading: int, place: int) -> None:
         """Move the stop of the run: it is where it was asked for, or flagged and one step per index ahead."""
-        rig, rule = self.rig, self.rig.r.rule
+        rig, rule = self.rig, self.rig.rule
         nearest = rule.position + heading * rule.index
         too_near = heading * (nearest - place) > 0
         braking, former = rule.state == DECEL, (rig.up if heading > 0 else rig.down).stop
@@ -254,11 +254,11 @@ class StepCase:
             end = self.run_leg(heading, rig.position, last=leg == turns)
             heading = -heading
         assert rig.position == end, f"the run ended at {rig.position}, not at its stop {end}"
-        assert rig.r.rule.state == REST
+        assert rig.rule.state == REST
 
     def run_manually(self) -> None:
         """The operator deflects, perhaps turns about, and lets go, or holds on: where the motor then rests."""
-        rig, rng, rule = self.rig, self.rng, self.rig.r.rule
+        rig, rng, rule = self.rig, self.rng, self.rig.rule
         for _ in range(whole(rng, 1, 3)):
             heading = 1 if chance(rng, 0.5) else -1
             # Turned about at speed it first comes down, one step per index.
@@ -289,17 +289,17 @@ class StepCase:
                 self.run_automatically()
             else:
                 self.run_manually()
-            self.rests.append(self.rig.r.timer.pulses)
+            self.rests.append(self.rig.timer.pulses)
             if chance(self.rng, 0.5):
                 self.settle()
             else:
-                self.rig.settle(self.rig.p.pause / float(self.axis.ramp.hz[0]))
+                self.rig.settle(self.rig.p.controller.pause / float(self.axis.ramp.hz[0]))
         self.settle()
 
     def settle(self) -> None:
         """Until the swing, damped with 0.2 of the critical damping, has fallen to a thousandth: no step is lost."""
         self.rig.settle(math.log(1000) / (0.2 * 2 * math.pi * self.axis.natural_hz))
-        lag = self.rig.r.rotor.peak_lag
+        lag = self.rig.rotor.peak_lag
         assert self.rig.lost == 0, f"{self.rig.lost} steps are lost"
         assert lag < PEAK_LAG, f"the rotor lagged by {lag} steps"
 

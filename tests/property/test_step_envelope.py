@@ -131,10 +131,10 @@ def run_once(data: st.DataObject, axis: Axis) -> None:
     rig.start(1, int(twice))
     stop = edit_on_the_way(data, rig)
     rig.run()
-    assert rig.r.rule.state == REST
+    assert rig.rule.state == REST
     assert rig.position == (min(rig.down.stop, stop) if twice else stop)
     assert rig.lost == 0
-    assert rig.r.rotor.peak_lag < PEAK_LAG
+    assert rig.rotor.peak_lag < PEAK_LAG
 
 
 @settings(max_examples=200, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -196,7 +196,7 @@ def test_the_judge_sees_what_is_lost_four_times_as_fast():
     lost = 0
     for number in range(100):
         case = StepCase(number)
-        case.rig.p.instant_ticks *= 4
+        case.rig.p.controller.instant_ticks *= 4
         try:
             case.run()
         except AssertionError as error:
@@ -243,9 +243,9 @@ def test_whatever_the_operator_does_the_limits_hold(data):
         turned = np.flatnonzero(np.diff(np.concatenate([course.direction[:1], course.direction])))
         assert (course.index[turned] == 0).all()
         assert np.abs(np.diff(path)).max(initial=0) <= 1
-        index = rig.r.rule.index
+        index = rig.rule.index
         assert 0 <= rig.position <= steps
-        assert rig.r.rule.state != FAULT
+        assert rig.rule.state != FAULT
     rig.joystick(0)
     rig.course()
     assert rig.resting

@@ -41,7 +41,7 @@ def test_run_does_the_job_and_leaves_report_and_trace(axis: str, job: str) -> No
     assert answer.out.splitlines()[0].endswith("no step was lost.")
     assert {path.name for path in Path("out").iterdir()} == {"report.html", "trace.h5", "trace.csv"}
     name = "group_b" if axis == ZOOM else "y"
-    assert f"{name}.rotor.lag" in load_trace(Path("out/trace.h5")).signals
+    assert f"{name}.plant.rotor.lag" in load_trace(Path("out/trace.h5")).signals
     assert Path(job).name in Path("out/report.html").read_text(encoding="utf-8")
 
 
@@ -66,13 +66,13 @@ def test_compare_shows_methods_per_motor_and_the_smooth_profile() -> None:
 
 
 def test_timing_and_registers_know_the_motors_by_name() -> None:
-    words = ("--signals", "group_a.timer.*,group_b.rule.index", "--for", "2 ms")
+    words = ("--signals", "group_a.controller.timer.*,group_b.controller.rule.index", "--for", "2 ms")
     answer = call("timing", ZOOM, "--at", "10 ms", *words, "--figure", "t.png", "--vcd", "t.vcd")
     assert answer.status == 0, answer.err
     found = load_vcd(Path("t.vcd"))
-    assert "group_b.rule.index" in [signal.name for signal in found.signals]
-    assert re.search(r"^group_b\.rotor\.lag +f8 ", call("registers", ZOOM).out, flags=re.MULTILINE)
-    assert re.search(r"^rotor\.lag +f8 ", call("registers", "stepper_envelope").out, flags=re.MULTILINE)
+    assert "group_b.controller.rule.index" in [signal.name for signal in found.signals]
+    assert re.search(r"^group_b\.plant\.rotor\.lag +f8 ", call("registers", ZOOM).out, flags=re.MULTILINE)
+    assert re.search(r"^plant\.rotor\.lag +f8 ", call("registers", "stepper_envelope").out, flags=re.MULTILINE)
 
 
 def test_envelope_writes_table_header_and_figure_of_each_motor() -> None:
@@ -103,7 +103,7 @@ BAD = {
     "a motor named as a job's word": (["check", "tick.toml"], 'the name "tick"'),
     "a place beyond the travel": (["run", STAGE, "--job", "far.csv"], r"far\.csv:2"),
     "an unknown motor in a job": (["run", STAGE, "--job", SEQUENCE], "group_a"),
-    "signals of no motor": (["run", STAGE, "--job", TILES, "--signals", "z.rotor.lag"], "z.rotor.lag"),
+    "signals of no motor": (["run", STAGE, "--job", TILES, "--signals", "z.plant.rotor.lag"], "z.plant.rotor.lag"),
 }
 
 

@@ -226,3 +226,18 @@ def deflect(p: StepRuleParams, r: StepRule, word: int, last: int, heading: int) 
     # The first index that is fast enough; of several with this very word the last, which the motor passes them to.
     below = sum(one > word if p.reload else one < word for one in words)
     r.request = AT_REST if word == 0 else min(below + max(words.count(word) - 1, 0), last)
+
+
+def release(r: StepRule) -> None:
+    """The operator lets go: the motor comes down its ramp and rests."""
+    r.manual, r.request, r.request_word, r.event = 1, AT_REST, 0, 0
+
+
+def reset(r: StepRule) -> None:
+    """Leave a fault, once the motor rests."""
+    r.reset = 1
+
+
+def acknowledge(r: StepRule) -> None:
+    """The host has seen the event: time may pass on."""
+    r.event = 0

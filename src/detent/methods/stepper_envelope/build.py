@@ -148,17 +148,19 @@ def make_tables(table: StepperTable) -> MotorTables:
 
 def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> "StepperParams":
     """Parameters of one motor."""
-    from detent.methods.stepper_envelope.system import StepperParams, load_rule
+    from detent.methods.stepper_envelope.controller import load_rule
+    from detent.methods.stepper_envelope.system import StepperParams
     from detent.plant.stepper_rotor import fill_curve
 
     p, table = StepperParams(), spec.stepper[name]
     motor, load = stepper_motor(table), stepper_load(table)
     reload = spec.controller.words == "reload"
-    load_rule(p, tables.ramp, tables.up.zones.limits, round(spec.controller.timer), reload=reload)
-    p.rule.literal = table.method.rule == "literal"
-    p.pause = table.drive.reversal_pause
-    p.instant_ticks, p.tolerance = instant_ticks(spec), spec.controller.tolerance
-    r, inertia = p.rotor, total_inertia(motor, load)
+    clock_hz = p.plant.clock_hz = round(spec.controller.timer)
+    load_rule(p.controller, tables.ramp, tables.up.zones.limits, clock_hz, reload=reload)
+    p.controller.rule.literal = table.method.rule == "literal"
+    p.controller.pause, p.controller.instant_ticks = table.drive.reversal_pause, instant_ticks(spec)
+    p.plant.tolerance = spec.controller.tolerance
+    r, inertia = p.plant.rotor, total_inertia(motor, load)
     r.dt, r.teeth, r.step_angle, r.inertia = instant(spec), motor.steps_per_turn / 4, motor.step_angle, inertia
     r.torque, r.friction = motor.holding_torque, load.friction_torque
     r.damping = DAMPING * math.sqrt(r.teeth * motor.holding_torque * inertia)

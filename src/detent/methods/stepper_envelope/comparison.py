@@ -19,6 +19,7 @@ from detent.methods.stepper_envelope.summary import stated
 from detent.page.figure import Figure
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, duration, milliseconds, number
+from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import Progress
 from detent.units import format_quantity
 
@@ -200,11 +201,13 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: i
     """One motor with one method over one way, on its rotor."""
     motor = motor_at_start(spec, name, way)
     if code:
-        _take_over(motor, code, way, motor.table.max_hz if method == "largest frequency" else None)
-    start_move(motor.r.rule, 1)
+        start_hz = motor.table.max_hz if method == "largest frequency" else float(motor.tables.ramp.hz[0])
+        motor.compare(code, range(way), start_hz)
+    start_move(motor.controller.rule, 1)
     motor.advance_to(1 << 60, 0, until_event=True)
-    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.rotor.dt), 0, until_event=False)
-    return Course(motor.rested, motor.lost, float(motor.r.rotor.peak_lag))
+    motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
+    rotor = motor.r.plant.rotor
+    return Course(motor.rested, lost_steps(motor.p.plant.rotor, rotor), float(rotor.peak_lag))
 
 
 def motor_at_start(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor:
@@ -216,16 +219,3 @@ def motor_at_start(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor
     motor.tables.up.move_start(0)
     motor.tables.up.move_stop(way)
     return motor
-
-
-def _take_over(motor: StageMotor, code: int, way: int, hz: float | None) -> None:
-    """Let another method drive upwards; `hz` is the frequency of the naive drive, the start frequency if None."""
-    c, zones = motor.p.comparison, motor.tables.up.zones
-    c.method, c.begin, c.steps = code, 0, way
-    c.start_hz = float(motor.tables.ramp.hz[0]) if hz is None else hz
-    c.acceleration = motor.table.limits.acceleration / motor.table.step
-    c.zones = len(zones.numbers)
-    for k, zone in enumerate(zones.numbers.tolist()):
-        c.edge[k], c.limit[k] = int(zones.edges[k + 1]), zones.limits[zone]
-    # The compared methods work a frequency out: the timer has to divide.
-    motor.p.timer.reload = 0

@@ -38,7 +38,7 @@ ARC_POINTS = 600
 POINTS = 1500
 """Rows that are chosen for one curve's sake: a page has many of them."""
 
-NEEDED_ROTOR = ("timer.period", "rule.direction", "rotor.velocity", "rotor.lag")
+NEEDED_ROTOR = ("controller.timer.period", "controller.rule.direction", "plant.rotor.velocity", "plant.rotor.lag")
 """Registers that the rotor is drawn from."""
 
 MM, MILLI = 1e3, 1e3
@@ -255,7 +255,7 @@ def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
     end = float(rows.t[-1])
     begin = max(motion.seconds - 0.4 * max(end - motion.seconds, 0.01), 0.0)
     part = slice(int(np.searchsorted(rows.t, begin)), None)
-    lag = rows[f"{motion.name}.rotor.lag"][part]
+    lag = rows[f"{motion.name}.plant.rotor.lag"][part]
     if motion.motor.lost or len(lag) < 2:
         return []
     reach = max(float(np.abs(lag).max()), limit)

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
-from detent.drive.step_timer import StepTimer
+from detent.control.step_timer import StepTimer
 from detent.errors import DetentError
 from detent.kernel.registers import Field, Registers
+from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.system import StepperParams, load_rule
 from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
 from detent.record.trace_store import part_of, writing
 from detent.units import format_quantity
@@ -126,9 +126,9 @@ class EnvelopeTables:
             found[entries >= 0] = (self.clock_hz + words // 2) // words
         return found
 
-    def _loaded(self) -> StepperParams:
+    def _loaded(self) -> StepperControllerParams:
         """Parameters of the motor's control unit, as a simulation has them."""
-        p = StepperParams()
+        p = StepperControllerParams()
         load_rule(p, self.up.ramp, self.up.zones.limits, self.clock_hz, reload=self.reload)
         return p
 

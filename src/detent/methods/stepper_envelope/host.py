@@ -7,12 +7,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from detent.control.step_rule import FAULT, deflect, start_move
+from detent.control.step_rule import FAULT, acknowledge, deflect, release, start_move
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
+from detent.methods.stepper_envelope.controller import NOWHERE, call_at
 from detent.methods.stepper_envelope.machine import Stage, StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
-from detent.methods.stepper_envelope.system import NOWHERE
 from detent.planning.step_envelope import StepEnvelope
 from detent.record.machine import AnyRecorder
 from detent.units import format_quantity
@@ -65,14 +65,14 @@ class StageHost:
             if leg.turn is not None:
                 second.move_start(via)
                 second.move_stop(leg.target)
-            start_move(motor.r.rule, heading, int(leg.turn is not None))
+            start_move(motor.controller.rule, heading, int(leg.turn is not None))
 
     def wait(self, legs: dict[str, Leg]) -> None:
         """Wait until all motors have come to rest."""
         limit = 1.0 + 2.0 * sum(leg.steps / self._slowest(name) for name, leg in legs.items())
         late = self.stage.wait_for(legs, limit)
         for name in legs:
-            rule = self.stage.motors[name].r.rule
+            rule = self.stage.motors[name].controller.rule
             if rule.state == FAULT:
                 raise AxisError(f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}")
             if name in late:
@@ -108,14 +108,13 @@ class StageHost:
     def _change(self, name: str, at: float, to: float) -> bool:
         """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
         motor = self.stage.motors[name]
-        rule = motor.r.rule
-        motor.r.stop_at = motor.table.step_inside(at)
+        rule = motor.controller.rule
+        call_at(motor.controller, motor.table.step_inside(at))
         late = self.stage.wait_for([name], 1.0 + 2.0 * motor.table.steps / self._slowest(name))
-        motor.r.stop_at = NOWHERE
+        call_at(motor.controller, NOWHERE)
         if late or motor.resting:
-            rule.event = int(motor.resting)
             return False
-        rule.event = 0
+        acknowledge(rule)
         ahead, behind = _tables(motor, rule.direction)
         edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
         behind.move_start(edit.stop)
@@ -131,9 +130,10 @@ class StageHost:
             table.move_start(lower)
             table.move_stop(upper)
         last = len(motor.tables.ramp) - 1
-        deflect(motor.p.rule, motor.r.rule, self._word(abs(jog.speed), motor.table), last, heading)
+        rule, word = motor.controller.rule, self._word(abs(jog.speed), motor.table)
+        deflect(motor.p.controller.rule, rule, word, last, heading)
         self.stage.pass_time(jog.duration)
-        deflect(motor.p.rule, motor.r.rule, 0, last, heading)
+        release(rule)
         if not motor.resting:
             self.wait({jog.motor: Leg(0, motor.table.steps)})
         self.goal[jog.motor] = motor.place

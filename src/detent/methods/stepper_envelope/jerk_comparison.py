@@ -18,7 +18,7 @@ from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
 from detent.methods.stepper_envelope.comparison import motor_at_start, time_text
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.summary import stated
-from detent.methods.stepper_envelope.system import Stepper, alone, tables
+from detent.methods.stepper_envelope.system import Stepper, alone
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
@@ -188,13 +188,12 @@ def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:
     open_table = spec.stepper[name].model_copy(update={"zone": {}})
     spec = spec.model_copy(update={"stepper": spec.stepper | {name: open_table}})
     motor = motor_at_start(spec, name, open_table.steps)
-    start_move(motor.r.rule, 1)
-    (period,) = choose_leaves(Stepper, ["timer.period"])
+    start_move(motor.controller.rule, 1)
+    (period,) = choose_leaves(Stepper, ["controller.timer.period"])
     picks = np.arange(period.offset, period.offset + period.width.size)
     rows = np.zeros((motor.table.steps + 1, len(picks)), np.uint8)
-    feed = tables(motor.tables.up.entries, motor.tables.down.entries)
-    made = advance(alone(motor.p), motor.r, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1, *feed)
-    seconds = np.asarray(rows[1 : made + 1].view("<i8")[:, 0] / motor.p.timer.clock_hz, float)
+    made = advance(alone(motor.p), motor.r, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1, *motor.feed)
+    seconds = np.asarray(rows[1 : made + 1].view("<i8")[:, 0] / motor.p.controller.timer.clock_hz, float)
     t: Numbers = np.concatenate([[0.0], np.cumsum(seconds)])
     position = np.linspace(0.0, made * motor.table.step, made + 1)
     return Profile(t, position, np.append(motor.table.step / seconds, 0.0), steps=True)

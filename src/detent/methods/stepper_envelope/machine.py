@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from detent.control.step_rule import FAULT, REST
+from detent.control.step_rule import FAULT, REST, acknowledge
 from detent.kernel.loop import advance
 from detent.kernel.registers import Registers, block, i8, register
 from detent.methods.stepper_envelope.build import MotorTables, build_stepper, instant, make_tables
+from detent.methods.stepper_envelope.compared import take_over
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.system import Stepper, switch_on, tables
-from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder
 
 _NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
@@ -45,11 +45,12 @@ class StageMotor:
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         self.name, self.table = name, spec.stepper[name]
         self.tables: MotorTables = make_tables(self.table)
-        self.p = build_stepper(spec, name, self.tables)
+        self.p: Any = build_stepper(spec, name, self.tables)
         # ctypes gives every register its type at run time only.
         self.r: Any = Stepper()
-        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.rotor.step_angle)
-        self._feed = tables(self.tables.up.entries, self.tables.down.entries)
+        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.plant.rotor.step_angle)
+        self.controller: Any = self.r.controller
+        self.feed: tuple[Any, ...] = tables(self.tables.up.entries, self.tables.down.entries)
         self.rows, self.picks = _NO_ROWS
         self.rested = 0.0
         """When its last step was over [s], at the last event."""
@@ -57,7 +58,7 @@ class StageMotor:
     @property
     def position(self) -> int:
         """Position of record [step]."""
-        return int(self.r.rule.position)
+        return int(self.controller.rule.position)
 
     @property
     def place(self) -> float:
@@ -67,25 +68,29 @@ class StageMotor:
     @property
     def resting(self) -> bool:
         """True when it stands and no start waits to be taken."""
-        rule = self.r.rule
+        rule = self.controller.rule
         return rule.index < 0 and rule.state in {REST, FAULT} and not rule.start
 
-    @property
-    def lost(self) -> int:
-        """Steps that the rotor, at rest, is away from its field."""
-        return lost_steps(self.p.rotor, self.r.rotor)
+    def compare(self, method: int, way: range, start_hz: float) -> None:
+        """Let a method of `control.step_comparison` drive, upwards over a way [step]."""
+        acceleration = self.table.limits.acceleration / self.table.step
+        zones = self.tables.up.zones
+        self.p, self.r = take_over(
+            self.p, self.r, zones, way, method=method, start_hz=start_hz, acceleration=acceleration
+        )
+        self.controller, self.feed = self.r.controller, ()
 
     def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
         """Advance up to an instant, or until the control unit has an event for the host; True if it has one."""
-        r = self.r
-        while r.tick < at and not (until_event and r.rule.event):
+        r, rule = self.r, self.controller.rule
+        while r.tick < at and not (until_event and rule.event):
             if not until_event:
-                r.rule.event = 0
+                acknowledge(rule)
             n = min(at - r.tick, LONGEST_STRETCH)
-            advance(self.p, r, n, self.rows, self.picks, every, *self._feed)
-        if r.rule.event:
-            self.rested = r.timer.expires / self.p.timer.clock_hz
-        return bool(r.rule.event)
+            advance(self.p, r, n, self.rows, self.picks, every, *self.feed)
+        if rule.event:
+            self.rested = self.controller.timer.expires / self.p.controller.timer.clock_hz
+        return bool(rule.event)
 
 
 class Stage:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
-    "timer.pulses", "timer.phase", "timer.period", "rule.index", "rule.relation", "rule.state", "rotor.lag",
+    "controller.timer.pulses", "controller.timer.phase", "controller.timer.period", "controller.rule.index",
+    "controller.rule.relation", "controller.rule.state", "plant.rotor.lag",
 )  # fmt: skip
 
 

@@ -158,8 +158,12 @@ def _notes(figures: StageFigures) -> list[Note]:
 
 
 def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
-    names = [name for name in figures.moved if has(trace, [f"{name}.rule.position"])]
-    rows = stretch(trace, [f"{name}.rule.position" for name in names], figures.run.time_ready) if names else None
+    names = [name for name in figures.moved if has(trace, [f"{name}.controller.rule.position"])]
+    rows = (
+        stretch(trace, [f"{name}.controller.rule.position" for name in names], figures.run.time_ready)
+        if names
+        else None
+    )
     if rows is None:
         return None
     part = slice(0, int(np.searchsorted(rows.t, LONGEST, side="right")))
@@ -188,14 +192,14 @@ def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
 def _path_curves(figures: StageFigures, rows: Stretch, name: str, part: slice) -> list[Curve]:
     """Target, and where the rotor was; the counted position if it is not that, or if nothing better was recorded."""
     table = figures.spec.stepper[name]
-    lower, steps = table.mechanics.lower_end, rows[f"{name}.rule.position"][part]
+    lower, steps = table.mechanics.lower_end, rows[f"{name}.controller.rule.position"][part]
     aim = target_of(figures, name, rows.trace.time[rows.rows][part])
     target = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * MM, thin=0)
     counted = (lower + steps * table.step) * MM
-    if not has(rows.trace, [f"{name}.rotor.lag"]):
+    if not has(rows.trace, [f"{name}.plant.rotor.lag"]):
         return [target, Curve(label="counted position", colour="speed", width=2, y=counted, digits=4, thin=POINTS)]
     # The field is where the steps are counted: the rotor lags behind it.
-    place = (lower + (steps - rows[f"{name}.rotor.lag"][part]) * table.step) * MM
+    place = (lower + (steps - rows[f"{name}.plant.rotor.lag"][part]) * table.step) * MM
     rotor = Curve(label="true position", colour="speed", width=2, y=place, digits=4, thin=POINTS)
     if not any(motion.motor.lost for motion in figures.motions if motion.name == name):
         return [target, rotor]

@@ -10,12 +10,13 @@ from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.planning.step_ramp import torque_margin
+from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
 
 MOTOR_SIGNALS = (
-    "rule.position", "rule.index", "rule.state", "rule.direction", "timer.period", "rotor.angle", "rotor.velocity",
-    "rotor.lag",
+    "controller.rule.position", "controller.rule.index", "controller.rule.state", "controller.rule.direction",
+    "controller.timer.period", "plant.rotor.angle", "plant.rotor.velocity", "plant.rotor.lag",
 )  # fmt: skip
 """Registers of each motor that a run records unless told otherwise."""
 
@@ -186,8 +187,9 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
     begin = stage.time
     before = {name: _counted(motor) for name, motor in stage.motors.items()}
     for name in move.motors:
-        r = stage.motors[name].r
-        r.rotor.peak_lag, r.peak_hz, r.outside = abs(r.rotor.lag), 0.0, stage.instant
+        plant = stage.motors[name].r.plant
+        plant.rotor.peak_lag = abs(plant.rotor.lag)
+        plant.gauge.peak_hz, plant.gauge.outside = 0.0, stage.instant
     over: set[str] = set()
     if isinstance(move, StageJog):
         legs = {move.motor: host.jog(move)}
@@ -206,25 +208,25 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
 
 def _counted(motor: StageMotor) -> tuple[int, int]:
     """Pulses made and steps lost so far."""
-    return int(motor.r.timer.pulses), motor.lost
+    return int(motor.controller.timer.pulses), lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
 
 
 def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, over: bool) -> dict[str, Any]:
     """What a look at the rotor tells after a motion."""
     motor = host.stage.motors[name]
-    r, table = motor.r, motor.table
+    plant, table = motor.r.plant, motor.table
     pulses, lost = (now - then for now, then in zip(_counted(motor), before, strict=True))
     return {
         "start": table.position_of(leg.start),
         "target": host.goal[name],
         "stop": motor.place,
-        "settled": r.outside * host.stage.tick,
+        "settled": plant.gauge.outside * host.stage.tick,
         "steps": pulses,
         "missed": table.step_inside(host.goal[name]) - motor.position,
         "lost": lost,
-        "rest_lag": float(r.rotor.lag),
-        "peak_lag": float(r.rotor.peak_lag),
-        "peak_hz": float(r.peak_hz),
+        "rest_lag": float(plant.rotor.lag),
+        "peak_lag": float(plant.rotor.peak_lag),
+        "peak_hz": float(plant.gauge.peak_hz),
         "margin": _margin(motor),
         "overrun": over,
         "naive": pulses / start_hz(table),
@@ -234,7 +236,7 @@ def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, o
 def _margin(motor: StageMotor) -> float:
     """Smallest torque margin on the part of the ramp that the motion went up and down."""
     ramp = motor.tables.ramp
-    used = ramp.hz[: ramp.index_of(float(motor.r.peak_hz)) + 1]
+    used = ramp.hz[: ramp.index_of(float(motor.r.plant.gauge.peak_hz)) + 1]
     return float(torque_margin(stepper_motor(motor.table), stepper_load(motor.table), used).min())
 
 

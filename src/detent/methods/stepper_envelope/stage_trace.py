@@ -17,7 +17,7 @@ from detent.planning.step_envelope import StepEnvelope, ZoneMap
 from detent.planning.step_ramp import needed_torque, torque_margin
 from detent.record.trace import Trace
 
-NEEDED_STEPS = ("rule.position", "rule.direction", "timer.period")
+NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
 """Registers of a motor that its steps are read from."""
 
 FLAT = 20
@@ -63,10 +63,10 @@ def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
         return None
     position, direction, period = (trace[name].astype(np.int64) for name in of(motor, NEEDED_STEPS))
     new = (period > 0) & (np.diff(position, prepend=position[:1] - direction[:1]) != 0)
-    if f"{motor}.rule.state" in trace:
-        new &= trace[f"{motor}.rule.state"] != TURN
+    if f"{motor}.controller.rule.state" in trace:
+        new &= trace[f"{motor}.controller.rule.state"] != TURN
     rows = np.flatnonzero(new)
-    index = trace[f"{motor}.rule.index"][rows] if f"{motor}.rule.index" in trace else None
+    index = trace[f"{motor}.controller.rule.index"][rows] if f"{motor}.controller.rule.index" in trace else None
     return MadeSteps(trace.time[rows], position[rows], direction[rows], clock_hz / period[rows], index)
 
 

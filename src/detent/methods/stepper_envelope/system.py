@@ -1,103 +1,65 @@
 """One stepper of the envelope method, wired as its block diagram (stepper-envelope specification 2.2).
 
-    host -> envelope builder -> table (up, down) -> control unit -> timer, phases -> motor, spindle, load
+    host -> envelope builder -> table (up, down) -> control unit -> timer, phases -> lines -> motor, spindle, load
                                                         ^              |
                                                         +-- period over+
 
-A tick is a time step of the rotor, the judge of whether the motor follows; without the rotor, as in firmware, it is a
-step (`alone`). The order is: decide, actuate, move, record; an open-loop motor has nothing to sample. What the host has
-laid ready are both tables. Several motors are several of these records, each with its own tables; nothing is shared.
+A tick is a time step of the rotor, the judge of whether the motor follows; without the plant, as in firmware, it is a
+step (`alone`). The order is: decide and drive the lines, move, record; an open-loop motor has nothing to sample. What
+the host has laid ready are both tables. Several motors are several of these records, each with its own tables; nothing
+is shared.
 """
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
-from detent.control.step_rule import (
-    AT_REST,
-    IDLE,
-    LIMITS,
-    PAUSE,
-    RAMP,
-    STEP,
-    StepRule,
-    StepRuleParams,
-    next_entry,
-    next_step,
-    place_motor,
+from detent.control.step_rule import PAUSE, STEP, next_entry, place_motor
+from detent.kernel.loop import lay_ready, ticks
+from detent.kernel.registers import Registers, block, i8, register
+from detent.kernel.step import hot_step
+from detent.methods.stepper_envelope.controller import (
+    NOWHERE,
+    Entries,
+    StepperController,
+    StepperControllerParams,
+    StepperLines,
+    control,
+    step_once,
 )
-from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
-from detent.kernel.loop import HostArray, lay_ready, ticks
-from detent.kernel.registers import Registers, block, f8, i8, register, u1
-from detent.kernel.step import hot_step, step
-from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
-from detent.planning.step_ramp import StepRamp
-from detent.plant.stepper_rotor import RotorParams, StepperRotor, hold_field, step_field, turn_rotor
-
-Entries = HostArray
-"""Table of int16, see `control.step_rule.next_entry`."""
-
-NOWHERE = -(1 << 62)
-"""Position that no motor reaches."""
+from detent.methods.stepper_envelope.plant import StepperPlant, StepperPlantParams, move
+from detent.plant.stepper_rotor import hold_field
 
 
 class StepperParams(Registers):
     """Everything about one motor that does not change while it runs, but its tables."""
 
-    rule: StepRuleParams = block("control unit")
-    comparison: ComparisonParams = block("a method to compare with, instead of the control unit")
-    pause: u1 = register("waiting time of a reversal, in periods of the start frequency", unit="count")
-    timer: StepTimerParams = block("step timer")
-    instant_ticks: i8 = register("time step of the rotor in ticks of the step timer", unit="tick")
-    tolerance: f8 = register("distance of the rotor from its field that counts as settled, in steps", unit="count")
-    rotor: RotorParams = block("motor and load")
+    controller: StepperControllerParams = block("control unit and timer")
+    plant: StepperPlantParams = block("motor and load")
 
 
 class AloneParams(StepperParams):
-    """The same for a motor without its rotor: control unit and timer, as in firmware, where a tick is a step."""
+    """The same for a controller without its plant: as in firmware a tick is a step."""
 
 
 class Stepper(Registers):
     """State of one motor with its control unit."""
 
     tick: i8 = register("time steps of the rotor since power-on; steps where it runs without the rotor", unit="tick")
-    rule: StepRule = block("control unit")
-    comparison: Comparison = block("a method to compare with")
-    timer: StepTimer = block("step timer and phases")
-    stop_at: i8 = register("position at which the loop returns to the host", unit="count")
-    peak_hz: f8 = register("largest step frequency since the host cleared it", unit="Hz")
-    outside: i8 = register("time step in which the rotor was last outside its tolerance", unit="count")
-    rotor: StepperRotor = block("motor")
+    controller: StepperController = block("control unit and timer")
+    lines: StepperLines = block("wires between controller and plant")
+    plant: StepperPlant = block("motor and load")
 
 
+@ticks(StepperParams)
 @hot_step
-def step_once(p: StepperParams, r: Stepper, entry: int) -> int:
-    """The running period is over: decide by the entry, and begin the next one. Returns IDLE, STEP or PAUSE."""
-    if p.comparison.method:
-        outcome = next_compared_step(p.comparison, r.comparison, r.rule)
-    else:
-        outcome = next_step(p.rule, r.rule, entry)
-    if outcome == STEP:
-        load_period(p.timer, r.timer, r.rule.word)
-        pulse(r.timer, r.rule.direction)
-        if r.rule.position == r.stop_at:
-            r.rule.event = 1
-    elif outcome == PAUSE:
-        start = r.timer.expires
-        if p.pause:
-            load_period(p.timer, r.timer, p.rule.ramp[0])
-        r.timer.expires = start + p.pause * r.timer.period
-    else:
-        r.timer.period = 0
-    return outcome
-
-
-@hot_step
-def next_period(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> int:
-    """The running period is over: what the control unit, or the method it is compared with, makes of it."""
-    return step_once(p, r, AT_REST if p.comparison.method else next_entry(r.rule, up, down))
+def tick(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> bool:
+    """One time step of the rotor; none while the controller has an event for its host."""
+    if r.controller.rule.event:
+        return False
+    control(p.controller, r.controller, r.lines, up, down)
+    move(p.plant, r.tick, r.lines, r.plant)
+    r.tick += 1
+    return True
 
 
 @ticks(AloneParams)
@@ -105,43 +67,11 @@ def next_period(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> int
 def tick_alone(p: AloneParams, r: Stepper, up: Entries, down: Entries) -> bool:
     """One step, as firmware makes it; none while the motor rests, or has raised an event."""
     outcome = PAUSE
-    while outcome == PAUSE and r.rule.event == 0:
-        outcome = next_period(p, r, up, down)
+    while outcome == PAUSE and r.controller.rule.event == 0:
+        outcome = step_once(p.controller, r.controller, next_entry(r.controller.rule, up, down))
     if outcome != STEP:
         return False
     r.tick += 1
-    return True
-
-
-@step
-def actuate(p: StepperParams, r: Stepper, up: Entries, down: Entries, now: int) -> bool:
-    """The running period is over: the next one, and what its pulse does to the field. False at rest."""
-    if r.timer.period == 0:
-        r.timer.expires = now  # at rest time passes until a start, which takes effect at once
-    outcome = next_period(p, r, up, down)
-    if outcome == STEP:
-        hz = frequency(p.timer, r.timer)
-        r.peak_hz = max(r.peak_hz, hz)
-        step_field(p.rotor, r.rotor, r.rule.direction, hz)
-    else:
-        hold_field(r.rotor)
-    return outcome != IDLE
-
-
-@ticks(StepperParams)
-@hot_step
-def tick(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> bool:
-    """One time step of the rotor; none while the motor has an event for its host."""
-    if r.rule.event:
-        return False
-    now = r.tick * p.instant_ticks
-    running = True
-    while running and r.timer.expires <= now:
-        running = actuate(p, r, up, down, now)
-    turn_rotor(p.rotor, r.rotor)
-    r.tick += 1
-    if abs(r.rotor.lag) > p.tolerance:
-        r.outside = r.tick
     return True
 
 
@@ -155,26 +85,10 @@ def tables(up: NDArray[np.int16], down: NDArray[np.int16]) -> tuple[Entries, Ent
     return lay_ready(up), lay_ready(down)
 
 
-def load_rule(p: StepperParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool) -> None:
-    """Put ramp list and zone limits into the control unit, in the words of its timer."""
-    if len(ramp) > RAMP or len(limits) > LIMITS:
-        raise ValueError(
-            f"{len(ramp)} ramp entries and {len(limits)} zone limits, must be {RAMP} and {LIMITS} or fewer"
-        )
-    bounds = np.asarray(limits, float)
-    words = reload_values(ramp.hz, clock_hz) if reload else ramp.words()
-    bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)
-    p.rule.ramp[: len(words)] = [int(word) for word in words]
-    p.rule.limit[: len(bounds)] = [int(word) for word in bound_words]
-    p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
-    p.rule.reload = p.timer.reload = int(reload)
-    p.timer.clock_hz = clock_hz
-
-
 def switch_on(r: Stepper, position: int, step_angle: float) -> None:
     """Power-on with the motor standing at `position` [step], the rotor in the middle of its field."""
-    place_motor(r.rule, position)
-    r.rotor.commanded = position
-    r.rotor.angle = position * step_angle
-    hold_field(r.rotor)
-    r.stop_at = NOWHERE
+    place_motor(r.controller.rule, position)
+    r.controller.stop_at = NOWHERE
+    r.plant.rotor.commanded = position
+    r.plant.rotor.angle = position * step_angle
+    hold_field(r.plant.rotor)

@@ -117,16 +117,16 @@ def registers_after(*overrides):
     table = spec.stepper["group_a"]
     tables = make_tables(table)
     p, r = build_stepper(spec, "group_a", tables), Stepper()
-    switch_on(r, table.step_at(table.mechanics.start_position), p.rotor.step_angle)
-    start_move(r.rule, 1, 1)
+    switch_on(r, table.step_at(table.mechanics.start_position), p.plant.rotor.step_angle)
+    start_move(r.controller.rule, 1, 1)
     states = []
     for _ in range(400):
         advance(p, r, 2500, *NO_TRACE, *feed(tables.up.entries, tables.down.entries))
         states.append(bytes(r))
-        if r.rule.event:
+        if r.controller.rule.event:
             break
-    assert r.rule.event
-    assert r.rule.position == tables.down.stop
+    assert r.controller.rule.event
+    assert r.controller.rule.position == tables.down.stop
     return tuple(states)
 
 
@@ -179,19 +179,20 @@ def test_the_zones_of_the_zoom_are_coarse_and_fine():
 
 def test_the_registers_of_the_zoom():
     p = build("group_a")
-    assert (p.rule.reload, p.timer.reload, p.rule.literal, p.pause) == (1, 1, 0, 1)
-    assert (p.timer.clock_hz, p.rule.ramp[0], p.rule.ramp[227], p.rule.limit[1]) == (1_000_000, 2500, 250, 1000)
-    assert (p.instant_ticks, p.tolerance) == (2, 0.5)
+    c = p.controller
+    assert (c.rule.reload, c.timer.reload, c.rule.literal, c.pause) == (1, 1, 0, 1)
+    assert (c.timer.clock_hz, c.rule.ramp[0], c.rule.ramp[227], c.rule.limit[1]) == (1_000_000, 2500, 250, 1000)
+    assert (c.instant_ticks, p.plant.clock_hz, p.plant.tolerance) == (2, 1_000_000, 0.5)
     rotor = rotor_params()
     for field in ("dt", "teeth", "step_angle", "inertia", "torque", "damping", "friction", "intervals_per_hz"):
-        assert getattr(p.rotor, field) == pytest.approx(getattr(rotor, field)), field
-    assert list(p.rotor.curve) == pytest.approx(list(rotor.curve))
+        assert getattr(p.plant.rotor, field) == pytest.approx(getattr(rotor, field)), field
+    assert list(p.plant.rotor.curve) == pytest.approx(list(rotor.curve))
 
 
 def test_words_may_be_frequencies():
-    p = build("group_a", "controller.words=frequency", "controller.timer=100 MHz")
-    assert (p.rule.reload, p.rule.ramp[0], p.rule.ramp[227], p.rule.limit[1]) == (0, 400, 4000, 1000)
-    assert p.instant_ticks == 200
+    c = build("group_a", "controller.words=frequency", "controller.timer=100 MHz").controller
+    assert (c.rule.reload, c.rule.ramp[0], c.rule.ramp[227], c.rule.limit[1]) == (0, 400, 4000, 1000)
+    assert c.instant_ticks == 200
 
 
 @pytest.mark.parametrize(
@@ -200,7 +201,7 @@ def test_words_may_be_frequencies():
 def test_a_time_step_is_whole_ticks_of_the_timer(timer, seconds):
     spec = load(f"controller.timer={timer}")
     assert instant(spec) == pytest.approx(seconds)
-    assert build("group_a", f"controller.timer={timer}").rotor.dt == instant(spec)
+    assert build("group_a", f"controller.timer={timer}").plant.rotor.dt == instant(spec)
 
 
 def test_a_catalogue_motor_is_driven_by_its_supply():
@@ -215,7 +216,7 @@ def test_a_catalogue_motor_is_driven_by_its_supply():
 
 
 def test_the_current_of_the_drive_is_that_of_the_rotor_too():
-    full, half = (build("x", *more, example="stage").rotor for more in ((), (f"{X}.drive.current=500 mA",)))
+    full, half = (build("x", *more, example="stage").plant.rotor for more in ((), (f"{X}.drive.current=500 mA",)))
     assert half.torque == pytest.approx(full.torque / 2)
     assert half.damping == pytest.approx(full.damping / math.sqrt(2))
 
@@ -307,7 +308,7 @@ def test_as_many_zones_as_may_be_have_room_for_their_limits():
     tables = make_tables(spec.stepper["group_a"])
     assert len(spec.stepper["group_a"].zone) == 14
     assert len(tables.up.zones.limits) == 15
-    assert build_stepper(spec, "group_a", tables).rule.limit[14] == 1000
+    assert build_stepper(spec, "group_a", tables).controller.rule.limit[14] == 1000
 
 
 def test_tables_are_made_without_compiled_blocks():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.bench.race import COMPILER, compile_c
-from tests.stepper_rig import COARSE_FINE, MAX_HZ, MOTOR, RAMP, N
+from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N
 
 from detent.control.step_rule import (
     ACCEL,
@@ -29,10 +29,16 @@ from detent.control.step_rule import (
     place_motor,
     start_move,
 )
-from detent.drive.step_timer import StepTimer
+from detent.control.step_timer import StepTimer
 from detent.kernel.registers import Registers, block
+from detent.methods.stepper_envelope.controller import (
+    NOWHERE,
+    StepperController,
+    StepperControllerParams,
+    load_rule,
+    step_once,
+)
 from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, motor_identifier, write_envelope_header
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, load_rule, step_once, switch_on
 from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap, turn_envelopes
 from detent.planning.step_ramp import StepRamp
 
@@ -81,9 +87,10 @@ class Twins:
 
     def __init__(self, tables: EnvelopeTables, library: ctypes.CDLL, at: int = 0) -> None:
         self.tables, self.library, self.name = tables, library, motor_identifier(tables.motor)
-        self.p, self.r, self.c = StepperParams(pause=tables.pause), Stepper(), FirmwareRegisters()
+        self.p, self.c = StepperControllerParams(pause=tables.pause), FirmwareRegisters()
+        self.r = StepperController(stop_at=NOWHERE)
         load_rule(self.p, tables.up.ramp, tables.up.zones.limits, tables.clock_hz, reload=tables.reload)
-        switch_on(self.r, at, MOTOR.step_angle)
+        place_motor(self.r.rule, at)
         self._c("set", ctypes.c_int64(at))
         assert self._function("size")() == ctypes.sizeof(FirmwareRegisters)
         table = self._function("table")

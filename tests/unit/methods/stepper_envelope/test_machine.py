@@ -6,12 +6,18 @@ from detent.control.step_rule import start_move
 from detent.methods.load import read_axis
 from detent.methods.stepper_envelope.build import instant
 from detent.methods.stepper_envelope.machine import Stage, stage_registers
+from detent.plant.stepper_rotor import lost_steps
 from detent.record.recorder import Recorder
 
 pytestmark = pytest.mark.compiled
 
 ZOOM = next(path for path in examples() if path.name == "zoom.toml")
-SIGNALS = ["group_a.rule.position", "group_a.rotor.lag", "group_b.rule.position", "group_b.timer.period"]
+SIGNALS = [
+    "group_a.controller.rule.position",
+    "group_a.plant.rotor.lag",
+    "group_b.controller.rule.position",
+    "group_b.controller.timer.period",
+]
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +30,13 @@ def short_moves(stage: Stage) -> None:
     for name, steps in (("group_a", 60), ("group_b", 35)):
         motor = stage.motors[name]
         motor.tables.up.move_stop(steps)
-        start_move(motor.r.rule, 1)
+        start_move(motor.controller.rule, 1)
 
 
 def test_registers_carry_the_names_of_the_motors(spec):
     paths = [leaf.path for leaf in stage_registers(spec).leaves()]
     assert paths[0] == "tick"
-    assert {"group_a.rule.position", "group_b.rotor.lag"} <= set(paths)
+    assert {"group_a.controller.rule.position", "group_b.plant.rotor.lag"} <= set(paths)
     assert stage_registers(spec) is stage_registers(spec)
 
 
@@ -42,7 +48,7 @@ def test_a_wait_ends_with_the_last_motor(spec):
     assert (a.position, b.position) == (60, 35)
     assert a.r.tick == b.r.tick == stage.instant
     assert b.rested < a.rested == pytest.approx(stage.time, abs=2 * stage.tick)
-    assert (a.lost, b.lost) == (0, 0)
+    assert [lost_steps(one.p.plant.rotor, one.r.plant.rotor) for one in (a, b)] == [0, 0]
     assert a.resting
     assert b.resting
 
@@ -60,7 +66,7 @@ def test_a_motor_runs_as_if_it_were_alone(spec):
     both, alone = Stage(spec), Stage(spec)
     short_moves(both)
     alone.motors["group_a"].tables.up.move_stop(60)
-    start_move(alone.motors["group_a"].r.rule, 1)
+    start_move(alone.motors["group_a"].controller.rule, 1)
     for stage in (both, alone):
         stage.wait_for(["group_a"], 5.0)
         stage.pass_time(0.01)
@@ -83,10 +89,10 @@ def recorded(spec, every: int, rooms: int) -> np.ndarray:
 def test_a_record_holds_both_motors_at_the_same_times(spec):
     rows = recorded(spec, 50, 3)
     assert np.allclose(np.diff(rows["t"]), 50 * instant(spec))
-    assert rows["group_a.rule.position"][-1] == 60
-    assert rows["group_b.rule.position"][-1] == 35
-    assert (np.diff(rows["group_a.rule.position"].astype(int)) >= 0).all()
-    assert np.abs(rows["group_a.rotor.lag"]).max() > 0.5
+    assert rows["group_a.controller.rule.position"][-1] == 60
+    assert rows["group_b.controller.rule.position"][-1] == 35
+    assert (np.diff(rows["group_a.controller.rule.position"].astype(int)) >= 0).all()
+    assert np.abs(rows["group_a.plant.rotor.lag"]).max() > 0.5
 
 
 def test_a_long_record_is_that_of_many_flushes(spec):

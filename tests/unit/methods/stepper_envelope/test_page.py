@@ -76,7 +76,13 @@ def marked(figure: Figure) -> list[str]:
 
 
 def test_what_is_drawn_is_what_is_recorded() -> None:
-    assert {"rule.position", *NEEDED_STEPS, "rule.index", "rule.state", "rotor.lag"} <= set(MOTOR_SIGNALS)
+    assert {
+        "controller.rule.position",
+        *NEEDED_STEPS,
+        "controller.rule.index",
+        "controller.rule.state",
+        "plant.rotor.lag",
+    } <= set(MOTOR_SIGNALS)
 
 
 def test_the_figures_of_a_whole_run(zoom: Played) -> None:
@@ -203,7 +209,7 @@ def test_more_motors_than_have_room_are_counted(zoom: Played, monkeypatch: pytes
 
 def test_without_a_trace_or_its_signals_figures_are_left_out(zoom: Played) -> None:
     spec, run, trace = zoom
-    only_lag = Trace(columns={name: trace.columns[name] for name in ("t", "group_a.rotor.lag")})
+    only_lag = Trace(columns={name: trace.columns[name] for name in ("t", "group_a.plant.rotor.lag")})
     for given in (None, trace.between(0.0, 5e-4), only_lag):
         page = stage_page(spec, run, given)
         assert (page.charts, [section.title for section in page.sections if section.shown]) == ([], ["Move by move"])

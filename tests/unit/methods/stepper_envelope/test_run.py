@@ -6,9 +6,10 @@ import math
 import pytest
 
 from detent import examples
-from detent.control.step_rule import INFEASIBLE
+from detent.control.step_rule import INFEASIBLE, acknowledge
 from detent.errors import STEP_FAULT_TEXT, AxisError, InputError
 from detent.methods.load import read_axis
+from detent.methods.stepper_envelope.controller import call_at
 from detent.methods.stepper_envelope.host import Leg, StageHost
 from detent.methods.stepper_envelope.run import run_stage, stage_signals
 from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
@@ -153,9 +154,9 @@ def test_a_fault_of_the_rule_ends_the_job(spec):
     motor = host.stage.motors["group_a"]
     legs = {"group_a": Leg(0, 400)}
     host.start(legs)
-    motor.r.stop_at = 150
+    call_at(motor.controller, 150)
     host.stage.wait_for(["group_a"], 1.0)
-    motor.r.rule.event = 0
+    acknowledge(motor.controller.rule)
     motor.tables.up.entries[150:] = -1  # a table that was cut off
     with pytest.raises(AxisError, match=STEP_FAULT_TEXT[INFEASIBLE][:40]):
         host.wait(legs)
@@ -200,7 +201,7 @@ def test_an_empty_run_has_no_worst():
 
 
 def test_the_usual_signals_are_those_of_every_motor(spec):
-    assert {"group_a.rotor.lag", "group_b.rule.position"} <= set(stage_signals(spec))
+    assert {"group_a.plant.rotor.lag", "group_b.controller.rule.position"} <= set(stage_signals(spec))
 
 
 def test_progress_is_told(spec):

@@ -31,7 +31,13 @@ def table():
 
 def trace_of(rows: list[tuple[int, int, int, int, int]], *, every: int = 1) -> Trace:
     """A row per millisecond: position, direction, period [µs], ramp index, state."""
-    names = ("rule.position", "rule.direction", "timer.period", "rule.index", "rule.state")
+    names = (
+        "controller.rule.position",
+        "controller.rule.direction",
+        "controller.timer.period",
+        "controller.rule.index",
+        "controller.rule.state",
+    )
     columns = {"t": 1e-3 * np.arange(len(rows))}
     columns |= {f"a.{name}": np.array(values) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
     return Trace(columns={name: values[::every] for name, values in columns.items()})
@@ -68,14 +74,14 @@ def test_every_step_is_found_once(played) -> None:
 def test_a_pause_is_no_step_though_a_period_runs(table) -> None:
     rows = there_and_back(make_step_ramp(table).hz)
     made = made_steps(trace_of(rows, every=7), "a", 1e6)
-    states = trace_of(rows, every=7)["a.rule.state"]
+    states = trace_of(rows, every=7)["a.controller.rule.state"]
     assert set(made.position) <= {*range(101, 111), *range(103, 110)}
     assert len(made.t) < int(np.count_nonzero(states == ACCEL)) + 1
 
 
 def test_registers_that_were_not_recorded_are_missed(played, table) -> None:
     trace = trace_of(there_and_back(make_step_ramp(table).hz))
-    without = {name: values for name, values in trace.columns.items() if name != "a.timer.period"}
+    without = {name: values for name, values in trace.columns.items() if name != "a.controller.timer.period"}
     assert made_steps(Trace(columns=without), "a", 1e6) is None
     assert made_steps(trace, "b", 1e6) is None
     bare = {name: values for name, values in trace.columns.items() if not name.endswith(("index", "state"))}

@@ -4,28 +4,28 @@ from tests.stepper_rig import CLOCK_HZ, NO_TRACE, RAMP, Rig
 
 from detent.control.step_rule import IDLE, PAUSE, STEP, next_entry
 from detent.kernel.loop import advance
-from detent.methods.stepper_envelope.system import NOWHERE, StepperParams, alone, load_rule, step_once
+from detent.methods.stepper_envelope.controller import NOWHERE, StepperControllerParams, load_rule, step_once
 from detent.planning.step_envelope import Zone
 from detent.planning.step_ramp import StepRamp
 
 
 def decide(rig: Rig) -> int:
     """One decision, by the rig's tables."""
-    return step_once(rig.p, rig.r, next_entry(rig.r.rule, *rig.tables))
+    return step_once(rig.p.controller, rig.r.controller, next_entry(rig.rule, *rig.tables))
 
 
 def test_a_step_moves_position_pattern_and_time_together():
     rig = Rig(5).start()
     assert decide(rig) == STEP
-    assert (rig.position, rig.r.timer.pulses, rig.r.timer.phase) == (1, 1, 1)
-    assert rig.r.timer.expires == rig.r.timer.period == CLOCK_HZ // 400
+    assert (rig.position, rig.timer.pulses, rig.timer.phase) == (1, 1, 1)
+    assert rig.timer.expires == rig.timer.period == CLOCK_HZ // 400
 
 
 def test_a_course_ends_with_the_last_period():
     rig = Rig(3).start()
-    assert advance(alone(rig.p), rig.r, 100, *NO_TRACE, *rig.tables) == 3
-    assert rig.r.timer.expires == pytest.approx(CLOCK_HZ * (2 / 400 + 1 / 490), rel=1e-6)
-    assert rig.r.timer.period == 0
+    assert advance(rig.alone, rig.r, 100, *NO_TRACE, *rig.tables) == 3
+    assert rig.timer.expires == pytest.approx(CLOCK_HZ * (2 / 400 + 1 / 490), rel=1e-6)
+    assert rig.timer.period == 0
     assert decide(rig) == IDLE
 
 
@@ -35,7 +35,7 @@ def test_a_reversal_waits_whole_periods_of_the_start_frequency(pause):
     outcomes, times = [], []
     for _ in range(5):
         outcomes.append(decide(rig))
-        times.append(rig.r.timer.expires * 400 // CLOCK_HZ)
+        times.append(rig.timer.expires * 400 // CLOCK_HZ)
     assert outcomes == [STEP, STEP, PAUSE, STEP, STEP]
     assert times == [1, 2, 2 + pause, 3 + pause, 4 + pause]
 
@@ -45,35 +45,35 @@ def test_on_the_rig_the_motor_takes_the_same_steps_at_the_same_times():
     seconds = steps.course().seconds
     rig = Rig(40).start().run_to_rest()
     assert rig.seconds == pytest.approx(seconds, abs=1e-12)
-    assert rig.r.rule.snapshot()[:-8] == steps.r.rule.snapshot()[:-8]
-    assert rig.r.rotor.commanded == rig.position == 40
+    assert rig.rule.snapshot()[:-8] == steps.rule.snapshot()[:-8]
+    assert rig.rotor.commanded == rig.position == 40
     assert rig.r.tick * 2e-6 == pytest.approx(seconds, abs=4e-6)
 
 
 def test_time_at_rest_passes_and_a_start_takes_effect_at_once():
     rig = Rig(4)
     assert advance(rig.p, rig.r, 1000, *NO_TRACE, *rig.tables) == 1000
-    assert rig.r.timer.pulses == 0
+    assert rig.timer.pulses == 0
     rig.start()
     assert advance(rig.p, rig.r, 1, *NO_TRACE, *rig.tables) == 1
-    assert rig.r.timer.pulses == 1
-    assert rig.r.timer.expires == 1000 * 2000 + CLOCK_HZ // 400
+    assert rig.timer.pulses == 1
+    assert rig.timer.expires == 1000 * 2000 + CLOCK_HZ // 400
 
 
 def test_the_loop_returns_at_a_position_that_the_host_names():
     rig = Rig(20).start().run_to(7)
-    assert rig.r.timer.pulses == 7
-    assert rig.r.stop_at == NOWHERE
+    assert rig.timer.pulses == 7
+    assert rig.r.controller.stop_at == NOWHERE
     rig.run_to_rest()
     assert rig.position == 20
 
 
 def test_records_are_taken_at_multiples_of_their_interval():
     rig = Rig(30).start()
-    leaf = next(leaf for leaf in type(rig.r).leaves() if leaf.path == "rule.position")
+    leaf = next(leaf for leaf in type(rig.r).leaves() if leaf.path == "controller.rule.position")
     picks = np.arange(leaf.offset, leaf.offset + 8)
     rows = np.zeros((10, 8), np.uint8)
-    advance(alone(rig.p), rig.r, 100, rows, picks, 4, *rig.tables)
+    advance(rig.alone, rig.r, 100, rows, picks, 4, *rig.tables)
     assert rows.view(np.int64)[:, 0].tolist() == [0, 4, 8, 12, 16, 20, 24, 28, 0, 0]
     rig = Rig(30).start()
     rows = np.zeros((8, 8), np.uint8)
@@ -82,7 +82,7 @@ def test_records_are_taken_at_multiples_of_their_interval():
 
 
 def test_words_of_the_control_unit():
-    p = StepperParams()
+    p = StepperControllerParams()
     load_rule(p, RAMP, [4000.9, 1000.0, 3000.0], 1_000_000, reload=False)
     assert [p.rule.ramp[k] for k in (0, 1, 227)] == [400, 490, 4000]
     assert list(p.rule.limit[:3]) == [4000, 1000, 3000]
@@ -94,9 +94,9 @@ def test_words_of_the_control_unit():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="2049 ramp entries"):
-        load_rule(StepperParams(), StepRamp(np.arange(1.0, 2050.0)), [1.0], 10**6, reload=False)
+        load_rule(StepperControllerParams(), StepRamp(np.arange(1.0, 2050.0)), [1.0], 10**6, reload=False)
     with pytest.raises(ValueError, match="17 zone limits"):
-        load_rule(StepperParams(), RAMP, [1.0] * 17, 10**6, reload=False)
+        load_rule(StepperControllerParams(), RAMP, [1.0] * 17, 10**6, reload=False)
 
 
 def test_zone_limits_are_kept_by_the_run():

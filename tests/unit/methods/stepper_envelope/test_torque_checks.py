@@ -140,7 +140,7 @@ def test_an_absurd_motor_is_refused_at_once(stage_text, load_text, overrides):
 
 
 def test_the_longest_ramp_is_that_of_the_control_unit():
-    from detent.methods.stepper_envelope.system import RAMP as ROOM
+    from detent.control.step_rule import RAMP as ROOM
     from detent.planning.step_envelope import MAX_RAMP
 
     assert torque_checks.MAX_RAMP == MAX_RAMP == ROOM

@@ -40,12 +40,6 @@ def pulse(r: StepTimer, direction: int) -> None:
     r.pulses += 1
 
 
-@hot_step
-def frequency(p: StepTimerParams, r: StepTimer) -> float:
-    """Frequency of the running period [Hz]; 0 at rest."""
-    return p.clock_hz / r.period if r.period > 0 else 0.0
-
-
 def reload_values(hz: ArrayLike, clock_hz: int) -> NDArray[np.int64]:
     """Period of each frequency in whole ticks, shape as `hz` [tick]."""
     return np.rint(clock_hz / np.asarray(hz, float)).astype(np.int64)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from detent.drive.step_timer import StepTimer, StepTimerParams, frequency, load_period, pulse, reload_values
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, reload_values
 
 
 @pytest.mark.parametrize(("hz", "period"), [(400, 2500), (3000, 333), (3999, 250), (3, 333_333), (1_000_000, 1)])
@@ -9,7 +9,6 @@ def test_a_frequency_becomes_the_nearest_period(hz, period):
     p, r = StepTimerParams(clock_hz=1_000_000), StepTimer(expires=7)
     load_period(p, r, hz)
     assert (r.period, r.expires) == (period, 7 + period)
-    assert frequency(p, r) == pytest.approx(1e6 / period)
 
 
 def test_a_reload_value_is_the_period():
@@ -17,11 +16,6 @@ def test_a_reload_value_is_the_period():
     for _ in range(3):
         load_period(p, r, 250)
     assert (r.period, r.expires) == (250, 750)
-    assert frequency(p, r) == 4000
-
-
-def test_at_rest_the_frequency_is_zero():
-    assert frequency(StepTimerParams(clock_hz=1000), StepTimer()) == 0
 
 
 def test_pulses_move_the_coil_pattern_by_direction():

@@ -1,0 +1,137 @@
+"""Controller of one stepper: control unit, step timer and phases (stepper-envelope specification 2.2, blocks B4, B5).
+
+What the host lays ready are both tables. The loop is open: nothing comes back along the lines.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from detent.control.step_rule import (
+    IDLE,
+    LIMITS,
+    PAUSE,
+    RAMP,
+    STEP,
+    StepRule,
+    StepRuleParams,
+    next_entry,
+    next_step,
+)
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, reload_values
+from detent.kernel.loop import HostArray, controls
+from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4
+from detent.kernel.step import hot_step, step
+from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
+from detent.planning.step_ramp import StepRamp
+
+Entries = HostArray
+"""Table of int16, see `control.step_rule.next_entry`."""
+
+NOWHERE = -(1 << 62)
+"""Position that is never reached."""
+
+
+class StepperControllerParams(Registers):
+    """Ramp list, zone limits and timer."""
+
+    rule: StepRuleParams = block("control unit")
+    pause: u1 = register("waiting time of a reversal, in periods of the start frequency", unit="count")
+    timer: StepTimerParams = block("step timer")
+    instant_ticks: i8 = register("ticks of the step timer in a tick of the axis", unit="tick")
+
+
+class StepperController(Registers):
+    """Control unit and timer."""
+
+    rule: StepRule = block("control unit")
+    timer: StepTimer = block("step timer and phases")
+    now: i8 = register("ticks of the step timer since power-on", unit="tick")
+    stop_at: i8 = register("position at which the loop returns to the host", unit="count")
+
+
+class StepperLines(Registers):
+    """Wires to the power stage; nothing comes back.
+
+    A tick has one pulse at most: it takes one tick of the timer, or 2 us at most (`build.instant`), and a period takes
+    ten ticks of the timer (`checks.LEAST_TICKS`) and 15 us (`step_ramp.MAX_HZ`) at least.
+    """
+
+    pulse: u1 = register("1 in the tick of a step pulse", by=CONTROLLER)
+    direction: i1 = register("direction line: 1 or -1", by=CONTROLLER)
+    period: u4 = register("period that the last pulse began; 0: hold, no step follows it", unit="tick", by=CONTROLLER)
+
+
+@hot_step
+def begin_period(p: StepperControllerParams, c: StepperController, outcome: int) -> int:
+    """The running period is over: load the timer with what was decided; hands the decision on."""
+    if outcome == STEP:
+        load_period(p.timer, c.timer, c.rule.word)
+        pulse(c.timer, c.rule.direction)
+        if c.rule.position == c.stop_at:
+            c.rule.event = 1
+    elif outcome == PAUSE:
+        start = c.timer.expires
+        if p.pause:
+            load_period(p.timer, c.timer, p.rule.ramp[0])
+        c.timer.expires = start + p.pause * c.timer.period
+    else:
+        c.timer.period = 0
+    return outcome
+
+
+@hot_step
+def step_once(p: StepperControllerParams, c: StepperController, entry: int) -> int:
+    """The running period is over: decide by the entry, and begin the next one. Returns IDLE, STEP or PAUSE."""
+    return begin_period(p, c, next_step(p.rule, c.rule, entry))
+
+
+@hot_step
+def put_out(c: StepperController, lines: StepperLines, outcome: int) -> bool:
+    """Drive the lines as it was decided; False at rest."""
+    lines.pulse = outcome == STEP
+    lines.direction = c.rule.direction
+    lines.period = c.timer.period if outcome == STEP else 0
+    return outcome != IDLE
+
+
+@step
+def actuate(p: StepperControllerParams, c: StepperController, lines: StepperLines, up: Entries, down: Entries) -> bool:
+    """The running period is over: begin the next one, and drive the lines; False at rest."""
+    if c.timer.period == 0:
+        c.timer.expires = c.now  # at rest time passes until a start, which takes effect at once
+    return put_out(c, lines, step_once(p, c, next_entry(c.rule, up, down)))
+
+
+@controls(StepperControllerParams)
+@hot_step
+def control(p: StepperControllerParams, c: StepperController, lines: StepperLines, up: Entries, down: Entries) -> None:
+    """One tick: begin the next period where one is over, after a pause of no length at once."""
+    lines.pulse = 0
+    running = True
+    while running and c.timer.expires <= c.now:
+        running = actuate(p, c, lines, up, down)
+    c.now += p.instant_ticks
+
+
+def call_at(c: StepperController, position: int) -> None:
+    """Raise the event at the step that reaches a position, too; `NOWHERE`: at rest only."""
+    c.stop_at = position
+
+
+def load_rule(
+    p: StepperControllerParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool
+) -> None:
+    """Put ramp list and zone limits into the control unit, in the words of its timer."""
+    if len(ramp) > RAMP or len(limits) > LIMITS:
+        raise ValueError(
+            f"{len(ramp)} ramp entries and {len(limits)} zone limits, must be {RAMP} and {LIMITS} or fewer"
+        )
+    bounds = np.asarray(limits, float)
+    words = reload_values(ramp.hz, clock_hz) if reload else ramp.words()
+    bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)
+    p.rule.ramp[: len(words)] = [int(word) for word in words]
+    p.rule.limit[: len(bounds)] = [int(word) for word in bound_words]
+    p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
+    p.rule.reload = p.timer.reload = int(reload)
+    p.timer.clock_hz = clock_hz
