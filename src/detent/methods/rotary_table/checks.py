@@ -9,11 +9,11 @@ the excitation, and a strobe takes the last; what it does need is a new one.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
-from detent.files.nearest import BARELY, Remedies, put
+from detent.files.nearest import BARELY, UNITS, Remedies, put
 from detent.methods.rotary_table.derive import FULL_TURN, TICK, Machine, counted, weakest_output
 from detent.methods.rotary_table.form_checks import find_forms
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
@@ -44,6 +44,21 @@ def _ticks(seconds: float) -> int:
     return round(seconds / TICK)
 
 
+def _above(keys: str, most: float, allowed: str) -> Contradiction:
+    """The first of the keys is above a bound."""
+    return wrong(keys, allowed, remedy.most(keys.partition(" ")[0], most))
+
+
+def _below(keys: str, least: float, allowed: str, otherwise: str = UNITS) -> Contradiction:
+    """The first of the keys is below a bound."""
+    return wrong(keys, allowed, remedy.least(keys.partition(" ")[0], least, otherwise))
+
+
+def _off(keys: str, value: float, allowed: str, otherwise: str = UNITS) -> Contradiction:
+    """The first of the keys has one value that will do."""
+    return wrong(keys, allowed, remedy.exactly(keys.partition(" ")[0], value, otherwise))
+
+
 # --------------------------------------------------------------------------------------------------- contradictions
 
 
@@ -52,19 +67,17 @@ def _gear(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     gear, reduction, ratio = spec.mechanics.gear_ratio, spec.detector.coarse.reduction, spec.ratio
     if gear != ratio:
         allowed = "a whole number: after a turn of the table the fine resolver must stand where it began (3.1)"
-        yield wrong("mechanics.gear_ratio", allowed, remedy.exactly("mechanics.gear_ratio", ratio))
+        yield _off("mechanics.gear_ratio", ratio, allowed)
     if reduction not in {ratio, gear}:
-        yield wrong(
-            "detector.coarse.reduction mechanics.gear_ratio",
-            f"equal to mechanics.gear_ratio, {gear:g}: the coarse resolver turns with the table",
-            remedy.exactly("detector.coarse.reduction", ratio, "leave it out: it is then mechanics.gear_ratio"),
-        )
+        allowed = f"equal to mechanics.gear_ratio, {gear:g}: the coarse resolver turns with the table"
+        otherwise = "leave it out: it is then mechanics.gear_ratio"
+        yield _off("detector.coarse.reduction mechanics.gear_ratio", ratio, allowed, otherwise)
     if 2 * spec.period >= LONGEST_WAY:
-        yield wrong(
+        yield _above(
             "detector.fine.counts mechanics.gear_ratio",
+            (LONGEST_WAY // 2 - 1) // ratio,
             f"such that T = G x fine counts, here {spec.period}, is below 2^30: a jog begins with 2 T to go, and the "
             "remaining angle has 32 bits before its point",
-            remedy.most("detector.fine.counts", (LONGEST_WAY // 2 - 1) // ratio),
         )
 
 
@@ -74,30 +87,27 @@ def _detector(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     if Machine(spec).allowed_coarse_error <= 0:
         # 1/(2 G) > 1/C + 1/(G F), times G
         least = math.floor(spec.ratio / (0.5 - 1 / detector.fine.counts) * (1 + BARELY)) + 1
-        yield wrong(
-            "detector.coarse.counts mechanics.gear_ratio detector.fine.counts",
-            f"at least {least}: a count of the coarse word is then less than half a motor turn (3.1)",
-            remedy.least("detector.coarse.counts", least, "choose a smaller mechanics.gear_ratio"),
-        )
+        keys = "detector.coarse.counts mechanics.gear_ratio detector.fine.counts"
+        allowed = f"at least {least}: a count of the coarse word is then less than half a motor turn (3.1)"
+        yield _below(keys, least, allowed, "choose a smaller mechanics.gear_ratio")
     name, counts = max((("fine", detector.fine.counts), ("coarse", detector.coarse.counts)), key=lambda entry: entry[1])
     if counts / detector.clock > strobe * (1 + BARELY):
-        yield wrong(
+        yield _below(
             f"detector.clock detector.{name}.counts method.strobe_period",
+            counts / strobe,
             f"at least {text(counts / strobe, 'Hz')}: a conversion of {counts} clocks, here "
             f"{text(counts / detector.clock, 's')}, ends in each strobe period, {text(strobe, 's')}",
-            remedy.least("detector.clock", counts / strobe),
         )
     tables: dict[str, FineTable] = {"fine": detector.fine, "coarse": detector.coarse}
     for name, table in tables.items():
         most, around = HIGHEST_OFFSET * weakest_output(table), f"detector.{name}"
         if abs(table.offset_error) > most:
-            key = f"{around}.offset_error"
-            yield wrong(
-                f"{key} {around}.gain_error {around}.quadrature_error",
+            keys = f"{around}.offset_error {around}.gain_error {around}.quadrature_error"
+            allowed = (
                 f"up to {text(most, '%')} in magnitude: where the windings give least, the comparator would see no "
-                "zero crossing",
-                remedy.least(key, -most) if table.offset_error < 0 else remedy.most(key, most),
+                "zero crossing"
             )
+            yield _below(keys, -most, allowed) if table.offset_error < 0 else _above(keys, most, allowed)
 
 
 def _clocks(spec: RotaryTableSpec) -> Iterator[Contradiction]:
@@ -106,26 +116,16 @@ def _clocks(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     for name, fewest in {"strobe_period": 2, "interrupt_delay": 1, "task_period": 2, "task_phase": 0}.items():
         ticks = float(getattr(method, name)) / TICK
         if abs(ticks - round(ticks)) > 1e-6:
-            nearest = remedy.exactly(f"method.{name}", max(fewest, round(ticks)) * TICK)
-            yield wrong(f"method.{name}", "a whole number of 0.1 ms, the base tick", nearest)
-    strobe, delay, period = (
-        _ticks(method.strobe_period),
-        _ticks(method.interrupt_delay),
-        text(method.strobe_period, "s"),
-    )
-    if delay >= strobe:
-        yield wrong(
-            "method.interrupt_delay method.strobe_period",
-            f"below method.strobe_period, {period}: each interrupt comes before the next strobe",
-            remedy.exactly("method.interrupt_delay", (strobe - 1) * TICK),
-        )
+            nearest = max(fewest, round(ticks)) * TICK
+            yield _off(f"method.{name}", nearest, "a whole number of 0.1 ms, the base tick")
+    strobe, period = _ticks(method.strobe_period), text(method.strobe_period, "s")
+    if _ticks(method.interrupt_delay) >= strobe:
+        allowed = f"below method.strobe_period, {period}: each interrupt comes before the next strobe"
+        yield _off("method.interrupt_delay method.strobe_period", (strobe - 1) * TICK, allowed)
     if _ticks(method.task_period) < strobe:
-        yield wrong(
-            "method.task_period method.strobe_period",
-            f"at least method.strobe_period, {period}: two passes of the task would judge the same angle, and roll "
-            "over twice",
-            remedy.exactly("method.task_period", strobe * TICK),
-        )
+        late = "two passes of the task would judge the same angle, and roll over twice"
+        allowed = f"at least method.strobe_period, {period}: {late}"
+        yield _off("method.task_period method.strobe_period", strobe * TICK, allowed)
     way = spec.drive.full_speed / spec.ratio * method.strobe_period
     if way >= math.pi:
         yield wrong(
@@ -142,20 +142,15 @@ def _speeds(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     word, bits = spec.per_interrupt(top), spec.method.fraction_bits
     if top > most * (1 + BARELY):
         which = "motor.max_speed" if spec.motor.max_speed <= spec.drive.full_speed else "drive.full_speed"
-        yield wrong(
-            "limits.speed motor.max_speed drive.full_speed mechanics.gear_ratio",
-            f"up to {which} over the gear ratio, {text(most, 'rad/s')}",
-            remedy.most("limits.speed", most),
-        )
+        keys = "limits.speed motor.max_speed drive.full_speed mechanics.gear_ratio"
+        yield _above(keys, most, f"up to {which} over the gear ratio, {text(most, 'rad/s')}")
     # A speed that was left out is that of the limit.
     speeds = {f"position.{number}.speed": entry.speed for number, entry in spec.position.items() if entry.speed != top}
     for key, speed in ({"limits.speed": top} | speeds).items():
         if speed < least * (1 - BARELY):
-            yield wrong(
-                f"{key} method.fraction_bits method.strobe_period detector.fine.counts",
-                f"at least {text(least, 'rad/s')}: the interpolator moves on by {_parts(bits)} in an interrupt",
-                remedy.least(key, least, "lengthen method.strobe_period"),
-            )
+            keys = f"{key} method.fraction_bits method.strobe_period detector.fine.counts"
+            allowed = f"at least {text(least, 'rad/s')}: the interpolator moves on by {_parts(bits)} in an interrupt"
+            yield _below(keys, least, allowed, "lengthen method.strobe_period")
     if word > FASTEST_WORD:
         yield wrong(
             "method.fraction_bits limits.speed method.strobe_period detector.fine.counts",
@@ -173,20 +168,22 @@ def _acceleration(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     m, speed, acceleration, bits = Machine(spec), spec.limits.speed, spec.limits.acceleration, spec.method.fraction_bits
     least = acceleration / spec.acceleration_word
     if acceleration < least * (1 - BARELY):
-        yield wrong(
+        yield _below(
             "limits.acceleration method.fraction_bits method.strobe_period detector.fine.counts",
+            least,
             f"at least {text(least, 'rad/s^2')}: the interpolator's speed grows by {_parts(bits)} per interrupt from "
             "one interrupt to the next",
-            remedy.least("limits.acceleration", least, "lengthen method.strobe_period"),
+            "lengthen method.strobe_period",
         )
     way, reserve = speed**2 / (2 * acceleration), m.jog_reserve_at(speed)
     if way >= FULL_TURN - reserve:
         harder = speed**2 / (2 * (FULL_TURN - reserve)) * (1 + BARELY) if reserve < FULL_TURN else math.inf
-        yield wrong(
+        yield _below(
             "limits.acceleration limits.speed method.task_period method.position_gain method.judge",
+            harder,
             f"such that braking, here over {text(way, 'rad')}, takes less than a turn less the {text(reserve, 'rad')} "
             "by which a rollover comes late: a jog would brake before it",
-            remedy.least("limits.acceleration", harder, "lower limits.speed, or raise method.position_gain"),
+            "lower limits.speed, or raise method.position_gain",
         )
 
 
@@ -195,8 +192,7 @@ def _positions(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     top, furthest, window = spec.limits.speed, LONGEST_WAY - spec.period, (spec.period - 1) // 2
     for number, entry in spec.position.items():
         if entry.speed > top * (1 + BARELY):
-            key = f"position.{number}.speed"
-            yield wrong(f"{key} limits.speed", f"up to limits.speed, {text(top, 'rad/s')}", remedy.most(key, top))
+            yield _above(f"position.{number}.speed limits.speed", top, f"up to limits.speed, {text(top, 'rad/s')}")
     others = [number for number, entry in spec.position.items() if entry.direction != "as commanded"]
     if spec.method.form != "turn counter" and others:
         yield wrong(
@@ -208,19 +204,16 @@ def _positions(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     for number, entry in spec.position.items():
         beyond = entry.direction == "as commanded" and abs(entry.angle) / spec.count >= furthest >= spec.period
         if beyond:
-            key, most = f"position.{number}.angle", (furthest - 1) * spec.count * (1 - BARELY)
-            yield wrong(
-                f"{key} detector.fine.counts mechanics.gear_ratio",
+            most = (furthest - 1) * spec.count * (1 - BARELY)
+            keys = f"position.{number}.angle detector.fine.counts mechanics.gear_ratio"
+            allowed = (
                 f"less than {text(furthest * spec.count, 'rad')} from 0: from any angle of the turn the way has fewer "
-                "than 2^31 counts, which the remaining angle holds",
-                remedy.least(key, -most) if entry.angle < 0 else remedy.most(key, most),
+                "than 2^31 counts, which the remaining angle holds"
             )
+            yield _below(keys, -most, allowed) if entry.angle < 0 else _above(keys, most, allowed)
     if spec.method.in_position > window:
-        yield wrong(
-            "method.in_position mechanics.gear_ratio detector.fine.counts",
-            f"below half a turn, up to {window} counts",
-            remedy.most("method.in_position", window),
-        )
+        keys = "method.in_position mechanics.gear_ratio detector.fine.counts"
+        yield _above(keys, window, f"below half a turn, up to {window} counts")
 
 
 def _machine(spec: RotaryTableSpec) -> Iterator[Contradiction]:
@@ -228,25 +221,14 @@ def _machine(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     static, load = spec.mechanics.static, spec.disturbance.load
     yield from common.static_friction({"mechanics": spec.mechanics}, "N*m")
     if spec.limits.effort <= static:
-        yield wrong(
-            "limits.effort mechanics.static mechanics.coulomb",
-            f"above mechanics.static, {text(static, 'N*m')}: the motor never breaks loose",
-            remedy.least("limits.effort", static * (1 + BARELY), "lower mechanics.static"),
-        )
+        allowed = f"above mechanics.static, {text(static, 'N*m')}: the motor never breaks loose"
+        keys = "limits.effort mechanics.static mechanics.coulomb"
+        yield _below(keys, static * (1 + BARELY), allowed, "lower mechanics.static")
     if load is not None and load.duration < TICK * (1 - BARELY):
-        key = "disturbance.load.duration"
-        yield wrong(key, f"at least a base tick, {text(TICK, 's')}", remedy.least(key, TICK))
+        yield _below("disturbance.load.duration", TICK, f"at least a base tick, {text(TICK, 's')}")
 
 
-RULES: tuple[Callable[[RotaryTableSpec], Iterator[Contradiction]], ...] = (
-    _gear,
-    _detector,
-    _clocks,
-    _speeds,
-    _acceleration,
-    _positions,
-    _machine,
-)
+RULES = (_gear, _detector, _clocks, _speeds, _acceleration, _positions, _machine)
 """Contradictions are told in this order."""
 
 

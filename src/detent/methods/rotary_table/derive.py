@@ -197,8 +197,7 @@ def _words(machine: Machine) -> Iterator[Derived]:
     spec, method = machine.spec, machine.spec.method
     yield Derived("period T", spec.period, "count", f"{spec.period} counts", "G x fine counts: a turn of the table")
     yield Derived("count", spec.count, "rad", arc_seconds(spec.count), "360 deg / T")
-    formula = "full speed / largest word / G"
-    yield quantity_figure("speed of one word", spec.speed_per_word, "rad/s", formula)
+    yield quantity_figure("speed of one word", spec.speed_per_word, "rad/s", "full speed / largest word / G")
     formula = "motor.max_speed or drive.full_speed, the lower one, / G"
     yield quantity_figure("largest table speed", spec.largest_speed, "rad/s", formula)
     per_interrupt = machine.speed * method.strobe_period / spec.count
@@ -224,8 +223,7 @@ def _drive(machine: Machine) -> Iterator[Derived]:
     """Inertia, stiffness, acceleration."""
     spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
     yield quantity_figure("inertia at the motor J", spec.inertia, "kg*m^2", "rotor + gear + table / G^2")
-    formula = "(1 - droop) x J / tau"
-    yield quantity_figure("stiffness of the velocity loop", machine.stiffness, "N*m*s/rad", formula)
+    yield quantity_figure("stiffness of the velocity loop", machine.stiffness, "N*m*s/rad", "(1 - droop) x J / tau")
     yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a")
     formula = "v^2 / (2 a), to limits.speed or from it to rest"
     yield quantity_figure("way of an acceleration", speed**2 / (2 * acceleration), "rad", formula)
@@ -241,8 +239,7 @@ def _loop(machine: Machine) -> Iterator[Derived]:
     formula = "(v / (1 - droop) + Coulomb friction / (stiffness x G)) / Kp"
     yield quantity_figure("following error at limits.speed", error, "rad", formula)
     ideal = 1 / (2 * math.sqrt(loop.gain * loop.share * loop.time_constant))
-    formula = "1 / (2 sqrt(Kp (1 - droop) tau))"
-    yield Derived("damping without sampling", ideal, "", f"{ideal:.3g}", formula)
+    yield Derived("damping without sampling", ideal, "", f"{ideal:.3g}", "1 / (2 sqrt(Kp (1 - droop) tau))")
     formula = "least damped mode that swings, with strobe period and interrupt delay"
     yield Derived("damping of the loop", loop.damping, "", f"{loop.damping:.3g}", formula)
     limit = machine.largest_gain

@@ -5,17 +5,19 @@ table has come to rest, that a start was refused, and how far from its target it
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import groupby
 from typing import Any
 
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
-from detent.files.nearest import at_least, at_most
+from detent.files.nearest import BARELY, at_least, at_most
 from detent.kernel.loop import advance
 from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.rotary_table.sequence_faults import Fault, find_faults
+from detent.methods.rotary_table.sequence_faults import find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
 from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.record.machine import AnyRecorder, Loop, Machine
@@ -150,8 +152,7 @@ def check_sequence(spec: RotaryTableSpec, job: SequenceJob) -> None:
     if not job.steps:
         raise InputError.of_file(job.name, "no steps", "a sequence of at least one step", "add a step")
     faults = find_faults(job.steps, job.inputs)
-    for index, step in enumerate(job.steps):
-        faults += _step_faults(spec, index, step)
+    faults += [(index, fault) for index, step in enumerate(job.steps) for fault in _step_faults(spec, step)]
     if faults:
         raise InputError([_problem(job, *fault) for fault in faults[:MOST_PROBLEMS]])
 
@@ -164,33 +165,27 @@ def _problem(job: SequenceJob, index: int, fault: FileProblem) -> FileProblem:
     return replace(fault, file=job.name, line=row, column=1 if row else 0, key=key)
 
 
-def _step_faults(spec: RotaryTableSpec, index: int, step: Step) -> list[Fault]:
-    """What this axis cannot do of a step."""
+def _step_faults(spec: RotaryTableSpec, step: Step) -> Iterator[FileProblem]:
+    """What this axis cannot do of a step: a number without an entry, a jog against dial and timer task."""
     if isinstance(step, Go) and str(step.number) not in spec.position:
         numbers = describe_numbers(sorted(int(number) for number in spec.position))
         remedy = f"name one of these, or add [position.{step.number}] to the axis file"
-        return [(index, FileProblem.of_key("go", f"position number {step.number}", numbers, remedy))]
-    return _jog_faults(spec, index, step) if isinstance(step, Jog) else []
-
-
-def _jog_faults(spec: RotaryTableSpec, index: int, jog: Jog) -> list[Fault]:
-    """Speed and time of a jog against dial and timer task."""
-    found: list[Fault] = []
-    top, least = spec.limits.speed, 1.0 / spec.per_interrupt(1.0)
-    if jog.speed is not None and jog.speed > top * (1 + 1e-9):
+        yield FileProblem.of_key("go", f"position number {step.number}", numbers, remedy)
+    if not isinstance(step, Jog):
+        return
+    top, least, task = spec.limits.speed, 1.0 / spec.per_interrupt(1.0), spec.method.task_period
+    if step.speed is not None and step.speed > top * (1 + BARELY):
         allowed = f"up to limits.speed, {format_quantity(top, 'rad/s')}"
         remedy = f"write speed = {at_most(top, 'rad/s')}, or raise limits.speed"
-        found.append((index, FileProblem.of_key("speed", format_quantity(jog.speed, "rad/s"), allowed, remedy)))
-    if jog.speed is not None and dial_of(spec, jog.speed) < 1:
+        yield FileProblem.of_key("speed", format_quantity(step.speed, "rad/s"), allowed, remedy)
+    if step.speed is not None and dial_of(spec, step.speed) < 1:
         allowed = f"a step of the dial, {format_quantity(least, 'rad/s')}, or more"
         remedy = f"write speed = {at_least(least, 'rad/s')}, or raise method.fraction_bits"
-        found.append((index, FileProblem.of_key("speed", format_quantity(jog.speed, "rad/s"), allowed, remedy)))
-    task = spec.method.task_period
-    if jog.duration is not None and jog.duration < task * (1 - 1e-9):
+        yield FileProblem.of_key("speed", format_quantity(step.speed, "rad/s"), allowed, remedy)
+    if step.duration is not None and step.duration < task * (1 - BARELY):
         allowed = f"method.task_period, {format_quantity(task, 's')}, or longer: the button is looked at so often"
         remedy = f"write for = {at_least(task, 's')}, or shorten method.task_period"
-        found.append((index, FileProblem.of_key("for", format_quantity(jog.duration, "s"), allowed, remedy)))
-    return found
+        yield FileProblem.of_key("for", format_quantity(step.duration, "s"), allowed, remedy)
 
 
 def describe_numbers(numbers: list[int]) -> str:
@@ -201,11 +196,7 @@ def describe_numbers(numbers: list[int]) -> str:
     """
     if not numbers:
         return "no number: the axis has no positions"
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    texts = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(str(number) for number in run) for run in runs]
+    # Neighbours keep their distance from their places in the list.
+    runs = [[n for _, n in run] for _, run in groupby(enumerate(numbers), lambda entry: entry[1] - entry[0])]
+    texts = [f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
     return f"the position numbers of the axis: {', '.join(texts)}"

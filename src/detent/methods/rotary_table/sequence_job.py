@@ -196,11 +196,6 @@ class Jog:
         How long the button is held down [s], above 0. Exactly one of `signal` and `duration` is given.
     row, label
         As in `Go`.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above.
     """
 
     direction: int
@@ -231,11 +226,6 @@ class Wait:
         Level of the signal that ends the wait: True for on.
     row, label
         As in `Go`.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above.
     """
 
     duration: float | None = None
@@ -262,11 +252,6 @@ class Output:
         What it is switched to. All outputs are off at power-on.
     row, label
         As in `Go`.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above.
     """
 
     signal: str
@@ -291,11 +276,6 @@ class Repeat:
         How often the loop is done altogether, 1 or more.
     row : int
         As in `Go`.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above.
     """
 
     label: str

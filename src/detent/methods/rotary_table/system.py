@@ -13,13 +13,7 @@ move. Between its clocks the logic rests, and a tick is the exact motion of the 
 from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step
-from detent.methods.rotary_table.controller import (
-    TableController,
-    TableControllerParams,
-    TableLines,
-    control,
-    power_on,
-)
+from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines, control, power_on
 from detent.methods.rotary_table.plant import TablePlant, TablePlantParams, Train, move, sense
 from detent.plant.rotary_motor import stand_at
 from detent.sensing.angle_gauge import read_angle_gauge
