@@ -221,10 +221,11 @@ def _start_cell(start: Start) -> Cell:
 
 def _text_table(found: AngleComparison) -> TextTable:
     conventional, endless = found.crossings
-    rows = [
-        ("deviation across the end of the turn", _change(endless), _change(conventional)),
-        (f"way after {number(endless.t[-1])} s", _way(endless), _way(conventional)),
+    changes = [
+        f"{degrees(case.deviation_before)} to {degrees(case.deviation_after)} deg" for case in (endless, conventional)
     ]
+    ways = [f"{degrees(case.travel)} deg, at {degrees(case.speed)} deg/s" for case in (endless, conventional)]
+    rows = [("deviation across the end of the turn", *changes), (f"way after {number(endless.t[-1])} s", *ways)]
     rows += [
         (f"mean speed of manual feed at {math.degrees(feed.speed):.4g} deg/s", _share(feed.closed), _share(feed.opened))
         for feed in found.feeds
@@ -234,14 +235,6 @@ def _text_table(found: AngleComparison) -> TextTable:
         rows.append((f"jog from {math.degrees(place):.3f} deg", _start(starts[USED]), others))
     title = f"Endless angle at {degrees(found.speed)} deg/s, beside its alternatives"
     return TextTable(title, ("", "turn counter, position control", "raw angle; no position control; other forms"), rows)
-
-
-def _change(case: Crossing) -> str:
-    return f"{degrees(case.deviation_before)} to {degrees(case.deviation_after)} deg"
-
-
-def _way(case: Crossing) -> str:
-    return f"{degrees(case.travel)} deg, at {degrees(case.speed)} deg/s"
 
 
 def _share(error: float) -> str:

@@ -10,7 +10,6 @@ from detent.methods.rotary_table.derive import derive
 from detent.methods.rotary_table.schema import RotaryTableSpec, fill_derived
 
 if TYPE_CHECKING:
-    from detent.kernel.registers import Registers
     from detent.page.frame import Comparison, Page
     from detent.record.machine import AnyRecorder, Progress
 
@@ -31,6 +30,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     pace = "100 us, every 20th"
     spec = RotaryTableSpec
     rules = RULES
+    state, params = "system:RotaryTable", "system:RotaryTableParams"
 
     def fill(self, spec: RotaryTableSpec) -> RotaryTableSpec:
         """The defaults that depend on another table."""
@@ -44,24 +44,12 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
         """What looks wrong."""
         return find_cautions(spec)
 
-    def registers(self) -> "type[Registers]":
-        """State of the axis."""
-        from detent.methods.rotary_table.system import RotaryTable
-
-        return RotaryTable
-
-    def parameters(self) -> "type[Registers]":
-        """Constants of the axis."""
-        from detent.methods.rotary_table.system import RotaryTableParams
-
-        return RotaryTableParams
-
     def simulated(self, spec: RotaryTableSpec) -> Simulated:
         """A table that runs sequences."""
-        from detent.methods.rotary_table import system
         from detent.methods.rotary_table.run import SEQUENCE_SIGNALS, SequenceRun, run_sequence
         from detent.methods.rotary_table.sequence_file import load_sequence
         from detent.methods.rotary_table.sequence_job import Jog, SequenceJob
+        from detent.methods.rotary_table.system import TICK
         from detent.record.capture import Clocking
 
         def run(
@@ -73,8 +61,8 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
             return SequenceJob("a short jog", (Jog(direction=1, duration=max(0.2, spec.method.task_period)),), {})
 
         return Simulated(
-            registers=system.RotaryTable,
-            tick=system.TICK,
+            registers=self.registers(),
+            tick=TICK,
             every=20,
             seed=spec.detector.seed,
             signals=SEQUENCE_SIGNALS,
