@@ -23,7 +23,12 @@ def one_move(axis: Any, target: float, *, dwell: float = 0.0, signals: tuple[str
     """A move of the example to a place [m], with a row per sample."""
     from detent.methods.moves.job import Move, MoveJob
 
-    names = signals or ("reference.position", "machine.load.position", "law.position_error", "law.command")
+    names = signals or (
+        "controller.reference.position",
+        "plant.machine.load.position",
+        "controller.law.position_error",
+        "controller.law.command",
+    )
     return axis.run(MoveJob("move", "moves", (Move(1, 0, target=target, dwell=dwell),)), signals=names)
 
 
@@ -39,7 +44,7 @@ def feed_forward() -> None:
         for (name, off), colour in zip(shares, (GREY, ORANGE, GREEN, BLUE), strict=True):
             run = one_move(slide(*(f"method.feed_forward.{key}=0" for key in off)), 0.27)
             part = run.trace.between(run.result.moves[0].begin, run.result.moves[0].end)
-            t, error = 1e3 * (part.time - part.time[0]), part["law.position_error"]
+            t, error = 1e3 * (part.time - part.time[0]), part["controller.law.position_error"]
             coarse.plot(t, 1e3 * error, color=colour, linewidth=1.5, label=name)
             fine.plot(t, 1e6 * error, color=colour, linewidth=1.2)
         coarse.set_ylabel("following error\n[mm]")
@@ -70,7 +75,7 @@ def which_encoder() -> None:
                  "method.in_position=0.2 deg", "disturbance.push.force=-0.4 N*m", "disturbance.push.at=0 s",
                  "disturbance.push.duration=60 s"],
             )  # fmt: skip
-            signals = ("reference.position", "machine.motor.position", "machine.load.position")
+            signals = ("controller.reference.position", "plant.machine.motor.position", "plant.machine.load.position")
             run = one_move(axis, np.radians(45), dwell=0.6, signals=signals)
             begin = run.result.moves[0].arrived - 0.25
             part = run.trace.between(begin, run.result.moves[0].end)

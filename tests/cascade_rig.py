@@ -44,12 +44,12 @@ def set_friction(friction: StribeckFriction, **values: float) -> None:
 def unlimited_params() -> CascadeParams:
     """A rigid mass without friction, ideal sensors and a source of 1 N/V without a limit; no gains yet."""
     p = CascadeParams()
-    p.machine.motor.mass, p.machine.load.mass = 0.4 * MASS, 0.6 * MASS
-    p.machine.winding.max_current = math.inf
-    p.source.gain, p.source.limit = 1.0, math.inf
-    p.law.max_command = p.law.cascade.max_velocity = math.inf
-    p.law.pid.smoothing = 1.0
-    for sensor in (p.motor_sensor, p.load_sensor):
+    p.plant.machine.motor.mass, p.plant.machine.load.mass = 0.4 * MASS, 0.6 * MASS
+    p.plant.machine.winding.max_current = math.inf
+    p.plant.source.gain, p.plant.source.limit = 1.0, math.inf
+    p.controller.law.max_command = p.controller.law.cascade.max_velocity = math.inf
+    p.controller.law.pid.smoothing = 1.0
+    for sensor in (p.controller.motor_sensor, p.controller.load_sensor):
         sensor.span, sensor.smoothing = 1, 1.0
     fill_clocks(p, TICK, SAMPLE_TICKS)
     return p
@@ -58,10 +58,10 @@ def unlimited_params() -> CascadeParams:
 def make_params(*, coupled: bool = False, gap: float = 0.0) -> CascadeParams:
     """The same with the gains of a position loop of 10 Hz over a velocity loop of 40 Hz."""
     p = unlimited_params()
-    p.law.cascade.position_gain = 2 * math.pi * 10
-    p.law.cascade.velocity_gain = 2 * math.pi * 40 * MASS
+    p.controller.law.cascade.position_gain = 2 * math.pi * 10
+    p.controller.law.cascade.velocity_gain = 2 * math.pi * 40 * MASS
     if coupled:
-        p.machine.stiffness, p.machine.damping, p.machine.half_gap = STIFFNESS, DAMPING, gap / 2
+        p.plant.machine.stiffness, p.plant.machine.damping, p.plant.machine.half_gap = STIFFNESS, DAMPING, gap / 2
     return p
 
 
@@ -76,7 +76,7 @@ class Rig:
     @property
     def x(self) -> float:
         """Position of the load [m]."""
-        return self.r.machine.load.position
+        return self.r.plant.machine.load.position
 
     def run(self, ticks: int) -> "Rig":
         """Let ticks pass."""
@@ -109,5 +109,5 @@ class Rig:
         advance(self.p, self.r, ticks, rows, picks, every, *laid)
         index = np.arange(first // every + 1, self.r.tick // every + 1)
         table = rows[index % len(rows)].view(dtype)[:, 0]
-        t = index * every * self.p.machine.period
+        t = index * every * self.p.plant.machine.period
         return {name: table[name].copy() for name in names} | {"t": t}

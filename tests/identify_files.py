@@ -93,11 +93,11 @@ def columns_of(run: detent.Run) -> dict[str, NDArray[np.float64]]:
     """Columns of a log of a run."""
     assert run.trace is not None
     trace = run.trace
-    force = trace["law.command"] + 0.05 * np.random.default_rng(1).standard_normal(len(trace))
+    force = trace["controller.law.command"] + 0.05 * np.random.default_rng(1).standard_normal(len(trace))
     return {
         "t [s]": trace.time,
-        "setpoint [m]": trace["reference.position"],
-        "position [m]": trace["motor_sensor.position"],
+        "setpoint [m]": trace["controller.reference.position"],
+        "position [m]": trace["controller.motor_sensor.position"],
         "force [N]": force,
     }
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts, response_deviation
 from detent.identify.analyse.two_mass_response import TwoMassModel, modes_of, respond_sampled
+from detent.methods.cascade.system import set_count
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
 
@@ -77,11 +78,11 @@ def record_cascade(seed, *, delay=2, coulomb=0.0, resolution=0.0, coupled=True, 
     """A multisine of 20 N into a cascade axis without its loops: times, effort, both positions."""
     command = np.tile(multisine(band, T_SAMPLE, 20.0, seed), periods)
     p = make_params(coupled=coupled)
-    p.source.delay = delay
-    p.motor_sensor.resolution = p.load_sensor.resolution = resolution
-    set_friction(p.machine.motor.friction, viscous=3.0)
-    set_friction(p.machine.load.friction, viscous=5.0, coulomb=coulomb, static=coulomb)
-    names = ["source.command", "motor_sensor.position", "load_sensor.position"]
+    p.plant.source.delay = delay
+    set_count(p, resolution, resolution)
+    set_friction(p.plant.machine.motor.friction, viscous=3.0)
+    set_friction(p.plant.machine.load.friction, viscous=5.0, coulomb=coulomb, static=coulomb)
+    names = ["plant.source.command", "controller.motor_sensor.position", "controller.load_sensor.position"]
     rows = Rig(p).record(len(command) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=command)
     return rows["t"], *(rows[name] for name in names)
 

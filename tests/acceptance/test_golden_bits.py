@@ -143,14 +143,14 @@ def cascade() -> Job:
 
     changes = ("mechanics.coupling.backlash=20 um", "encoder.velocity_filter=2 ms", "method.derivative_filter=1 ms")
     host = CascadeHost(load_spec(EXAMPLES / "cascade.toml", changes))
-    limits, start = motion_limits(host.spec), host.position
+    limits, start = motion_limits(host.spec), host.spec.mechanics.start_position
 
     def to(begin: float, end: float) -> Callable[[], object]:
         return lambda: host.follow(plan_move(start + begin, start + end, limits, host.period))
 
     machine = host.machine
     commands = (to(0.0, 0.02), to(0.02, 0.005))
-    return Job({"": machine.params}, {"": machine.state}, commands, machine.pass_ticks)
+    return Job({"": machine.params}, {"": machine.state}, commands, machine.pass_ticks, feed=lambda _: host.feed)
 
 
 JOBS = (print_head, phase_servo, filtered_servo, rotary_table, stepper_envelope, cascade)

@@ -20,7 +20,7 @@ class Shuttle:
 
     def __init__(self, *, coupled: bool, stribeck: bool) -> None:
         p = make_params(coupled=coupled, gap=1e-4 if coupled else 0.0)
-        for mass in (p.machine.motor, p.machine.load):
+        for mass in (p.plant.machine.motor, p.plant.machine.load):
             set_friction(mass.friction, coulomb=3.0, static=4.0, viscous=5.0, stribeck=2e-3 if stribeck else 0.0)
         there = plan_move(0.0, 0.1, MotionLimits(0.5, 5.0, 100.0), T_SAMPLE)
         samples = round(LOG / T_SAMPLE)
@@ -43,7 +43,7 @@ class Shuttle:
         rig = self.rig
         rig.r.restore(self.begin)
         advance(rig.p, rig.r, self.ticks, *NO_TRACE, *self.feed)
-        assert abs(rig.r.law.position_error) < 0.05
+        assert abs(rig.r.controller.law.position_error) < 0.05
         return self.ticks
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from detent.kernel.loop import advance
-from detent.methods.cascade.system import Cascade, CascadeParams, along, fill_clocks, switch_on
+from detent.methods.cascade.system import Cascade, CascadeParams, along, fill_clocks, set_count, switch_on
 from detent.planning.profile import MotionLimits, Profile, plan_move, profile_of_recording
 
 SUBSTEPS = 4
@@ -92,21 +92,24 @@ def make_axis(rng: np.random.Generator) -> Axis:
 def make_params(a: Axis, rng: np.random.Generator, limit: float = math.inf) -> CascadeParams:
     """Registers of the axis under a cascade of moderate bandwidth."""
     p = CascadeParams()
-    p.machine.motor.mass = a.mass
-    f = p.machine.motor.friction
+    p.plant.machine.motor.mass = a.mass
+    f = p.plant.machine.motor.friction
     for k, d in enumerate((f.positive, f.negative)):
         d.coulomb, d.viscous, d.static, d.stribeck = a.coulomb[k], a.viscous[k], a.static[k], a.stribeck
     f.offset = a.offset
-    p.machine.winding.max_current = math.inf
-    p.source.gain, p.source.limit, p.source.delay = 1.0, limit, a.delay
-    p.law.max_command, p.law.cascade.max_velocity = limit, math.inf
+    p.plant.machine.winding.max_current = math.inf
+    p.plant.source.gain, p.plant.source.limit, p.plant.source.delay = 1.0, limit, a.delay
+    p.controller.law.max_command, p.controller.law.cascade.max_velocity = limit, math.inf
     band = 2 * math.pi * float(rng.uniform(8.0, 25.0))
-    p.law.cascade.position_gain, p.law.cascade.velocity_gain = band / 4, band * a.mass
-    p.law.cascade.integral_gain = p.law.cascade.velocity_gain * band / 8 * float(rng.integers(0, 2))
-    p.law.feed_forward.velocity = float(rng.integers(0, 2))
+    p.controller.law.cascade.position_gain, p.controller.law.cascade.velocity_gain = band / 4, band * a.mass
+    p.controller.law.cascade.integral_gain = (
+        p.controller.law.cascade.velocity_gain * band / 8 * float(rng.integers(0, 2))
+    )
+    p.controller.law.feed_forward.velocity = float(rng.integers(0, 2))
     span = max(1, round(2e-3 / a.step))
-    for s in (p.motor_sensor, p.load_sensor):
-        s.resolution, s.span, s.smoothing = a.resolution, span, 1.0
+    for s in (p.controller.motor_sensor, p.controller.load_sensor):
+        s.span, s.smoothing = span, 1.0
+    set_count(p, a.resolution, a.resolution)
     fill_clocks(p, a.step / SUBSTEPS, SUBSTEPS)
     return p
 
@@ -144,11 +147,11 @@ def record(p: CascadeParams, ref: Profile, start: float) -> dict[str, np.ndarray
     r = Cascade()
     switch_on(p, r, start)
     leaves = {leaf.path: leaf for leaf in Cascade.leaves()}
-    names = ("motor_sensor.position", "law.command")
+    names = ("controller.motor_sensor.position", "controller.law.command")
     offsets = [leaves[name].offset for name in names]
     picks = np.concatenate([np.arange(o, o + 8) for o in offsets]).astype(np.int64)
     rows = np.zeros((ref.count + 1, 16), np.uint8)
-    every = p.sample_ticks
+    every = p.controller.sample_ticks
     advance(p, r, ref.count * every, rows, picks, every, *along(ref.position, ref.velocity, ref.acceleration))
     table = rows.view(np.float64)[1 : ref.count + 1]
     return {"position": table[:, 0].copy(), "force": table[:, 1].copy()}

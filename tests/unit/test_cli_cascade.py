@@ -37,13 +37,13 @@ def write_log(name: str = "log.csv", *, unit: str = "mm", scale: float = 1e3) ->
 
 @pytest.mark.parametrize(("axis", "job", "unit"), [(CASCADE, SLIDE, "m"), (TURNTABLE, TURN, "rad")])
 def test_run_makes_the_moves_and_leaves_report_and_trace(axis: str, job: str, unit: str) -> None:
-    answer = call("run", axis, "--job", job, "-o", "out", "--signals", "motor_sensor.count")
+    answer = call("run", axis, "--job", job, "-o", "out", "--signals", "lines.motor.count")
     assert answer.status == 0, answer.out
     assert ": every move was in position on " in answer.out.splitlines()[0]
     assert {path.name for path in Path("out").iterdir()} == {"report.html", "trace.h5", "trace.csv"}
     trace = load_trace(Path("out/trace.h5"))
-    assert set(trace.signals) >= {*CASCADE_SIGNALS, "motor_sensor.count"}
-    assert trace.units["machine.load.position"] == unit
+    assert set(trace.signals) >= {*CASCADE_SIGNALS, "lines.motor.count"}
+    assert trace.units["plant.machine.load.position"] == unit
     report = Path("out/report.html").read_text(encoding="utf-8")
     assert "What profile and feed-forward are worth" in report
 
@@ -127,7 +127,7 @@ def test_a_mapping_file_says_what_the_columns_are() -> None:
 
 def test_the_own_trace_of_an_axis_can_be_replayed() -> None:
     assert call(*RUN, "-o", "own", "--trace", "csv").status == 0
-    answer = call(*PLAIN, "--replay", "own/trace.csv", "--column", "voltage=law.command", "--json")
+    answer = call(*PLAIN, "--replay", "own/trace.csv", "--column", "voltage=controller.law.command", "--json")
     found = {one["signal"]: one for one in answer.data["compared"]}
     assert found["position"]["peak"] < 1e-5
     assert found["position of the load"]["peak"] < 1e-5

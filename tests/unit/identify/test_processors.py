@@ -111,13 +111,12 @@ def agree(commands: list[list[str]], folder: Path) -> list[str]:
 def documented(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder in which the page has made its logs."""
     folder = tmp_path_factory.mktemp("documented")
-    identify = ["identify", "first/trace.csv", "--column", "voltage=law.command", "--axis", "axes/cascade.toml"]
     cascade = ["run", "axes/cascade.toml", *DOCUMENTED, "--job"]
     _, texts = run(
         [
             ["examples", "--copy", "axes"],
             [*cascade, "axes/slide_moves.toml", "--output", "first"],
-            [*identify, "--job", "moves.toml"],
+            [*of_the_page("first"), "--job", "moves.toml"],
             [*cascade, "moves.toml", "--output", "second"],
         ],
         folder,
@@ -127,7 +126,7 @@ def documented(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def of_the_page(log: str) -> list[str]:
-    return ["identify", f"{log}/trace.csv", "--column", "voltage=law.command", "--axis", "axes/cascade.toml"]
+    return ["identify", f"{log}/trace.csv", "--column", "voltage=controller.law.command", "--axis", "axes/cascade.toml"]
 
 
 def test_the_log_of_the_page_and_recordings(documented: Path) -> None:

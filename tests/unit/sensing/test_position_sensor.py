@@ -3,7 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from detent.sensing.position_sensor import MEMORY, PositionSensor, PositionSensorParams, read_position, stand_sensor
+from detent.sensing.position_sensor import (
+    MEMORY,
+    EncoderWord,
+    PositionSensor,
+    PositionSensorParams,
+    read_word,
+    stand_sensor,
+)
 
 T = 1e-3
 COUNT = 1e-5
@@ -16,10 +23,20 @@ def sensor(**changes: float) -> PositionSensorParams:
     return p
 
 
+def word_of(p: PositionSensorParams, position: float) -> EncoderWord:
+    if p.resolution == 0.0:
+        return EncoderWord(place=position)
+    return EncoderWord(count=math.floor(position / p.resolution + 0.5))
+
+
 def standing(p: PositionSensorParams, position: float = 0.0) -> PositionSensor:
     r = PositionSensor()
-    stand_sensor(p, r, position)
+    stand_sensor(p, r, word_of(p, position))
     return r
+
+
+def read_position(p: PositionSensorParams, r: PositionSensor, position: float) -> None:
+    read_word(p, r, word_of(p, position))
 
 
 @pytest.mark.parametrize("delay", [0, 1, 5, MEMORY - 2])
@@ -33,22 +50,18 @@ def test_a_position_is_read_after_the_delay(delay):
     assert read == [-1.0] * delay + [float(k) for k in range(200 - delay)]
 
 
-@pytest.mark.parametrize(
-    ("place", "count"), [(0.0, 0), (0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (123456.4, 123456), (-7.6, -8)]
-)
-def test_the_nearest_count_is_read(place, count):
+def test_a_count_stands_for_its_place():
     p = sensor(resolution=COUNT)
     r = standing(p)
-    read_position(p, r, place * COUNT)
-    assert r.count == count
-    assert r.position == count * COUNT
+    read_word(p, r, EncoderWord(count=-8, place=0.3))
+    assert r.position == -8 * COUNT
 
 
-def test_without_a_resolution_the_position_itself_is_read():
+def test_an_ideal_encoder_shows_the_position_itself():
     p = sensor()
     r = standing(p)
-    read_position(p, r, math.pi)
-    assert (r.position, r.count) == (math.pi, 0)
+    read_word(p, r, EncoderWord(count=5, place=math.pi))
+    assert r.position == math.pi
 
 
 @pytest.mark.parametrize("span", [1, 2, 4, 10])

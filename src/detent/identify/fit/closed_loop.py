@@ -17,13 +17,13 @@ from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.prepare import Run
 from detent.kernel.loop import advance
 from detent.logs.log import Values
-from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, switch_on
+from detent.methods.cascade.system import MAX_RATE, Cascade, CascadeParams, along, fill_clocks, set_count, switch_on
 from detent.planning.profile import profile_of_recording
 from detent.plant.two_mass import fastest_rate
 from detent.record.recorder import byte_places, choose_leaves
 from detent.sensing.position_sensor import MEMORY
 
-_PICKS = byte_places(choose_leaves(Cascade, ["machine.motor.position", "law.command"]))
+_PICKS = byte_places(choose_leaves(Cascade, ["plant.machine.motor.position", "controller.law.command"]))
 SUBSTEPS = 4  # ticks of the plant per sample of the log
 
 
@@ -72,14 +72,15 @@ def _share(error: Values, signal: Values) -> float:
 def _params(constants: Constants, loops: Loops, run: Run) -> CascadeParams:
     """Plant and loops; the velocity is the difference that the log's loops took."""
     p = plant_registers(constants)
-    law, feed = p.law, p.law.feed_forward
+    law, feed = p.controller.law, p.controller.law.feed_forward
     law.cascade.position_gain, law.cascade.velocity_gain = loops.position, loops.velocity
     law.cascade.integral_gain = loops.integral
     feed.velocity, feed.acceleration, feed.viscous = loops.feed_velocity, loops.feed_acceleration, loops.feed_viscous
     feed.coulomb_positive = feed.coulomb_negative = loops.feed_coulomb
-    p.source.delay = min(max(round(constants.value("delay") / run.step), 0), MEMORY - 1)
-    p.motor_sensor.span, p.motor_sensor.resolution = loops.span, run.resolution
-    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.machine) * run.step / MAX_RATE))
+    p.plant.source.delay = min(max(round(constants.value("delay") / run.step), 0), MEMORY - 1)
+    p.controller.motor_sensor.span = loops.span
+    set_count(p, run.resolution, 0.0)
+    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * run.step / MAX_RATE))
     fill_clocks(p, run.step / ticks, ticks)
     return p
 
@@ -89,14 +90,14 @@ def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
     velocity = float(start_velocities(run)[well_known_from(run)])
     place = float(run.position[0])
     switch_on(p, r, place)
-    r.machine.motor.velocity = r.machine.load.velocity = velocity
-    r.motor_sensor.memory[:] = [place - (MEMORY - k) * velocity * run.step for k in range(MEMORY)]
-    r.motor_sensor.place = MEMORY - 1
+    r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
+    r.controller.motor_sensor.memory[:] = [place - (MEMORY - k) * velocity * run.step for k in range(MEMORY)]
+    r.controller.motor_sensor.place = MEMORY - 1
     if loops.integral > 0.0 and run.reference is not None:
         speeds = np.gradient(run.reference[:8], run.step)
         demand = loops.position * (float(run.reference[0]) - place) + loops.feed_velocity * float(speeds[0])
         fed = loops.feed_viscous * float(speeds[0]) + loops.feed_coulomb * float(np.sign(speeds[0]))
-        r.law.integral = float(run.effort[0]) - loops.velocity * (demand - velocity) - fed
+        r.controller.law.integral = float(run.effort[0]) - loops.velocity * (demand - velocity) - fed
 
 
 def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Values]:
@@ -107,7 +108,7 @@ def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Value
     asked = profile_of_recording(run.t, reference, run.step)
     samples = len(run.position)
     rows = np.zeros((samples + 1, 16), np.uint8)
-    every = p.sample_ticks
+    every = p.controller.sample_ticks
     feed = along(asked.position, asked.velocity, asked.acceleration)
     advance(p, r, samples * every, rows, _PICKS, every, *feed)
     table = rows.view(np.float64)

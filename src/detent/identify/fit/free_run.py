@@ -48,7 +48,7 @@ class Plant:
 
     def __init__(self, constants: Constants, step: float) -> None:
         p = plant_registers(constants)
-        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.machine) * step / MAX_RATE))
+        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * step / MAX_RATE))
         fill_clocks(p, step / self.ticks, 1)
         self._params = p
         self._late = round(constants.value("delay") / step * self.ticks)
@@ -59,7 +59,7 @@ class Plant:
         """Positions at samples under a recorded effort, loops open."""
         r = Cascade()
         switch_on(self._params, r, position - self._hanging)
-        r.machine.motor.velocity = r.machine.load.velocity = velocity
+        r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
         ticks = (samples - 1) * self.ticks
         at = np.arange(ticks) + begin * self.ticks - self._late
         command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
@@ -73,25 +73,25 @@ class Plant:
 def plant_registers(constants: Constants) -> CascadeParams:
     """Registers of a plant that is driven by the effort itself."""
     p = CascadeParams()
-    p.machine.motor.mass = constants.value("mass")
+    p.plant.machine.motor.mass = constants.value("mass")
     offset = 0.5 * (constants.value("coulomb.positive") - constants.value("coulomb.negative"))
-    friction = p.machine.motor.friction
+    friction = p.plant.machine.motor.friction
     friction.offset = offset
     for direction, way, sign in ((friction.positive, "positive", 1.0), (friction.negative, "negative", -1.0)):
         direction.coulomb = max(constants.value(f"coulomb.{way}") - sign * offset, 0.0)
         direction.viscous = max(constants.value(f"viscous.{way}"), 0.0)
         direction.static = max(constants.value(f"static.{way}") - sign * offset, 0.0)
         direction.stribeck = max(constants.value("stribeck"), 0.0)
-    p.machine.pendulum = math.hypot(constants.value("pendulum"), constants.value("pendulum.across"))
-    p.machine.loss = min(max(constants.value("loss"), 0.0), 1.0)
-    p.machine.winding.max_current = p.law.cascade.max_velocity = math.inf
-    p.source.gain, p.source.limit, p.law.max_command = 1.0, math.inf, math.inf
-    for sensor in (p.motor_sensor, p.load_sensor):
+    p.plant.machine.pendulum = math.hypot(constants.value("pendulum"), constants.value("pendulum.across"))
+    p.plant.machine.loss = min(max(constants.value("loss"), 0.0), 1.0)
+    p.plant.machine.winding.max_current = p.controller.law.cascade.max_velocity = math.inf
+    p.plant.source.gain, p.plant.source.limit, p.controller.law.max_command = 1.0, math.inf, math.inf
+    for sensor in (p.controller.motor_sensor, p.controller.load_sensor):
         sensor.span, sensor.smoothing = 1, 1.0
     return p
 
 
-_PICKS = byte_places(choose_leaves(Cascade, ["machine.motor.position"]))
+_PICKS = byte_places(choose_leaves(Cascade, ["plant.machine.motor.position"]))
 
 
 def start_velocities(run: Run) -> Values:

@@ -4,7 +4,7 @@ import math
 
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, DirectionTable, EncoderTable, FrictionTable
-from detent.methods.cascade.system import CascadeParams, fill_clocks, smoothing
+from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
 from detent.plant.stribeck import DirectionFriction, StribeckFriction
 from detent.plant.two_mass import TwoMassParams, fastest_rate
@@ -20,19 +20,20 @@ LONGEST_TICK = 1e-4
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
     p = CascadeParams()
-    _fill_machine(p.machine, spec)
+    _fill_machine(p.plant.machine, spec)
     _fill_source(p, spec)
-    _fill_sensor(p.motor_sensor, spec.encoder, spec.method.sample_period)
-    _fill_sensor(p.load_sensor, spec.load_encoder or IDEAL_ENCODER, spec.method.sample_period)
-    p.feedback.position_on_load = spec.method.feedback.position == "load"
-    p.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
+    _fill_sensor(p.controller.motor_sensor, spec.encoder, spec.method.sample_period)
+    _fill_sensor(p.controller.load_sensor, spec.load_encoder or IDEAL_ENCODER, spec.method.sample_period)
+    set_count(p, spec.encoder.resolution, (spec.load_encoder or IDEAL_ENCODER).resolution)
+    p.controller.feedback.position_on_load = spec.method.feedback.position == "load"
+    p.controller.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
     _fill_law(p, spec)
-    ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.machine))
+    ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.plant.machine))
     tick = spec.method.sample_period / ticks
     push = spec.disturbance.push
     if push is not None:
-        p.push.force = push.force
-        p.push.begin, p.push.end = round(push.at / tick), round((push.at + push.duration) / tick)
+        p.plant.push.force = push.force
+        p.plant.push.begin, p.plant.push.end = round(push.at / tick), round((push.at + push.duration) / tick)
     fill_clocks(p, tick, ticks)
     return p
 
@@ -80,17 +81,21 @@ def _fill_direction(p: DirectionFriction, table: DirectionTable) -> None:
 
 def _fill_source(p: CascadeParams, spec: CascadeSpec) -> None:
     drive = spec.drive
-    p.source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
-    p.source.step, p.source.limit, p.source.delay = drive.command_step, spec.largest_command, drive.delay
+    p.plant.source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
+    p.plant.source.step, p.plant.source.limit, p.plant.source.delay = (
+        drive.command_step,
+        spec.largest_command,
+        drive.delay,
+    )
 
 
 def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:
-    p.resolution, p.delay, p.span = table.resolution, table.delay, table.velocity_span
+    p.delay, p.span = table.delay, table.velocity_span
     p.smoothing = smoothing(table.velocity_filter, sample_period)
 
 
 def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:
-    law, method = p.law, spec.method
+    law, method = p.controller.law, spec.method
     law.position_pid = method.structure == "pid"
     law.max_command = spec.largest_command
     law.cascade.position_gain, law.cascade.max_velocity = method.position_gain, method.velocity_limit

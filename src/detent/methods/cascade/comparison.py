@@ -299,14 +299,14 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
     _pass(host, REST_TIME)
     begin = host.time
     profile = plan_move(start, target, limits, host.period)
-    set_gauge(host.state.gauge, host.state.tick, start, target, spec.method.in_position)
+    set_gauge(host.state.plant.gauge, host.state.tick, start, target, spec.method.in_position)
     host.follow(profile)
     frequency = held_frequency(spec)
     watched = WATCHED_TIME if math.isnan(frequency) else max(WATCHED_TIME, SWINGS / frequency)
     rows = _pass(host, (profile.count - 1) * host.period + watched)
-    settled = host.state.gauge.outside * host.tick - begin
+    settled = host.state.plant.gauge.outside * host.tick - begin
     duration = (profile.count - 1) * host.period
-    twist = rows["machine.motor.position"] - rows["machine.load.position"]
+    twist = rows["plant.machine.motor.position"] - rows["plant.machine.load.position"]
     after = twist[profile.count - 1 :]
     speed = np.zeros(len(rows))
     speed[: profile.count] = profile.velocity[: len(rows)]
@@ -314,13 +314,13 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
         shape=shape,
         feed=feed,
         duration=duration,
-        peak_following=float(np.abs(rows["law.position_error"]).max()),
+        peak_following=float(np.abs(rows["controller.law.position_error"]).max()),
         settling=max(settled - duration, 0.0) if abs(host.position - target) <= spec.method.in_position else math.nan,
         twist_after=math.nan if math.isnan(frequency) else float(np.ptp(after)),
-        peak_command=float(np.abs(rows["law.command"]).max()),
+        peak_command=float(np.abs(rows["controller.law.command"]).max()),
         t=np.arange(len(rows), dtype=np.float64) * host.period,
         speed=speed,
-        following=rows["law.position_error"],
+        following=rows["controller.law.position_error"],
         twist=twist,
     )
 

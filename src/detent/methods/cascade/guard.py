@@ -23,12 +23,12 @@ class Guard:
     def __call__(self, rows: Rows) -> Stop | None:
         """Look through a stretch."""
         limits, method = self._spec.limits, self._spec.method
-        place = rows["machine.load.position"]
-        limited = run_lengths(rows["law.limited"] > 0, self._limited)
+        place = rows["plant.machine.load.position"]
+        limited = run_lengths(rows["controller.law.limited"] > 0, self._limited)
         self._limited = int(limited[-1])
         # Turned round, so that a figure that is no number is wrong too.
         lasting = (
-            (~(np.abs(rows["law.position_error"]) <= method.following_error), self._following),
+            (~(np.abs(rows["controller.law.position_error"]) <= method.following_error), self._following),
             (~(place <= self._spec.highest + method.in_position), lambda: self._beyond("upper", self._spec.highest)),
             (~(place >= limits.lowest - method.in_position), lambda: self._beyond("lower", limits.lowest)),
             (limited >= self._most, self._saturated),
@@ -73,7 +73,7 @@ class Arrival:
 
     def __call__(self, rows: Rows) -> Stop | None:
         """Look through a stretch."""
-        within = run_lengths(np.abs(rows["law.position_error"]) <= self._window, self._within)
+        within = run_lengths(np.abs(rows["controller.law.position_error"]) <= self._window, self._within)
         self._within = int(within[-1])
         there = np.flatnonzero(within >= self._samples)
         wrong = self._guard(rows[: there[0] + 1] if there.size else rows)

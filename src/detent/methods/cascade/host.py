@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from detent.kernel.loop import advance
 from detent.kernel.registers import Leaf, Registers
 from detent.methods.cascade.build import build_cascade
+from detent.methods.cascade.controller import follow, switch_off
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import Cascade, CascadeParams, Feed, along, driven, switch_on
 from detent.planning.profile import Profile
@@ -34,9 +35,9 @@ class RotaryCascade(Cascade):
     """Registers of an axis that turns: the same places, other units."""
 
     @classmethod
-    def leaves(cls, prefix: str = "", offset: int = 0) -> Iterator[Leaf]:
+    def leaves(cls, prefix: str = "", offset: int = 0, by: str = "") -> Iterator[Leaf]:
         """Every stored quantity with its dotted path, in order of memory."""
-        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in Cascade.leaves(prefix, offset))
+        return (replace(leaf, unit=rotary_unit(leaf.unit)) for leaf in Cascade.leaves(prefix, offset, by))
 
 
 def rotary_unit(unit: str) -> str:
@@ -76,9 +77,9 @@ class Peaks:
 
     def take(self, rows: Rows) -> None:
         """Take the rows of a stretch."""
-        self.following = max(self.following, float(np.abs(rows["law.position_error"]).max(initial=0.0)))
-        self.command = max(self.command, float(np.abs(rows["law.command"]).max(initial=0.0)))
-        self.limited += int(np.count_nonzero(rows["law.limited"]))
+        self.following = max(self.following, float(np.abs(rows["controller.law.position_error"]).max(initial=0.0)))
+        self.command = max(self.command, float(np.abs(rows["controller.law.command"]).max(initial=0.0)))
+        self.limited += int(np.count_nonzero(rows["controller.law.limited"]))
 
 
 class CascadeHost:
@@ -91,12 +92,12 @@ class CascadeHost:
         self.state: Any = Cascade()
         start = spec.mechanics.start_position if position is None else position
         switch_on(self.params, self.state, start)
-        self.tick: float = self.params.machine.period
-        self.sample_ticks: int = self.params.sample_ticks
+        self.tick: float = self.params.plant.machine.period
+        self.sample_ticks: int = self.params.controller.sample_ticks
         self.machine: Machine[CascadeParams, Cascade] = Machine(
             self.params, self.state, Loop(self.tick, self._advance), recorder
         )
-        self._feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
+        self.feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
 
     @property
     def period(self) -> float:
@@ -111,33 +112,24 @@ class CascadeHost:
     @property
     def position(self) -> float:
         """True position of the load [m]."""
-        return float(self.state.machine.load.position)
-
-    def set_off(self, velocity: float) -> None:
-        """Be in motion [m/s] at power-on, motor, load and what the encoders have seen so far."""
-        self.state.machine.motor.velocity = self.state.machine.load.velocity = velocity
-        for r in (self.state.motor_sensor, self.state.load_sensor):
-            back = np.arange(len(r.memory))
-            # Place 0 is one sample before the first; before that lies the end of the ring.
-            r.memory[:] = [r.position - velocity * self.period * (1 + (-k) % len(r.memory)) for k in back.tolist()]
-            r.velocity = velocity
+        return float(self.state.plant.machine.load.position)
 
     def follow(self, profile: Profile) -> None:
         """Follow a reference from the next sample on; behind its end it stands."""
-        self._feed = along(profile.position, profile.velocity, profile.acceleration)
-        self.state.entry = 0
+        self.feed = along(profile.position, profile.velocity, profile.acceleration)
+        follow(self.state.controller)
 
     def drive(self, command: Numbers) -> None:
         """Open the loops: the amplifier gets these commands, one per sample, and nothing behind their end."""
-        self._feed = driven(command)
-        self.state.entry = 0
+        self.feed = driven(command)
+        follow(self.state.controller)
 
     def switch_off(self) -> None:
         """Take the drive's command away; the axis coasts."""
-        self.drive(np.zeros(1))
+        switch_off(self.state.controller)
 
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
-        return advance(p, r, ticks, *recording, *self._feed)
+        return advance(p, r, ticks, *recording, *self.feed)
 
     def rehearse(self, samples: int) -> Rows:
         """What the next samples would bring; the axis stays where it is."""
@@ -163,9 +155,9 @@ class CascadeHost:
 
 
 WATCHED = (
-    "law.position_error", "law.command", "law.limited", "source.command", "motor_sensor.position",
-    "motor_sensor.velocity", "load_sensor.position", "machine.current", "machine.motor.position",
-    "machine.load.position",
+    "controller.law.position_error", "controller.law.command", "controller.law.limited", "plant.source.command",
+    "controller.motor_sensor.position", "controller.motor_sensor.velocity", "controller.load_sensor.position",
+    "plant.machine.current", "plant.machine.motor.position", "plant.machine.load.position",
 )  # fmt: skip
 """Registers that a rehearsal shows."""
 

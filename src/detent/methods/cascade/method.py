@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from detent.record.machine import AnyRecorder, Progress
 
 TIMING = (
-    "wake", "reference.position", "motor_sensor.count", "motor_sensor.velocity", "law.position_error", "law.command",
-    "law.limited", "source.output", "machine.motor.position", "machine.motor.sense", "machine.load.position",
-    "machine.side",
+    "controller.left", "controller.reference.position", "lines.motor.count", "controller.motor_sensor.velocity",
+    "controller.law.position_error", "controller.law.command", "controller.law.limited", "plant.source.output",
+    "plant.machine.motor.position", "plant.machine.motor.sense", "plant.machine.load.position",
+    "plant.machine.side",
 )  # fmt: skip
 
 ROTARY: type[CascadeSpec] = rotary_model(CascadeSpec)
@@ -88,8 +89,8 @@ class CascadeMethod(Method[CascadeSpec]):
         middle = spec.limits.lowest + 0.5 * spec.limits.travel
         return Simulated(
             registers=cascade_registers(spec),
-            tick=p.machine.period,
-            every=p.sample_ticks,
+            tick=p.plant.machine.period,
+            every=p.controller.sample_ticks,
             signals=CASCADE_SIGNALS,
             timing=TIMING,
             clocking=Clocking(),

@@ -30,9 +30,9 @@ from detent.page.table import Cell, bar_cell, left_out, long_table, offset_cell
 from detent.page.words import count, duration, number
 from detent.record.trace import Trace
 
-REFERENCE, REFERENCE_SPEED = "reference.position", "reference.velocity"
-LOAD, LOAD_SPEED = "machine.load.position", "machine.load.velocity"
-FOLLOWING, COMMAND = "law.position_error", "source.command"
+REFERENCE, REFERENCE_SPEED = "controller.reference.position", "controller.reference.velocity"
+LOAD, LOAD_SPEED = "plant.machine.load.position", "plant.machine.load.velocity"
+FOLLOWING, COMMAND = "controller.law.position_error", "plant.source.command"
 NEEDED = (REFERENCE, REFERENCE_SPEED, LOAD, LOAD_SPEED, FOLLOWING, COMMAND)
 """Signals that the figures over time are drawn from; of a trace without them these figures are left out."""
 

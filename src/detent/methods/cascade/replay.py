@@ -20,6 +20,7 @@ from detent.methods.cascade.host import CHUNK, CascadeHost, Rows
 from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.cascade.replay_job import ReplayJob
 from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.cascade.system import set_off
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
 from detent.units import format_quantity
@@ -156,7 +157,7 @@ def _start(spec: CascadeSpec, job: ReplayJob, recorder: AnyRecorder | None) -> C
     host = CascadeHost(spec, recorder, position=float(job.position[0]))
     speed = starting_velocity(job.t, job.position)
     if speed:
-        host.set_off(speed)
+        set_off(host.params, host.state, speed)
     return host
 
 
@@ -204,7 +205,7 @@ def _open_loop(spec: CascadeSpec, job: ReplayJob) -> tuple[str, Numbers]:
 def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) -> None:
     """Compare, and say what should be known."""
     job = result.job
-    finite = np.isfinite(seen["machine.load.position"]) & np.isfinite(seen["law.command"])
+    finite = np.isfinite(seen["plant.machine.load.position"]) & np.isfinite(seen["controller.law.command"])
     result.done = bool(finite.all())
     if not result.done:
         first = int(np.argmin(finite)) * host.period
@@ -220,9 +221,9 @@ def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) 
 
     efforts = [one for one in _efforts(spec, job, simulated) if one.name != result.open_loop]
     result.compared = [*_motion(spec, job, simulated), *efforts]
-    at_limit = seen["law.limited"] > 0
+    at_limit = seen["controller.law.limited"] > 0
     if result.open_loop:
-        at_limit = np.abs(seen["source.command"]) >= host.params.source.limit * (1 - 1e-12)
+        at_limit = np.abs(seen["plant.source.command"]) >= host.params.plant.source.limit * (1 - 1e-12)
     result.limited = float(np.count_nonzero(at_limit)) * host.period
     result.warnings = _cautions(spec, result, seen)
 
@@ -241,13 +242,13 @@ def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Number
     way, speed = spec.unit("m"), spec.unit("m/s")
     # The one encoder that was recorded is the one that the position loop uses.
     on_load = spec.method.feedback.position == "load" and job.load_position is None
-    place = simulated("load_sensor.position" if on_load else "motor_sensor.position")
+    place = simulated("controller.load_sensor.position" if on_load else "controller.motor_sensor.position")
     found = [Compared(name="position", unit=way, measured=job.position, simulated=place)]
     if job.load_position is not None:
-        load = simulated("load_sensor.position")
+        load = simulated("controller.load_sensor.position")
         found.append(Compared(name="position of the load", unit=way, measured=job.load_position, simulated=load))
     if job.velocity is not None and not on_load:
-        velocity = simulated("motor_sensor.velocity")
+        velocity = simulated("controller.motor_sensor.velocity")
         found.append(Compared(name="velocity", unit=speed, measured=job.velocity, simulated=velocity))
     else:
         measured, came = (smooth_velocity(job.t, values) for values in (job.position, place))
@@ -260,9 +261,9 @@ def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Number
 def _efforts(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
     """Every recorded effort that this axis has too."""
     units: Mapping[str, str] = {"force": "N", "torque": "N*m", "current": "A", "voltage": "V", "command": "V"}
-    came = {name: gain * simulated("source.command") for name, gain in per_command(spec).items()}
+    came = {name: gain * simulated("plant.source.command") for name, gain in per_command(spec).items()}
     if spec.drive.input == "voltage":
-        current = simulated("machine.current")
+        current = simulated("plant.machine.current")
         came |= {
             "current": current,
             "torque" if spec.axis.motion == "rotary" else "force": spec.force_constant * current,
@@ -279,7 +280,7 @@ def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:
     found: list[str] = []
     way, limit = spec.unit("m"), spec.method.following_error
     if not result.open_loop:
-        errors = np.abs(seen["law.position_error"])
+        errors = np.abs(seen["controller.law.position_error"])
         result.peak_following = float(errors.max())
         if result.peak_following > limit:
             first = int(np.argmax(errors > limit)) * result.period
@@ -287,7 +288,7 @@ def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:
                 f"the simulated following error went beyond {format_quantity(limit, way)}, method.following_error, "
                 f"{format_quantity(first, 's')} after the begin: in a run of moves the drive would have gone off"
             )
-    place, limits = seen["machine.load.position"], spec.limits
+    place, limits = seen["plant.machine.load.position"], spec.limits
     if place.min() < limits.lowest or place.max() > spec.highest:
         ends = f"{format_quantity(limits.lowest, way)} to {format_quantity(spec.highest, way)}"
         found.append(f"the simulated load left the way of the axis, {ends}; widen limits.travel, or look at the log")

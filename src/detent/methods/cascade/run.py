@@ -20,10 +20,12 @@ COAST = 0.1
 """Time that a run goes on after the drive has gone off [s]."""
 
 CASCADE_SIGNALS = (
-    "reference.position", "reference.velocity", "motor_sensor.position", "motor_sensor.velocity",
-    "load_sensor.position", "law.position_error", "law.integral", "law.feed_forward", "law.command", "law.limited",
-    "source.command", "source.output", "machine.current", "machine.motor.position", "machine.motor.velocity",
-    "machine.load.position", "machine.load.velocity", "gauge.target",
+    "controller.reference.position", "controller.reference.velocity", "controller.motor_sensor.position",
+    "controller.motor_sensor.velocity", "controller.load_sensor.position", "controller.law.position_error",
+    "controller.law.integral", "controller.law.feed_forward", "controller.law.command", "controller.law.limited",
+    "plant.source.command", "plant.source.output", "plant.machine.current", "plant.machine.motor.position",
+    "plant.machine.motor.velocity", "plant.machine.load.position", "plant.machine.load.velocity",
+    "plant.gauge.target",
 )  # fmt: skip
 
 
@@ -212,7 +214,7 @@ class _Mover:
             limits = MotionLimits(move.speed, limits.acceleration, limits.jerk)
         profile = plan_move(place, target, limits, host.period)
         begin, start, host.peaks = host.time, host.position, Peaks()
-        set_gauge(host.state.gauge, host.state.tick, start, target, self.result.tolerance)
+        set_gauge(host.state.plant.gauge, host.state.tick, start, target, self.result.tolerance)
         host.follow(profile)
         stop = host.pass_samples(profile.count - 1, self.guard)
         arrived = host.time
@@ -236,7 +238,7 @@ class _Mover:
 
     def _note(self, move: Move, times: tuple[float, float, float | str], way: tuple[float, float]) -> None:
         """Put the move into the result."""
-        host, gauge, peaks = self.host, self.host.state.gauge, self.host.peaks
+        host, gauge, peaks = self.host, self.host.state.plant.gauge, self.host.peaks
         begin, arrived, ready = times
         outside = abs(way[1] - host.position) > self.result.tolerance
         self.result.moves.append(
@@ -263,7 +265,7 @@ class _Mover:
     def _late(self) -> str:
         """The axis was not in position in time."""
         method = self.spec.method
-        error = self._text(abs(float(self.host.state.law.position_error)))
+        error = self._text(abs(float(self.host.state.controller.law.position_error)))
         return (
             f"not in position within {format_quantity(method.timeout, 's')} of the end of the reference "
             f"(method.timeout): its error is {error}, method.in_position is "

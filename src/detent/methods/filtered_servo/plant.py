@@ -51,13 +51,13 @@ class FilteredPlant(Registers):
 
 
 @hot_step
-def has_passed(edge: float, start: float, way: float, k: int, right: bool) -> bool:  # noqa: FBT001 - a direction
+def has_passed(edge: float, start: float, way: float, k: int, right: bool) -> bool:
     """True when the slide, `way` [m] in the tick, has passed an edge by clock `k`."""
     return (start + way * ((k + 1) * (1.0 / CLOCKS)) >= edge) == right
 
 
 @hot_step
-def clock_of(edge: float, start: float, way: float, k: int, right: bool) -> int:  # noqa: FBT001 - a direction
+def clock_of(edge: float, start: float, way: float, k: int, right: bool) -> int:
     """Clock, `k` or later, in which the slide passes an edge: near their quotient, as the places in its clocks say."""
     first, ahead = k, edge - start
     k = max(int(ahead / way * CLOCKS) if abs(ahead) < abs(way) else CLOCKS - 1, first)

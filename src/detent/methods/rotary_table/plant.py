@@ -49,7 +49,7 @@ class TablePlant(Registers):
 
 
 @step
-def latch(  # noqa: PLR0913 - where motor and gears are
+def latch(
     p: TablePlantParams, r: TablePlant, lines: TableLines, turns: int, angle: float, coarse_slack: float, slack: float
 ) -> None:
     """Both comparators, the motor at `turns` and `angle` [rad], gears with their slack [rad]; and the true angle."""

@@ -11,6 +11,7 @@ from detent.errors import DetentError
 from detent.identify.analyse.measure_response import measure_response
 from detent.identify.analyse.resonances import fit_resonances
 from detent.identify.fit.dead_time import find_dead_time
+from detent.methods.cascade.system import set_count
 
 pytestmark = pytest.mark.compiled
 
@@ -22,12 +23,13 @@ def record(delay=3, coulomb=0.5, resolution=1e-6, top=20.0):
     t = T_SAMPLE * np.arange(16_000)
     effort = sum(np.cos(2 * np.pi * f * t + rng.uniform(0, 6.3)) for f in rng.uniform(0.3, top, 30))
     p = make_params()
-    p.source.delay, p.motor_sensor.resolution = delay, resolution
-    set_friction(p.machine.load.friction, coulomb=coulomb, static=coulomb, viscous=4.0)
-    names = ["source.command", "motor_sensor.position"]
+    p.plant.source.delay = delay
+    set_count(p, resolution, 0.0)
+    set_friction(p.plant.machine.load.friction, coulomb=coulomb, static=coulomb, viscous=4.0)
+    names = ["plant.source.command", "controller.motor_sensor.position"]
     command = effort * 15 / np.abs(effort).max()
     rows = Rig(p).record(len(t) * SAMPLE_TICKS, names, SAMPLE_TICKS, command=command)
-    return rows["t"], rows["source.command"], rows["motor_sensor.position"]
+    return rows["t"], rows["plant.source.command"], rows["controller.motor_sensor.position"]
 
 
 @pytest.mark.parametrize(

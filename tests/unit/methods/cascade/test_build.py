@@ -141,12 +141,19 @@ def registers(name, overrides):
     start, way = start_position(spec), 0.05
     rig, seen = Rig(p, start), []
     for target in (start + way, start):
-        move = plan_move(target - way if target > start else start + way, target, motion_limits(spec), p.law.period)
-        rig.r.entry = 0
+        move = plan_move(
+            target - way if target > start else start + way, target, motion_limits(spec), p.controller.law.period
+        )
+        rig.r.controller.entry = 0
         for _ in range(4):
-            rig.record(move.count // 4 * p.sample_ticks, ["law.command"], p.sample_ticks, profile=move)
+            rig.record(
+                move.count // 4 * p.controller.sample_ticks,
+                ["controller.law.command"],
+                p.controller.sample_ticks,
+                profile=move,
+            )
             seen.append(bytes(rig.r))
-        rig.run(800 * p.sample_ticks)
+        rig.run(800 * p.controller.sample_ticks)
     return tuple(seen)
 
 
@@ -169,11 +176,11 @@ def test_every_key_is_tried():
 def test_a_pendulum_pulls_a_rotary_axis_down():
     hanging = load("turntable", "mechanics.pendulum=0.5 N*m", "mechanics.start_position=90 deg")
     rig = Rig(build_cascade(hanging), start_position(hanging))
-    rig.drive([0.0], 200 * rig.p.sample_ticks)
+    rig.drive([0.0], 200 * rig.p.controller.sample_ticks)
     assert rig.x < math.radians(89)
     still = load("turntable", "mechanics.pendulum=0.5 N*m")
     rig = Rig(build_cascade(still), start_position(still))
-    assert rig.drive([0.0], 200 * rig.p.sample_ticks).x == 0.0
+    assert rig.drive([0.0], 200 * rig.p.controller.sample_ticks).x == 0.0
 
 
 def test_the_continuous_current_is_warned_about():
@@ -197,22 +204,23 @@ def test_limits_of_a_move():
 def test_parameters_of_a_rotary_axis():
     p = build_cascade(load("turntable"))
     radius = 8 / 360
-    w = p.machine.winding
+    w = p.plant.machine.winding
     assert (w.used, w.resistance, w.inductance) == (1, 3.99, 0.556e-3)
     assert w.force_constant == pytest.approx(0.0352 / radius)
     assert w.max_current == pytest.approx(3 / w.force_constant)
-    assert (p.source.gain, p.source.limit, p.source.delay, p.law.max_command) == (2.4, 10.0, 1, 10.0)
-    assert p.machine.motor.mass == pytest.approx(0.02 + 45.3e-7 / radius**2)
-    assert p.machine.load.mass == pytest.approx(0.12)
-    assert (p.feedback.position_on_load, p.feedback.velocity_on_load) == (1, 0)
-    assert p.load_sensor.resolution == pytest.approx(math.radians(0.009))
-    assert p.law.feed_forward.velocity == 1.0
+    source = p.plant.source
+    assert (source.gain, source.limit, source.delay, p.controller.law.max_command) == (2.4, 10.0, 1, 10.0)
+    assert p.plant.machine.motor.mass == pytest.approx(0.02 + 45.3e-7 / radius**2)
+    assert p.plant.machine.load.mass == pytest.approx(0.12)
+    assert (p.controller.feedback.position_on_load, p.controller.feedback.velocity_on_load) == (1, 0)
+    assert p.controller.load_sensor.resolution == p.plant.load_count == pytest.approx(math.radians(0.009))
+    assert p.controller.law.feed_forward.velocity == 1.0
 
 
 def test_feed_forward_is_what_the_plant_needs():
     shares = [f"method.feed_forward.{name}=1" for name in ("acceleration", "viscous", "coulomb", "weight")]
     spec = load("cascade", *shares, "mechanics.weight=50 N", "mechanics.friction.offset=2 N")
-    f, per_volt = build_cascade(spec).law.feed_forward, spec.effort_per_command
+    f, per_volt = build_cascade(spec).controller.law.feed_forward, spec.effort_per_command
     assert f.acceleration * per_volt == pytest.approx(spec.mass)
     assert f.viscous * per_volt == pytest.approx(115)
     assert f.coulomb_positive * per_volt == pytest.approx(14 + 8 + 2)
@@ -221,7 +229,7 @@ def test_feed_forward_is_what_the_plant_needs():
     rotary = load(
         "turntable", "method.feed_forward.viscous=0.5", "method.feed_forward.weight=0.5", "mechanics.pendulum=2 N*m"
     )
-    f, per_volt = build_cascade(rotary).law.feed_forward, rotary.effort_per_command
+    f, per_volt = build_cascade(rotary).controller.law.feed_forward, rotary.effort_per_command
     assert f.pendulum * per_volt == pytest.approx(1.0)
     assert f.viscous * per_volt == pytest.approx(0.5 * (0.02 + rotary.back_emf_drag))
 
@@ -229,12 +237,13 @@ def test_feed_forward_is_what_the_plant_needs():
 def test_the_command_ends_where_the_amplifier_does():
     for overrides in ((), ("drive.max_current=1 A",), VOLTAGE, (BARE, *FORCE)):
         p = build_cascade(load("cascade", *overrides))
-        assert p.law.max_command == p.source.limit
+        assert p.controller.law.max_command == p.plant.source.limit
 
 
 def test_a_missing_encoder_of_the_load_reads_the_position_itself():
-    s = build_cascade(load("cascade")).load_sensor
+    s = build_cascade(load("cascade")).controller.load_sensor
     assert (s.resolution, s.delay, s.span, s.smoothing) == (0.0, 0, 1, 1.0)
+    assert build_cascade(load("cascade")).plant.load_count == 0.0
 
 
 @pytest.mark.parametrize("name", ["cascade", "turntable"])
@@ -244,9 +253,9 @@ def test_ticks_divide_the_sample_and_are_short_enough(name, stiffer):
     key = spec.mechanics.coupling.stiffness * stiffer
     unit = "N/m" if name == "cascade" else "N*m/rad"
     p = build_cascade(load(name, f"mechanics.coupling.stiffness={key!r} {unit}"))
-    assert p.machine.period * p.sample_ticks == pytest.approx(spec.method.sample_period, rel=1e-12)
-    assert p.machine.period <= LONGEST_TICK * (1 + 1e-9)
-    assert fastest_rate(p.machine) * p.machine.period <= LARGEST_ANGLE * (1 + 1e-9) < MAX_RATE
+    assert p.plant.machine.period * p.controller.sample_ticks == pytest.approx(spec.method.sample_period, rel=1e-12)
+    assert p.plant.machine.period <= LONGEST_TICK * (1 + 1e-9)
+    assert fastest_rate(p.plant.machine) * p.plant.machine.period <= LARGEST_ANGLE * (1 + 1e-9) < MAX_RATE
 
 
 def test_ticks_of_a_sample():
@@ -257,5 +266,5 @@ def test_ticks_of_a_sample():
 
 def test_a_push_counts_in_ticks():
     p = build_cascade(load("cascade", *PUSH))
-    tick = p.machine.period
-    assert (p.push.force, p.push.begin, p.push.end) == (80.0, round(0.05 / tick), round(0.25 / tick))
+    tick = p.plant.machine.period
+    assert (p.plant.push.force, p.plant.push.begin, p.plant.push.end) == (80.0, round(0.05 / tick), round(0.25 / tick))

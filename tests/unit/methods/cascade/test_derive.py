@@ -71,10 +71,15 @@ def steady_error(spec, sense):
     limits = motion_limits(spec)
     move = plan_move(start, start + sense * 0.2, limits, spec.method.sample_period)
     rig = Rig(p, start)
-    run = rig.record(move.count * p.sample_ticks, ["law.position_error"], p.sample_ticks, profile=move)
+    run = rig.record(
+        move.count * p.controller.sample_ticks,
+        ["controller.law.position_error"],
+        p.controller.sample_ticks,
+        profile=move,
+    )
     fast = np.flatnonzero(np.abs(move.velocity) > limits.speed * (1 - 1e-9))
     chosen = fast[-len(fast) // 10 :]
-    return float(run["law.position_error"][chosen].mean())
+    return float(run["controller.law.position_error"][chosen].mean())
 
 
 @pytest.mark.compiled
@@ -108,8 +113,8 @@ def test_the_axis_rests_within_the_error_at_rest(load_text, rigid_text, override
     for share, moves in ((-0.95, False), (-1.05, True)):
         p = build_cascade(spec)
         rig = Rig(p, 0.25)
-        rig.r.reference.position = 0.25 + share * allowed
-        rig.run(400 * p.sample_ticks)
+        rig.r.controller.reference.position = 0.25 + share * allowed
+        rig.run(400 * p.controller.sample_ticks)
         assert (rig.x != 0.25) == moves
 
 

@@ -14,7 +14,7 @@ from detent.methods.cascade.host import (
     rotary_unit,
     run_lengths,
 )
-from detent.methods.cascade.system import Cascade
+from detent.methods.cascade.system import Cascade, set_off
 from detent.methods.load import load_spec
 from detent.planning.profile import MotionLimits, plan_move
 
@@ -39,10 +39,10 @@ def test_registers_of_a_rotary_axis_differ_in_their_units_alone():
     assert cascade_registers(LINEAR) is Cascade
     assert [(x.path, x.offset, x.width) for x in linear] == [(x.path, x.offset, x.width) for x in rotary]
     units = {x.path: x.unit for x in rotary}
-    assert units["machine.load.position"] == "rad"
-    assert units["reference.acceleration"] == "rad/s2"
-    assert units["machine.external"] == "N.m"
-    assert units["law.command"] == "V"
+    assert units["plant.machine.load.position"] == "rad"
+    assert units["controller.reference.acceleration"] == "rad/s2"
+    assert units["plant.machine.external"] == "N.m"
+    assert units["controller.law.command"] == "V"
     assert units["tick"] == "tick"
 
 
@@ -60,8 +60,8 @@ def test_a_rehearsal_shows_what_comes_and_changes_nothing():
     assert rows.dtype.names == WATCHED
     assert host.state.snapshot() == before
     host.pass_samples(200, go)
-    assert host.position == rows["machine.load.position"][-1]
-    assert host.state.law.command == rows["law.command"][-1]
+    assert host.position == rows["plant.machine.load.position"][-1]
+    assert host.state.controller.law.command == rows["controller.law.command"][-1]
 
 
 def test_samples_pass_in_stretches_as_in_one():
@@ -90,8 +90,8 @@ def test_a_stretch_ends_in_the_sample_that_the_judge_names():
 def test_behind_its_end_a_reference_stands():
     host = moving(target=0.03)
     host.pass_samples(4000, go)
-    assert host.state.reference.position == 0.03
-    assert host.state.reference.velocity == 0.0
+    assert host.state.controller.reference.position == 0.03
+    assert host.state.controller.reference.velocity == 0.0
     assert host.position == pytest.approx(0.03, abs=2e-5)
 
 
@@ -99,30 +99,30 @@ def test_peaks_are_those_of_the_samples_that_passed():
     host = moving()
     rows = host.rehearse(300)
     host.pass_samples(100, go)
-    assert host.peaks.following == np.abs(rows["law.position_error"][:100]).max()
-    assert host.peaks.command == np.abs(rows["law.command"][:100]).max()
-    assert host.peaks.command < np.abs(rows["law.command"]).max()
+    assert host.peaks.following == np.abs(rows["controller.law.position_error"][:100]).max()
+    assert host.peaks.command == np.abs(rows["controller.law.command"][:100]).max()
+    assert host.peaks.command < np.abs(rows["controller.law.command"]).max()
     assert Peaks().limited == host.peaks.limited == 0
 
 
 def test_a_drive_that_is_off_gets_no_command():
     host = moving()
     host.pass_samples(600, go)
-    assert host.state.source.output != 0.0
+    assert host.state.plant.source.output != 0.0
     host.switch_off()
     host.pass_samples(LINEAR.drive.delay + 1, go)
-    assert host.state.source.command == host.state.source.output == 0.0
+    assert host.state.plant.source.command == host.state.plant.source.output == 0.0
 
 
 def test_an_axis_that_is_in_motion_at_power_on_reads_its_velocity_at_once():
     spec = load_spec(detent.example("cascade.toml"), ["encoder.velocity_span=5", "encoder.delay=2"])
     host = CascadeHost(spec, position=0.1)
-    host.set_off(0.2)
+    set_off(host.params, host.state, 0.2)
     host.drive(np.zeros(1))
     rows = host.rehearse(3)
-    assert rows["motor_sensor.velocity"] == pytest.approx(0.2, rel=0.01)
+    assert rows["controller.motor_sensor.velocity"] == pytest.approx(0.2, rel=0.01)
     # Two samples late.
-    assert rows["motor_sensor.position"][0] == pytest.approx(0.1 - 2 * 0.2 * host.period, abs=1e-6)
+    assert rows["controller.motor_sensor.position"][0] == pytest.approx(0.1 - 2 * 0.2 * host.period, abs=1e-6)
 
 
 def test_run_lengths_go_on_from_the_stretch_before():

@@ -52,10 +52,10 @@ def swing(spec, seconds):
     """Largest position error after a push at rest, in the first and in the last quarter of a run [m]."""
     p = build_cascade(spec)
     rig = Rig(p, start_position(spec))
-    rig.r.machine.motor.velocity = rig.r.machine.load.velocity = 1e-3
+    rig.r.plant.machine.motor.velocity = rig.r.plant.machine.load.velocity = 1e-3
     samples = round(seconds / spec.method.sample_period)
-    run = rig.record(samples * p.sample_ticks, ["machine.motor.position"], p.sample_ticks)
-    error = np.abs(run["machine.motor.position"] - start_position(spec))
+    run = rig.record(samples * p.controller.sample_ticks, ["plant.machine.motor.position"], p.controller.sample_ticks)
+    error = np.abs(run["plant.machine.motor.position"] - start_position(spec))
     quarter = samples // 4
     return error[:quarter].max(), error[-quarter:].max()
 
@@ -95,7 +95,7 @@ def test_the_slowest_mode_decays_as_the_model_says(load_text, rigid_text):
     ).spec
     p = build_cascade(spec)
     rig = Rig(p, 0.25)
-    rig.r.machine.motor.velocity = rig.r.machine.load.velocity = 2e-3
+    rig.r.plant.machine.motor.velocity = rig.r.plant.machine.load.velocity = 2e-3
     loop = LinearLoop(spec)
     m = loop.transition()
     state = np.zeros(len(m))
@@ -104,8 +104,8 @@ def test_the_slowest_mode_decays_as_the_model_says(load_text, rigid_text):
     for _ in range(400):
         state = m @ state
         expected.append(state[0])
-    run = rig.record(400 * p.sample_ticks, ["machine.motor.position"], p.sample_ticks)
-    found = run["machine.motor.position"] - 0.25
+    run = rig.record(400 * p.controller.sample_ticks, ["plant.machine.motor.position"], p.controller.sample_ticks)
+    found = run["plant.machine.motor.position"] - 0.25
     assert np.abs(expected).max() > 5e-6
     # Viscous friction has two directions, of which the model takes the weaker.
     assert found == pytest.approx(np.array(expected), abs=0.02 * np.abs(expected).max())

@@ -55,10 +55,10 @@ def record(spec, *, name="run.csv", begin=0):
     return ReplayJob(
         name=name,
         t=3.0 + profile.t[begin:],
-        position=rows["motor_sensor.position"].copy(),
+        position=rows["controller.motor_sensor.position"].copy(),
         reference=profile.position[begin:].copy(),
-        load_position=rows["load_sensor.position"].copy(),
-        efforts={"voltage": rows["source.command"].copy(), "current": 0.8 * rows["source.command"]},
+        load_position=rows["controller.load_sensor.position"].copy(),
+        efforts={"voltage": rows["plant.source.command"].copy(), "current": 0.8 * rows["plant.source.command"]},
     )
 
 
@@ -148,7 +148,7 @@ def test_efforts_that_the_axis_does_not_have_are_named(own, force_axis):
 def test_an_axis_that_runs_away_ends_the_comparison(own, monkeypatch):
     def broken(self, samples, judge):
         rows = self.rehearse(samples)
-        rows["machine.load.position"][500:] = math.inf
+        rows["plant.machine.load.position"][500:] = math.inf
         judge(rows)
 
     monkeypatch.setattr(CascadeHost, "pass_samples", broken)

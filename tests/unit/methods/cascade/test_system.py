@@ -16,7 +16,7 @@ from tests.cascade_rig import (
     unlimited_params,
 )
 
-from detent.methods.cascade.system import CascadeParams, fill_clocks, smoothing
+from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits, plan_move
 from detent.sensing.gauge import set_gauge
 
@@ -29,34 +29,36 @@ MOVE = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)
 
 def test_the_first_sample_is_at_power_on_and_then_one_every_so_many_ticks():
     rig = Rig(make_params())
-    rig.r.reference.position = 1e-3
-    run = rig.record(61, ["law.position_error", "machine.load.position"])
-    changes = np.flatnonzero(np.diff(run["law.position_error"])) + 1
+    rig.r.controller.reference.position = 1e-3
+    run = rig.record(61, ["controller.law.position_error", "plant.machine.load.position"])
+    changes = np.flatnonzero(np.diff(run["controller.law.position_error"])) + 1
     assert changes.tolist() == [20, 40, 60]
-    assert run["law.position_error"][0] == 1e-3
-    assert run["machine.load.position"][0] > 0.0, "it acts in the tick of its sample"
+    assert run["controller.law.position_error"][0] == 1e-3
+    assert run["plant.machine.load.position"][0] > 0.0, "it acts in the tick of its sample"
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3, 63])
 def test_the_delay_of_the_amplifier_is_exact(delay):
     p = unlimited_params()
-    p.source.delay = delay
+    p.plant.source.delay = delay
     rig = Rig(p)
-    run = rig.record((delay + 3) * SAMPLE_TICKS, ["source.output", "machine.load.velocity"], command=[7.0] * 200)
+    run = rig.record(
+        (delay + 3) * SAMPLE_TICKS, ["plant.source.output", "plant.machine.load.velocity"], command=[7.0] * 200
+    )
     begins = delay * SAMPLE_TICKS
-    assert not run["source.output"][:begins].any()
-    assert not run["machine.load.velocity"][:begins].any()
+    assert not run["plant.source.output"][:begins].any()
+    assert not run["plant.machine.load.velocity"][:begins].any()
     ticks = np.arange(1, 3 * SAMPLE_TICKS + 1)
-    assert run["machine.load.velocity"][begins:] == pytest.approx(7.0 / MASS * ticks * TICK, rel=1e-12)
+    assert run["plant.machine.load.velocity"][begins:] == pytest.approx(7.0 / MASS * ticks * TICK, rel=1e-12)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 7])
 def test_the_delay_of_a_sensor_is_exact(delay):
     p = unlimited_params()
-    p.motor_sensor.delay = delay
+    p.controller.motor_sensor.delay = delay
     rig = Rig(p)
-    rig.r.machine.motor.velocity = rig.r.machine.load.velocity = 0.1
-    names = ["motor_sensor.position", "load_sensor.position"]
+    rig.r.plant.machine.motor.velocity = rig.r.plant.machine.load.velocity = 0.1
+    names = ["controller.motor_sensor.position", "controller.load_sensor.position"]
     run = rig.record(30 * SAMPLE_TICKS, names, every=SAMPLE_TICKS, command=[0.0])
     motor, load = (run[name] for name in names)
     assert load == pytest.approx(0.1 * T * np.arange(30), abs=1e-15)
@@ -66,42 +68,47 @@ def test_the_delay_of_a_sensor_is_exact(delay):
 
 def test_commands_of_the_host_end_in_none():
     rig = Rig(unlimited_params())
-    run = rig.record(5 * SAMPLE_TICKS, ["source.output"], every=SAMPLE_TICKS, command=[3.0, -2.0, 5.0])
-    assert run["source.output"].tolist() == [3.0, -2.0, 5.0, 0.0, 0.0]
-    assert rig.r.law.command == 0.0
+    run = rig.record(5 * SAMPLE_TICKS, ["plant.source.output"], every=SAMPLE_TICKS, command=[3.0, -2.0, 5.0])
+    assert run["plant.source.output"].tolist() == [3.0, -2.0, 5.0, 0.0, 0.0]
+    assert rig.r.controller.law.command == 0.0
 
 
 def test_behind_the_end_of_the_reference_the_axis_is_held_there():
     rig = Rig(make_params())
     move = plan_move(0.0, 0.01, MOVE, T)
     move.velocity[-1] = 0.3  # a recording may end in motion
-    run = rig.record(1000 * SAMPLE_TICKS, ["reference.position", "reference.velocity"], SAMPLE_TICKS, profile=move)
-    assert np.array_equal(run["reference.position"][: move.count], move.position)
-    assert (run["reference.position"][move.count :] == 0.01).all()
-    assert run["reference.velocity"][move.count - 1] == 0.3
-    assert not run["reference.velocity"][move.count :].any()
+    run = rig.record(
+        1000 * SAMPLE_TICKS,
+        ["controller.reference.position", "controller.reference.velocity"],
+        SAMPLE_TICKS,
+        profile=move,
+    )
+    assert np.array_equal(run["controller.reference.position"][: move.count], move.position)
+    assert (run["controller.reference.position"][move.count :] == 0.01).all()
+    assert run["controller.reference.velocity"][move.count - 1] == 0.3
+    assert not run["controller.reference.velocity"][move.count :].any()
     assert rig.x == pytest.approx(0.01, abs=1e-9)
-    assert rig.r.entry == move.count
+    assert rig.r.controller.entry == move.count
 
 
 def test_the_disturbing_force_acts_in_its_ticks():
     p = unlimited_params()
-    p.push.force, p.push.begin, p.push.end = -4.0, 13, 33
-    run = Rig(p).record(50, ["machine.load.velocity"], command=[0.0])
+    p.plant.push.force, p.plant.push.begin, p.plant.push.end = -4.0, 13, 33
+    run = Rig(p).record(50, ["plant.machine.load.velocity"], command=[0.0])
     ticks = np.clip(np.arange(1, 51) - 13, 0, 20)
-    assert run["machine.load.velocity"] == pytest.approx(-4.0 / MASS * ticks * TICK, rel=1e-12, abs=1e-18)
+    assert run["plant.machine.load.velocity"] == pytest.approx(-4.0 / MASS * ticks * TICK, rel=1e-12, abs=1e-18)
 
 
 def test_the_gauge_reads_the_load():
     p = make_params()
     rig = Rig(p)
-    set_gauge(rig.r.gauge, 0, 0.0, 0.01, 1e-5)
-    rig.r.reference.position = 0.01
-    run = rig.record(12_000, ["machine.load.position", "machine.load.velocity"])
-    x, v = run["machine.load.position"], run["machine.load.velocity"]
-    assert rig.r.gauge.peak_speed == v.max()
-    assert rig.r.gauge.beyond == pytest.approx(x.max() - 0.01, abs=1e-18)
-    assert rig.r.gauge.outside == np.flatnonzero(np.abs(x - 0.01) > 1e-5)[-1] + 1
+    set_gauge(rig.r.plant.gauge, 0, 0.0, 0.01, 1e-5)
+    rig.r.controller.reference.position = 0.01
+    run = rig.record(12_000, ["plant.machine.load.position", "plant.machine.load.velocity"])
+    x, v = run["plant.machine.load.position"], run["plant.machine.load.velocity"]
+    assert rig.r.plant.gauge.peak_speed == v.max()
+    assert rig.r.plant.gauge.beyond == pytest.approx(x.max() - 0.01, abs=1e-18)
+    assert rig.r.plant.gauge.outside == np.flatnonzero(np.abs(x - 0.01) > 1e-5)[-1] + 1
 
 
 # -- loops against closed forms ----------------------------------------------------------------------------------------
@@ -111,13 +118,13 @@ def test_the_velocity_loop_is_a_first_order_lag():
     """Position gain 0 and a fast sample: v = v_ref (1 - exp(-t K_v / m))."""
     p = make_params()
     fill_clocks(p, 1e-6, 1)
-    p.law.cascade.position_gain, p.law.feed_forward.velocity = 0.0, 1.0
+    p.controller.law.cascade.position_gain, p.controller.law.feed_forward.velocity = 0.0, 1.0
     rig = Rig(p)
-    rig.r.reference.velocity = 0.2
-    run = rig.record(20_000, ["machine.load.velocity"])
-    tau = MASS / p.law.cascade.velocity_gain
+    rig.r.controller.reference.velocity = 0.2
+    run = rig.record(20_000, ["plant.machine.load.velocity"])
+    tau = MASS / p.controller.law.cascade.velocity_gain
     # The difference over a sample is 0.5 us late, the hold of the command another 0.5 us: 0.03 % of 4 ms.
-    assert run["machine.load.velocity"] == pytest.approx(-0.2 * np.expm1(-run["t"] / tau), abs=0.2 * 3e-4)
+    assert run["plant.machine.load.velocity"] == pytest.approx(-0.2 * np.expm1(-run["t"] / tau), abs=0.2 * 3e-4)
 
 
 def test_the_position_loop_follows_with_the_error_of_its_gain():
@@ -128,27 +135,33 @@ def test_the_position_loop_follows_with_the_error_of_its_gain():
     ref = plan_move(0.0, 1.0, MOVE, T)
     ramp = type(ref)(T, ramp, np.full(n, speed), np.zeros(n))
     rig.record(n * SAMPLE_TICKS, ["tick"], SAMPLE_TICKS, profile=ramp)
-    assert rig.r.law.position_error == pytest.approx(speed / p.law.cascade.position_gain, rel=1e-6)
-    p.law.feed_forward.velocity = 1.0
+    assert rig.r.controller.law.position_error == pytest.approx(
+        speed / p.controller.law.cascade.position_gain, rel=1e-6
+    )
+    p.controller.law.feed_forward.velocity = 1.0
     rig = Rig(p)
     rig.record(n * SAMPLE_TICKS, ["tick"], SAMPLE_TICKS, profile=ramp)
-    assert abs(rig.r.law.position_error) < 1e-6 * speed
+    assert abs(rig.r.controller.law.position_error) < 1e-6 * speed
 
 
 @pytest.mark.parametrize("pid", [False, True], ids=["cascade", "pid"])
 def test_with_full_feed_forward_a_rigid_axis_follows_nearly_without_error(pid):
     p = make_params()
     if pid:
-        p.law.position_pid = 1
-        p.law.pid.proportional = p.law.cascade.position_gain * p.law.cascade.velocity_gain
-        p.law.pid.derivative = p.law.cascade.velocity_gain
+        p.controller.law.position_pid = 1
+        p.controller.law.pid.proportional = (
+            p.controller.law.cascade.position_gain * p.controller.law.cascade.velocity_gain
+        )
+        p.controller.law.pid.derivative = p.controller.law.cascade.velocity_gain
     move = plan_move(0.0, 0.1, MOVE, T)
     errors = []
     for share in (0.0, 1.0):
-        p.law.feed_forward.velocity = share
-        p.law.feed_forward.acceleration = share * MASS
-        run = Rig(p).record((move.count + 100) * SAMPLE_TICKS, ["law.position_error"], SAMPLE_TICKS, profile=move)
-        errors.append(np.abs(run["law.position_error"]).max())
+        p.controller.law.feed_forward.velocity = share
+        p.controller.law.feed_forward.acceleration = share * MASS
+        run = Rig(p).record(
+            (move.count + 100) * SAMPLE_TICKS, ["controller.law.position_error"], SAMPLE_TICKS, profile=move
+        )
+        errors.append(np.abs(run["controller.law.position_error"]).max())
     assert errors[0] > 5e-3
     # What is left is the hold of the command: a sample of jerk, and half a sample in the measured velocity.
     assert errors[1] < 0.01 * errors[0]
@@ -156,20 +169,20 @@ def test_with_full_feed_forward_a_rigid_axis_follows_nearly_without_error(pid):
 
 def test_friction_and_weight_fed_forward_leave_the_error_of_the_dead_band():
     p = make_params()
-    set_friction(p.machine.motor.friction, coulomb=6.0, viscous=15.0)
-    p.machine.weight = 8.0
+    set_friction(p.plant.machine.motor.friction, coulomb=6.0, viscous=15.0)
+    p.plant.machine.weight = 8.0
     move = plan_move(0.0, 0.1, MOVE, T)
     errors = []
     for share in (0.0, 1.0):
-        f = p.law.feed_forward
+        f = p.controller.law.feed_forward
         f.velocity, f.acceleration = 1.0, MASS
         f.viscous, f.weight = share * 15.0, share * 8.0
         f.coulomb_positive = f.coulomb_negative = share * 6.0
         f.dead_band = 1e-3
-        run = Rig(p).record(move.count * SAMPLE_TICKS, ["law.position_error"], SAMPLE_TICKS, profile=move)
-        errors.append(np.abs(run["law.position_error"]).max())
+        run = Rig(p).record(move.count * SAMPLE_TICKS, ["controller.law.position_error"], SAMPLE_TICKS, profile=move)
+        errors.append(np.abs(run["controller.law.position_error"]).max())
     assert errors[0] == pytest.approx(
-        (6.0 + 15.0 * 0.5 + 8.0) / (2 * math.pi * 10) / p.law.cascade.velocity_gain, rel=0.1
+        (6.0 + 15.0 * 0.5 + 8.0) / (2 * math.pi * 10) / p.controller.law.cascade.velocity_gain, rel=0.1
     )
     assert errors[1] < 0.1 * errors[0]
 
@@ -177,23 +190,23 @@ def test_friction_and_weight_fed_forward_leave_the_error_of_the_dead_band():
 @pytest.mark.compiled
 def test_the_integral_takes_the_error_of_the_weight_away():
     p = make_params()
-    p.machine.weight = 10.0
-    sag = 10.0 / p.law.cascade.velocity_gain / p.law.cascade.position_gain
+    p.plant.machine.weight = 10.0
+    sag = 10.0 / p.controller.law.cascade.velocity_gain / p.controller.law.cascade.position_gain
     assert Rig(p).run(40_000).x == pytest.approx(-sag, rel=1e-6)
-    p.law.cascade.integral_gain = p.law.cascade.velocity_gain * 20.0
+    p.controller.law.cascade.integral_gain = p.controller.law.cascade.velocity_gain * 20.0
     rig = Rig(p).run(40_000)
     assert abs(rig.x) < 1e-5 * sag
-    assert rig.r.law.integral == pytest.approx(10.0, rel=1e-6)
+    assert rig.r.controller.law.integral == pytest.approx(10.0, rel=1e-6)
 
 
 def test_a_coarse_encoder_leaves_the_axis_within_a_count():
     p = make_params()
-    p.motor_sensor.resolution = 1e-5
+    set_count(p, 1e-5, 0.0)
     rig = Rig(p)
-    rig.r.reference.position = 0.0123456
+    rig.r.controller.reference.position = 0.0123456
     rig.run(40_000)
     assert abs(rig.x - 0.0123456) < 1e-5
-    assert rig.r.motor_sensor.count in {1234, 1235}
+    assert rig.r.lines.motor.count in {1234, 1235}
 
 
 # -- limits ------------------------------------------------------------------------------------------------------------
@@ -201,28 +214,28 @@ def test_a_coarse_encoder_leaves_the_axis_within_a_count():
 
 def release(p: CascadeParams, blocked_ticks: int) -> tuple[float, np.ndarray]:
     """Hold the load by a friction that the motor cannot overcome; then let it go. Integral, and what it does then."""
-    set_friction(p.machine.load.friction, coulomb=1e4)
+    set_friction(p.plant.machine.load.friction, coulomb=1e4)
     rig = Rig(p)
-    rig.r.reference.position = 0.02
+    rig.r.controller.reference.position = 0.02
     rig.run(blocked_ticks)
     assert rig.x == 0.0
-    held = rig.r.law.integral
-    set_friction(p.machine.load.friction, coulomb=0.0)
-    return held, rig.record(20_000, ["machine.load.position"])["machine.load.position"]
+    held = rig.r.controller.law.integral
+    set_friction(p.plant.machine.load.friction, coulomb=0.0)
+    return held, rig.record(20_000, ["plant.machine.load.position"])["plant.machine.load.position"]
 
 
 @pytest.mark.compiled
 def test_after_a_stall_of_any_length_the_axis_comes_back_alike():
     p = make_params()
-    p.law.max_command = 40.0
-    p.law.cascade.integral_gain = p.law.cascade.velocity_gain * 30.0
-    p.law.cascade.max_velocity = 0.05
+    p.controller.law.max_command = 40.0
+    p.controller.law.cascade.integral_gain = p.controller.law.cascade.velocity_gain * 30.0
+    p.controller.law.cascade.max_velocity = 0.05
     (held, short), (also_held, long) = release(p, 2_000), release(p, 60_000)
     assert held == also_held < 40.0
     assert np.array_equal(short, long)
     assert short.max() < 0.02 * 1.15
     assert short[-1] == pytest.approx(0.02, abs=2e-4)
-    p.law.max_command = math.inf
+    p.controller.law.max_command = math.inf
     wound, free = release(p, 60_000)
     assert wound > 10 * held
     assert free.max() > 5 * short.max()
@@ -230,19 +243,19 @@ def test_after_a_stall_of_any_length_the_axis_comes_back_alike():
 
 def test_a_limited_command_moves_the_axis_at_its_limit():
     p = make_params()
-    p.law.max_command = 3.0
+    p.controller.law.max_command = 3.0
     rig = Rig(p)
-    rig.r.reference.position = 10.0
+    rig.r.controller.reference.position = 10.0
     rig.run(20_000)
-    assert rig.r.law.limited == 1
-    assert rig.r.machine.load.velocity == pytest.approx(3.0 / MASS * 20_000 * TICK, rel=1e-9)
+    assert rig.r.controller.law.limited == 1
+    assert rig.r.plant.machine.load.velocity == pytest.approx(3.0 / MASS * 20_000 * TICK, rel=1e-9)
 
 
 def test_the_amplifier_has_its_own_limit_and_steps():
     p = unlimited_params()
-    p.source.limit, p.source.step = 2.0, 0.25
-    run = Rig(p).record(3 * SAMPLE_TICKS, ["source.output"], SAMPLE_TICKS, command=[1.1, 9.0, -9.0])
-    assert run["source.output"].tolist() == [1.0, 2.0, -2.0]
+    p.plant.source.limit, p.plant.source.step = 2.0, 0.25
+    run = Rig(p).record(3 * SAMPLE_TICKS, ["plant.source.output"], SAMPLE_TICKS, command=[1.1, 9.0, -9.0])
+    assert run["plant.source.output"].tolist() == [1.0, 2.0, -2.0]
 
 
 # -- two masses --------------------------------------------------------------------------------------------------------
@@ -254,14 +267,14 @@ def test_the_position_loop_on_the_load_takes_backlash_out_of_the_load():
     ends = []
     for on_load in (0, 1):
         p = make_params(coupled=True, gap=4e-4)
-        p.feedback.position_on_load = on_load
-        p.law.cascade.position_gain = 10.0
-        set_friction(p.machine.load.friction, coulomb=0.3)
+        p.controller.feedback.position_on_load = on_load
+        p.controller.law.cascade.position_gain = 10.0
+        set_friction(p.plant.machine.load.friction, coulomb=0.3)
         rig = Rig(p)
-        rig.r.reference.position = 0.01
+        rig.r.controller.reference.position = 0.01
         rig.run(60_000)
         ends.append(rig.x - 0.01)
-    sag = 0.3 / p.law.cascade.velocity_gain / 10.0
+    sag = 0.3 / p.controller.law.cascade.velocity_gain / 10.0
     assert ends == pytest.approx([-2e-4 - sag - 0.3 / STIFFNESS, -sag], rel=1e-6)
 
 
@@ -270,12 +283,12 @@ def test_the_velocity_loop_on_the_load_swings_up_where_that_on_the_motor_does_no
     peaks = []
     for on_load in (0, 1):
         p = make_params(coupled=True)
-        p.feedback.velocity_on_load = on_load
-        p.machine.damping = 2.0
+        p.controller.feedback.velocity_on_load = on_load
+        p.plant.machine.damping = 2.0
         rig = Rig(p)
-        rig.r.reference.position = 1e-3
-        run = rig.record(20_000, ["machine.load.velocity"])
-        peaks.append(np.abs(run["machine.load.velocity"][-2000:]).max())
+        rig.r.controller.reference.position = 1e-3
+        run = rig.record(20_000, ["plant.machine.load.velocity"])
+        peaks.append(np.abs(run["plant.machine.load.velocity"][-2000:]).max())
     assert peaks[0] < 1e-3
     assert peaks[1] > 1.0
 
@@ -291,19 +304,19 @@ def test_smoothing_of_a_filter():
 def test_clocks_are_filled_everywhere():
     p = make_params()
     fill_clocks(p, 1e-5, 25)
-    assert (p.machine.period, p.sample_ticks) == (1e-5, 25)
-    assert p.law.period == p.motor_sensor.period == p.load_sensor.period == 25e-5
+    assert (p.plant.machine.period, p.controller.sample_ticks) == (1e-5, 25)
+    assert p.controller.law.period == p.controller.motor_sensor.period == p.controller.load_sensor.period == 25e-5
 
 
 @pytest.mark.parametrize(
     ("path", "value", "text"),
     [
-        ("source.delay", 64, "delay of the amplifier 64 samples, must be 0 to 63"),
-        ("source.delay", -1, "delay of the amplifier -1 samples"),
-        ("motor_sensor.span", 0, "motor sensor: span 0"),
-        ("load_sensor.delay", 63, "load sensor: span 1 and delay 63"),
-        ("machine.half_gap", 1e-4, r"half gap 0\.0001 m of a rigid coupling"),
-        ("machine.stiffness", 1e9, r"tick 5e-05 s, must be 2\.19e-05 s or less"),
+        ("plant.source.delay", 64, "delay of the amplifier 64 samples, must be 0 to 63"),
+        ("plant.source.delay", -1, "delay of the amplifier -1 samples"),
+        ("controller.motor_sensor.span", 0, "motor sensor: span 0"),
+        ("controller.load_sensor.delay", 63, "load sensor: span 1 and delay 63"),
+        ("plant.machine.half_gap", 1e-4, r"half gap 0\.0001 m of a rigid coupling"),
+        ("plant.machine.stiffness", 1e9, r"tick 5e-05 s, must be 2\.19e-05 s or less"),
     ],
 )
 def test_what_cannot_run_is_refused(path, value, text):

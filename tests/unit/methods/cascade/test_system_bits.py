@@ -12,7 +12,7 @@ from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, T_SAMPLE, TICK, Rig,
 from tests.places import ROOT
 
 from detent.kernel.loop import advance
-from detent.methods.cascade.system import STANDING, Cascade, CascadeParams, along, fill_clocks
+from detent.methods.cascade.system import STANDING, Cascade, CascadeParams, along, fill_clocks, set_count
 from detent.planning.profile import MotionLimits, plan_move
 
 MOVE = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)
@@ -21,28 +21,30 @@ MOVE = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)
 def noisy_params(variant: str) -> CascadeParams:
     """Axes that between them use every block: winding, coupling, backlash, friction, delays, both laws."""
     p = make_params(coupled=variant != "rigid", gap=2e-4 if variant == "backlash" else 0.0)
-    m = p.machine
+    m = p.plant.machine
     set_friction(m.motor.friction, coulomb=2.0, static=3.0, stribeck=0.01, viscous=5.0, offset=0.3)
     set_friction(m.load.friction, coulomb=1.0, viscous=2.0)
     m.load.friction.negative.coulomb = 1.5
-    p.motor_sensor.resolution, p.motor_sensor.span, p.motor_sensor.smoothing = 1e-5, 2, 0.7
-    p.load_sensor.resolution, p.load_sensor.delay = 2e-5, 1
-    p.source.step, p.source.delay = 0.05, 2
-    p.law.max_command = 60.0
-    p.law.cascade.integral_gain = p.law.cascade.velocity_gain * 5.0
-    p.law.feed_forward.velocity, p.law.feed_forward.acceleration = 0.9, MASS
-    p.law.feed_forward.coulomb_positive, p.law.feed_forward.dead_band = 2.0, 1e-3
-    p.push.force, p.push.begin, p.push.end = 6.0, 3000, 3400
+    c, law = p.controller, p.controller.law
+    set_count(p, 1e-5, 2e-5)
+    c.motor_sensor.span, c.motor_sensor.smoothing = 2, 0.7
+    c.load_sensor.delay = 1
+    p.plant.source.step, p.plant.source.delay = 0.05, 2
+    law.max_command = 60.0
+    law.cascade.integral_gain = law.cascade.velocity_gain * 5.0
+    law.feed_forward.velocity, law.feed_forward.acceleration = 0.9, MASS
+    law.feed_forward.coulomb_positive, law.feed_forward.dead_band = 2.0, 1e-3
+    p.plant.push.force, p.plant.push.begin, p.plant.push.end = 6.0, 3000, 3400
     if variant == "backlash":
         w = m.winding
         w.used, w.resistance, w.inductance, w.force_constant, w.emf_constant = 1, 1.0, 2e-3, 8.0, 8.0
         w.max_current = 6.0
-        p.source.gain = 0.3
+        p.plant.source.gain = 0.3
     if variant == "coupled":
-        p.law.position_pid, m.pendulum, p.law.feed_forward.pendulum = 1, 3.0, 3.0
-        p.law.pid.proportional, p.law.pid.integral, p.law.pid.derivative = 8000.0, 2000.0, 300.0
-        p.law.pid.smoothing = 0.5
-        p.feedback.position_on_load = p.feedback.velocity_on_load = 1
+        law.position_pid, m.pendulum, law.feed_forward.pendulum = 1, 3.0, 3.0
+        law.pid.proportional, law.pid.integral, law.pid.derivative = 8000.0, 2000.0, 300.0
+        law.pid.smoothing = 0.5
+        c.feedback.position_on_load = c.feedback.velocity_on_load = 1
     fill_clocks(p, TICK, SAMPLE_TICKS)
     return p
 
@@ -62,13 +64,13 @@ def run_hash(variant: str) -> str:
         advance(rig.p, rig.r, ticks, rows, picks, 130, *feed)
         digest.update(rig.r.snapshot())
     digest.update(rows.tobytes())
-    rig.r.reference.position -= 0.001
+    rig.r.controller.reference.position -= 0.001
     rig.run(1500)
     digest.update(rig.r.snapshot())
-    rig.r.entry = 0
+    rig.r.controller.entry = 0
     rig.drive(12.0 * np.sin(np.arange(60)), 1200)
     digest.update(rig.r.snapshot())
-    assert rig.r.machine.load.position != 0.0
+    assert rig.r.plant.machine.load.position != 0.0
     return digest.hexdigest()
 
 
@@ -108,7 +110,7 @@ def test_rows_are_the_registers_after_every_so_many_ticks():
     picks = np.arange(size, dtype=np.int64)
     rows = np.zeros((5, size), np.uint8)
     rig = Rig(noisy_params("backlash"))
-    rig.r.reference.position = 0.001
+    rig.r.controller.reference.position = 0.001
     r, stepped = rig.r, rig.r.copy()
     assert advance(rig.p, r, 3, rows, picks, 7, *STANDING) == 3
     assert advance(rig.p, r, 37, rows, picks, 7, *STANDING) == 37

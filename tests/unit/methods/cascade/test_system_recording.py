@@ -12,7 +12,7 @@ from scipy.signal import butter, filtfilt
 from tests.cascade_rig import Rig, set_friction
 from tests.places import DATA
 
-from detent.methods.cascade.system import CascadeParams, fill_clocks
+from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count
 from detent.planning.profile import profile_of_recording
 
 RECORDING = DATA / "emps" / "DATA_EMPS.mat"
@@ -37,14 +37,15 @@ def emps():
 def emps_params(force_per_volt: float, tick: float, mass: float) -> CascadeParams:
     """Position P over velocity P, vir = kp kv (qg - qm) - kv dq, on the model of one mass with friction."""
     p = CascadeParams()
-    p.machine.motor.mass = mass
-    set_friction(p.machine.motor.friction, coulomb=COULOMB, viscous=VISCOUS, offset=OFFSET)
-    p.law.cascade.position_gain, p.law.cascade.velocity_gain = KP, KV
-    p.law.cascade.max_velocity = math.inf
-    p.law.max_command = p.source.limit = 10.0
-    p.source.gain = force_per_volt
-    for sensor in (p.motor_sensor, p.load_sensor):
-        sensor.resolution, sensor.span, sensor.smoothing = 5e-8, 1, 1.0
+    p.plant.machine.motor.mass = mass
+    set_friction(p.plant.machine.motor.friction, coulomb=COULOMB, viscous=VISCOUS, offset=OFFSET)
+    p.controller.law.cascade.position_gain, p.controller.law.cascade.velocity_gain = KP, KV
+    p.controller.law.cascade.max_velocity = math.inf
+    p.controller.law.max_command = p.plant.source.limit = 10.0
+    p.plant.source.gain = force_per_volt
+    for sensor in (p.controller.motor_sensor, p.controller.load_sensor):
+        sensor.span, sensor.smoothing = 1, 1.0
+    set_count(p, 5e-8, 5e-8)
     fill_clocks(p, tick, round(T / tick))
     return p
 
@@ -66,10 +67,10 @@ def simulate(emps: dict[str, np.ndarray], *, tick: float = 50e-6, mass: float = 
     ref = profile_of_recording(np.arange(len(qg)) * T, qg, T)
     p = emps_params(float(emps["gtau"][0]), tick, mass)
     rig = Rig(p, float(emps["qm"][0]))
-    every = p.sample_ticks
-    run = rig.record(len(qg) * every, ["machine.motor.position", "law.command"], every, profile=ref)
-    before = np.concatenate([emps["qm"][:1], run["machine.motor.position"][:-1]])
-    return before, run["law.command"]
+    every = p.controller.sample_ticks
+    run = rig.record(len(qg) * every, ["plant.machine.motor.position", "controller.law.command"], every, profile=ref)
+    before = np.concatenate([emps["qm"][:1], run["plant.machine.motor.position"][:-1]])
+    return before, run["controller.law.command"]
 
 
 def test_the_closed_loop_follows_the_recorded_one(emps):
