@@ -273,7 +273,7 @@ def _print_ladder(found: Any) -> None:
 
 def _print_horizons(found: Any) -> None:
     """How far off the simulation is."""
-    from detent.identify.page.scales import Ways
+    from detent.identify.page.words import Ways
 
     ways = Ways(found.runs[0].position_unit)
     rows: list[tuple[str, ...]] = []

@@ -1,4 +1,4 @@
-"""How a text table is laid out: separator, decimal sign, header, units, and where its numbers begin."""
+"""How a text table is laid out: separator, decimal sign, header, units, first row of numbers; and what its cells say."""
 
 import csv
 import re
@@ -6,10 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from detent.errors import InputError
 from detent.files.text import short
-from detent.logs.csv_cells import MISSING, is_moment, is_number
 from detent.logs.log_units import is_unit, split_heading
+from detent.logs.raw_table import LARGEST_EXACT
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
 """Separators by the words that name them in options."""
@@ -17,6 +20,78 @@ SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": 
 SAMPLE_LINES = 200  # lines that say something from which the layout is guessed
 _TRIED = ("\t", ";", ",", "|", " ")
 _COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
+MISSING = frozenset({"", "-", "--", "?", "na", "n/a", "nan", "-nan", "null", "none", "nil", "inf", "-inf", "+inf"})
+"""Texts, in small letters, with which programs say that there is no value."""
+
+_WORDS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eEdD][+-]?[0-9]{1,3})?")
+_MOMENT = re.compile(
+    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?)(?:Z|[+-][0-9:]{4,6})?"
+)
+
+
+def is_number(cell: str) -> bool:
+    """True for a cell that is a number, with a decimal point or comma, or a truth value."""
+    return _NUMBER.fullmatch(cell) is not None or cell.lower() in _WORDS
+
+
+def is_moment(cell: str) -> bool:
+    """True for a cell that is a date with a time of day, such as ``2024-10-26T12:23:27.5``."""
+    return _MOMENT.fullmatch(cell) is not None
+
+
+def read_cell(cell: str, decimal: str) -> float | None:
+    """Number of one cell: NaN where it says nothing, None where it is no number.
+
+    >>> read_cell("1,5", ","), read_cell("n/a", ","), read_cell("1.2.3", ",")
+    (1.5, nan, None)
+    """
+    if cell.lower() in MISSING:
+        return np.nan
+    if cell.lower() in _WORDS:
+        return _WORDS[cell.lower()]
+    if not _NUMBER.fullmatch(cell) or ("," in cell and decimal != ","):
+        return None
+    # Fortran writes double precision with a D.
+    return float(cell.replace(",", ".").replace("D", "e").replace("d", "e"))
+
+
+def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64] | NDArray[np.int64], set[int]]:
+    """Numbers of a piece of a column, and the indices of the cells that are no numbers (NaN there).
+
+    Whole numbers beyond what a float holds exactly stay whole numbers.
+    """
+    try:
+        values = np.array(cells, dtype=np.float64)
+    except ValueError:
+        found = [read_cell(cell, decimal) for cell in cells]
+        wrong = {index for index, value in enumerate(found) if value is None}
+        values = np.array([np.nan if value is None else value for value in found])
+        return values, wrong
+    if len(values) and np.all(np.abs(values) > LARGEST_EXACT):
+        try:
+            return np.array([int(cell) for cell in cells], dtype=np.int64), set()
+        except (ValueError, OverflowError):
+            return values, set()
+    return values, set()
+
+
+def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]]:
+    """Moments of a piece of a column of dates and times, and the indices of the cells that are none.
+
+    The difference to universal time is left out: it is the same for all.
+    """
+    texts: list[str] = []
+    wrong: set[int] = set()
+    for index, cell in enumerate(cells):
+        match = _MOMENT.fullmatch(cell)
+        texts.append(f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT")
+        if match is None:
+            wrong.add(index)
+    try:
+        return np.array(texts, dtype="datetime64[ns]"), wrong
+    except ValueError:  # a month 13, or a year beyond what nanoseconds can count
+        return np.full(len(cells), np.datetime64("NaT"), dtype="datetime64[ns]"), set(range(len(cells)))
 
 
 @dataclass(frozen=True, slots=True)

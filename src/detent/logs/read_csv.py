@@ -9,8 +9,16 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import read_bytes, short
-from detent.logs.csv_cells import read_cell, read_column, read_moments
-from detent.logs.csv_layout import CsvLayout, FileOptions, guess_layout, is_telling, split_lines
+from detent.logs.csv_layout import (
+    CsvLayout,
+    FileOptions,
+    guess_layout,
+    is_telling,
+    read_cell,
+    read_column,
+    read_moments,
+    split_lines,
+)
 from detent.logs.raw_table import BrokenRow, Item, RawTable, add_column, check_size
 
 MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import decode_utf8, kind_of, read_bytes, short
-from detent.logs.csv_cells import is_moment, read_cell, read_moments
-from detent.logs.csv_layout import FileOptions
+from detent.logs.csv_layout import FileOptions, is_moment, read_cell, read_moments
 from detent.logs.log_units import split_heading
 from detent.logs.raw_table import (
     BrokenRow,

@@ -9,11 +9,10 @@ import numpy as np
 
 from detent.errors import InputError
 from detent.identify.fit import untold
-from detent.identify.fit.closed_loop import ClosedLoop, simulate_closed_loop
 from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS
 from detent.identify.fit.estimate import Estimate, quantile
-from detent.identify.fit.free_run import Horizon, simulate_horizons
+from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
 from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
 from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.prepare import Run, make_run

@@ -12,7 +12,7 @@ from detent.identify.fit.estimate import rms
 from detent.identify.fit.identification import Identification, prepare_all
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit
-from detent.identify.page.scales import SINCE, effort_scale, label_of, peak_of, scaled
+from detent.identify.page.words import SINCE, effort_scale, label_of, peak_of, scaled
 from detent.methods.cascade.units import percent
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts
 from detent.page.figure import Figure

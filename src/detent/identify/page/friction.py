@@ -8,7 +8,7 @@ import numpy as np
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import quantile
 from detent.identify.page.effort import Windows
-from detent.identify.page.scales import Ways, digits_for, effort_scale, label_of, peak_of, scaled
+from detent.identify.page.words import Ways, digits_for, effort_scale, label_of, peak_of, scaled
 from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers

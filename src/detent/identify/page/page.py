@@ -10,9 +10,8 @@ from detent.identify.page.effort import effort_figures, windows_of
 from detent.identify.page.friction import friction_figures
 from detent.identify.page.recordings import recording_figures, refused_figures
 from detent.identify.page.response import response_figures
-from detent.identify.page.scales import Ways
 from detent.identify.page.simulated import hold_out, simulated_figures
-from detent.identify.page.words import constant_name, is_known, relative_half, sentence, written
+from detent.identify.page.words import Ways, constant_name, is_known, relative_half, sentence, written
 from detent.methods.cascade.units import percent
 from detent.page.frame import Card, Headline, Level, Page, Section, card
 from detent.page.parts import Note

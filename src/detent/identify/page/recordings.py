@@ -6,8 +6,7 @@ from markupsafe import Markup
 
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.prepare import Run
-from detent.identify.page.scales import SINCE, Ways, effort_scale, label_of, peak_of, scaled
-from detent.identify.page.words import constant_name, unit_text
+from detent.identify.page.words import SINCE, Ways, constant_name, effort_scale, label_of, peak_of, scaled, unit_text
 from detent.logs.log import Action, Finding, Log, Severity, tell_rows
 from detent.page.chart import Band, Chart, Panel, Timeline, spans_of, time_charts
 from detent.page.figure import Figure

@@ -12,8 +12,7 @@ from detent.identify.fit.estimate import rms
 from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
 from detent.identify.fit.identification import HELD_OUT, Identification
 from detent.identify.fit.prepare import Run
-from detent.identify.page.scales import SINCE, Ways, label_of, peak_of, scaled
-from detent.identify.page.words import long_bar
+from detent.identify.page.words import SINCE, Ways, label_of, long_bar, peak_of, scaled
 from detent.methods.cascade.units import Scale, percent
 from detent.page.chart import Chart, Panel, Timeline, time_charts
 from detent.page.figure import Figure

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.trust.plants import make_axis, make_case
 
-from detent.identify.fit.closed_loop import simulate_closed_loop
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.free_run import simulate_closed_loop
 from detent.identify.fit.prepare import Run
 
 pytestmark = pytest.mark.compiled

@@ -8,7 +8,7 @@ from tests.unit.identify.page.samples import constants, windows
 
 from detent.identify.fit.estimate import quantile
 from detent.identify.page.friction import friction_at, friction_chart, friction_limits
-from detent.identify.page.scales import Ways
+from detent.identify.page.words import Ways
 
 
 def test_friction_is_that_of_each_direction() -> None:

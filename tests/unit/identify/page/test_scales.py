@@ -2,7 +2,7 @@
 
 import math
 
-from detent.identify.page.scales import Ways, digits_for, effort_scale, label_of
+from detent.identify.page.words import Ways, digits_for, effort_scale, label_of
 from detent.page.words import GAP
 
 

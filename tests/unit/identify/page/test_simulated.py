@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.unit.identify.page.samples import identified, unfitted
 
-from detent.identify.page.scales import Ways
 from detent.identify.page.simulated import HeldOut, held_charts, hold_out
+from detent.identify.page.words import Ways
 
 pytestmark = pytest.mark.compiled
 
