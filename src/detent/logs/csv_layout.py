@@ -1,4 +1,4 @@
-"""How a text table is laid out: separator, decimal sign, header, units, first row of numbers; and what its cells say."""
+"""How a text table is laid out: separator, decimal sign, header, units, first row of numbers; and what cells say."""
 
 import csv
 import re
