@@ -27,6 +27,7 @@ WIDTH = 11.0  # width of the figure [in]
 ROW = 0.30  # height of one row of a flag or a word [in]
 SLOT_FLOAT = 2.0
 SLOT_HEADING = 1.0  # heights of the other rows, in rows
+MARK_LINE = 0.8  # height of one line of marks, in rows
 LEVEL = 0.62  # height of a square wave, in rows
 SLANT = 0.003  # half of a lozenge's slanted end, as a part of the window
 FINEST = 1 / 900  # part of the window below which two changes cannot be told apart
@@ -79,20 +80,24 @@ class _Scale:
 _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 
 
-def plot_timing(waveforms: Waveforms, path: str | Path) -> None:
-    """Draw a timing diagram; its height grows with the signals."""
+def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
+    """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
     path = check_figure_path(path)
-    _check(len(waveforms.signals), path)
+    _check(waveforms, marks, path)
     scale = _scale(waveforms)
     rows, headings, depth = _arrange(waveforms.signals)
-    with new_figure(path, WIDTH, depth * ROW + (1.1 if waveforms.title else 0.75)) as figure:
+    ranks = _ranks([scale.of(time) / scale.span for time, _ in marks], [text for _, text in marks])
+    above = MARK_LINE * (max(ranks, default=-1) + 1)
+    with new_figure(path, WIDTH, (depth + above) * ROW + (1.1 if waveforms.title else 0.75)) as figure:
         area: Axes = figure.subplots()
         if waveforms.title:
             figure.suptitle(waveforms.title, x=0.01, ha="left", fontsize=11, fontweight="bold")
         area.set_xlim(0, scale.span)
-        area.set_ylim(-depth, 0.1)
+        area.set_ylim(-depth, above + 0.1)
         _label_rows(area, rows, headings)
         _label_time(area, scale)
+        for (time, text), rank in zip(marks, ranks, strict=True):
+            _draw_mark(area, scale.of(time), text, rank, depth)
         words = _draw_rows(area, rows, scale)
         # Only once everything has its place is it known how much room a value has.
         figure.draw_without_rendering()
@@ -116,7 +121,8 @@ def _draw_rows(area: Axes, rows: list[_Row], scale: _Scale) -> list[tuple[_Row, 
     return words
 
 
-def _check(count: int, path: Path) -> None:
+def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -> None:
+    count = len(waveforms.signals)
     if not count:
         raise DetentError(f"{path}: there are no signals to draw; allowed: 1 to {MAX_SIGNALS}; name some to record")
     if count > MAX_SIGNALS:
@@ -124,6 +130,12 @@ def _check(count: int, path: Path) -> None:
             f"{path}: came {count} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be read; name those "
             "that matter, or look at all of them in a VCD file"
         )
+    for time, text in marks:
+        if not waveforms.begin <= time <= waveforms.end:
+            raise DetentError(
+                f"{path}: the mark {text!r} is at {time} ps; allowed: {waveforms.begin} ps to {waveforms.end} ps, the "
+                "window; move the mark or widen the window"
+            )
 
 
 def _scale(waveforms: Waveforms) -> _Scale:
@@ -290,3 +302,28 @@ def _label_time(area: Axes, scale: _Scale) -> None:
         area.set_xlabel(f"t = {begin} {unit} + … [{scale.unit}]")
     else:
         area.set_xlabel(f"t, time since power-on [{scale.unit}]")
+
+
+def _ranks(places: list[float], texts: list[str]) -> list[int]:
+    """Line above the diagram in which each mark's text stands, so that no text covers another.
+
+    Places are parts of the window, and its width is not known before the layout: two thirds of the page are assumed.
+    """
+    free: list[float] = []
+    ranks = [0] * len(places)
+    for index in sorted(range(len(places)), key=places.__getitem__):
+        half = _text_width(texts[index], 8) / (0.6 * WIDTH) / 2
+        rank = next((k for k, end in enumerate(free) if end <= places[index] - half), len(free))
+        free[rank : rank + 1] = [places[index] + half]
+        ranks[index] = rank
+    return ranks
+
+
+def _draw_mark(area: Axes, at: float, text: str, rank: int, depth: float) -> None:
+    top = 0.1 + MARK_LINE * rank
+    area.plot(
+        [at, at], [-depth, top], color=COLOURS[1], linewidth=1.0, linestyle=(0, (4, 2)), zorder=0.9, clip_on=False
+    )
+    # The white ground keeps the lines of other marks out of the text.
+    ground = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+    area.text(at, top + 0.1, text, ha="center", va="bottom", fontsize=8, color=COLOURS[1], bbox=ground)

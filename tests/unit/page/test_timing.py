@@ -51,8 +51,8 @@ def texts(path: Path) -> list[str]:
     ]
 
 
-def drawn(waveforms: Waveforms, tmp_path: Path) -> list[str]:
-    plot_timing(waveforms, tmp_path / "a.svg")
+def drawn(waveforms: Waveforms, tmp_path: Path, **options) -> list[str]:
+    plot_timing(waveforms, tmp_path / "a.svg", **options)
     return texts(tmp_path / "a.svg")
 
 
@@ -166,6 +166,21 @@ def test_a_window_with_far_too_many_changes_still_makes_a_small_file(shown, tmp_
     )
     plot_timing(replace(shown, signals=signals), tmp_path / "a.svg")
     assert (tmp_path / "a.svg").stat().st_size < 300_000
+
+
+# -- marks ------------------------------------------------------------------------------------------------------------
+def test_marks_are_written_and_kept_apart(shown, tmp_path):
+    marks = [(BEGIN + 20 * TICK, "+ pulse"), (BEGIN + 21 * TICK, "one count more"), (END, "end")]
+    assert {"+ pulse", "one count more", "end"} <= set(drawn(shown, tmp_path, marks=marks))
+    assert timing._ranks([0.5, 0.52, 0.9], [text for _, text in marks]) == [0, 1, 0]
+    assert timing._ranks([0.52, 0.5, 0.51], ["late", "early", "between"]) == [2, 0, 1]
+    assert timing._ranks([], []) == []
+
+
+@pytest.mark.parametrize("time", [BEGIN - 1, END + 1])
+def test_a_mark_outside_the_window_is_refused(shown, tmp_path, time):
+    with pytest.raises(DetentError, match=rf"the mark 'x' is at {time} ps; allowed: {BEGIN} ps to {END} ps"):
+        plot_timing(shown, tmp_path / "a.png", marks=[(time, "x")])
 
 
 # -- files ------------------------------------------------------------------------------------------------------------
