@@ -108,7 +108,7 @@ def test_one_speed_or_none_is_refused_in_words():
 
 def test_wrong_input_is_an_error():
     t = np.arange(0.0, 1.0, DT)
-    with pytest.raises(DetentError, match="allowed: a log with force"):
+    with pytest.raises(DetentError, match="something that drives the axis, one of force"):
         fit_two_speeds(make_log(t, position=t))
     with pytest.raises(DetentError, match="allowed: current that drives the axis"):
         fit_two_speeds(make_log(t, position=t, force=t), "current")

@@ -216,7 +216,7 @@ def test_a_gap_parts_the_record():
 
 def test_wrong_input_is_an_error():
     t, signals, _, _ = record(np.random.default_rng(1))
-    with pytest.raises(DetentError, match="name the column, as in current=COLUMN"):
+    with pytest.raises(DetentError, match="name the column: current=COLUMN"):
         fit_winding(make_log(t, voltage=signals["voltage"]))
     with pytest.raises(DetentError, match="a delay of -1 samples"):
         fit_winding(turning(t, signals), late=-1)
