@@ -260,7 +260,7 @@ def test_a_log_that_cannot_be_identified_is_an_error_with_what_to_do():
     assert error.value.exit_status == 2
     with pytest.raises(InputError, match="something that drives the axis"):
         identify([make_log(t, {"position": np.sin(t)})])
-    with pytest.raises(InputError, match="a column for torque"):
+    with pytest.raises(InputError, match="torque that drives the axis"):
         identify([RECORDER.log()], "torque")
     with pytest.raises(InputError, match="record a longer run"):
         identify([make_log(t[:10], {"position": t[:10], "force": t[:10]})])
