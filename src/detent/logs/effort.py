@@ -37,8 +37,8 @@ def find_motion(draft: Draft) -> Motion | None:
     if position is None or np.ptp(position) <= 20 * grain(position):
         return None
     rows = 2 * window_rows(position) + 1
-    samples, series = smooth(position, draft.t, rows)
-    return Motion(*series, rows) if len(samples) >= _FEWEST else None
+    samples, (x, v, a) = smooth(position, draft.t, rows)
+    return Motion(x, v, a, rows) if len(samples) >= _FEWEST else None
 
 
 def smoothed(values: Values, draft: Draft, motion: Motion) -> Values:

@@ -89,7 +89,8 @@ def _checked_step(t: Values, effort: Values, position: Values) -> float:
 
 def _columns(position: Values, step: float, rows: int) -> Values:
     """What the effort is explained by: acceleration, velocity, its sign, position, one; shape (n - 2 rows + 2, 5)."""
-    columns = terms(Motion(*parabolas(position, step, rows), rows))
+    x, v, a = parabolas(position, step, rows)
+    columns = terms(Motion(x, v, a, rows))
     # The effort is smoothed, and friction with it; where that is not 1 or -1 the axis turned round, or stood.
     friction = parabolas(columns[:, 2], step, rows)[0]
     columns = columns[rows // 2 : -(rows // 2)]
