@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
-from detent.methods.rotary_table.derive import FULL_TURN, TICK, Machine, counted, weakest_output
+from detent.methods.rotary_table.derive import TICK, Machine, counted, weakest_output
 from detent.methods.rotary_table.form_checks import find_forms
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity as text
@@ -176,8 +176,8 @@ def _acceleration(spec: RotaryTableSpec) -> Iterator[Contradiction]:
             "lengthen method.strobe_period",
         )
     way, reserve = speed**2 / (2 * acceleration), m.jog_reserve_at(speed)
-    if way >= FULL_TURN - reserve:
-        harder = speed**2 / (2 * (FULL_TURN - reserve)) * (1 + BARELY) if reserve < FULL_TURN else math.inf
+    if way >= math.tau - reserve:
+        harder = speed**2 / (2 * (math.tau - reserve)) * (1 + BARELY) if reserve < math.tau else math.inf
         yield _below(
             "limits.acceleration limits.speed method.task_period method.position_gain method.judge",
             harder,
@@ -388,7 +388,7 @@ def _slow(m: Machine) -> Iterator[Caution]:
 def _composition(m: Machine) -> Iterator[Caution]:
     """The two words of the detector make one angle."""
     spec, errors, allowed = m.spec, m.coarse_errors, m.allowed_coarse_error
-    turn, total = text(FULL_TURN / spec.ratio, "rad"), sum(errors.values())
+    turn, total = text(math.tau / spec.ratio, "rad"), sum(errors.values())
     if spec.detector.composition == "truncated":
         yield Caution(
             "detector.composition",

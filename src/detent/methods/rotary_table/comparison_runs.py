@@ -14,7 +14,6 @@ from detent.methods.rotary_table.comparison import AngleComparison, Crossing, Fe
 from detent.methods.rotary_table.host import TableHost
 from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, RotaryTableSpec
 from detent.methods.rotary_table.system import TICK, RotaryTable
-from detent.methods.rotary_table.table_observer import FULL_TURN
 from detent.page.parts import Numbers
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, make_trace
@@ -26,7 +25,7 @@ START = math.radians(100)
 TARGET = math.radians(540)
 """Target of the conventional unit [rad]: one and a half turns."""
 
-WATCHED = 2 * FULL_TURN
+WATCHED = 2 * math.tau
 """Way of a jog while the crossing is watched [rad]."""
 
 FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
@@ -60,8 +59,8 @@ LONGEST_TURN = 3600.0
 def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) -> AngleComparison:
     """Take the axis over the end of its turn, feed it by hand, and start it near the boundary, in every form."""
     speed = crossing_speed(spec)
-    if speed < FULL_TURN / LONGEST_TURN:
-        least = format_quantity(FULL_TURN / LONGEST_TURN, "rad/s")
+    if speed < math.tau / LONGEST_TURN:
+        least = format_quantity(math.tau / LONGEST_TURN, "rad/s")
         raise DetentError(
             f"compare: came a table that goes round at {format_quantity(speed, 'rad/s')}; allowed: {least} or more, a "
             "turn in an hour; do: raise limits.speed, or limits.acceleration where it stops the table too slowly"
@@ -95,7 +94,7 @@ def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) ->
 
 def crossing_speed(spec: RotaryTableSpec) -> float:
     """Speed of the crossings [rad/s]: the axis's largest from which it stops within a quarter turn."""
-    return min(spec.limits.speed, math.sqrt(2 * spec.limits.acceleration * FULL_TURN / 4))
+    return min(spec.limits.speed, math.sqrt(2 * spec.limits.acceleration * math.tau / 4))
 
 
 def _variant(spec: RotaryTableSpec, place: float, **changes: object) -> RotaryTableSpec:
@@ -147,7 +146,7 @@ def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], Non
     host.machine.close()
     trace = make_trace(recorder, blocks, {})
     turns = trace["plant.train.motor.turns"] - math.floor(start_turns(spec))
-    way = (turns + trace["plant.train.motor.angle"] / FULL_TURN - start_turns(spec) % 1) * (FULL_TURN / spec.ratio)
+    way = (turns + trace["plant.train.motor.angle"] / math.tau - start_turns(spec) % 1) * (math.tau / spec.ratio)
     return _Seen(
         t=trace.time - start * TICK,
         way=way,
@@ -200,4 +199,4 @@ def _start(spec: RotaryTableSpec, speed: float, place: float, form: str) -> Star
     seen = _run(_variant(spec, place, **FORMS[form]), FORWARD / speed, lambda host: host.press(1, speed))
     asked = FORWARD - speed * ramp / 2
     travel = float(seen.way[-1])
-    return Start(angle=place, form=form, travel=travel, asked=asked, thrown_back=asked - travel > FULL_TURN / 2)
+    return Start(angle=place, form=form, travel=travel, asked=asked, thrown_back=asked - travel > math.tau / 2)

@@ -17,8 +17,6 @@ from detent.units import format_quantity
 TICK = 1e-4
 """Base tick [s] (`methods.rotary_table.system`)."""
 
-FULL_TURN = 2 * math.pi
-
 POINTS = 256
 """Places of a turn at which the errors of a resolver are looked at, those of its table (`kernel.turn_table`)."""
 
@@ -103,7 +101,7 @@ class Machine:
     @property
     def noise(self) -> int:
         """Largest error of an angle by the noise of the fine resolver [count]."""
-        return math.ceil(self.spec.detector.fine.noise / FULL_TURN * self.spec.detector.fine.counts)
+        return math.ceil(self.spec.detector.fine.noise / math.tau * self.spec.detector.fine.counts)
 
     @property
     def latency_way(self) -> float:
@@ -121,7 +119,7 @@ class Machine:
     def allowed_coarse_error(self) -> float:
         """Largest sum of errors with which the motor turns still come out right [rad] (3.1)."""
         spec = self.spec
-        return math.pi / spec.ratio - FULL_TURN / spec.detector.coarse.counts - spec.count
+        return math.pi / spec.ratio - math.tau / spec.detector.coarse.counts - spec.count
 
     @property
     def coarse_errors(self) -> dict[str, float]:
@@ -154,11 +152,11 @@ def resolver_error(table: FineTable) -> float:
         return 0.0
     worst = 0.0
     for k in range(POINTS):
-        x = FULL_TURN * k / POINTS
+        x = math.tau * k / POINTS
         a = (1 + table.gain_error) * math.cos(x) - math.sin(table.quadrature_error) * math.sin(x)
         b = math.cos(table.quadrature_error) * math.sin(x)
         late = math.asin(max(-1.0, min(1.0, table.offset_error / math.hypot(a, b))))
-        worst = max(worst, abs(math.remainder(math.atan2(b, a) - x, FULL_TURN) + late))
+        worst = max(worst, abs(math.remainder(math.atan2(b, a) - x, math.tau) + late))
     return worst
 
 
@@ -215,7 +213,7 @@ def _clocks(machine: Machine) -> Iterator[Derived]:
     method = machine.spec.method
     passes = method.task_period / method.strobe_period
     yield Derived("interrupts in a pass of the task", passes, "", f"{passes:.4g}", "task period / strobe period")
-    turn = FULL_TURN / machine.speed / method.strobe_period
+    turn = math.tau / machine.speed / method.strobe_period
     yield Derived("interrupts in a turn at limits.speed", turn, "", f"{turn:.4g}", "360 deg / v / strobe period")
 
 
@@ -253,7 +251,7 @@ def _loop(machine: Machine) -> Iterator[Derived]:
 
 def _jog(machine: Machine) -> Iterator[Derived]:
     """Cycle and rollover of a jog."""
-    yield quantity_figure("cycle of a jog", FULL_TURN / machine.speed, "s", "T / v: one rollover in each")
+    yield quantity_figure("cycle of a jog", math.tau / machine.speed, "s", "T / v: one rollover in each")
     way = machine.latency_way
     formula = "v x task period: the pass that sees less than T comes up to that late"
     yield Derived("latency of a rollover", way, "rad", f"0 to {format_quantity(way, 'rad')}", formula)

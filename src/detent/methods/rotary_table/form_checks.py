@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from detent.files.findings import Caution
 from detent.files.nearest import put
-from detent.methods.rotary_table.derive import FULL_TURN, TICK, Machine, counted
+from detent.methods.rotary_table.derive import TICK, Machine, counted
 from detent.units import format_quantity as text
 
 TURN_COUNTER = put("method.form", '"turn counter"')
@@ -76,7 +76,7 @@ def _race(m: Machine) -> Iterator[Caution]:
         f"{many} is interrupted between its halves" if apart == 0 else "no interrupt comes between as the clocks are"
     )
     lag = m.following_error(m.speed)
-    jump = FULL_TURN + lag if method.update == "flag first" else lag - FULL_TURN
+    jump = math.tau + lag if method.update == "flag first" else lag - math.tau
     yield Caution(
         "method.update",
         f'"{method.update}": {value}',
@@ -116,11 +116,11 @@ def _near_boundary(m: Machine) -> Iterator[Caution]:
         return
     for number, entry in spec.position.items():
         margin = m.overshoot(entry.speed) + (m.resting_error + m.noise + 1) * spec.count
-        if not margin <= entry.angle <= FULL_TURN - margin:
+        if not margin <= entry.angle <= math.tau - margin:
             yield Caution(
                 f"position.{number}.angle",
                 text(entry.angle, "rad"),
-                f"{text(margin, 'rad')} to {text(FULL_TURN - margin, 'rad')} without the counter",
+                f"{text(margin, 'rad')} to {text(math.tau - margin, 'rad')} without the counter",
                 "the table meets the boundary on its way or by its overshoot, and runs away (test 11)",
                 TURN_COUNTER,
             )

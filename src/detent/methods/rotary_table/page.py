@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from detent.methods.rotary_table.detail import step_section
+from detent.methods.rotary_table.detail import DEG, POINTS, step_section
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change
-from detent.methods.rotary_table.summary import SequenceFigures, rollovers, times, turns
+from detent.methods.rotary_table.summary import SequenceFigures, rollovers, times, turns, whose
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -50,9 +50,6 @@ LINE_SECONDS = 120.0
 MOST_SIGNALS = 12
 """Inputs and outputs that the time line shows."""
 
-POINTS = 1500
-"""Rows that are chosen for one curve's sake: the time line is drawn in four plot areas."""
-
 KINDS = (("go", "go to", "right"), ("jog", "jog", "left"), ("wait", "wait", "muted"))
 """Kinds of steps that last, their lanes and colours; an output is switched in no time."""
 
@@ -67,8 +64,6 @@ HEADS = (
     ("step", True), ("what", False), ("begin [s]", True), ("took [s]", True), ("from [deg]", True), ("to [deg]", True),
     ("way [deg]", True), ("error [count]", True), ("lag [deg]", True), ("crossed", True), ("roll\u00adovers", True),
 )  # fmt: skip
-
-DEG = 180.0 / math.pi
 
 
 def table_page(
@@ -113,7 +108,7 @@ def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
     if not _is_off(spec, run, error.value):
         return run_headline(name, run, f"{lead} In every positioning it came to within {off} of its target.")
     lead += (
-        f" But in {_whose(error.of)} it stood {off} beside its target while the axis said that it was in position: the "
+        f" But in {whose(error.of)} it stood {off} beside its target while the axis said that it was in position: the "
         "detector cannot see what backlash and eccentricity of the gear do to the table."
     )
     return run_headline(name, run, lead, doubt="Done, but beside its targets")
@@ -132,21 +127,17 @@ def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
     ]
     if error := figures.error:
         value, word = unit.counts(error.value).split(" ")
-        below = f"{angle(error.value)}, {_whose(error.of)}; window {unit.counts(run.in_position)}"
+        below = f"{angle(error.value)}, {whose(error.of)}; window {unit.counts(run.in_position)}"
         shown.append(Card("Worst error at rest", value, word, below, bad=_is_off(spec, run, error.value)))
     if deviation := figures.deviation:
         value, word = turns(run.travel).split(" ")
         crossed = f"end of the turn crossed {times(run.crossings)}" if run.crossings else "within the turn"
         shown.append(Card("Turned", value, word, crossed + rollovers(run)))
-        shown.append(card("Largest lag", angle(deviation.value), f"deviation dR, {_whose(deviation.of)}"))
+        shown.append(card("Largest lag", angle(deviation.value), f"deviation dR, {whose(deviation.of)}"))
     if fastest := figures.peak_speed:
-        below = f"{_whose(fastest.of)}, command limited to {degrees(spec.limits.speed)}"
+        below = f"{whose(fastest.of)}, command limited to {degrees(spec.limits.speed)}"
         shown.append(Card("Peak speed", degrees(fastest.value), "deg/s", below))
     return shown
-
-
-def _whose(step: StepRecord) -> str:
-    return f"step {count(step.number)}"
 
 
 # ---- time line
@@ -190,7 +181,7 @@ def _step_bar(run: SequenceRun, step: StepRecord) -> Bar:
     # What the name of the lane says already is left out: "go to position 2 (180 deg, positive)" -> "2".
     short = step.text.removeprefix("go to position ").removeprefix("jog ").removeprefix("wait ")
     short = short.partition(" ")[0] if step.kind == "go" else short
-    return Bar(step.begin - run.time_ready, step.end - run.time_ready, short, f"{_whose(step)}: {step.text}")
+    return Bar(step.begin - run.time_ready, step.end - run.time_ready, short, f"{whose(step)}: {step.text}")
 
 
 def _signal_lanes(run: SequenceRun) -> list[Lane]:

@@ -9,7 +9,7 @@ from detent.methods.rotary_table.host import TableHost, check_sequence, dial_spe
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob, Wait
-from detent.methods.rotary_table.table_observer import FULL_TURN, TableObserver
+from detent.methods.rotary_table.table_observer import TableObserver
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Progress
 from detent.record.run import RunRecord
 from detent.sensing.angle_gauge import set_angle_gauge
@@ -231,7 +231,7 @@ class _WatchedTable:
         """A table that goes a turn farther than it was asked has run away."""
         if self._host.tick - self._told > LONGEST_STRETCH:
             self._tell()
-        if abs(self._travel) > asked + self._controller.latency + FULL_TURN:
+        if abs(self._travel) > asked + self._controller.latency + math.tau:
             raise AxisError(
                 f"the table has run away: it has turned {_degrees(self._travel)} where {_degrees(asked)} were asked, "
                 f"and turns on at {format_quantity(self._observer.speed, 'rad/s')}; {suspect(self._host)}"
@@ -241,13 +241,13 @@ class _WatchedTable:
         """Why a step that has ended did not do what it was asked; empty if it did."""
         if isinstance(step, Jog):
             lost = step.direction * self._controller.asked - self._travel
-            if abs(lost) > FULL_TURN / 2 + self._controller.latency:
+            if abs(lost) > math.tau / 2 + self._controller.latency:
                 asked = _degrees(step.direction * self._controller.asked)
                 return f"the table has turned {_degrees(self._travel)} where {asked} were asked; {suspect(self._host)}"
         elif isinstance(step, Go) and abs(self._observer.miss) > 0.5:
             spec, turns = self._host.spec, self._observer.miss
             return (
-                f"the axis says that it is in position, but stands {_degrees(abs(turns) * FULL_TURN / spec.ratio)} "
+                f"the axis says that it is in position, but stands {_degrees(abs(turns) * math.tau / spec.ratio)} "
                 f"{'below' if turns > 0 else 'above'} it, {abs(turns):.1f} turns of the motor: the detected angle is "
                 f"wrong; {_detector_remedy(spec)}"
             )
@@ -288,7 +288,7 @@ class _WatchedTable:
         result.travel = sum(abs(step.travel) for step in result.steps)
         net = self._observer.angle - self._first
         # A turn is whole that ends where it began, within the window.
-        result.turns = int(math.copysign(abs(net) + result.in_position + result.count, net) / FULL_TURN)
+        result.turns = int(math.copysign(abs(net) + result.in_position + result.count, net) / math.tau)
         result.crossings = sum(step.crossings for step in result.steps)
         result.rollovers = sum(step.rollovers for step in result.steps)
         result.position = self._state.controller.positioner.angle.position

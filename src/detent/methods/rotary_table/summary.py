@@ -65,12 +65,12 @@ def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple
     if run.steps:
         rows.append(("time", duration(figures.seconds)))
     if error := figures.error:
-        rows.append(("error at rest", f"worst {unit.counts(error.value)}, {angle(error.value)} {_whose(error.of)}"))
+        rows.append(("error at rest", f"worst {unit.counts(error.value)}, {angle(error.value)} ({whose(error.of)})"))
     if deviation := figures.deviation:
         rows.append(("travel", _travel(run)))
-        rows.append(("deviation", f"up to {angle(deviation.value)} {_whose(deviation.of)}"))
+        rows.append(("deviation", f"up to {angle(deviation.value)} ({whose(deviation.of)})"))
     if fastest := figures.peak_speed:
-        rows.append(("peak speed", f"{degrees(fastest.value)} deg/s {_whose(fastest.of)}"))
+        rows.append(("peak speed", f"{degrees(fastest.value)} deg/s ({whose(fastest.of)})"))
     if run.refused:
         rows.append(("refused", count(run.refused, "start")))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
@@ -81,8 +81,9 @@ def _travel(run: SequenceRun) -> str:
     return turns(run.travel) + crossed + rollovers(run)
 
 
-def _whose(step: StepRecord) -> str:
-    return f"(step {count(step.number)})"
+def whose(step: StepRecord) -> str:
+    """Name a step by its number."""
+    return f"step {count(step.number)}"
 
 
 def rollovers(run: SequenceRun) -> str:

@@ -9,8 +9,6 @@ from detent.methods.rotary_table.system import RotaryTable, RotaryTableParams
 from detent.plant.gearing import PHASE_PER_RADIAN
 from detent.record.machine import Machine
 
-FULL_TURN = 2 * math.pi
-
 
 def endless_phase(p: RotaryTableParams, r: RotaryTable) -> int:
     """True angle of the table with all its turns [turn/2^32]: `detent.plant.gearing.output_phase` goes on beyond one.
@@ -38,7 +36,7 @@ class TableObserver:
     def angle(self) -> float:
         """True angle of the table [rad], endless; 0 where the motor's angle is 0."""
         turns, phase = divmod(endless_phase(self._machine.params, self._machine.state), TURN)
-        return turns * FULL_TURN + phase / TURN * FULL_TURN
+        return turns * math.tau + phase / TURN * math.tau
 
     @property
     def target(self) -> float:
@@ -59,7 +57,7 @@ class TableObserver:
     @property
     def _motor_counts(self) -> float:
         motor, fine = self._state.plant.train.motor, self._spec.detector.fine.counts
-        return motor.turns * fine + motor.angle / FULL_TURN * fine
+        return motor.turns * fine + motor.angle / math.tau * fine
 
     @property
     def speed(self) -> float:
