@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -112,26 +111,17 @@ def _variant(spec: RotaryTableSpec, place: float, **changes: object) -> RotaryTa
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """Columns of a run, one value per interrupt or less often: time since the start [s], and what their names say."""
-
-    t: Numbers
-    way: Numbers
-    speed: Numbers
-    deviation: Numbers
-    s4: Numbers
-    crossings: Numbers
-
-
 _SIGNALS = (
     "plant.train.motor.turns", "plant.train.motor.angle", "plant.train.motor.velocity", "controller.positioner.dr",
     "controller.positioner.s4", "controller.positioner.angle.crossings",
 )  # fmt: skip
 
 
-def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], None]) -> _Seen:
-    """Let the host begin something, and time pass; the table may do what it likes."""
+def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], None]) -> dict[str, Numbers]:
+    """Let the host begin something, and time pass; the table may do what it likes.
+
+    Columns by the names of `Crossing`, one value per interrupt or less often, and the speed of the table [rad/s].
+    """
     strobes = max(1, math.ceil(seconds / spec.method.strobe_period / MOST_ROWS))
     blocks: list[NDArray[np.void]] = []
     every = strobes * ticks(spec.method.strobe_period)
@@ -146,15 +136,15 @@ def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], Non
     host.machine.close()
     trace = make_trace(recorder, blocks, {})
     turns = trace["plant.train.motor.turns"] - math.floor(start_turns(spec))
-    way = (turns + trace["plant.train.motor.angle"] / math.tau - start_turns(spec) % 1) * (math.tau / spec.ratio)
-    return _Seen(
-        t=trace.time - start * TICK,
-        way=way,
-        speed=trace["plant.train.motor.velocity"] / spec.ratio,
-        deviation=trace["controller.positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
-        s4=trace["controller.positioner.s4"] * spec.speed_per_word,
-        crossings=trace["controller.positioner.angle.crossings"],
-    )
+    return {
+        "t": trace.time - start * TICK,
+        "angle": (turns + trace["plant.train.motor.angle"] / math.tau - start_turns(spec) % 1)
+        * (math.tau / spec.ratio),
+        "speed": trace["plant.train.motor.velocity"] / spec.ratio,
+        "deviation": trace["controller.positioner.dr"] * (spec.count / (1 << spec.method.fraction_bits)),
+        "s4": trace["controller.positioner.s4"] * spec.speed_per_word,
+        "crossings": trace["controller.positioner.angle.crossings"],
+    }
 
 
 def _cross(spec: RotaryTableSpec, speed: float, *, endless: bool) -> Crossing:
@@ -165,19 +155,17 @@ def _cross(spec: RotaryTableSpec, speed: float, *, endless: bool) -> Crossing:
     )
     seconds = WATCHED / speed + speed / spec.limits.acceleration
     seen = _run(axis, seconds, lambda host: host.press(1, speed) if endless else host.begin(0))
-    after = int(np.argmax(seen.crossings > 0))
-    crossed = bool(seen.crossings[after]) and after > 0
+    t, deviation = seen["t"], seen["deviation"]
+    after = int(np.argmax(seen["crossings"] > 0))
+    crossed = bool(seen["crossings"][after]) and after > 0
     return Crossing(
         name="endless" if endless else "conventional",
-        time=float(seen.t[after]) if crossed else math.nan,
-        deviation_before=float(seen.deviation[after - 1]) if crossed else math.nan,
-        deviation_after=float(seen.deviation[after]) if crossed else math.nan,
-        travel=float(seen.way[-1]),
-        speed=float(seen.speed[-1]),
-        t=seen.t,
-        angle=seen.way,
-        deviation=seen.deviation,
-        s4=seen.s4,
+        time=float(t[after]) if crossed else math.nan,
+        deviation_before=float(deviation[after - 1]) if crossed else math.nan,
+        deviation_after=float(deviation[after]) if crossed else math.nan,
+        travel=float(seen["angle"][-1]),
+        speed=float(seen["speed"][-1]),
+        **{name: seen[name] for name in ("t", "angle", "deviation", "s4")},
     )
 
 
@@ -188,8 +176,8 @@ def _feed(spec: RotaryTableSpec, speed: float) -> Feed:
     errors: list[float] = []
     for closed in (True, False):
         seen = _run(_variant(spec, START, position_control=closed), begin + span, lambda host: host.press(1, speed))
-        late = seen.t >= begin
-        errors.append(float(np.polyfit(seen.t[late], seen.way[late], 1)[0]) / speed - 1)
+        late = seen["t"] >= begin
+        errors.append(float(np.polyfit(seen["t"][late], seen["angle"][late], 1)[0]) / speed - 1)
     return Feed(speed=speed, closed=errors[0], opened=errors[1])
 
 
@@ -198,5 +186,5 @@ def _start(spec: RotaryTableSpec, speed: float, place: float, form: str) -> Star
     ramp = speed / spec.limits.acceleration
     seen = _run(_variant(spec, place, **FORMS[form]), FORWARD / speed, lambda host: host.press(1, speed))
     asked = FORWARD - speed * ramp / 2
-    travel = float(seen.way[-1])
+    travel = float(seen["angle"][-1])
     return Start(angle=place, form=form, travel=travel, asked=asked, thrown_back=asked - travel > math.tau / 2)

@@ -184,14 +184,12 @@ def counted(counts: int) -> str:
 def derive(spec: RotaryTableSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
     machine = Machine(spec)
-    groups = [_words(machine), _clocks(machine), _drive(machine), _jog(machine), _rest(machine), _detector(machine)]
-    if spec.method.position_control:
-        groups.insert(3, _loop(machine))
-    return tuple(figure for group in groups for figure in group)
+    loop = _loop(machine) if spec.method.position_control else ()
+    return (*_words(machine), *_drive(machine), *loop, *_motion(machine), *_detector(machine))
 
 
 def _words(machine: Machine) -> Iterator[Derived]:
-    """What a count is, and a word."""
+    """What a count is, and a word; strobe, interrupt and task."""
     spec, method = machine.spec, machine.spec.method
     yield Derived("period T", spec.period, "count", f"{spec.period} counts", "G x fine counts: a turn of the table")
     yield Derived("count", spec.count, "rad", arc_seconds(spec.count), "360 deg / T")
@@ -206,11 +204,6 @@ def _words(machine: Machine) -> Iterator[Derived]:
     yield quantity_figure("slowest jog", least / (1 << method.fraction_bits), "rad/s", formula)
     formula = "count / strobe period: below it D stands still in some interrupts"
     yield quantity_figure("slowest jog with a count in each interrupt", least, "rad/s", formula)
-
-
-def _clocks(machine: Machine) -> Iterator[Derived]:
-    """Strobe, interrupt and task."""
-    method = machine.spec.method
     passes = method.task_period / method.strobe_period
     yield Derived("interrupts in a pass of the task", passes, "", f"{passes:.4g}", "task period / strobe period")
     turn = math.tau / machine.speed / method.strobe_period
@@ -249,17 +242,13 @@ def _loop(machine: Machine) -> Iterator[Derived]:
         yield quantity_figure("overshoot", passed, "rad", formula)
 
 
-def _jog(machine: Machine) -> Iterator[Derived]:
-    """Cycle and rollover of a jog."""
+def _motion(machine: Machine) -> Iterator[Derived]:
+    """Cycle and rollover of a jog; what is in position, and how the table rests."""
+    spec, method = machine.spec, machine.spec.method
     yield quantity_figure("cycle of a jog", math.tau / machine.speed, "s", "T / v: one rollover in each")
     way = machine.latency_way
     formula = "v x task period: the pass that sees less than T comes up to that late"
     yield Derived("latency of a rollover", way, "rad", f"0 to {format_quantity(way, 'rad')}", formula)
-
-
-def _rest(machine: Machine) -> Iterator[Derived]:
-    """What is in position, and how the table rests."""
-    spec, method = machine.spec, machine.spec.method
     window = method.in_position * spec.count
     text = f"+-{arc_seconds(window)} for {format_quantity(method.in_position_time, 's')}"
     yield Derived("in position", window, "rad", text, "in_position x count")
