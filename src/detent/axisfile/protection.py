@@ -22,7 +22,6 @@ class ProtectionTable(Table, frozen=True):
         1.5, ge=0.0, le=100.0,
     )  # fmt: skip
     saturation_time: Time = optional("how long the command may stay at its limit", 1.0, ge=0.0, le=1000.0)
-    travel: bool = optional("switch off beyond an end of the travel", default=True)
     stuck_time: Time = optional("how long the sensor may stand under effort", 0.05, ge=0.0, le=10.0)
     reversed_time: Time = optional("how long the axis may speed up against its effort", 0.02, ge=0.0, le=10.0)
     stuck_effort: float = optional(
@@ -31,12 +30,21 @@ class ProtectionTable(Table, frozen=True):
     )  # fmt: skip
 
 
+class TravelProtectionTable(ProtectionTable, frozen=True):
+    """The same of an axis whose controller knows how far it has come."""
+
+    travel: bool = optional("switch off beyond an end of the travel", default=True)
+
+
 def fill_guard(p: GuardParams, table: ProtectionTable, *, sample: float, speed: float) -> None:
     """Guard of a controller that samples every `sample` [s] an axis of at most `speed` [count/s]."""
     most = speed * sample
     p.speed = math.ceil(table.overspeed * most) + 1 if table.overspeed else 0
     p.jump = math.ceil(table.jump * most) + 2 if table.jump else 0
-    p.travel, p.saturated = table.travel, samples(table.saturation_time, sample)
+    p.travel, p.saturated = (
+        isinstance(table, TravelProtectionTable) and table.travel,
+        samples(table.saturation_time, sample),
+    )
     p.stuck, p.reversed = samples(table.stuck_time, sample), samples(table.reversed_time, sample)
 
 
@@ -59,7 +67,9 @@ def guard_text(code: int, **limits: str) -> str:
     return GUARD_TEXT[code].format(**limits)
 
 
-def describe_fault(guard: Guard, table: ProtectionTable, *, speed: str, lower: str, upper: str, **more: str) -> str:
+def describe_fault(
+    guard: Guard, table: ProtectionTable, speed: str, lower: str = "", upper: str = "", **more: str
+) -> str:
     """What a fault of the guard means and what to do, by the keys of the file; largest speed and ends for people."""
     return guard_text(
         guard.code,

@@ -1,13 +1,16 @@
 import pytest
 
-from detent.axisfile.protection import ProtectionTable, breaking_effort, fill_guard, guard_text, samples
+from detent.axisfile.protection import TravelProtectionTable, breaking_effort, fill_guard, guard_text, samples
 from detent.control.guard import GuardParams
 
 
 def guard_of(sample=1e-3, speed=10_000.0, **keys):
     p = GuardParams()
     fill_guard(
-        p, ProtectionTable.model_construct(**(ProtectionTable().model_dump() | keys)), sample=sample, speed=speed
+        p,
+        TravelProtectionTable.model_construct(**(TravelProtectionTable().model_dump() | keys)),
+        sample=sample,
+        speed=speed,
     )
     return p
 

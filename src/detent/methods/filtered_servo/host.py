@@ -87,7 +87,7 @@ class FilteredHost(Host):
         if d.cause != GUARDED:
             return SERVO_FAULT_TEXT[d.cause]
         speed, lower, upper = format_quantity(limits.speed, "m/s"), "0 m", format_quantity(limits.travel, "m")
-        return describe_fault(self.controller.guard, self.spec.protection, speed=speed, lower=lower, upper=upper)
+        return describe_fault(self.controller.guard, self.spec.protection, speed, lower, upper)
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand; that it comes into position again after a disturbance is no news."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from detent.axisfile.protection import ProtectionTable, breaking_effort
+from detent.axisfile.protection import TravelProtectionTable, breaking_effort
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
@@ -148,7 +148,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
     mechanics: MechanicsTable
     encoder: EncoderTable
     method: MethodTable = Field(default_factory=MethodTable)
-    protection: ProtectionTable = Field(default_factory=ProtectionTable)
+    protection: TravelProtectionTable = Field(default_factory=TravelProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property

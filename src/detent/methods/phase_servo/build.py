@@ -4,6 +4,7 @@ import math
 
 from detent.axisfile.drive_train import fill_drive_train
 from detent.axisfile.interference import fill_interference, fill_push
+from detent.axisfile.protection import fill_guard
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN
@@ -26,6 +27,8 @@ def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
     _fill_sequencer(c.sequencer, spec)
     _fill_law(c.law, spec)
     c.speed.half = 1 << (spec.method.speed_bits - 1)
+    fill_guard(c.guard, spec.protection, sample=spec.sample_period, speed=spec.limits.speed / spec.step)
+    c.breaking = round(spec.protection.stuck_effort * (c.law.word_limit - 1))
     c.pwm.half = 1 << (spec.drive.pwm_bits - 1)
     _fill_detector(plant.detector, spec)
     plant.bridge.supply, plant.bridge.limit = spec.drive.supply, spec.limits.effort

@@ -13,6 +13,7 @@ from detent.control.clock_chain import (
     reference_period,
     sample_strobe,
 )
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
 from detent.control.phase_law import Law, LawParams, drive_word, integrate
 from detent.control.phase_sequencer import (
     ACQUIRE,
@@ -32,7 +33,7 @@ from detent.control.phase_sequencer import (
 from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i8, register, u1, u2
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 from detent.sensing.absolute_converter import AbsoluteConverter, AbsoluteParams, absolute_error, count_absolute
 from detent.sensing.carrier import Carrier, CarrierParams, count_carrier, reset_carrier
@@ -71,6 +72,8 @@ class PhaseControllerParams(Registers):
     sequencer: SequencerParams = block("sequencer")
     law: LawParams = block("corrector, integrator, arithmetic")
     pwm: SawtoothParams = block("PWM")
+    guard: GuardParams = block("protection")
+    breaking: i4 = register("drive word that breaks the carriage loose", unit="count")
 
 
 class PhaseController(Registers):
@@ -84,6 +87,7 @@ class PhaseController(Registers):
     wake: i8 = register("next tick in which a one-shot runs out", unit="tick")
     pwm: SawtoothPwm = block("PWM")
     changed: u1 = register("1 when the words of the logic must be worked out anew")
+    guard: Guard = block("protection")
 
 
 class PhaseLines(Registers):
@@ -149,6 +153,7 @@ def enable(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> N
     c.speed.count = c.speed.word = 0
     s.distance = s.remaining = s.position = 0
     lines.enable = 1
+    enable_guard(c.guard)
     enter_position(p.sequencer, s, reference_period(c.clocks))
     c.changed = 1
 
@@ -176,6 +181,21 @@ def tick_integrator(p: PhaseControllerParams, c: PhaseController) -> None:
         c.changed = 1
 
 
+@step
+def protect(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> None:
+    """The guard looks at each window of the speed detector; a fault takes the bridge off and tells the host."""
+    if lines.enable == 0 or lines.missed:
+        return
+    word = c.law.word
+    pushing = 1 if word >= p.breaking else -1 if word <= -p.breaking else 0
+    limited = 1 if word <= -p.law.word_limit or word >= p.law.word_limit - 1 else 0
+    if watch(p.guard, c.guard, 0, 0, limited, pushing, c.speed.word):
+        lines.enable = 0
+        c.sequencer.event = 1
+    if c.guard.awaited and is_overdue(c.guard):
+        c.sequencer.event = 1
+
+
 @hot_step
 def sample(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> None:
     """Clocks, carrier, converters; what their pulses and strobes change is noted."""
@@ -193,6 +213,7 @@ def sample(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> N
         tick_integrator(p, c)
     if sample_strobe(p.clocks, c.clocks):
         sample_speed(p, c, lines)
+        protect(p, c, lines)
 
 
 @controls(PhaseControllerParams)
@@ -215,11 +236,24 @@ def command(c: PhaseController, distance: int, backward: int) -> None:
 
 
 @step
+def arrive_within(c: PhaseController, windows: int) -> None:
+    """Ready must rise within so many windows of the speed detector; 0 lifts it."""
+    await_arrival(c.guard, windows)
+
+
+@step
+def acquire(c: PhaseController) -> None:
+    """Leave a fault: once the tracker is silent the bridge drives again."""
+    c.sequencer.state, c.sequencer.last_pulse = ACQUIRE, reference_period(c.clocks)
+    c.sequencer.ready = c.sequencer.stop = 0
+
+
+@step
 def take_ready(c: PhaseController) -> int:
-    """The host's look at ready: 1 if it has risen since the last look."""
-    risen = c.sequencer.event
+    """The host's look at ready: 1 if it has risen since the last look, and not because something is wrong."""
+    risen = c.sequencer.event and c.guard.code == 0
     c.sequencer.event = 0
-    return risen
+    return 1 if risen else 0
 
 
 @step

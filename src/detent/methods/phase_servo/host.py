@@ -2,13 +2,15 @@
 
 import math
 
+from detent.axisfile.protection import describe_fault
+from detent.control.guard import NO_ARRIVAL
 from detent.errors import AxisError, FileProblem
 from detent.kernel.loop import advance
 from detent.methods.moves.host import Destination, Host, Problem, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.controller import command, take_ready
+from detent.methods.phase_servo.controller import arrive_within, command, take_ready
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
@@ -68,8 +70,12 @@ class PhaseHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until ready; False when it is not within `seconds`."""
-        self.machine.pass_time(seconds)
-        return bool(take_ready(self.controller))
+        windows = math.ceil(seconds / self.spec.sample_period)
+        arrive_within(self.controller, windows)
+        self.machine.pass_time((windows + 1) * self.spec.sample_period)
+        ready = bool(take_ready(self.controller))
+        arrive_within(self.controller, 0)
+        return ready
 
     def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
         """Targets off the positioning points, and words that this axis does not take."""
@@ -81,6 +87,15 @@ class PhaseHost(Host):
             key = "target" if move.by is None else "by"
             found.append(problem(key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"))
         return found + refused_words(move, problem, "this axis takes its speed from the velocity table")
+
+    @property
+    def failure(self) -> str:
+        """Why the bridge is off; empty while it drives."""
+        if self.controller.guard.code in {0, NO_ARRIVAL}:
+            return ""
+        return describe_fault(
+            self.controller.guard, self.spec.protection, format_quantity(self.spec.limits.speed, "m/s")
+        )
 
     def in_counts(self, error: float) -> str:
         """How far off that is, in steps, and whether it is on another positioning point."""

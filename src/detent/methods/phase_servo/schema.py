@@ -9,6 +9,7 @@ from typing import Annotated, Literal, TypeVar
 from annotated_types import Ge, Le
 from pydantic import Field
 
+from detent.axisfile.protection import ProtectionTable, breaking_effort
 from detent.axisfile.tables import AxisSpec, AxisTable, FrictionTables, InterferenceTable, MotorTable, PushTable
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
@@ -198,6 +199,7 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     detector: DetectorTable
     clock: ClockTable = Field(default_factory=ClockTable)
     method: MethodTable = Field(default_factory=MethodTable)
+    protection: ProtectionTable = Field(default_factory=ProtectionTable)
     printing: PrintTable = Field(default_factory=PrintTable, alias="print")
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
@@ -220,6 +222,13 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     def step(self) -> float:
         """Travel per count [m]."""
         return self.pitch / self.detector.counts
+
+    @property
+    def stall_force(self) -> float:
+        """Force on the carriage at standstill with a full drive word [N]."""
+        resistance = self.motor.resistance + self.drive.bridge_resistance
+        current = min(self.drive.supply / resistance, self.limits.effort)
+        return current * self.motor.torque_constant * 2 * math.pi / self.mechanics.pulley_circumference
 
     @property
     def tick(self) -> float:
@@ -245,6 +254,7 @@ class PhaseServoSpec(AxisSpec, frozen=True):
 def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
     """Fill the defaults that depend on another key, as their `derived` texts say."""
     literal, travel = spec.clock.order == "literal", spec.limits.travel
+    static = max(spec.mechanics.friction.right.static, spec.mechanics.friction.left.static)
     character = max(1, round(INCH / 10 / spec.pitch)) * spec.pitch
     return spec.model_copy(
         update={
@@ -256,6 +266,7 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
                 speed_gains=[1, 1, 8] if literal else [1, 1, 16],
                 position_gains=[3, 6, 1] if literal else [4, 16, 1],
             ),
+            "protection": _filled(spec.protection, stuck_effort=breaking_effort(static, spec.stall_force)),
             "printing": _filled(spec.printing, left_margin=min(INCH, travel / 2), character_pitch=character),
         }
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from tests.phase_servo_rig import EXAMPLE
 
+from detent.axisfile.protection import ProtectionTable
 from detent.control.phase_sequencer import NEVER
 from detent.errors import InputError
 from detent.kernel.turn_table import TURN
@@ -102,7 +103,10 @@ ELSEWHERE = {
     "print.left_margin": "test_rules.py: left margin; the jobs of the axis",
     "print.character_pitch": "test_rules.py: character pitch; the jobs of the axis",
     "print.hammer_time": "the jobs of the axis",
-}
+} | dict.fromkeys(
+    (f"protection.{key}" for key in ProtectionTable.model_fields),
+    "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
+)
 
 
 def test_each_key_of_the_schema_is_tried() -> None:
