@@ -1,18 +1,22 @@
 """Live specification, section 8. The first ones are about the cut: what a controller is, and that it is whole."""
 
+import math
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.acceptance.test_golden_bits import JOBS, Job
+from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
+from detent.methods.cascade.system import Cascade, along
 from detent.methods.registry import METHODS
 
 TICKS = 100_000
@@ -104,3 +108,50 @@ def test_02_an_axis_is_controller_lines_and_plant(name):
     assert [leaf.path for leaf in wires if leaf.by not in {PLANT, CONTROLLER}] == []
     told = [leaf.path for leaf in method.registers().leaves() if leaf.by and not leaf.path.startswith("lines.")]
     assert told == []
+
+
+class Shuttle:
+    """The cascade example to and fro for 10 s, with its guard or without."""
+
+    def __init__(self, *, guarded: bool) -> None:
+        from detent.methods.cascade.build import motion_limits
+        from detent.methods.cascade.host import CascadeHost
+        from detent.methods.load import load_spec
+        from detent.planning.profile import plan_move
+
+        spec = load_spec(EXAMPLES / "cascade.toml", ())
+        self.host = CascadeHost(spec, guarded=guarded)
+        start = spec.mechanics.start_position
+        way = plan_move(start, start + 0.2, motion_limits(spec), self.host.period)
+        self.samples = round(10.0 / self.host.period)
+        times = -(-self.samples // (2 * way.count))
+        both = [(way.position, way.position[::-1]), (way.velocity, -way.velocity[::-1]),
+                (way.acceleration, way.acceleration[::-1])]  # fmt: skip
+        self.host.feed = along(*(np.tile(np.concatenate(pair), times)[: self.samples] for pair in both))
+        self.begin = self.host.state.snapshot()
+
+    def seconds(self) -> float:
+        """Processor time of the job."""
+        self.host.state.restore(self.begin)
+        begin = time.process_time()
+        assert self.host.pass_samples(self.samples) == 0
+        seconds = time.process_time() - begin
+        assert self.host.controller.samples == self.samples
+        assert self.host.state.tick == self.samples * self.host.sample_ticks
+        return seconds
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="the compiled loop is what is timed")
+def test_04_the_guard_is_a_step_of_the_loop(monkeypatch):
+    """No sample is simulated twice: nobody runs a copy of the axis."""
+
+    def refuse(_self):
+        pytest.fail("a copy of the axis is simulated")
+
+    with_guard, without = Shuttle(guarded=True), Shuttle(guarded=False)
+    monkeypatch.setattr(Cascade, "copy", refuse)
+    best = [math.inf, math.inf]
+    for _ in range(9):
+        best = [min(before, axis.seconds()) for before, axis in zip(best, (with_guard, without), strict=True)]
+    assert best[0] <= 1.15 * best[1]

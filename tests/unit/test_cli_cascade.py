@@ -145,8 +145,8 @@ def test_compare_shows_a_move_in_four_ways() -> None:
 
 def test_timing_and_registers_know_the_axis() -> None:
     assert call("timing", CASCADE, "--at", "60 ms", "--for", "2 ms").status == 0
-    assert re.search(r"^law\.command +f8 +V ", call("registers", "cascade").out, flags=re.MULTILINE)
-    assert re.search(r"^machine\.load\.position +f8 +rad ", call("registers", TURNTABLE).out, flags=re.MULTILINE)
+    assert re.search(r"^controller\.law\.command +f8 +V ", call("registers", "cascade").out, flags=re.MULTILINE)
+    assert re.search(r"^plant\.machine\.load\.position +f8 +rad ", call("registers", TURNTABLE).out, flags=re.MULTILINE)
 
 
 def test_python_says_the_same() -> None:

@@ -2,7 +2,9 @@
 
 import math
 
+from detent.axisfile.protection import breaking_effort, fill_guard, samples
 from detent.control.cascade_law import FeedForwardParams
+from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, DirectionTable, EncoderTable, FrictionTable
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
@@ -28,6 +30,7 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
     p.controller.feedback.position_on_load = spec.method.feedback.position == "load"
     p.controller.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
     _fill_law(p, spec)
+    _fill_limits(p.controller, spec)
     ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.plant.machine))
     tick = spec.method.sample_period / ticks
     push = spec.disturbance.push
@@ -92,6 +95,25 @@ def _fill_source(p: CascadeParams, spec: CascadeSpec) -> None:
 def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:
     p.delay, p.span = table.delay, table.velocity_span
     p.smoothing = smoothing(table.velocity_filter, sample_period)
+
+
+def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
+    method, table, resolution = spec.method, spec.protection, spec.encoder.resolution
+    limits, period = p.limits, method.sample_period
+    limits.following_error, limits.window = method.following_error, method.in_position
+    limits.lowest, limits.highest = spec.limits.lowest - method.in_position, spec.highest + method.in_position
+    limits.place_on_load = spec.load_encoder is not None
+    limits.arrival = samples(method.in_position_time, period)
+    holding = spec.static_friction + abs(spec.mechanics.weight) + spec.mechanics.pendulum
+    limits.breaking = breaking_effort(table, holding, spec.largest_effort) * spec.largest_command
+    # The loops may ask for more than the speed of a move, to catch up.
+    speed = max(spec.limits.speed, method.velocity_limit)
+    fill_guard(p.guard, table, sample=period, speed=speed / resolution if resolution else 0.0)
+    p.guard.following = 1
+    if resolution == 0.0:  # an ideal encoder has no counts to be looked after
+        p.guard.speed = p.guard.jump = p.guard.stuck = p.guard.reversed = 0
+    if p.guard.reversed:
+        p.guard.reversed += spec.drive.delay + spec.encoder.delay
 
 
 def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:

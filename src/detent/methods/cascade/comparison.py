@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.methods.cascade.build import motion_limits
-from detent.methods.cascade.host import CascadeHost, Rows
+from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.panels import POINTS
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
 from detent.methods.cascade.units import Units, milliseconds
@@ -295,16 +295,19 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
     shares: dict[str, float] = dict.fromkeys(("velocity", "acceleration", "viscous", "coulomb"), share)
     # A weight is held in both: the axis must not drop before the move.
     method = spec.method.model_copy(update={"feed_forward": own.model_copy(update=shares)})
-    host = CascadeHost(spec.model_copy(update={"method": method, "disturbance": DisturbanceTable()}), position=start)
-    _pass(host, REST_TIME)
+    alone = spec.model_copy(update={"method": method, "disturbance": DisturbanceTable()})
+    host = CascadeHost(alone, position=start, guarded=False)
+    host.pass_samples(math.ceil(REST_TIME / host.period - 1e-9))
     begin = host.time
     profile = plan_move(start, target, limits, host.period)
-    set_gauge(host.state.plant.gauge, host.state.tick, start, target, spec.method.in_position)
+    plant = host.state.plant
+    set_gauge(plant.gauge, host.state.tick, start, target, spec.method.in_position)
     host.follow(profile)
     frequency = held_frequency(spec)
     watched = WATCHED_TIME if math.isnan(frequency) else max(WATCHED_TIME, SWINGS / frequency)
-    rows = _pass(host, (profile.count - 1) * host.period + watched)
-    settled = host.state.plant.gauge.outside * host.tick - begin
+    rows = host.watch(math.ceil(((profile.count - 1) * host.period + watched) / host.period - 1e-9))
+    settled = plant.gauge.outside * host.tick - begin
+    resting = abs(plant.machine.load.position - target) <= spec.method.in_position
     duration = (profile.count - 1) * host.period
     twist = rows["plant.machine.motor.position"] - rows["plant.machine.load.position"]
     after = twist[profile.count - 1 :]
@@ -315,7 +318,7 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
         feed=feed,
         duration=duration,
         peak_following=float(np.abs(rows["controller.law.position_error"]).max()),
-        settling=max(settled - duration, 0.0) if abs(host.position - target) <= spec.method.in_position else math.nan,
+        settling=max(settled - duration, 0.0) if resting else math.nan,
         twist_after=math.nan if math.isnan(frequency) else float(np.ptp(after)),
         peak_command=float(np.abs(rows["controller.law.command"]).max()),
         t=np.arange(len(rows), dtype=np.float64) * host.period,
@@ -323,10 +326,3 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
         following=rows["controller.law.position_error"],
         twist=twist,
     )
-
-
-def _pass(host: CascadeHost, seconds: float) -> Rows:
-    """Let time pass, and see every sample."""
-    kept: list[Rows] = []
-    host.pass_samples(math.ceil(seconds / host.period - 1e-9), kept.append)
-    return np.concatenate(kept)

@@ -1,10 +1,22 @@
 """The controller of a cascade axis: a reference, two encoders read at each sample, two loops, and a word to the drive.
 
-It counts its own ticks from sample to sample; between two of them it does nothing.
+It counts its own ticks from sample to sample; between two of them it does nothing. At each sample it looks after
+itself: a fault takes the command away in that sample. A fault, or an axis in position, is an event that the host is to
+answer.
 """
 
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
+from detent.control.guard import (
+    NEVER,
+    Guard,
+    GuardParams,
+    await_arrival,
+    enable_guard,
+    lasting,
+    miss_arrival,
+    watch,
+)
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
@@ -17,12 +29,27 @@ from detent.sensing.position_sensor import (
     stand_sensor,
 )
 
+ARRIVED, FAULT = 1, 2
+"""Events."""
+
 
 class FeedbackParams(Registers):
     """Which encoder the loops use."""
 
     position_on_load: u1 = register("position loop: 0 encoder of the motor, 1 of the load")
     velocity_on_load: u1 = register("velocity loop: 0 encoder of the motor, 1 of the load")
+
+
+class LimitParams(Registers):
+    """What the guard compares with."""
+
+    following_error: f8 = register("largest magnitude of the position error", unit="m")
+    lowest: f8 = register("lower end of the travel, with the window", unit="m")
+    highest: f8 = register("upper end of the travel, with the window", unit="m")
+    place_on_load: u1 = register("ends of the travel: 0 encoder of the motor, 1 of the load")
+    breaking: f8 = register("magnitude of the command that breaks the axis loose", unit="V")
+    window: f8 = register("position error that counts as in position", unit="m")
+    arrival: i8 = register("samples in the window until the axis is in position", unit="count")
 
 
 class CascadeControllerParams(Registers):
@@ -33,18 +60,36 @@ class CascadeControllerParams(Registers):
     load_sensor: PositionSensorParams = block("encoder of the load")
     feedback: FeedbackParams = block("which encoder the loops use")
     law: CascadeLawParams = block("position and velocity loop")
+    limits: LimitParams = block("what the guard compares with")
+    guard: GuardParams = block("how long something may be wrong")
+
+
+class Peaks(Registers):
+    """Largest magnitudes since the host cleared them."""
+
+    following: f8 = register("position error", unit="m")
+    command: f8 = register("command", unit="V")
+    limited: i8 = register("samples with the command at its limit", unit="count")
 
 
 class CascadeController(Registers):
     """What the controller holds."""
 
     left: i8 = register("ticks until the next sample", unit="tick")
-    on: u1 = register("mailbox: 1 while the drive is on, 0 lets the axis coast")
+    samples: i8 = register("samples since power-on", unit="count")
+    on: u1 = register("mailbox: 1 while the drive is on, 0 lets the axis coast; a fault clears it")
+    guarded: u1 = register("mailbox: 1 while faults switch off")
+    awaited: u1 = register("mailbox: 1 while the axis is to come into position")
+    event: u1 = register("mailbox: 1 in position, 2 fault; nothing goes on until the host has cleared it")
     entry: i8 = register("mailbox: entry of the reference or command that the next sample takes", unit="count")
     reference: CascadeReference = block("what the axis should do")
     motor_sensor: PositionSensor = block("encoder of the motor")
     load_sensor: PositionSensor = block("encoder of the load")
     law: CascadeLaw = block("position and velocity loop")
+    guard: Guard = block("what is wrong")
+    count: i8 = register("motor's encoder at the last sample, for the guard", unit="count")
+    within: i8 = register("samples in the window up to this one", unit="count")
+    peaks: Peaks = block("largest magnitudes")
 
 
 class CascadeLines(Registers):
@@ -87,7 +132,62 @@ def decide(p: CascadeControllerParams, c: CascadeController) -> float:
 
 
 @step
-def sample(
+def note_peaks(c: CascadeController) -> None:
+    """Remember the largest magnitudes."""
+    c.peaks.following = max(c.peaks.following, abs(c.law.position_error))
+    c.peaks.command = max(c.peaks.command, abs(c.law.command))
+    if c.law.limited:
+        c.peaks.limited += 1
+
+
+@step
+def beyond_ends(p: CascadeControllerParams, c: CascadeController) -> int:
+    """End of the travel that has been passed, 1 upper, -1 lower; what is no number has passed one too."""
+    place = c.load_sensor.position if p.limits.place_on_load else c.motor_sensor.position
+    if not place <= p.limits.highest:
+        return 1
+    return -1 if not place >= p.limits.lowest else 0
+
+
+@step
+def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> int:
+    """One sample of the guard; the code of the fault, 0 while there is none."""
+    late = not abs(c.law.position_error) <= p.limits.following_error
+    pushing = 0
+    if abs(c.law.command) >= p.limits.breaking:
+        pushing = 1 if c.law.command > 0.0 else -1
+    moved = count - c.count
+    c.count = count
+    return watch(p.guard, c.guard, late, beyond_ends(p, c), c.law.limited > 0, pushing, moved)
+
+
+@step
+def find_arrival(p: CascadeControllerParams, c: CascadeController) -> int:
+    """One sample of an axis that is to come into position: the event that it makes, 0 none."""
+    c.within = lasting(abs(c.law.position_error) <= p.limits.window, c.within)
+    if c.within >= p.limits.arrival:
+        return ARRIVED
+    if c.samples < c.guard.deadline:
+        return 0
+    miss_arrival(c.guard)
+    return FAULT
+
+
+@step
+def look_after(p: CascadeControllerParams, c: CascadeController, count: int) -> None:
+    """Guard and arrival; a fault switches off, and comes before an arrival in the same sample."""
+    if find_fault(p, c, count) != 0:
+        c.event = FAULT
+    elif c.awaited:
+        c.event = find_arrival(p, c)
+    if c.event != 0:
+        c.awaited = 0
+    if c.event == FAULT:
+        c.on = 0
+
+
+@step
+def sample(  # noqa: PLR0913 - what the host has laid ready is four arrays
     p: CascadeControllerParams,
     c: CascadeController,
     lines: CascadeLines,
@@ -97,6 +197,7 @@ def sample(
     command: HostArray,
 ) -> None:
     """Read, decide, command; where there are commands, the loops are open, and 0 comes behind the last one."""
+    c.samples += 1
     read_sensors(p, c, lines)
     output, entries = 0.0, len(command)
     if c.on and entries > 0:
@@ -105,12 +206,16 @@ def sample(
     elif c.on:
         refer(c, position, velocity, acceleration)
         output = decide(p, c)
+        note_peaks(c)
+        if c.guarded:
+            look_after(p, c, lines.motor.count)
+            output = output if c.on else 0.0
     lines.enable, lines.command = c.on, output
 
 
 @controls(CascadeControllerParams)
 @hot_step
-def control(
+def control(  # noqa: PLR0913 - as `sample`
     p: CascadeControllerParams,
     c: CascadeController,
     lines: CascadeLines,
@@ -145,12 +250,37 @@ def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLin
     stand_sensor(p.motor_sensor, c.motor_sensor, lines.motor)
     stand_sensor(p.load_sensor, c.load_sensor, lines.load)
     c.reference.position = position
+    c.count = lines.motor.count
+    await_arrival(c.guard, NEVER)
     c.on = lines.enable = lines.sync = 1
 
 
 def follow(c: CascadeController) -> None:
     """What the host has laid ready is taken from its first entry on, from the next sample on."""
     c.entry = 0
+
+
+def guard_axis(c: CascadeController) -> None:
+    """From the next sample on, faults switch off."""
+    enable_guard(c.guard)
+    c.guarded = 1
+
+
+def await_position(c: CascadeController, samples: int) -> None:
+    """The axis must be in position within so many samples, which is an event, or not, which is a fault."""
+    c.awaited, c.within = 1, 0
+    await_arrival(c.guard, c.samples + samples)
+
+
+def acknowledge(c: CascadeController) -> int:
+    """Take the event, 0 if there is none; the axis goes on."""
+    event, c.event = c.event, 0
+    return event
+
+
+def clear_peaks(c: CascadeController) -> None:
+    """Remember from the next sample on."""
+    c.peaks = Peaks()
 
 
 def switch_off(c: CascadeController) -> None:

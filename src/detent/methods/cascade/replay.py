@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.methods.cascade.host import CHUNK, CascadeHost, Rows
+from detent.methods.cascade.host import CascadeHost, Rows
 from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.cascade.replay_job import ReplayJob
 from detent.methods.cascade.schema import CascadeSpec
@@ -31,6 +31,9 @@ EFFORTS: dict[str, tuple[str, ...]] = {
     "voltage": ("voltage", "command"),
 }
 """Signals that drive an axis open loop, by its ``drive.input``; the first that was recorded is taken."""
+
+CHUNK = 8192
+"""Samples between two words of progress."""
 
 Numbers = NDArray[np.float64]
 
@@ -154,7 +157,7 @@ def run_cascade_replay(
 
 def _start(spec: CascadeSpec, job: ReplayJob, recorder: AnyRecorder | None) -> CascadeHost:
     """The axis where the recorded one stood, moving as it moved."""
-    host = CascadeHost(spec, recorder, position=float(job.position[0]))
+    host = CascadeHost(spec, recorder, position=float(job.position[0]), guarded=False)
     speed = starting_velocity(job.t, job.position)
     if speed:
         set_off(host.params, host.state, speed)
@@ -165,7 +168,7 @@ def _watch(host: CascadeHost, samples: int, progress: Progress | None) -> Rows:
     """Every sample of the replay."""
     kept: list[Rows] = []
     for begin in range(0, samples, CHUNK):
-        host.pass_samples(min(CHUNK, samples - begin), kept.append)
+        kept.append(host.watch(min(CHUNK, samples - begin)))
         if progress is not None:
             progress(min(begin + CHUNK, samples) / samples, "replaying the recording")
     return np.concatenate(kept)

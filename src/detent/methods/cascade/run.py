@@ -4,10 +4,12 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
+from detent.axisfile.protection import guard_text
+from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
-from detent.methods.cascade.guard import Arrival, Guard
-from detent.methods.cascade.host import CascadeHost, Peaks
+from detent.methods.cascade.controller import ARRIVED, FAULT, clear_peaks
+from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_move
@@ -182,7 +184,7 @@ def run_cascade_moves(
         if result.failure:
             result.time_off = host.time
             host.switch_off()
-            host.pass_samples(math.ceil(COAST / host.period), lambda _rows: None)
+            host.pass_samples(math.ceil(COAST / host.period))
     finally:
         host.machine.close()
     result.time_end = host.time
@@ -196,76 +198,85 @@ class _Mover:
 
     def __init__(self, spec: CascadeSpec, host: CascadeHost, result: CascadeRun) -> None:
         self.spec, self.host, self.result = spec, host, result
-        self.guard = Guard(spec, host.period)
+        self.controller: Any = host.controller
+        self.plant: Any = host.machine.state.plant
         self.most = math.ceil(spec.method.timeout / host.period)
 
     def power_on(self) -> str:
         """Wait until the axis stands in position where it was switched on; what went wrong, or nothing."""
-        ready = self._arrive()
+        event = self.host.arrive(self.most)
         self.result.time_ready = self.host.time
-        if isinstance(ready, str):
-            return f"after power-on: {ready or self._late()}"
-        return ""
+        return f"after power-on: {self._cause()}" if event == FAULT else ""
 
     def make(self, move: Move, place: float, target: float) -> str:
         """One move from `place` [m] and its dwell; what went wrong, or nothing."""
-        host, limits = self.host, motion_limits(self.spec)
+        host, limits, load = self.host, motion_limits(self.spec), self.plant.machine.load
         if move.speed is not None:
             limits = MotionLimits(move.speed, limits.acceleration, limits.jerk)
         profile = plan_move(place, target, limits, host.period)
-        begin, start, host.peaks = host.time, host.position, Peaks()
-        set_gauge(host.state.plant.gauge, host.state.tick, start, target, self.result.tolerance)
+        begin, start, arrived, ready = host.time, load.position, math.nan, math.nan
+        clear_peaks(self.controller)
+        set_gauge(self.plant.gauge, host.machine.state.tick, start, target, self.result.tolerance)
         host.follow(profile)
-        stop = host.pass_samples(profile.count - 1, self.guard)
-        arrived = host.time
-        ready: float | str = stop.cause if stop else self._arrive()
-        failed = ready if isinstance(ready, str) else ""
-        if isinstance(ready, float) and move.dwell > 0:
-            stop = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9), self.guard)
-            failed = stop.cause if stop else ""
-        self._note(move, (begin, math.nan if stop and isinstance(ready, str) else arrived, ready), (start, target))
-        if isinstance(ready, str) and not failed:
-            failed = self._late()
-        return f"move {move.number} to {self._text(target, 6)}: {failed}" if failed else ""
+        event = host.pass_samples(profile.count - 1)
+        if not event:
+            arrived, event = host.time, host.arrive(self.most)
+        if event == ARRIVED:
+            ready = host.time
+            event = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9)) if move.dwell > 0 else 0
+        self._note(move, (begin, arrived, ready), (start, target))
+        return f"move {move.number} to {self._text(target, 6)}: {self._cause()}" if event == FAULT else ""
 
-    def _arrive(self) -> float | str:
-        """When the axis was in position [s]; else why the drive went off, empty if the time was over."""
-        arrival = Arrival(self.spec, self.host.period, self.guard)
-        stop = self.host.pass_samples(self.most, arrival)
-        if stop is None:
-            return ""
-        return stop.cause or self.host.time
-
-    def _note(self, move: Move, times: tuple[float, float, float | str], way: tuple[float, float]) -> None:
+    def _note(self, move: Move, times: tuple[float, float, float], way: tuple[float, float]) -> None:
         """Put the move into the result."""
-        host, gauge, peaks = self.host, self.host.state.plant.gauge, self.host.peaks
+        host, gauge, peaks, load = self.host, self.plant.gauge, self.controller.peaks, self.plant.machine.load
         begin, arrived, ready = times
-        outside = abs(way[1] - host.position) > self.result.tolerance
+        outside = abs(way[1] - load.position) > self.result.tolerance
         self.result.moves.append(
             CascadeMove(
                 number=move.number,
                 label=move.label,
                 begin=begin,
                 arrived=arrived,
-                ready=ready if isinstance(ready, float) else math.nan,
+                ready=ready,
                 settled=math.nan if outside else gauge.outside * host.tick,
                 end=host.time,
                 start=way[0],
                 target=way[1],
-                position=host.position,
+                position=load.position,
                 overshoot=max(float(gauge.beyond), 0.0),
                 peak_speed=float(gauge.peak_speed),
                 peak_following=peaks.following,
                 peak_command=peaks.command,
                 limited=peaks.limited * host.period,
-                in_position=isinstance(ready, float),
+                in_position=not math.isnan(ready),
             )
+        )
+
+    def _cause(self) -> str:
+        """Why the drive went off, and what to do."""
+        spec, method, guard = self.spec, self.spec.method, self.controller.guard
+        if guard.code == NO_ARRIVAL:
+            return self._late()
+        upper, table = guard.side > 0, spec.protection
+        ends = ("upper", "limits.lowest + limits.travel") if upper else ("lower", "limits.lowest")
+        place = self._text(spec.highest if upper else spec.limits.lowest)
+        speed = table.overspeed * max(spec.limits.speed, method.velocity_limit)
+        return guard_text(
+            guard.code,
+            following=f"{self._text(method.following_error)}, method.following_error",
+            side=ends[0],
+            end=f"{place}, {ends[1]}",
+            saturated=format_quantity(table.saturation_time, "s"),
+            stuck=format_quantity(table.stuck_time, "s"),
+            reversed=format_quantity(table.reversed_time, "s"),
+            speed=format_quantity(speed, spec.unit("m/s"), 4),
         )
 
     def _late(self) -> str:
         """The axis was not in position in time."""
         method = self.spec.method
-        error = self._text(abs(float(self.host.state.controller.law.position_error)))
+        error = self._text(abs(float(self.controller.law.position_error)))
         return (
             f"not in position within {format_quantity(method.timeout, 's')} of the end of the reference "
             f"(method.timeout): its error is {error}, method.in_position is "

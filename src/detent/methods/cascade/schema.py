@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from detent.axisfile.motion import unit_in
+from detent.axisfile.protection import ProtectionTable
 from detent.axisfile.tables import AxisSpec, AxisTable, MotorTable
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
@@ -254,6 +255,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     encoder: EncoderTable
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)
+    protection: ProtectionTable = Field(default_factory=ProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     def unit(self, linear: str) -> str:
@@ -264,6 +266,12 @@ class CascadeSpec(AxisSpec, frozen=True):
     def highest(self) -> float:
         """Position of the upper end [m]."""
         return self.limits.lowest + self.limits.travel
+
+    @property
+    def static_friction(self) -> float:
+        """Force that breaks motor and load loose, in the direction that takes more [N]."""
+        tables = (self.mechanics.friction, self.mechanics.load_friction)
+        return max(sum(t.positive.static + t.offset for t in tables), sum(t.negative.static - t.offset for t in tables))
 
     @property
     def radius(self) -> float:

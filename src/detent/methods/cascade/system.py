@@ -63,6 +63,8 @@ def tick(
     command: HostArray,
 ) -> bool:
     """One substep of the mechanics, on `machine` of the plant; `along` and `driven` say what the host lays ready."""
+    if r.controller.event:
+        return False
     sense(p.plant, r.plant, machine, r.lines)
     control(p.controller, r.controller, r.lines, position, velocity, acceleration, command)
     move(p.plant, r.plant, machine, r.tick, r.lines)

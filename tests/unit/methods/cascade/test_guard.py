@@ -1,80 +1,192 @@
-"""When the drive goes off, in the sample that shows it, and when a move is in position."""
+"""What the controller looks after: faults in the sample that shows them, arrival, and peaks that the host clears."""
 
 import math
 
 import numpy as np
+import pytest
+from tests.cascade_rig import SAMPLE_TICKS, Rig, make_params
 
 import detent
-from detent.methods.cascade.guard import Arrival, Guard
-from detent.methods.cascade.host import Stop
+from detent.control.guard import FOLLOWING, NO_ARRIVAL, SATURATED, TRAVEL
+from detent.methods.cascade.build import motion_limits
+from detent.methods.cascade.controller import (
+    ARRIVED,
+    FAULT,
+    CascadeController,
+    CascadeControllerParams,
+    acknowledge,
+    await_position,
+    clear_peaks,
+    guard_axis,
+    look_after,
+    note_peaks,
+)
+from detent.methods.cascade.host import CascadeHost
 from detent.methods.load import load_spec
+from detent.planning.profile import MotionLimits, plan_move
 
 
-def linear(*overrides):
-    return load_spec(detent.example("cascade.toml"), overrides)
+def guarded(**times):
+    """A controller at rest within its limits, and its parameters."""
+    p, c = CascadeControllerParams(), CascadeController()
+    p.limits.following_error, p.limits.window, p.limits.breaking = 1e-2, 1e-4, math.inf
+    p.limits.lowest, p.limits.highest, p.limits.arrival = -1.0, 1.0, 5
+    p.guard.following, p.guard.travel = 1, 1
+    for name, value in times.items():
+        setattr(p.guard, name, value)
+    guard_axis(c)
+    c.on = 1
+    return p, c
 
 
-def rows_of(count):
-    rows = np.zeros(
-        count,
-        [
-            ("controller.law.position_error", "f8"),
-            ("controller.law.limited", "u1"),
-            ("plant.machine.load.position", "f8"),
-        ],
+def test_what_is_no_number_is_a_following_error():
+    p, c = guarded()
+    look_after(p, c, 0)
+    assert (c.event, c.on) == (0, 1)
+    c.law.position_error = math.nan
+    look_after(p, c, 0)
+    assert (c.event, c.on, c.guard.code) == (FAULT, 0, FOLLOWING)
+
+
+@pytest.mark.parametrize(("place", "side"), [(-1.1, -1), (1.1, 1)])
+@pytest.mark.parametrize("on_load", [0, 1])
+def test_an_end_is_passed_where_the_chosen_encoder_says_so(place, side, on_load):
+    p, c = guarded()
+    p.limits.place_on_load = on_load
+    (c.motor_sensor if on_load else c.load_sensor).position = place
+    look_after(p, c, 0)
+    assert c.guard.code == 0
+    (c.load_sensor if on_load else c.motor_sensor).position = place
+    look_after(p, c, 0)
+    assert (c.event, c.guard.code, c.guard.side) == (FAULT, TRAVEL, side)
+
+
+def test_the_first_fault_stays():
+    p, c = guarded()
+    c.motor_sensor.position = -2.0
+    look_after(p, c, 0)
+    c.law.position_error = 1.0
+    look_after(p, c, 0)
+    assert c.guard.code == TRAVEL
+
+
+def test_saturation_is_a_fault_once_it_has_lasted():
+    p, c = guarded(saturated=4)
+    events = []
+    for limited in (1, 1, 1, 0, 1, 1, 1, 1):
+        c.law.limited = limited
+        look_after(p, c, 0)
+        events.append(c.event)
+    assert events == [0] * 7 + [FAULT]
+    assert c.guard.code == SATURATED
+
+
+def test_an_axis_is_in_position_once_its_error_has_been_small_for_long_enough():
+    p, c = guarded()
+    look_after(p, c, 0)
+    await_position(c, 100)
+    c.law.position_error = 1e-3
+    look_after(p, c, 0)
+    c.law.position_error = 1e-5
+    for event in (0, 0, 0, 0, ARRIVED):
+        look_after(p, c, 0)
+        assert c.event == event
+    assert (acknowledge(c), c.event, c.on) == (ARRIVED, 0, 1)
+    look_after(p, c, 0)
+    assert c.event == 0, "it is told once"
+
+
+def test_a_fault_comes_before_the_arrival():
+    p, c = guarded()
+    p.limits.arrival = 1
+    await_position(c, 100)
+    c.motor_sensor.position = 9.0
+    look_after(p, c, 0)
+    assert (c.event, c.guard.code) == (FAULT, TRAVEL)
+
+
+def test_who_does_not_arrive_in_time_has_a_fault():
+    p, c = guarded()
+    c.law.position_error = 1e-3
+    await_position(c, 3)
+    for event in (0, 0, FAULT):
+        c.samples += 1
+        look_after(p, c, 0)
+        assert c.event == event
+    assert (c.guard.code, c.on) == (NO_ARRIVAL, 0)
+
+
+def test_peaks_are_the_largest_since_the_host_cleared_them():
+    c = CascadeController()
+    for error, command, limited in ((0.1, -2.0, 0), (-0.3, 1.0, 1), (math.nan, 1.0, 1)):
+        c.law.position_error, c.law.command, c.law.limited = error, command, limited
+        note_peaks(c)
+    assert (c.peaks.following, c.peaks.command, c.peaks.limited) == (0.3, 2.0, 2)
+    clear_peaks(c)
+    assert (c.peaks.following, c.peaks.command, c.peaks.limited) == (0.0, 0.0, 0)
+
+
+def test_a_fault_takes_the_command_away_in_its_sample_and_the_axis_waits_for_its_host():
+    p = make_params()
+    p.controller.limits.following_error, p.controller.guard.following = 1e-3, 1
+    p.controller.limits.breaking = math.inf
+    rig = Rig(p)
+    guard_axis(rig.r.controller)
+    rig.r.controller.reference.position = 2e-3
+    run = rig.record(10 * SAMPLE_TICKS, ["lines.enable", "lines.command", "controller.law.command"])
+    assert len(run["t"]) == rig.r.tick == 1
+    assert (run["lines.enable"][0], run["lines.command"][0]) == (0, 0.0)
+    assert run["controller.law.command"][0] != 0.0
+    assert acknowledge(rig.r.controller) == FAULT
+    rig.run(3 * SAMPLE_TICKS)
+    assert rig.x == 0.0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("way", [-1, 1], ids=["lower", "upper"])
+def test_an_end_is_passed_in_the_sample_in_which_the_encoder_shows_it(way):
+    """The guard knows what its encoder read at the sample, behind the true load by counts and twist.
+
+    A judge of the true load at the end of a sample would have seen it one sample earlier at most: the load is beyond
+    the end there by less than what it moves in a sample, a count, and the twist.
+    """
+    spec = load_spec(
+        detent.example("cascade.toml"),
+        ["limits.lowest=0 m", "limits.travel=100 mm", "mechanics.start_position=50 mm", "method.following_error=10 m"],
     )
-    rows["plant.machine.load.position"] = 0.1
-    return rows
+    host, limits = CascadeHost(spec), spec.limits
+    end = spec.highest + spec.method.in_position if way > 0 else limits.lowest - spec.method.in_position
+    move = plan_move(0.05, 0.05 + way * 0.08, motion_limits(spec), host.period)
+    host.follow(move)
+    seen = host.watch(move.count)
+    assert host.controller.guard.code == TRAVEL
+    assert host.controller.guard.side == way
+    passed = host.controller.samples
+    rows = seen[: passed - 1]
+    beyond = way * (rows["plant.machine.load.position"] - end)
+    shown = way * (rows["controller.motor_sensor.position"] - end)
+    assert (shown <= 0.0).all(), "no sample before showed it"
+    # By the speed, a sample of it; by stiffness and force, the twist; and a count.
+    force = np.abs(rows["controller.law.command"]).max() * spec.effort_per_command
+    assert spec.mechanics.coupling is not None
+    slack = limits.speed * host.period + force / spec.mechanics.coupling.stiffness + spec.encoder.resolution
+    assert beyond.max() < slack
 
 
-def test_the_guard_takes_what_is_no_number_for_wrong():
-    rows = rows_of(4)
-    guard = Guard(linear(), 1e-3)
-    assert guard(rows) is None
-    rows["controller.law.position_error"][2] = math.nan
-    found = guard(rows)
-    assert found is not None
-    assert found.samples == 3
-    assert "following error" in found.cause
-
-
-def test_what_comes_first_is_told():
-    rows = rows_of(4)
-    rows["controller.law.position_error"][3], rows["plant.machine.load.position"][1] = 1.0, -1.0
-    found = Guard(linear(), 1e-3)(rows)
-    assert found is not None
-    assert found.samples == 2
-    assert "lower end" in found.cause
-
-
-def test_saturation_is_counted_over_stretches():
-    rows = rows_of(600)
-    rows["controller.law.limited"] = 1
-    guard = Guard(linear(), 1e-3)
-    assert guard(rows) is None
-    found = guard(rows)
-    assert found is not None
-    assert found.samples == 400
-
-
-def test_a_move_is_in_position_once_its_error_has_been_small_for_long_enough():
-    spec = linear("method.in_position_time=5 ms")
-    arrival = Arrival(spec, 1e-3, Guard(spec, 1e-3))
-    rows = rows_of(4)
-    rows["controller.law.position_error"][0] = 1e-3
-    assert arrival(rows) is None
-    # Three of the five samples lie in the stretch before.
-    assert arrival(rows_of(4)) == Stop(2)
-
-
-def test_the_guard_comes_before_the_arrival():
-    spec = linear("method.in_position_time=2 ms")
-    rows = rows_of(6)
-    rows["controller.law.position_error"][:4] = 1e-3
-    rows["plant.machine.load.position"][4] = 9.0
-    found = Arrival(spec, 1e-3, Guard(spec, 1e-3))(rows)
-    assert found is not None
-    assert found.samples == 5
-    assert "upper end" in found.cause
-    rows["plant.machine.load.position"][4] = 0.1
-    assert Arrival(spec, 1e-3, Guard(spec, 1e-3))(rows) == Stop(6)
+@pytest.mark.compiled
+@pytest.mark.parametrize("pieces", [(1,), (1, 7, 13, 40)], ids=["whole", "cut"])
+def test_a_blocked_load_is_a_following_error_in_the_same_sample_every_time(pieces):
+    spec = load_spec(detent.example("cascade.toml"), ["method.following_error=1 mm"])
+    host = CascadeHost(spec)
+    host.follow(plan_move(spec.mechanics.start_position, 0.4, MotionLimits(0.1, 5.0, 200.0), host.period))
+    assert host.pass_samples(round(1.0 / host.period)) == 0
+    blocked = host.params.plant.machine.load.friction
+    for direction in (blocked.positive, blocked.negative):
+        direction.coulomb = direction.static = 1e6
+    event, count = 0, 0
+    while not event:
+        event = host.pass_samples(pieces[count % len(pieces)])
+        count += 1
+    # The reference goes on at 100 mm/s while the motor stands on its coupling: 1 mm of error comes after some 10 ms.
+    assert (event, host.controller.guard.code) == (FAULT, FOLLOWING)
+    assert host.controller.samples == 4041

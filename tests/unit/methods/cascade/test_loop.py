@@ -39,13 +39,13 @@ PID = [
 )
 def test_the_fastest_rate_is_that_of_the_plant(load_text, rotary_text, overrides):
     spec = load_text(rotary_text, *overrides).spec
-    assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).machine), rel=1e-9)
+    assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).plant.machine), rel=1e-9)
 
 
 def test_the_fastest_rate_of_one_mass(load_text, rigid_text):
     for overrides in ([], ["drive.input=voltage", "motor.inductance=2 mH"], ["drive.input=voltage"]):
         spec = load_text(rigid_text, *overrides).spec
-        assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).machine), rel=1e-9)
+        assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).plant.machine), rel=1e-9)
 
 
 def swing(spec, seconds):

@@ -49,9 +49,7 @@ def record(spec, *, name="run.csv", begin=0):
     limits = MotionLimits(speed=0.2, acceleration=2.0, jerk=80.0)
     profile, _ = plan_job(MoveJob(name, "moves", moves), spec.mechanics.start_position, limits, host.period)
     host.follow(profile)
-    kept = []
-    host.pass_samples(profile.count, kept.append)
-    rows = np.concatenate(kept)[begin:]
+    rows = host.watch(profile.count)[begin:]
     return ReplayJob(
         name=name,
         t=3.0 + profile.t[begin:],
@@ -146,12 +144,14 @@ def test_efforts_that_the_axis_does_not_have_are_named(own, force_axis):
 
 
 def test_an_axis_that_runs_away_ends_the_comparison(own, monkeypatch):
-    def broken(self, samples, judge):
-        rows = self.rehearse(samples)
-        rows["plant.machine.load.position"][500:] = math.inf
-        judge(rows)
+    watch = CascadeHost.watch
 
-    monkeypatch.setattr(CascadeHost, "pass_samples", broken)
+    def broken(self, samples):
+        rows = watch(self, samples)
+        rows["plant.machine.load.position"][500:] = math.inf
+        return rows
+
+    monkeypatch.setattr(CascadeHost, "watch", broken)
     run = run_cascade_replay(linear(), own)
     assert not run.done
     assert run.failure.startswith("the simulated axis ran away 500 ms after the begin: its loops are unstable")
