@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.protection import breaking_effort, fill_guard, samples
+from detent.axisfile.protection import fill_guard, samples
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, DirectionTable, EncoderTable, FrictionTable
@@ -104,8 +104,7 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
     limits.lowest, limits.highest = spec.limits.lowest - method.in_position, spec.highest + method.in_position
     limits.place_on_load = spec.load_encoder is not None
     limits.arrival = samples(method.in_position_time, period)
-    holding = spec.static_friction + abs(spec.mechanics.weight) + spec.mechanics.pendulum
-    limits.breaking = breaking_effort(table, holding, spec.largest_effort) * spec.largest_command
+    limits.breaking = table.stuck_effort * spec.largest_command
     # The loops may ask for more than the speed of a move, to catch up.
     speed = max(spec.limits.speed, method.velocity_limit)
     fill_guard(p.guard, table, sample=period, speed=speed / resolution if resolution else 0.0)

@@ -8,13 +8,12 @@ answer.
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
 from detent.control.guard import (
-    NEVER,
     Guard,
     GuardParams,
     await_arrival,
     enable_guard,
+    is_overdue,
     lasting,
-    miss_arrival,
     watch,
 )
 from detent.kernel.loop import HostArray, controls
@@ -79,7 +78,6 @@ class CascadeController(Registers):
     samples: i8 = register("samples since power-on", unit="count")
     on: u1 = register("mailbox: 1 while the drive is on, 0 lets the axis coast; a fault clears it")
     guarded: u1 = register("mailbox: 1 while faults switch off")
-    awaited: u1 = register("mailbox: 1 while the axis is to come into position")
     event: u1 = register("mailbox: 1 in position, 2 fault; nothing goes on until the host has cleared it")
     entry: i8 = register("mailbox: entry of the reference or command that the next sample takes", unit="count")
     reference: CascadeReference = block("what the axis should do")
@@ -167,10 +165,7 @@ def find_arrival(p: CascadeControllerParams, c: CascadeController) -> int:
     c.within = lasting(abs(c.law.position_error) <= p.limits.window, c.within)
     if c.within >= p.limits.arrival:
         return ARRIVED
-    if c.samples < c.guard.deadline:
-        return 0
-    miss_arrival(c.guard)
-    return FAULT
+    return FAULT if is_overdue(c.guard) else 0
 
 
 @step
@@ -178,16 +173,16 @@ def look_after(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     """Guard and arrival; a fault switches off, and comes before an arrival in the same sample."""
     if find_fault(p, c, count) != 0:
         c.event = FAULT
-    elif c.awaited:
+    elif c.guard.awaited:
         c.event = find_arrival(p, c)
     if c.event != 0:
-        c.awaited = 0
+        c.guard.awaited = 0
     if c.event == FAULT:
         c.on = 0
 
 
 @step
-def sample(  # noqa: PLR0913 - what the host has laid ready is four arrays
+def sample(
     p: CascadeControllerParams,
     c: CascadeController,
     lines: CascadeLines,
@@ -215,7 +210,7 @@ def sample(  # noqa: PLR0913 - what the host has laid ready is four arrays
 
 @controls(CascadeControllerParams)
 @hot_step
-def control(  # noqa: PLR0913 - as `sample`
+def control(
     p: CascadeControllerParams,
     c: CascadeController,
     lines: CascadeLines,
@@ -251,7 +246,6 @@ def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLin
     stand_sensor(p.load_sensor, c.load_sensor, lines.load)
     c.reference.position = position
     c.count = lines.motor.count
-    await_arrival(c.guard, NEVER)
     c.on = lines.enable = lines.sync = 1
 
 
@@ -268,8 +262,8 @@ def guard_axis(c: CascadeController) -> None:
 
 def await_position(c: CascadeController, samples: int) -> None:
     """The axis must be in position within so many samples, which is an event, or not, which is a fault."""
-    c.awaited, c.within = 1, 0
-    await_arrival(c.guard, c.samples + samples)
+    c.within = 0
+    await_arrival(c.guard, samples)
 
 
 def acknowledge(c: CascadeController) -> int:

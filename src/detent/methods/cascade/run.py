@@ -4,7 +4,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
-from detent.axisfile.protection import guard_text
+from detent.axisfile.protection import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
@@ -255,22 +255,16 @@ class _Mover:
 
     def _cause(self) -> str:
         """Why the drive went off, and what to do."""
-        spec, method, guard = self.spec, self.spec.method, self.controller.guard
-        if guard.code == NO_ARRIVAL:
+        spec, method = self.spec, self.spec.method
+        if self.controller.guard.code == NO_ARRIVAL:
             return self._late()
-        upper, table = guard.side > 0, spec.protection
-        ends = ("upper", "limits.lowest + limits.travel") if upper else ("lower", "limits.lowest")
-        place = self._text(spec.highest if upper else spec.limits.lowest)
-        speed = table.overspeed * max(spec.limits.speed, method.velocity_limit)
-        return guard_text(
-            guard.code,
+        return describe_fault(
+            self.controller.guard,
+            spec.protection,
+            speed=format_quantity(max(spec.limits.speed, method.velocity_limit), spec.unit("m/s"), 4),
+            lower=f"{self._text(spec.limits.lowest)}, limits.lowest",
+            upper=f"{self._text(spec.highest)}, limits.lowest + limits.travel",
             following=f"{self._text(method.following_error)}, method.following_error",
-            side=ends[0],
-            end=f"{place}, {ends[1]}",
-            saturated=format_quantity(table.saturation_time, "s"),
-            stuck=format_quantity(table.stuck_time, "s"),
-            reversed=format_quantity(table.reversed_time, "s"),
-            speed=format_quantity(speed, spec.unit("m/s"), 4),
         )
 
     def _late(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from detent.axisfile.motion import unit_in
-from detent.axisfile.protection import ProtectionTable
+from detent.axisfile.protection import ProtectionTable, breaking_effort
 from detent.axisfile.tables import AxisSpec, AxisTable, MotorTable
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
@@ -371,4 +371,13 @@ def fill_derived(spec: CascadeSpec) -> CascadeSpec:
     }
     stated = {name: value for name, value in derived.items() if math.isnan(getattr(method, name))}
     tables = {"mechanics": mechanics.model_copy(update=filled), "method": method.model_copy(update=stated)}
-    return spec.model_copy(update=tables)
+    return _fill_protection(spec.model_copy(update=tables))
+
+
+def _fill_protection(spec: CascadeSpec) -> CascadeSpec:
+    """What breaks the axis loose takes its weight, too."""
+    if not math.isnan(spec.protection.stuck_effort):
+        return spec
+    holding = spec.static_friction + abs(spec.mechanics.weight) + spec.mechanics.pendulum
+    share = breaking_effort(holding, spec.largest_effort)
+    return spec.model_copy(update={"protection": spec.protection.model_copy(update={"stuck_effort": share})})

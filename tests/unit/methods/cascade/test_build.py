@@ -113,17 +113,26 @@ CHANGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "disturbance.push.at": ("60 ms", PUSH),
     "disturbance.push.duration": ("0.1 s", PUSH),
 }
-# Keys of a rotary axis, and of the plan, of the host that runs it or of what is said about it.
+# Keys of a rotary axis, of what is said about it, and of the host that runs it.
 ROTARY = {"axis.motion", "mechanics.pendulum"}
 SAID = {"axis.name", "axis.method", "motor.max_current"}
-HOST = {
-    "limits.travel",
-    "limits.lowest",
-    "method.in_position",
-    "method.in_position_time",
-    "method.timeout",
-    "method.following_error",
+HOST = {"method.timeout"}
+
+GUARDED = {
+    "limits.travel": "0.4 m",
+    "limits.lowest": "-1 mm",
+    "method.in_position": "60 um",
+    "method.in_position_time": "20 ms",
+    "method.following_error": "1 mm",
+    "protection.overspeed": "1.5",
+    "protection.jump": "3",
+    "protection.saturation_time": "0.5 s",
+    "protection.travel": "false",
+    "protection.stuck_time": "80 ms",
+    "protection.reversed_time": "40 ms",
+    "protection.stuck_effort": "0.8",
 }
+"""What the guard of the controller is made of."""
 
 
 def load(name, *overrides):
@@ -169,8 +178,23 @@ def test_a_key_changes_the_run(key):
 
 def test_every_key_is_tried():
     keys = {row.key for row in reference_rows("cascade")}
-    assert set(CHANGES) | ROTARY | SAID | HOST == keys
-    assert len(CHANGES) + len(ROTARY | SAID | HOST) == len(keys)
+    assert set(CHANGES) | set(GUARDED) | ROTARY | SAID | HOST == keys
+    assert len(CHANGES) + len(GUARDED) + len(ROTARY | SAID | HOST) == len(keys)
+
+
+@pytest.mark.parametrize("key", GUARDED)
+def test_a_key_changes_the_guard(key):
+    p, other = (build_cascade(load("cascade", *change)).controller for change in ((), (f"{key}={GUARDED[key]}",)))
+    changed = p.diff(other)
+    assert changed
+    assert all(path.startswith(("guard.", "limits.")) for path in changed)
+
+
+def test_an_encoder_without_counts_is_not_looked_after():
+    p = build_cascade(load("cascade", "encoder.resolution=0 m")).controller.guard
+    assert (p.speed, p.jump, p.stuck, p.reversed) == (0, 0, 0, 0)
+    assert p.following == p.travel == 1
+    assert p.saturated > 0
 
 
 def test_a_pendulum_pulls_a_rotary_axis_down():
