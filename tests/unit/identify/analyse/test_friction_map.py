@@ -122,7 +122,7 @@ def test_wrong_input_is_an_error():
         map_friction(log, mass=-1.0)
     with pytest.raises(DetentError, match="came 0 bins"):
         map_friction(log, bins=0)
-    with pytest.raises(DetentError, match="allowed: force"):
+    with pytest.raises(DetentError, match="allowed: voltage that drives the axis"):
         map_friction(log, "voltage")
 
 
