@@ -162,13 +162,13 @@ def refused(signals, effort=None, t=T) -> str:
 def test_what_cannot_be_identified_is_said_with_what_to_do():
     text = refused({"force": FORCE})
     assert "signals force" in text
-    assert "a measured position" in text
-    assert "do: name its column: position=COLUMN [UNIT]" in text
+    assert "a recording with position" in text
+    assert "do: name the column: position=COLUMN [UNIT]" in text
     text = refused({"position": POSITION, "reference": POSITION})
     assert "force, torque, current, voltage, command" in text
-    assert "do: name its column, such as force=COLUMN [N]" in text
+    assert "do: name its column: force=COLUMN [UNIT]" in text
     text = refused({"position": POSITION, "force": FORCE}, "voltage")
-    assert "a column for voltage" in text
-    assert "do: name it: voltage=COLUMN" in text
+    assert "allowed: voltage that drives the axis" in text
+    assert "do: name its column: voltage=COLUMN [UNIT]" in text
     text = refused({"position": POSITION[:19], "force": FORCE[:19]}, t=T[:19])
     assert "came 19 samples; allowed: 20 or more; do: record a longer run" in text
