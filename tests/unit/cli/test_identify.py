@@ -180,7 +180,7 @@ def test_a_log_that_is_none_is_status_2(name: str, content: bytes | None, words:
         (("--column", "strength=force"), "strength"),
         (("--column", "force=force [mm]"), "mm"),
         (("--map", "absent.toml"), "no such file"),
-        (("--effort", "current"), "a column for current"),
+        (("--effort", "current"), "current that drives the axis"),
         (("--effort", "rubbish"), "rubbish"),
         (("--method", "guess"), "regression or output-error"),
         (("--axis", "absent.toml"), "no such file"),
