@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from detent.control.step_comparison import CONSTANT_FREQUENCY
-from detent.control.step_rule import FAULT, REST, acknowledge, deflect, start_move
-from detent.kernel.loop import advance
+from detent.control.step_rule import FAULT, REST, STEP, acknowledge, deflect, start_move
+from detent.kernel.loop import advance, ticks
 from detent.kernel.registers import Leaf
-from detent.methods.stepper_envelope.compared import ComparedParams, compared_alone, take_over
+from detent.kernel.step import hot_step
+from detent.methods.stepper_envelope.compared import Compared, ComparedParams, step_compared, take_over
 from detent.methods.stepper_envelope.controller import NOWHERE, call_at, load_rule
 from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone, switch_on, tables
 from detent.planning.pull_out import FirstOrderPullOut
@@ -64,6 +65,20 @@ def rotor_params(
     )
     fill_curve(p, motor.pull_out, top)
     return p
+
+
+class ComparedAloneParams(ComparedParams):
+    """A compared method without the rotor: a tick is a step."""
+
+
+@ticks(ComparedAloneParams)
+@hot_step
+def tick_compared_alone(p: ComparedAloneParams, r: Compared) -> bool:
+    """One step; none while the motor rests, or has raised an event."""
+    if r.controller.rule.event or step_compared(p, r) != STEP:
+        return False
+    r.tick += 1
+    return True
 
 
 @dataclass
@@ -158,7 +173,7 @@ class Rig:
     @property
     def alone(self) -> Any:
         """Parameters for running without the rotor."""
-        return compared_alone(self.p) if isinstance(self.p, ComparedParams) else alone(self.p)
+        return ComparedAloneParams.from_buffer(self.p) if isinstance(self.p, ComparedParams) else alone(self.p)
 
     @property
     def resting(self) -> bool:
@@ -316,3 +331,10 @@ def heavier(load: StepperLoad, **changes: float) -> StepperLoad:
 def envelope(steps: int, zones: Sequence[Zone] = (), ramp: StepRamp = RAMP, max_hz: float = MAX_HZ) -> StepEnvelope:
     """Table upwards between the ends of the travel."""
     return StepEnvelope(ramp, ZoneMap(steps, max_hz, zones))
+
+
+def turn_envelopes(
+    ramp: StepRamp, zones: ZoneMap, start: int, turn: int, stop: int
+) -> tuple[StepEnvelope, StepEnvelope]:
+    """Both tables of a run from `start` up to `turn` and down to `stop`, with the same zones in both directions."""
+    return StepEnvelope(ramp, zones, 1, start, turn), StepEnvelope(ramp, zones, -1, turn, stop)

@@ -8,7 +8,6 @@ import ast
 import inspect
 import math
 import textwrap
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -29,15 +28,20 @@ from tests.stepper_rig import (
     default_ramp,
     envelope,
     heavier,
+    turn_envelopes,
 )
 
+from detent import example
 from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
 from detent.control.step_timer import reload_values
 from detent.kernel.loop import advance
-from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory, turn_envelopes
-from detent.planning.step_ramp import start_frequency, total_inertia, travel_per_step
+from detent.methods.load import load_spec
+from detent.methods.stepper_envelope.build import stepper_motor
+from detent.methods.stepper_envelope.torque_checks import changed
+from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory
+from detent.planning.step_ramp import start_frequency, total_inertia
 
 TOP = len(RAMP) - 1
 L = len(RAMP)
@@ -707,9 +711,9 @@ def test_29_cost_and_memory_grow_with_the_motors(plain_rule, motors):
 
 @pytest.mark.parametrize(("steps_per_turn", "travel"), [(200, 5.0e-6), (96, 10.417e-6), (360, 2.778e-6)])
 def test_30_geometry(steps_per_turn, travel):
-    motor = replace(MOTOR, steps_per_turn=steps_per_turn)
-    assert travel_per_step(motor, LOAD) == pytest.approx(travel, abs=0.0005e-6)
-    assert math.degrees(motor.step_angle) == pytest.approx(360 / steps_per_turn)
+    table = changed(load_spec(example("zoom.toml"), ()).stepper["group_a"], "motor.steps_per_turn", steps_per_turn)
+    assert table.step == pytest.approx(travel, abs=0.0005e-6)
+    assert math.degrees(stepper_motor(table).step_angle) == pytest.approx(360 / steps_per_turn)
     if steps_per_turn == 200:
         assert MAX_HZ * travel == pytest.approx(20e-3)
         steps = round(40e-3 / travel)

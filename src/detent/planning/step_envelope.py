@@ -206,13 +206,6 @@ class StepEnvelope:
         return hz
 
 
-def turn_envelopes(
-    ramp: StepRamp, zones: ZoneMap, start: int, turn: int, stop: int
-) -> tuple[StepEnvelope, StepEnvelope]:
-    """Both tables of a run from `start` up to `turn` and down to `stop`, with the same zones in both directions."""
-    return StepEnvelope(ramp, zones, 1, start, turn), StepEnvelope(ramp, zones, -1, turn, stop)
-
-
 @dataclass(frozen=True, slots=True)
 class EnvelopeMemory:
     """What a method keeps in memory [byte]."""

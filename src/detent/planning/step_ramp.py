@@ -73,11 +73,6 @@ def total_inertia(motor: StepperMotor, load: StepperLoad) -> float:
     return motor.rotor_inertia + load.inertia
 
 
-def travel_per_step(motor: StepperMotor, load: StepperLoad) -> float:
-    """Travel of the moved mass per step [m]."""
-    return load.pitch / motor.steps_per_turn
-
-
 def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1) -> float:
     """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
     if not safety >= 1:

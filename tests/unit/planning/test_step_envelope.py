@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from tests.stepper_rig import turn_envelopes
 
 from detent.planning.step_envelope import (
     INDEX_BITS,
@@ -10,7 +11,6 @@ from detent.planning.step_envelope import (
     Zone,
     ZoneMap,
     envelope_memory,
-    turn_envelopes,
 )
 from detent.planning.step_ramp import StepRamp
 

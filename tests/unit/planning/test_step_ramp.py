@@ -14,7 +14,6 @@ from detent.planning.step_ramp import (
     natural_frequency,
     start_frequency,
     total_inertia,
-    travel_per_step,
 )
 
 
@@ -75,10 +74,6 @@ def test_index_of_a_frequency():
     assert ramp.index_of(1000.0) == ramp.index_of(9999.0) == len(ramp) - 1
     assert ramp.words().dtype == np.uint16
     assert np.abs(ramp.words() - ramp.hz).max() <= 0.5
-
-
-def test_travel_per_step():
-    assert travel_per_step(MOTOR, LOAD) == pytest.approx(5e-6)
 
 
 @pytest.mark.parametrize(("start", "top"), [(0, 100), (200, 100), (100, 65536), (math.nan, 100), (100, math.inf)])

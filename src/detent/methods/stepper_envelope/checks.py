@@ -12,7 +12,7 @@ from detent.axisfile.catalogue import STEPPER_MOTORS
 from detent.files.fields import unit_of
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, put
-from detent.methods.stepper_envelope.build import instant, pull_out, stepper_load
+from detent.methods.stepper_envelope.build import DAMPING, instant, pull_out, stepper_load
 from detent.methods.stepper_envelope.derive import MotorFigures
 from detent.methods.stepper_envelope.place_checks import MOST_STEPS, PLACE_RULES, ZONE_RULES
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
@@ -302,7 +302,7 @@ def _current(m: MotorFigures, key: str) -> Iterator[Caution]:
             f"add rated_current in [{key}.motor], or remove drive.current",
         )
         return
-    needed = drive.current * (m.resistance or 0.0)
+    needed = drive.current * ((m.table.motor.resistance or 0.0) + drive.bridge_resistance)
     if drive.current > rated * (1 + BARELY):
         yield Caution(
             "drive.current",
@@ -354,8 +354,9 @@ def _is_stated(m: MotorFigures, name: str) -> bool:
 
 def _settling_time(m: MotorFigures) -> float:
     """Time of a swing of the rotor, and of the decay of a swing of one step to the tolerance [s]."""
-    decay = max(0.0, -math.log(m.spec.controller.tolerance)) / (m.damping * 2 * math.pi * m.natural_hz)
-    return 1 / (m.natural_hz * math.sqrt(1 - m.damping**2)) + decay
+    damping = DAMPING / 2  # the ratio of that swing (7.2)
+    decay = max(0.0, -math.log(m.spec.controller.tolerance)) / (damping * 2 * math.pi * m.natural_hz)
+    return 1 / (m.natural_hz * math.sqrt(1 - damping**2)) + decay
 
 
 def _settling(m: MotorFigures) -> Iterator[Caution]:

@@ -4,7 +4,6 @@ It keeps to the registers of the envelope's control unit and timer (`control.ste
 """
 
 from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
-from detent.control.step_rule import STEP
 from detent.kernel.loop import ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step, step
@@ -28,14 +27,10 @@ class ComparedParams(Registers):
     comparison: ComparisonParams = block("method that drives")
 
 
-class ComparedAloneParams(ComparedParams):
-    """The same for a controller without its plant: a tick is a step."""
-
-
 class Compared(Registers):
     """State of the motor and of the method; the former lies as in `Stepper`."""
 
-    tick: i8 = register("time steps of the rotor since power-on; steps where it runs without the rotor", unit="tick")
+    tick: i8 = register("time steps of the rotor since power-on", unit="tick")
     controller: StepperController = block("control unit and timer")
     lines: StepperLines = block("wires between controller and plant")
     plant: StepperPlant = block("motor and load")
@@ -69,21 +64,6 @@ def tick_compared(p: ComparedParams, r: Compared) -> bool:
     move(p.plant, r.tick, r.lines, r.plant)
     r.tick += 1
     return True
-
-
-@ticks(ComparedAloneParams)
-@hot_step
-def tick_compared_alone(p: ComparedAloneParams, r: Compared) -> bool:
-    """One step; none while the motor rests, or has raised an event."""
-    if r.controller.rule.event or step_compared(p, r) != STEP:
-        return False
-    r.tick += 1
-    return True
-
-
-def compared_alone(p: ComparedParams) -> ComparedAloneParams:
-    """The same parameters, in the same memory, for running without the rotor."""
-    return ComparedAloneParams.from_buffer(p)
 
 
 def take_over(  # noqa: PLR0913 - a run of the methods, which know no table

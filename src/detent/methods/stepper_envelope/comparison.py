@@ -16,6 +16,7 @@ from detent.control.step_rule import start_move
 from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import stated
+from detent.methods.stepper_envelope.torque_checks import changed
 from detent.page.figure import Figure
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, duration, milliseconds, number
@@ -31,31 +32,16 @@ WAYS = (100, 500, 2000, 8000)
 SETTLING = 0.05
 """Time that a rotor is given to come to rest before its lost steps are counted (7.2) [s]."""
 
-ENVELOPE = "envelope"
+A, B = "A: braking distance per step", "B: speed per step"
+
 METHODS = {
-    ENVELOPE: 0,
-    "A: braking distance per step": BRAKING_DISTANCE,
-    "B: speed per step": PERMISSIBLE_FREQUENCY,
-    "start frequency": CONSTANT_FREQUENCY,
-    "largest frequency": CONSTANT_FREQUENCY,
+    "envelope": (0, "envelope (this method)", "1 table read, 1 comparison, at most 1 increment"),
+    A: (BRAKING_DISTANCE, A, "1 or 2 square roots, 1 or 2 divisions"),
+    B: (PERMISSIBLE_FREQUENCY, B, "1 square root, 1 multiplication"),
+    "start frequency": (CONSTANT_FREQUENCY, "constant start frequency", "nothing"),
+    "largest frequency": (CONSTANT_FREQUENCY, "constant largest frequency", "nothing"),
 }
-"""What is compared, and how the control unit names it."""
-
-METHOD_NAMES = {
-    ENVELOPE: "envelope (this method)",
-    "start frequency": "constant start frequency",
-    "largest frequency": "constant largest frequency",
-}
-"""Names of compared methods in full; the others carry theirs."""
-
-METHOD_COSTS = {
-    ENVELOPE: "1 table read, 1 comparison, at most 1 increment",
-    "A: braking distance per step": "1 or 2 square roots, 1 or 2 divisions",
-    "B: speed per step": "1 square root, 1 multiplication",
-    "start frequency": "nothing",
-    "largest frequency": "nothing",
-}
-"""What the control unit works out before every step, compared methods as in stepper-envelope specification 3.7."""
+"""What is compared: its code (`control.step_comparison`), its name in full, what it works out before every step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +91,8 @@ class StepComparison:
             cells = [
                 format_quantity(one.seconds, "s") + (f", {abs(one.lost)} lost" if one.lost else "") for one in courses
             ]
-            rows.append((METHOD_NAMES.get(method, method), *cells, METHOD_COSTS.get(method, "")))
+            _, name, cost = METHODS[method]
+            rows.append((name, *cells, cost))
         return TextTable(title, heads, rows)
 
     def figures(self) -> tuple[Figure, ...]:
@@ -129,14 +116,11 @@ class StepComparison:
 def _bars(found: StepComparison) -> Table:
     heads = [(f"{count(way, 'step')}, {stated(way * found.step * 1e3)}{GAP}mm", True) for way in found.ways]
     longest = np.max([found.seconds(k) for k in range(len(found.methods))], axis=0)
-    rows = [
-        [
-            Markup("<b>{}</b>").format(METHOD_NAMES.get(method, method)),
-            *(_course_cell(course, float(most)) for course, most in zip(courses, longest, strict=True)),
-            METHOD_COSTS.get(method, ""),
-        ]
-        for method, courses in zip(found.methods, found.courses, strict=True)
-    ]
+    rows: list[list[str | Cell]] = []
+    for method, courses in zip(found.methods, found.courses, strict=True):
+        _, name, cost = METHODS[method]
+        cells = (_course_cell(course, float(most)) for course, most in zip(courses, longest, strict=True))
+        rows.append([Markup("<b>{}</b>").format(name), *cells, cost])
     return Table(heads=[("", False), *heads, ("worked out before every step", False)], rows=rows)
 
 
@@ -155,8 +139,6 @@ def time_text(seconds: float) -> str:
 
 def _worth(found: StepComparison) -> str:
     """What the envelope saves over the start frequency on the longest way."""
-    if "start frequency" not in found.methods:
-        return ""
     constant = found.courses[found.methods.index("start frequency")][-1].seconds
     times = number(constant / found.courses[0][-1].seconds, 2)
     return f"On the longest way it is {times} times as quick as the constant start frequency. "
@@ -168,7 +150,7 @@ def _losers(found: StepComparison) -> str:
         method: max(abs(course.lost) for course in courses)
         for method, courses in zip(found.methods, found.courses, strict=True)
     }
-    recomputed = [method[:1] for method in lost if method[:2] in {"A:", "B:"} and lost[method]]
+    recomputed = [method[:1] for method in (A, B) if lost[method]]
     text = ""
     if recomputed:
         jump = "jump" if len(recomputed) > 1 else "jumps"
@@ -176,7 +158,7 @@ def _losers(found: StepComparison) -> str:
             f"{' and '.join(recomputed)} {jump} from one speed to the other where a zone begins or torque falls, which "
             "the rotor cannot follow: steps are lost. "
         )
-    if lost.get("largest frequency"):
+    if lost["largest frequency"]:
         text += "The largest frequency from rest is quicker on paper only: the rotor is left behind."
     return text
 
@@ -190,16 +172,16 @@ def _compare_motor(spec: StepperEnvelopeSpec, name: str, progress: Progress | No
     table = spec.stepper[name]
     ways = tuple(way for way in WAYS if way <= table.steps) or (table.steps,)
     rows: list[tuple[Course, ...]] = []
-    for done, (method, code) in enumerate(METHODS.items()):
+    for done, method in enumerate(METHODS):
         if progress is not None:
             progress(done / len(METHODS), f"motor {name}: {method}")
-        rows.append(tuple(_course(spec, name, method, code, way) for way in ways))
+        rows.append(tuple(_course(spec, name, method, way) for way in ways))
     return StepComparison(name, table.step, ways, tuple(METHODS), tuple(rows))
 
 
-def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: int) -> Course:
+def _course(spec: StepperEnvelopeSpec, name: str, method: str, way: int) -> Course:
     """One motor with one method over one way, on its rotor."""
-    motor = motor_at_start(spec, name, way)
+    motor, (code, *_) = motor_at_start(spec, name, way), METHODS[method]
     if code:
         start_hz = motor.table.max_hz if method == "largest frequency" else float(motor.tables.ramp.hz[0])
         motor.compare(code, range(way), start_hz)
@@ -212,9 +194,8 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, code: int, way: i
 
 def motor_at_start(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor:
     """The motor at its lower end, with its tables set for a run of `way` steps."""
-    lower = spec.stepper[name].mechanics.lower_end
-    mechanics = spec.stepper[name].mechanics.model_copy(update={"start_position": lower})
-    table = spec.stepper[name].model_copy(update={"mechanics": mechanics})
+    table = spec.stepper[name]
+    table = changed(table, "mechanics.start_position", table.mechanics.lower_end)
     motor = StageMotor(spec.model_copy(update={"stepper": spec.stepper | {name: table}}), name)
     motor.tables.up.move_start(0)
     motor.tables.up.move_stop(way)

@@ -11,9 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.files.findings import Derived, quantity_figure
+from detent.files.findings import Derived
 from detent.methods.stepper_envelope.build import (
-    DAMPING,
     make_step_ramp,
     start_hz,
     stepper_load,
@@ -30,6 +29,9 @@ HIGHEST_HZ = 1e6
 
 PLACES = 1000
 """Places of that range at which a curve is looked at first, evenly on a logarithmic scale."""
+
+Row = tuple[str, float | None, str, str, str]
+"""Name, value, unit, text and formula of a figure; no value where there is none, no text where it is the quantity."""
 
 PULL_OUT_FORMULA = {
     "winding": "from winding, current and supply",
@@ -54,11 +56,6 @@ class MotorFigures:
     def natural_hz(self) -> float:
         """Frequency at which the loaded rotor swings about its step [Hz]."""
         return natural_frequency(self.motor.steps_per_turn, self.motor.holding_torque, self.inertia)
-
-    @property
-    def damping(self) -> float:
-        """Damping ratio of that swing (7.2)."""
-        return DAMPING / 2
 
     def torque_left(self, hz: float) -> float:
         """Torque that is left to accelerate with at a frequency [N m]."""
@@ -99,16 +96,6 @@ class MotorFigures:
         return float(share[worst]), float(following[worst])
 
     @property
-    def rest_error(self) -> float:
-        """Distance from its step at which friction can hold a resting rotor [step]."""
-        return math.asin(min(self.load.friction_torque / self.motor.holding_torque, 1.0)) * 2 / math.pi
-
-    @property
-    def braking_steps(self) -> int:
-        """Steps to come down from the largest frequency."""
-        return len(self.ramp) - 1
-
-    @property
     def shortest_way(self) -> int:
         """Steps of the shortest move that reaches the largest frequency."""
         return 2 * len(self.ramp) - 1
@@ -123,34 +110,11 @@ class MotorFigures:
         hz = np.minimum(self.ramp.hz[entries & INDEX_MASK], np.array(zones.limits)[entries >> INDEX_BITS])
         return float(np.sum(many[entries] / hz))
 
-    @property
-    def constant_time(self) -> float:
-        """Time for the same way at the start frequency [s]."""
-        return self.table.steps / self.start_hz
-
     def rounding(self, clock: float, words: str) -> float:
         """Largest relative error of the ramp's frequencies, stored as `words` and made by a timer's clock [Hz]."""
         stored = self.ramp.hz if words == "reload" else np.rint(self.ramp.hz)
         made = clock / np.rint(clock / stored)
         return float(np.max(np.abs(made / self.ramp.hz - 1)))
-
-    @property
-    def resistance(self) -> float | None:
-        """Winding and switches, per phase [ohm]; None where the winding is not known."""
-        own = self.table.motor.resistance
-        return None if own is None else own + self.table.drive.bridge_resistance
-
-    @property
-    def rise_time(self) -> float | None:
-        """Time constant of the current [s]; None where the winding is not known."""
-        inductance = self.table.motor.inductance
-        return None if self.resistance is None or inductance is None else inductance / self.resistance
-
-    @property
-    def dissipation(self) -> float | None:
-        """Heat of both windings at rest [W]; None where it is not known."""
-        own, current = self.table.motor.resistance, self.table.drive.current
-        return None if own is None or current is None else 2 * own * current**2
 
 
 def first_crossing(function: Callable[[float], float], low: float) -> float | None:
@@ -168,97 +132,81 @@ def first_crossing(function: Callable[[float], float], low: float) -> float | No
 
 def derive(spec: StepperEnvelopeSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, motor by motor, in the order they are read."""
-    return tuple(figure for name in spec.stepper for figure in _of_motor(MotorFigures(spec, name)))
+    return tuple(
+        Derived(f"{m.name}: {figure}", value, unit, text or format_quantity(value, unit), formula)
+        for m in (MotorFigures(spec, name) for name in spec.stepper)
+        for part in (_steps, _rotor, _torque, _ramp, _words)
+        for figure, value, unit, text, formula in part(m)
+        if value is not None
+    )
 
 
-def _of_motor(m: MotorFigures) -> Iterator[Derived]:
-    for part in (_steps, _rotor, _torque, _ramp, _times, _words, _winding):
-        for figure in part(m):
-            yield Derived(f"{m.name}: {figure.name}", figure.value, figure.unit, figure.text, figure.formula)
-
-
-def _steps(m: MotorFigures) -> Iterator[Derived]:
+def _steps(m: MotorFigures) -> Iterator[Row]:
     """What a step is, and how many there are."""
     table = m.table
-    yield quantity_figure("step", table.step, "m", "travel per revolution / steps per turn")
-    yield quantity_figure("step angle", m.motor.step_angle, "rad", "1 turn / steps per turn")
     whole = table.steps * table.step
-    text = f"{table.steps} steps"
-    if table.limits.travel - whole > 1e-6 * table.step:
-        text += f", {format_quantity(whole, 'm', 7)}"
-    yield Derived("travel", table.steps, "count", text, "limits.travel / step, rounded down")
+    rest = f", {format_quantity(whole, 'm', 7)}" if table.limits.travel - whole > 1e-6 * table.step else ""
     hz = f"{format_quantity(m.max_hz, 'Hz')}, {m.max_hz / m.motor.steps_per_turn * 60:.4g} rpm"
-    yield Derived("largest frequency f_max", m.max_hz, "Hz", hz, "limits.speed / step")
+    yield "step", table.step, "m", "", "travel per revolution / steps per turn"
+    yield "step angle", m.motor.step_angle, "rad", "", "1 turn / steps per turn"
+    yield "travel", table.steps, "count", f"{table.steps} steps{rest}", "limits.travel / step, rounded down"
+    yield "largest frequency f_max", m.max_hz, "Hz", hz, "limits.speed / step"
 
 
-def _rotor(m: MotorFigures) -> Iterator[Derived]:
+def _rotor(m: MotorFigures) -> Iterator[Row]:
     """How the rotor with its load swings and starts."""
-    ratio = m.load.inertia / m.motor.rotor_inertia
-    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {ratio:.3g} x rotor"
-    yield Derived("inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2")
-    formula = "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
-    yield quantity_figure("natural frequency", m.natural_hz, "Hz", formula)
+    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.load.inertia / m.motor.rotor_inertia:.3g} x rotor"
+    yield "inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2"
+    yield "natural frequency", m.natural_hz, "Hz", "", "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
     speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.natural_hz
     text = f"{format_quantity(m.start_hz, 'Hz')} ({speed}), {relative:.3g} x natural"
     formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
-    yield Derived("start frequency", m.start_hz, "Hz", text, formula)
-    text = f"{m.rest_error:.3g} steps, {format_quantity(m.rest_error * m.table.step, 'm')}"
-    yield Derived("error at rest", m.rest_error, "count", text, "asin(friction / holding torque) / 90 deg, at most")
+    yield "start frequency", m.start_hz, "Hz", text, formula
+    # The distance from its step at which friction can hold a resting rotor.
+    error = math.asin(min(m.load.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
+    text = f"{error:.3g} steps, {format_quantity(error * m.table.step, 'm')}"
+    yield "error at rest", error, "count", text, "asin(friction / holding torque) / 90 deg, at most"
 
 
-def _torque(m: MotorFigures) -> Iterator[Derived]:
+def _torque(m: MotorFigures) -> Iterator[Row]:
     """Where the torque goes (3.1)."""
-    way = PULL_OUT_FORMULA[m.table.motor.pull_out]
-    yield quantity_figure("pull-out torque at standstill", m.motor.pull_out(0.0), "N*m", way)
-    yield quantity_figure("pull-out torque at f_max", m.motor.pull_out(m.max_hz), "N*m", way)
-    yield quantity_figure("torque left at f_max", m.torque_left(m.max_hz), "N*m", "T_po(f_max) / SF - friction")
-    if m.linear_end is not None:
-        formula = "T_po(f) / SF - friction = J x step angle x a_lin"
-        yield quantity_figure("end of the linear ramp", m.linear_end, "Hz", formula)
-    if m.torque_end is not None:
-        yield quantity_figure("end of the torque", m.torque_end, "Hz", "T_po(f) / SF = friction")
-    share, hz = m.torque_used
-    formula = "(friction + 2 J x step angle x a) / holding torque at f: the zones may double a step of the ramp"
-    yield Derived("torque used", share, "", f"{share:.2f} of it, at {format_quantity(hz, 'Hz')}", formula)
+    way, (share, hz) = PULL_OUT_FORMULA[m.table.motor.pull_out], m.torque_used
+    used = "(friction + 2 J x step angle x a) / holding torque at f: the zones may double a step of the ramp"
+    yield "pull-out torque at standstill", m.motor.pull_out(0.0), "N*m", "", way
+    yield "pull-out torque at f_max", m.motor.pull_out(m.max_hz), "N*m", "", way
+    yield "torque left at f_max", m.torque_left(m.max_hz), "N*m", "", "T_po(f_max) / SF - friction"
+    yield "end of the linear ramp", m.linear_end, "Hz", "", "T_po(f) / SF - friction = J x step angle x a_lin"
+    yield "end of the torque", m.torque_end, "Hz", "", "T_po(f) / SF = friction"
+    yield "torque used", share, "", f"{share:.2f} of it, at {format_quantity(hz, 'Hz')}", used
 
 
-def _ramp(m: MotorFigures) -> Iterator[Derived]:
-    """The ramp list and the ways it needs."""
-    step, down, way = m.table.step, m.braking_steps, m.shortest_way
-    text = f"{len(m.ramp)} entries, {format_quantity(m.ramp.duration, 's')}"
-    yield Derived("ramp", len(m.ramp), "count", text, "f^2 grows by 2 a(f) per step (3.1)")
-    text = f"{down} steps, {format_quantity(down * step, 'm')}"
-    yield Derived("braking distance from f_max", down, "count", text, "entries of the ramp - 1")
-    text = f"{way} steps, {format_quantity(way * step, 'm')}"
-    yield Derived("shortest way that reaches f_max", way, "count", text, "2 x entries of the ramp - 1")
+def _ramp(m: MotorFigures) -> Iterator[Row]:
+    """The ramp list, the ways it needs, and the whole travel."""
+    entries, way, fast = len(m.ramp), m.shortest_way, m.travel_time
+    text = f"{entries} entries, {format_quantity(m.ramp.duration, 's')}"
+    yield "ramp", entries, "count", text, "f^2 grows by 2 a(f) per step (3.1)"
+    text = f"{entries - 1} steps, {format_quantity((entries - 1) * m.table.step, 'm')}"
+    yield "braking distance from f_max", entries - 1, "count", text, "entries of the ramp - 1"
+    text = f"{way} steps, {format_quantity(way * m.table.step, 'm')}"
+    yield "shortest way that reaches f_max", way, "count", text, "2 x entries of the ramp - 1"
+    times = m.table.steps / m.start_hz / fast
+    text = f"{format_quantity(fast, 's')}, {times:.3g} x as fast as at the start frequency"
+    yield "time for the whole travel", fast, "s", text, "sum of the periods of all steps, zones included"
 
 
-def _times(m: MotorFigures) -> Iterator[Derived]:
-    """The whole travel."""
-    slow, fast = m.constant_time, m.travel_time
-    text = f"{format_quantity(fast, 's')}, {slow / fast:.3g} x as fast as at the start frequency"
-    yield Derived("time for the whole travel", fast, "s", text, "sum of the periods of all steps, zones included")
-
-
-def _words(m: MotorFigures) -> Iterator[Derived]:
-    """Memory and rounding."""
-    memory = envelope_memory(m.ramp, zone_maps(m.table)[0])
-    text = f"{memory.tables} bytes"
-    if memory.compact:
-        text += f" (as 8-bit indices {2 * memory.compact})"
-    formula = "2 bytes per step and direction; extremes and zones of the comparison methods take "
-    yield Derived("memory of the tables", memory.tables, "byte", text, f"{formula}{memory.conventional}")
-    yield Derived("memory of the ramp", memory.ramp, "byte", f"{memory.ramp} bytes", "2 bytes per entry")
-    controller = m.spec.controller
-    error = m.rounding(controller.timer, controller.words)
+def _words(m: MotorFigures) -> Iterator[Row]:
+    """Memory, rounding, and the winding where it is known."""
+    memory, controller, table = envelope_memory(m.ramp, zone_maps(m.table)[0]), m.spec.controller, m.table
+    compact = f" (as 8-bit indices {2 * memory.compact})" if memory.compact else ""
+    formula = f"2 bytes per step and direction; extremes and zones of the comparison methods take {memory.conventional}"
+    yield "memory of the tables", memory.tables, "byte", f"{memory.tables} bytes{compact}", formula
+    yield "memory of the ramp", memory.ramp, "byte", f"{memory.ramp} bytes", "2 bytes per entry"
     formula = f"of the ramp's frequencies, as {controller.words} words at controller.timer"
-    yield quantity_figure("largest rounding error", error, "%", formula)
-
-
-def _winding(m: MotorFigures) -> Iterator[Derived]:
-    """Electrical figures, where the winding is known."""
-    if m.rise_time is not None:
-        yield quantity_figure("current rise time L / R", m.rise_time, "s", "inductance / (winding + bridge)")
-    if m.dissipation is not None:
-        text = f"{m.dissipation:.3g} W"
-        yield Derived("heat of the windings", m.dissipation, "W", text, "2 x resistance x current^2, both phases on")
+    yield "largest rounding error", m.rounding(controller.timer, controller.words), "%", "", formula
+    own, inductance, current = table.motor.resistance, table.motor.inductance, table.drive.current
+    if own is not None and inductance is not None:
+        rise = inductance / (own + table.drive.bridge_resistance)
+        yield "current rise time L / R", rise, "s", "", "inductance / (winding + bridge)"
+    if own is not None and current is not None:
+        heat = 2 * own * current**2
+        yield "heat of the windings", heat, "W", f"{heat:.3g} W", "2 x resistance x current^2, both phases on"

@@ -3,14 +3,12 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from detent.methods.stepper_envelope.run import StageMoveRecord
 from detent.methods.stepper_envelope.runs_chart import Runs, runs_chart
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.methods.stepper_envelope.stage_job import Change, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_job import StageJog, StageMove
 from detent.methods.stepper_envelope.stage_trace import (
     Leg,
     MadeSteps,
@@ -164,12 +162,9 @@ def torque_charts(torques: StepTorques) -> list[Chart]:
     available, needed = torques.available[kept] * MILLI, torques.needed[kept] * MILLI
     planned: list[list[Curve]] = [[], []]
     if torques.safety > 1:
-        look: dict[str, Any] = {
-            "label": f"planned with a reserve of {stated(torques.safety)}",
-            "colour": "left",
-            "dash": (6, 4),
-        }
-        planned = [[Curve(y=available / torques.safety, **look)], [Curve(y=np.full(len(kept), torques.safety), **look)]]
+        label = f"planned with a reserve of {stated(torques.safety)}"
+        lines = (available / torques.safety, np.full(len(kept), torques.safety))
+        planned = [[Curve(label=label, colour="left", dash=(6, 4), y=y)] for y in lines]
     torque = Panel(
         name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(torques.available * MILLI)),
         curves=[
@@ -188,12 +183,9 @@ def torque_charts(torques: StepTorques) -> list[Chart]:
             Curve(label="pull-out torque / torque needed", colour="drive", width=2, step=True, y=margin[kept]),
         ],
     )  # fmt: skip
-    sync = {"sync": "torque"}
-    label = "step of the move, counted from its start [step]"
-    return [
-        line_chart(torque, kept + 1.0, label) | sync | {"foot": False},
-        line_chart(ratio, kept + 1.0, label) | sync,
-    ]
+    label, sync = "step of the move, counted from its start [step]", {"sync": "torque"}
+    above, below = (line_chart(panel, kept + 1.0, label) | sync for panel in (torque, ratio))
+    return [above | {"foot": False}, below]
 
 
 def _top(values: Numbers) -> float:
@@ -276,22 +268,23 @@ def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
 def motion_events(shown: ShownMotion) -> list[Event]:
     """What happened in the move, in order of time since the start signal."""
     asked, motion, legs = shown.asked, shown.motion, shown.legs
-    begin = motion.move.begin
+    begin, change = motion.move.begin, None if isinstance(asked, StageJog) else asked.change
     events = [Event(0.0, _start_text(asked, motion.name)), Event(motion.seconds, "the last step is over")]
     if isinstance(asked, StageJog):
         events.append(Event(asked.duration, "the joystick is let go"))
-    elif asked.change is not None:
-        events += _change_events(shown.table, asked.change, motion.move, legs)
-    events += [
-        Event(float(leg.made.t[0]) - begin, f"turns, {'up' if leg.direction > 0 else 'down'} from here")
-        for leg in legs[1:]
-    ]
+    if change is not None:
+        made, way = legs[0].made, legs[0].direction
+        text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
+        passed = np.flatnonzero((made.position - shown.table.step_at(change.at)) * way >= 0)
+        events += [Event(float(made.t[first]) - begin, text) for first in passed[:1]]
+    for leg in legs[1:]:
+        text = f"turns, {'up' if leg.direction > 0 else 'down'} from here"
+        events.append(Event(float(leg.made.t[0]) - begin, text))
     settled, tolerance = motion.motor.settled, shown.spec.controller.tolerance
     if abs(motion.motor.rest_lag) <= tolerance and settled > begin:
         events.append(Event(settled - begin, f"the rotor is within ±{stated(tolerance)} steps of its place for good"))
     done = "the time to settle is over: the host takes the move for done"
-    events.append(Event(motion.move.ready - begin, done))
-    return sorted(events, key=lambda event: event.t)
+    return sorted([*events, Event(motion.move.ready - begin, done)], key=lambda event: event.t)
 
 
 def _start_text(asked: StageMove | StageJog, name: str) -> str:
@@ -299,11 +292,3 @@ def _start_text(asked: StageMove | StageJog, name: str) -> str:
         return f"the joystick asks for {stated(asked.speed * MM)}{GAP}mm/s"
     others = [other for other in asked.motors if other != name]
     return "start signal" + (f", at the same time for {', '.join(others)}" if others else "")
-
-
-def _change_events(table: StepperTable, change: Change, move: StageMoveRecord, legs: Sequence[Leg]) -> list[Event]:
-    """When the stop was changed, if the motor came by."""
-    made = legs[0].made
-    passed = np.flatnonzero((made.position - table.step_at(change.at)) * legs[0].direction >= 0)
-    text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
-    return [Event(float(made.t[passed[0]]) - move.begin, text)] if passed.size else []

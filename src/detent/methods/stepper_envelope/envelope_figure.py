@@ -114,15 +114,14 @@ def _name_direction(area: Axes, table: StepEnvelope, colour: str) -> None:
 def _mark_extremes(area: Axes, tables: EnvelopeTables) -> None:
     """Points on the axis where a run begins, turns and ends, each named in its own half, outside of the run."""
     up, down = tables.up, tables.down
-    turns = up.stop == down.start
+    marks = [("start", up.start, (1, -1)), ("stop", down.stop, (-1, -1))]
     if up.start == down.stop:
-        _mark(area, up.start / tables.steps, f"start and stop {up.start}", (1, -1))
-    else:
-        _mark(area, up.start / tables.steps, f"start {up.start}", (1, -1))
-        _mark(area, down.stop / tables.steps, f"stop {down.stop}", (-1, -1))
-    _mark(area, up.stop / tables.steps, f"{'turn' if turns else 'stop'} {up.stop}", (1, 1))
-    if not turns:
-        _mark(area, down.start / tables.steps, f"start {down.start}", (-1, 1))
+        marks = [("start and stop", up.start, (1, -1))]
+    marks += [("stop", up.stop, (1, 1)), ("start", down.start, (-1, 1))]
+    if up.stop == down.start:
+        marks[-2:] = [("turn", up.stop, (1, 1))]
+    for name, place, towards in marks:
+        _mark(area, place / tables.steps, f"{name} {place}", towards)
 
 
 def _mark(area: Axes, place: float, text: str, towards: tuple[int, int]) -> None:
@@ -149,11 +148,4 @@ def _add_scales(area: Axes, tables: EnvelopeTables) -> None:
 
 def _line(begin: float, slope: float) -> tuple[Callable[[Numbers], Numbers], Callable[[Numbers], Numbers]]:
     """A straight line, there and back, as matplotlib wants a second scale."""
-
-    def there(values: Numbers) -> Numbers:
-        return begin + slope * np.asarray(values)
-
-    def back(values: Numbers) -> Numbers:
-        return (np.asarray(values) - begin) / slope
-
-    return there, back
+    return lambda there: begin + slope * np.asarray(there), lambda back: (np.asarray(back) - begin) / slope

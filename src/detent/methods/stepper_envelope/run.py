@@ -198,11 +198,13 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
     arrived = {name: stage.motors[name].rested for name in legs}
     stage.pass_time(stage.spec.controller.settle_time)
     ready = stage.time
-    seen = {name: _observe(host, name, leg, before[name], over=name in over) for name, leg in legs.items()}
-    for name, found in seen.items():
-        result.lost[name] += found["lost"]
+    motors = {
+        name: _observe(host, name, leg, before[name], arrived=arrived[name], over=name in over)
+        for name, leg in legs.items()
+    }
+    for name, motor in motors.items():
+        result.lost[name] += motor.lost
     stage.pass_time(move.dwell)
-    motors = {name: MotorMove(arrived=arrived[name], **found) for name, found in seen.items()}
     return StageMoveRecord(move.number, move.label, begin, ready, stage.time, motors)
 
 
@@ -211,26 +213,29 @@ def _counted(motor: StageMotor) -> tuple[int, int]:
     return int(motor.controller.timer.pulses), lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
 
 
-def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, over: bool) -> dict[str, Any]:
+def _observe(  # noqa: PLR0913 - what the host knows of the motion
+    host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, arrived: float, over: bool
+) -> MotorMove:
     """What a look at the rotor tells after a motion."""
     motor = host.stage.motors[name]
     plant, table = motor.r.plant, motor.table
     pulses, lost = (now - then for now, then in zip(_counted(motor), before, strict=True))
-    return {
-        "start": table.position_of(leg.start),
-        "target": host.goal[name],
-        "stop": motor.place,
-        "settled": plant.gauge.outside * host.stage.tick,
-        "steps": pulses,
-        "missed": table.step_inside(host.goal[name]) - motor.position,
-        "lost": lost,
-        "rest_lag": float(plant.rotor.lag),
-        "peak_lag": float(plant.rotor.peak_lag),
-        "peak_hz": float(plant.gauge.peak_hz),
-        "margin": _margin(motor),
-        "overrun": over,
-        "naive": pulses / start_hz(table),
-    }
+    return MotorMove(
+        start=table.position_of(leg.start),
+        target=host.goal[name],
+        stop=motor.place,
+        arrived=arrived,
+        settled=plant.gauge.outside * host.stage.tick,
+        steps=pulses,
+        missed=table.step_inside(host.goal[name]) - motor.position,
+        lost=lost,
+        rest_lag=float(plant.rotor.lag),
+        peak_lag=float(plant.rotor.peak_lag),
+        peak_hz=float(plant.gauge.peak_hz),
+        margin=_margin(motor),
+        overrun=over,
+        naive=pulses / start_hz(table),
+    )
 
 
 def _margin(motor: StageMotor) -> float:

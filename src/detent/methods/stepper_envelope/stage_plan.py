@@ -1,5 +1,6 @@
 """Tiles of a job as a drawing from above: which order, how long each took, and where the stage stood."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -227,9 +228,5 @@ def _scales(plan: TilePlan, view: _View) -> Markup:
 
 def _nice(wanted: float) -> float:
     """The largest of 1, 2 and 5 times a power of ten that is not larger than what is wanted."""
-    power = 1e-9
-    best = power
-    while power <= wanted:
-        best = max([best, *(step * power for step in NICE if step * power <= wanted)])
-        power *= 10
-    return best
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return max((step * power for step in NICE if step * power <= wanted), default=power)

@@ -41,10 +41,7 @@ class MadeSteps:
 
     def between(self, begin: float, end: float) -> "MadeSteps":
         """Steps of a stretch of time [s]."""
-        first, last = np.searchsorted(self.t, (begin, end)).tolist()
-        part = slice(first, last)
-        index = None if self.index is None else self.index[part]
-        return MadeSteps(self.t[part], self.position[part], self.direction[part], self.hz[part], index)
+        return self._rows(slice(*np.searchsorted(self.t, (begin, end)).tolist()))
 
     def legs(self) -> "list[MadeSteps]":
         """Stretches of one direction, in order of time."""
@@ -146,12 +143,12 @@ def travel_envelope(table: StepperTable) -> Envelope:
 def move_envelope(table: StepperTable, legs: Sequence[Leg]) -> Envelope:
     """Permissible frequency between the extremes of a move."""
     ramp, maps = make_tables(table).ramp, zone_maps(table)
-    first = {leg.direction: leg for leg in reversed(legs)}
-    found = [
-        StepEnvelope(ramp, zones, sign, first[sign].start, first[sign].stop) if sign in first else None
+    first = {leg.direction: (leg.start, leg.stop) for leg in reversed(legs)}
+    up, down = (
+        StepEnvelope(ramp, zones, sign, *first[sign]) if sign in first else None
         for sign, zones in zip((1, -1), maps, strict=True)
-    ]
-    return _envelope(table, *found)
+    )
+    return _envelope(table, up, down)
 
 
 def _envelope(table: StepperTable, up: StepEnvelope | None, down: StepEnvelope | None) -> Envelope:

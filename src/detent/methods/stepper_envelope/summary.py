@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
@@ -33,108 +31,50 @@ class Motion(NamedTuple):
 WorstMotion = Worst[Motion] | None
 
 
-@dataclass(frozen=True)
 class StageFigures:
     """Sums and extremes of a run, done or not; None where no motion has the figure."""
 
-    spec: StepperEnvelopeSpec
-    run: StageRun
+    def __init__(self, spec: StepperEnvelopeSpec, run: StageRun) -> None:
+        self.spec, self.run = spec, run
+        self.word = "tile" if run.job.kind == "tiles" else "move"  # what a move of this job is called
+        self.asked = run.job.count  # moves of the job
+        self.by_move: list[list[Motion]] = []  # motions of each move; none of a move in which all stay
+        self.placed = 0  # moves after which every rotor stood in its place: it had lost no step up to then
+        self._judge()
+        self.motions = [motion for motions in self.by_move for motion in motions]
+        names = {motion.name for motion in self.motions}
+        self.moved = [name for name in spec.stepper if name in names]
+        self.seconds = max(run.time_end - run.time_ready, 0.0) if run.moves else 0.0  # of the whole job
+        self.rate = f"{number(run.moves_per_second * 60)} {self.word}s per minute"  # settling and dwells included
+        # Time in which a motor ran, the same if each had run at its start frequency [s], and their ratio.
+        self.moving = self._longest(lambda motion: motion.seconds)
+        self.naive = self._longest(lambda motion: motion.motor.naive)
+        self.faster = self.naive / self.moving if self.moving > 0 else math.nan
+        self.steps = sum(motion.motor.steps for motion in self.motions)
+        self.all_lost = sum(abs(n) for n in run.lost.values())  # by all motors, of either sign
+        self.first_lost = next((motion for motion in self.motions if motion.motor.lost), None)
+        self.lag = largest(self.motions, lambda motion: motion.motor.peak_lag)  # of a rotor behind its field [step]
+        self.rest = largest(self.motions, lambda motion: abs(motion.motor.rest_lag))  # when a move was done [step]
+        self.peak_hz = largest(self.motions, lambda motion: motion.motor.peak_hz)
+        self.peak_speed = largest(self.motions, lambda motion: motion.motor.peak_hz * spec.stepper[motion.name].step)
 
-    @property
-    def word(self) -> str:
-        """What a move of this job is called."""
-        return "tile" if self.run.job.kind == "tiles" else "move"
-
-    @property
-    def asked(self) -> int:
-        """Moves of the job."""
-        return self.run.job.count
-
-    @cached_property
-    def motions(self) -> list[Motion]:
-        """Every motion of every motor, in order."""
-        return [motion for motions in self.by_move for motion in motions]
-
-    @cached_property
-    def by_move(self) -> list[list[Motion]]:
-        """Motions of each move; none of a move in which all stay."""
+    def _judge(self) -> None:
+        """Go through all moves, the steps lost up to each in mind."""
         lost = dict.fromkeys(self.spec.stepper, 0)
-        found: list[list[Motion]] = []
         for move in self.run.moves:
             for name, motor in move.motors.items():
                 lost[name] += motor.lost
-            found.append([Motion(move, name, made, lost[name] + made.missed) for name, made in move.motors.items()])
-        return found
+            motions = [Motion(move, name, made, lost[name] + made.missed) for name, made in move.motors.items()]
+            self.by_move.append(motions)
+            self.placed += not any(lost.values()) and not any(map(self.astray, motions))
 
-    @property
-    def moved(self) -> list[str]:
-        """Motors that moved, in the order of the axis file."""
-        names = {motion.name for motion in self.motions}
-        return [name for name in self.spec.stepper if name in names]
-
-    @cached_property
-    def placed(self) -> int:
-        """Moves after which every rotor stood in its place: it had lost no step up to then."""
-        lost, placed = dict.fromkeys(self.spec.stepper, 0), 0
-        for motions in self.by_move:
-            for motion in motions:
-                lost[motion.name] += motion.motor.lost
-            placed += not any(lost.values()) and not any(self.astray(motion) for motion in motions)
-        return placed
+    def _longest(self, time: Callable[[Motion], float]) -> float:
+        """Sum over the moves of the longest time of a motor [s]."""
+        return sum(max(map(time, motions), default=0.0) for motions in self.by_move)
 
     def astray(self, motion: Motion) -> bool:
         """Whether a motion of its own did not end in its place."""
         return motion.motor.missed != 0 or abs(motion.motor.rest_lag) > self.spec.controller.tolerance
-
-    @property
-    def seconds(self) -> float:
-        """From the start of the job to its end [s]."""
-        return max(self.run.time_end - self.run.time_ready, 0.0) if self.run.moves else 0.0
-
-    @property
-    def rate(self) -> str:
-        """How many moves are made in a minute, settling and dwells included."""
-        return f"{number(self.run.moves_per_second * 60)} {self.word}s per minute"
-
-    @property
-    def moving(self) -> float:
-        """Time in which a motor ran [s]."""
-        return sum(max((motion.seconds for motion in motions), default=0.0) for motions in self.by_move)
-
-    @property
-    def naive(self) -> float:
-        """The same if every motor had run at its start frequency [s]."""
-        return sum(max((motion.motor.naive for motion in motions), default=0.0) for motions in self.by_move)
-
-    @property
-    def faster(self) -> float:
-        """How many times as long the start frequency would take; NaN if nothing moved."""
-        return self.naive / self.moving if self.moving > 0 else math.nan
-
-    @property
-    def steps(self) -> int:
-        """Steps made by all motors."""
-        return sum(motion.motor.steps for motion in self.motions)
-
-    @property
-    def all_lost(self) -> int:
-        """Steps lost by all motors, of either sign."""
-        return sum(abs(n) for n in self.run.lost.values())
-
-    @property
-    def first_lost(self) -> Motion | None:
-        """The motion that lost steps first."""
-        return next((motion for motion in self.motions if motion.motor.lost), None)
-
-    @property
-    def lag(self) -> WorstMotion:
-        """Largest distance of a rotor from its field on the way [step]."""
-        return largest(self.motions, lambda motion: motion.motor.peak_lag)
-
-    @property
-    def rest(self) -> WorstMotion:
-        """The same when the move was taken for done [step]."""
-        return largest(self.motions, lambda motion: abs(motion.motor.rest_lag))
 
     @property
     def margin(self) -> WorstMotion:
@@ -142,16 +82,6 @@ class StageFigures:
         needy = [motion for motion in self.motions if math.isfinite(motion.motor.margin)]
         found = largest(needy, lambda motion: -motion.motor.margin)
         return found and Worst(-found.value, found.of)
-
-    @property
-    def peak_hz(self) -> WorstMotion:
-        """Largest step frequency [Hz]."""
-        return largest(self.motions, lambda motion: motion.motor.peak_hz)
-
-    @property
-    def peak_speed(self) -> WorstMotion:
-        """Largest speed [m/s]."""
-        return largest(self.motions, lambda motion: motion.motor.peak_hz * self.spec.stepper[motion.name].step)
 
     def whose(self, motion: Motion) -> str:
         """Whose motion it is: "move 1, x"."""

@@ -93,7 +93,6 @@ def test_the_time_of_the_travel_is_that_of_its_table(load_text, good_text):
     figures = MotorFigures(load_text(good_text).spec, "group_a")
     table = StepEnvelope(make_tables(figures.table).ramp, make_tables(figures.table).up.zones)
     assert figures.travel_time == pytest.approx(float(np.sum(1 / table.permissible_hz())), rel=1e-12)
-    assert figures.constant_time == pytest.approx(8000 / figures.start_hz)
 
 
 def test_a_travel_that_is_no_whole_number_of_steps_says_how_long_it_is(load_text, good_text):

@@ -3,13 +3,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N
+from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, turn_envelopes
 
 from detent.errors import DetentError
 from detent.methods.stepper_envelope import envelope_figure
 from detent.methods.stepper_envelope.envelope_figure import plot_envelope
 from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
-from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
 
 
 def tables(steps: int = N, zones=COARSE_FINE, start: int = 0, turn: int = 6000, stop: int = 1500, **changes):

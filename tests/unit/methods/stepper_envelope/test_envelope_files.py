@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, Rig, default_ramp
+from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, Rig, default_ramp, turn_envelopes
 
 from detent.errors import DetentError
 from detent.methods.stepper_envelope import envelope_files
@@ -16,7 +16,7 @@ from detent.methods.stepper_envelope.envelope_files import (
     write_envelope_csv,
     write_envelope_header,
 )
-from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
 
 STEP = 5e-6
 MEGAHERTZ = 1_000_000

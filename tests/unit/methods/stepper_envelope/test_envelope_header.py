@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.bench.race import COMPILER, compile_c
-from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N
+from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, turn_envelopes
 
 from detent.control.step_rule import (
     ACCEL,
@@ -39,7 +39,7 @@ from detent.methods.stepper_envelope.controller import (
     step_once,
 )
 from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, motor_identifier, write_envelope_header
-from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap, turn_envelopes
+from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import StepRamp
 
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc) here to compile the header with")
