@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,12 +15,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from tests.docs.pages import Block
+
+from detent.cli import main
 
 TIMEOUT_S = 300
 # A tail for each command: what it leaves behind (status, folder) is what the next one starts with.
 KEEP_STATE = '\n__status=$?; pwd > "$DETENT_DOCS_FOLDER"; exit $__status'
+
+# What a command sees of a terminal.
+PLAIN = {"NO_COLOR": "1", "TERM": "dumb", "COLUMNS": "120", "LC_ALL": "C.UTF-8", "MPLBACKEND": "Agg"}
+SHELL_SYNTAX = set("|&;<>()[]{}$`*?~#!\\\n")
 
 
 class DocumentationError(AssertionError):
@@ -50,6 +58,14 @@ def commands_of(block: Block) -> list[Command]:
     return [Command("\n".join(text), "\n".join(shown)) for text, shown in commands]
 
 
+def words_of(text: str) -> list[str] | None:
+    """The words of a command that is `detent` and its arguments; None where a shell has more to do than to split it."""
+    joined = text.replace("\\\n", " ")
+    if not joined.startswith("detent ") or set(joined) & SHELL_SYNTAX:
+        return None
+    return shlex.split(joined)
+
+
 FIRST_RUN = "First run with this version: compiling the axis"
 
 
@@ -68,7 +84,8 @@ def matches(shown: str, came: str) -> bool:
 class PageRunner:
     """Runs one page's blocks in `folder`.
 
-    ```console   each `$ ` line is run by bash; a command must succeed, unless `$ echo $?` follows and shows the status
+    ```console   each `$ ` line is run by bash, `detent` without anything of the shell in this process, where all that
+                 detent imports is loaded; a command must succeed, unless `$ echo $?` follows and shows the status
     ```python    executed; a page has one namespace; with `>>>` it is a doctest; a following ```output is compared
     ```toml      must parse, and so must ```json; any block after `<!-- file: NAME -->` is also saved under that name
     """
@@ -100,7 +117,8 @@ class PageRunner:
         """Run the commands of a console block and compare status and output."""
         commands = commands_of(block)
         for command, following in zip(commands, [*commands[1:], None], strict=True):
-            came = self.shell(command.text)
+            words = words_of(command.text)
+            came = self.shell(command.text) if words is None else self.detent(words)
             if self.status and not (following and following.text == "echo $?"):
                 message = f"{block.where}: `{command.text}` ended with status {self.status}:\n{came}"
                 raise DocumentationError(message)
@@ -112,7 +130,6 @@ class PageRunner:
         """Run one command where the last one left off; return what it printed."""
         kept = self.folder / ".shell-folder"
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-        plain = {"NO_COLOR": "1", "TERM": "dumb", "COLUMNS": "120", "LC_ALL": "C.UTF-8", "MPLBACKEND": "Agg"}
         bash = shutil.which("bash")
         if bash is None:
             message = "console blocks are run by bash, which is not installed"
@@ -120,7 +137,7 @@ class PageRunner:
         done = subprocess.run(
             [bash, "-c", f"(exit {self.status})\n{text}{KEEP_STATE}"],
             cwd=self.shell_folder,
-            env={**os.environ, **plain, "PATH": path, "DETENT_DOCS_FOLDER": str(kept)},
+            env={**os.environ, **PLAIN, "PATH": path, "DETENT_DOCS_FOLDER": str(kept)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -133,6 +150,22 @@ class PageRunner:
             self.shell_folder = Path(kept.read_text(encoding="utf-8").strip())
             kept.unlink()
         return done.stdout
+
+    def detent(self, words: list[str]) -> str:
+        """Run `detent` where the last command left off; return what it printed."""
+        said = io.StringIO()
+        with (
+            contextlib.chdir(self.shell_folder),
+            mock.patch.dict(os.environ, PLAIN),
+            mock.patch.object(sys, "argv", words),
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+        ):
+            try:
+                main()
+            except SystemExit as left:
+                self.status = left.code
+        return said.getvalue()
 
     def run_python(self, block: Block) -> None:
         """Execute a Python block, or check it as a doctest where it shows prompts."""

@@ -4,7 +4,7 @@ import textwrap
 
 import pytest
 from tests.docs.pages import Block, anchors_of, blocks_of, links_of
-from tests.docs.runner import DocumentationError, PageRunner, matches
+from tests.docs.runner import DocumentationError, PageRunner, matches, words_of
 
 
 def run_page(folder, text):
@@ -28,6 +28,13 @@ GOOD = [
         "```console\n$ mkdir sub\n$ cd sub\n```\n\n```console\n$ pwd\n...sub\n```\n", id="folder kept between blocks"
     ),
     pytest.param("```console\n$ echo a \\\n> b\na b\n```\n", id="continued command"),
+    pytest.param(
+        "```console\n$ mkdir sub\n$ cd sub\n$ detent examples --copy .\n...\n$ ls cascade.toml\ncascade.toml\n```\n",
+        id="detent in the folder of the shell",
+    ),
+    pytest.param(
+        "```console\n$ detent check nowhere.toml\n...nowhere...\n$ echo $?\n2\n```\n", id="a refusal of detent"
+    ),
     pytest.param("```python\nx = 2\n```\n\n```python\n>>> x + 1\n3\n```\n", id="one namespace for a page"),
     pytest.param("```python\nprint('six')\n```\n\n```output\nsix\n```\n", id="printed output"),
     pytest.param(
@@ -47,6 +54,8 @@ BAD = [
     pytest.param("```console\n$ echo one\ntwo\n```\n", "but it prints", id="wrong output"),
     pytest.param("```console\n$ echo one\n```\n", "but it prints", id="output left out"),
     pytest.param("```console\n$ true\n$ echo $?\n1\n```\n", "but it prints", id="wrong status shown"),
+    pytest.param("```console\n$ detent check nowhere.toml\n...\n```\n", "status 2", id="failing detent"),
+    pytest.param("```console\n$ detent --version\nnone\n```\n", "but it prints", id="wrong output of detent"),
     pytest.param("```console\necho one\n```\n", "begins with", id="command without a prompt"),
     pytest.param("```python\n>>> 1 + 1\n3\n```\n", "Expected", id="wrong doctest"),
     pytest.param("```python\nprint(1)\n```\n\n```output\n2\n```\n", "above prints", id="wrong printed output"),
@@ -81,6 +90,21 @@ def test_an_exception_of_a_python_block_names_its_line(tmp_path):
 )
 def test_comparison_of_output(shown, came, same):
     assert matches(shown, came) is same
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('detent run a.toml \\\n    --set k="1 m"', ["detent", "run", "a.toml", "--set", "k=1 m"]),
+        ("detent check a.toml | tail -n 1", None),
+        ("detent run a.toml > b.json", None),
+        ("detent plot $file", None),
+        ("detent-other", None),
+        ("echo detent", None),
+    ],
+)
+def test_only_what_needs_no_shell_runs_without_one(text, words):
+    assert words_of(text) == words
 
 
 def test_links_and_anchors_are_found(tmp_path):
