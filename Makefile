@@ -20,6 +20,9 @@ define environment
 @'$(PYTHON)' tools/environment.py $(CHOSEN) '$(VENV)' $(1)
 endef
 
+# Every process of the tests imports the same files: their bytecode is kept, even where the surroundings forbid it.
+export PYTHONDONTWRITEBYTECODE :=
+
 .DEFAULT_GOAL := help
 # The commands share one environment: under `make -j` two of them must not install into it at once.
 .NOTPARALLEL:
@@ -42,9 +45,10 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 	$(BIN)/detent run $(EXAMPLES)/print_head.toml --job $(EXAMPLES)/letter.txt --output $(DEMO)
 	@echo "Open $(CURDIR)/$(DEMO)/report.html in a browser."
 
-# Files go whole to one process per processor: what a file prepares is prepared once.
+# Files go whole to one process per processor: what a file prepares is prepared once. They go in the order that
+# tests/conftest.py gives them, not by how many tests they hold: the longest have few.
 test: venv-test ## the tests, without those that take long
-	$(PYTEST) -n auto --dist loadfile -p no:benchmark $(PYTEST_ARGS)
+	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark $(PYTEST_ARGS)
 
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)

@@ -8,6 +8,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("COLUMNS", None)
 os.environ.pop("LINES", None)
 
+import pytest
 from hypothesis import settings
 
 # A compiled step costs seconds the first time it is called, which says nothing about the example that met it: no
@@ -15,3 +16,8 @@ from hypothesis import settings
 settings.register_profile("detent", deadline=None, print_blob=True)
 settings.register_profile("ci", settings.get_profile("detent"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "detent")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take longest begin first: no process is left alone with one of them at the end."""
+    items.sort(key=lambda item: item.get_closest_marker("early") is None)

@@ -28,6 +28,8 @@ MARKS = {"file", "checked-by"}
 # What a block may hold, besides `make` lines, when .ci/run checks it in place of this harness.
 INSTALLING = re.compile(r"(git clone|cd|(sudo )?apt install|\S*python3? -m venv|source|\S*pip install|\S*pytest)\b.*")
 
+pytestmark = pytest.mark.early
+
 PAGES = all_pages()
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
 LEFT_TO_CI = [block for block in BLOCKS if "checked-by" in block.marks]

@@ -29,6 +29,8 @@ from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import StepperMotor, acceleration_limit, make_ramp, natural_frequency
 
+pytestmark = pytest.mark.early
+
 MOST = 700
 """Steps of a travel."""
 

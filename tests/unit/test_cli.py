@@ -23,7 +23,7 @@ from detent.methods.print_head.run import default_signals
 from detent.page.words import GAP
 from detent.record.trace_files import load_trace
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.compiled, pytest.mark.early]
 
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
 VERBS = ("examples", "check", "run", "compare", "timing", "plot", "registers")

@@ -121,9 +121,14 @@ def test_an_unlisted_unit_describes_itself():
     assert parse_quantity("3 kW", "W") == 3000.0
 
 
+@pytest.fixture(scope="module")
+def registry():
+    """Pint's own units, which take half a second to read."""
+    return pint.UnitRegistry(non_int_type=Fraction)
+
+
 @pytest.mark.parametrize(("unit", "text"), [(unit, text) for unit, texts in COMMON_UNITS.items() for text in texts])
-def test_the_built_in_factors_are_pints(unit, text):
-    registry = pint.UnitRegistry(non_int_type=Fraction)
+def test_the_built_in_factors_are_pints(unit, text, registry):
     assert registry.Quantity(Fraction(1), registry.parse_units(text)).to(unit).magnitude == COMMON_UNITS[unit][text]
 
 

@@ -18,6 +18,7 @@ from tests.log_rig import EMPS
 DATA = Path(__file__).parents[4] / "shared" / "data"
 
 pytestmark = [
+    pytest.mark.early,
     pytest.mark.compiled,
     pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="the names are those of x86 kernels"),
 ]
