@@ -60,48 +60,87 @@ def python(tmp_path_factory):
     return python
 
 
-def detent(python, *words, status=0):
+PROGRAM = """
+import contextlib, io, json, sys
+from detent.cli import main
+
+def said(words):
+    out, err, sys.argv = io.StringIO(), io.StringIO(), ["detent", *words]
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as left:
+            return left.code, out.getvalue(), err.getvalue()
+
+print(json.dumps({name: said(words) for name, words in json.loads(sys.argv[1]).items()}))
+"""
+"""Prints what commands print. A step from outside is compiled in each process, so one process runs all that tick."""
+
+
+@pytest.fixture(scope="module")
+def made(python, tmp_path_factory):
+    """What the commands that tick print, and the folder of their files."""
+    folder = tmp_path_factory.mktemp("made")
+    commands = {
+        "run": ["run", FILE, "--job", JOB, "--trace", "csv", "--output", ".", "--json"],
+        "compare": ["compare", FILE, "--figure", "page.html", "--json"],
+        "timing": [
+            *("timing", FILE, "--at", "5 ms", "--figure", "timing.png", "--vcd", "timing.vcd"),
+            "--json",
+        ],
+    }
+    done = subprocess.run([python, "-c", PROGRAM, json.dumps(commands)], check=False, cwd=folder, **PIPED, timeout=240)
+    assert done.returncode == 0, done.stderr
+    printed = {}
+    for name, (status, out, err) in json.loads(done.stdout).items():
+        assert status == 0, (name, err)
+        printed[name] = json.loads(out)
+    return printed, folder
+
+
+def detent(python, *words):
     done = subprocess.run([python, "-m", "detent", *words], check=False, **PIPED, timeout=120)
-    assert done.returncode == status, done.stderr
-    return done
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_check_and_registers_know_the_method(python):
-    found = json.loads(detent(python, "check", FILE, "--json").stdout)
+    found = json.loads(detent(python, "check", FILE, "--json"))
     assert (found["method"], found["warnings"]) == ("bang_bang", [])
-    names = {row["name"] for row in json.loads(detent(python, "registers", "bang_bang", "--json").stdout)}
+    names = {row["name"] for row in json.loads(detent(python, "registers", "bang_bang", "--json"))}
     assert {"controller.speed", "lines.drive", "plant.train.position"} <= names
-    assert "bang_bang: a list of moves" in " ".join(detent(python, "run", "--help").stdout.split())
+    assert "bang_bang: a list of moves" in " ".join(detent(python, "run", "--help").split())
 
 
-def test_a_run_has_a_report_with_a_section_of_its_own_and_a_trace(python, tmp_path):
-    done = detent(python, "run", FILE, "--job", JOB, "--trace", "csv", "--output", tmp_path, "--json")
-    found = json.loads(done.stdout)
+def test_a_run_has_a_report_with_a_section_of_its_own_and_a_trace(made):
+    printed, folder = made
+    found = printed["run"]
     assert found["done"]
     assert [move["number"] for move in found["moves"]] == [1, 2, 3, 4]
     assert all(abs(move["error"]) <= found["tolerance"] for move in found["moves"])
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    text = (folder / "report.html").read_text(encoding="utf-8")
     words = " ".join(Reader(text).words)
     assert "How the axis did it" in words
     assert "Braking ahead of the target" in words
     assert all(f'"{chart}"' in text for chart in ("job", "move-speed", "move-drive", "approach-place"))
-    heads = (tmp_path / "trace.csv").read_text(encoding="utf-8")
+    heads = (folder / "trace.csv").read_text(encoding="utf-8")
     assert "lines.drive" in heads[:2000]
 
 
-def test_compare_holds_it_beside_itself_without_the_braking_rule(python, tmp_path):
-    done = detent(python, "compare", FILE, "--figure", tmp_path / "page.html", "--json")
-    ((with_braking, without),) = (one["rows"] for one in json.loads(done.stdout)["comparisons"])
+def test_compare_holds_it_beside_itself_without_the_braking_rule(made):
+    printed, folder = made
+    ((with_braking, without),) = (one["rows"] for one in printed["compare"]["comparisons"])
     assert (with_braking["way"], without["way"]) == ("with braking", "without")
     overshoots = [parse_quantity(one["overshoot"], "m") for one in (with_braking, without)]
     assert 0.0 <= overshoots[0] < 0.2 * overshoots[1]
+    assert (folder / "page.html").stat().st_size > 0
 
 
-def test_timing_shows_its_lines(python, tmp_path):
-    files = ("--figure", tmp_path / "timing.png", "--vcd", tmp_path / "timing.vcd")
-    done = detent(python, "timing", FILE, "--at", "5 ms", *files, "--json")
-    assert json.loads(done.stdout)["signals"][0] == "lines.a"
-    assert "controller" in (tmp_path / "timing.vcd").read_text(encoding="utf-8")
+def test_timing_shows_its_lines(made):
+    printed, folder = made
+    assert printed["timing"]["signals"][0] == "lines.a"
+    assert (folder / "timing.png").stat().st_size > 0
+    assert "controller" in (folder / "timing.vcd").read_text(encoding="utf-8")
 
 
 def test_no_line_of_detent_names_it():
