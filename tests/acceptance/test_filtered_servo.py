@@ -446,12 +446,10 @@ def test_19_one_strobe_drives_the_counter_and_the_filter():
 def test_19_no_setting_changes_only_one_of_window_and_filter():
     times = {"s", "ms", "us", "tick", "1/s", "Hz", "uHz"}
     for registers in (FilteredServoParams, FilteredServo):
-        clocked = [
-            leaf for leaf in registers.leaves() if leaf.path.startswith(("controller.speed.", "controller.filter."))
-        ]
+        clocked = [leaf for leaf in registers.leaves() if ".speed." in leaf.path or ".filter." in leaf.path]
         assert len(clocked) >= 4
         assert [leaf.path for leaf in clocked if leaf.unit in times] == []
-    clock = [leaf.path for leaf in FilteredServo.leaves() if leaf.path.startswith("controller.clock.")]
+    clock = [leaf.path for leaf in FilteredServo.leaves() if ".clock." in leaf.path]
     assert clock == ["controller.clock.demanded", "controller.clock.period", "controller.clock.left"]
     keys = FilteredServoSpec.model_fields["method"].annotation.model_fields
     assert [key for key in keys if "sample" in key or "window" in key or "filter" in key] == ["filter", "sample_period"]

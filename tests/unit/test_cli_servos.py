@@ -28,7 +28,9 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ("axis", "job", "signals"), [(PHASE, MOVES, PHASE_SIGNALS), (FILTERED, SLIDE, FILTERED_SIGNALS)]
 )
 def test_run_makes_the_moves_and_leaves_report_and_trace(axis: str, job: str, signals: tuple[str, ...]) -> None:
-    answer = call("run", axis, "--job", job, "-o", "out", "--signals", "encoder.edge" if axis == FILTERED else "wake")
+    answer = call(
+        "run", axis, "--job", job, "-o", "out", "--signals", "plant.encoder.edge" if axis == FILTERED else "wake"
+    )
     assert answer.status == 0, answer.out
     assert ": every move arrived on " in answer.out.splitlines()[0]
     assert {path.name for path in Path("out").iterdir()} == {"report.html", "trace.h5", "trace.csv"}
@@ -107,7 +109,7 @@ def test_timing_takes_a_job_a_length_and_signals() -> None:
 def test_registers_are_listed_by_method_or_file(name: str) -> None:
     answer = call("registers", name)
     assert answer.status == 0
-    assert re.search(r"^train\.position +f8 +m ", answer.out, flags=re.MULTILINE)
+    assert re.search(r"^(plant\.)?train\.position +f8 +m ", answer.out, flags=re.MULTILINE)
     assert call("registers", name, "--json").data[0]["name"] == "tick"
 
 

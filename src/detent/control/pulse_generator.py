@@ -71,6 +71,22 @@ def ramp_rate(p: PulseGeneratorParams, r: PulseGenerator) -> None:
 
 
 @hot_step
+def steer_rate(p: PulseGeneratorParams, r: PulseGenerator) -> None:
+    """Rate and direction of this tick, where they change."""
+    moving = r.command != r.goal or r.present > 0
+    if moving and not keeps_rate(p, r):
+        ramp_rate(p, r)
+
+
+@hot_step
+def is_between_pulses(p: PulseGeneratorParams, r: PulseGenerator, clocks: int) -> bool:
+    """True when so many decoder clocks do no more than add to the phase."""
+    if r.command == r.goal:
+        return r.present == 0
+    return keeps_rate(p, r) and r.phase + r.present * clocks < FULL
+
+
+@hot_step
 def clock_generator(r: PulseGenerator, clocks: int) -> int:
     """So many decoder clocks; the command pulses in them, signed."""
     if r.command == r.goal:

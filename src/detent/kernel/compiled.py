@@ -332,6 +332,31 @@ def _power_of_two(exponent: Any) -> Any:
     return compiled
 
 
+@extending.intrinsic
+def expect_false(_typingctx: Any, condition: Any) -> Any:
+    """Hand a condition on with LLVM's hint that it seldom holds."""
+
+    def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+        bit = ir.IntType(1)
+        hint = cgutils.get_or_insert_function(builder.module, ir.FunctionType(bit, [bit, bit]), "llvm.expect.i1")
+        return builder.call(hint, [args[0], ir.Constant(bit, 0)])
+
+    return types.boolean(condition), codegen
+
+
+def unlikely(condition: bool) -> bool:  # noqa: FBT001 - a condition
+    """The condition itself; compiled code is laid out for the case that it does not hold."""
+    return condition
+
+
+@extending.overload(unlikely, inline="always")
+def _unlikely(condition: Any) -> Any:
+    def compiled(condition: Any) -> bool:
+        return expect_false(condition)
+
+    return compiled
+
+
 def local_copy(registers: Any) -> Any:
     """Copy of a register file in a stack slot of the compiled caller (a fresh structure in plain Python)."""
     return registers.copy()

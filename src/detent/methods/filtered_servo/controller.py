@@ -20,10 +20,11 @@ from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
     clock_generator,
-    keeps_rate,
-    ramp_rate,
+    is_between_pulses,
+    steer_rate,
 )
 from detent.control.sample_clock import SampleClock, count_clock
+from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
@@ -285,12 +286,14 @@ def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
     return held and lines.stray == 0 and c.busy == 0 and c.clock.left > CLOCKS
 
 
-@hot_step
-def ramp(p: FilteredControllerParams, c: FilteredController) -> None:
-    """Rate of the command in this tick."""
-    moving = c.generator.command != c.generator.goal or c.generator.present > 0
-    if moving and not keeps_rate(p.generator, c.generator):
-        ramp_rate(p.generator, c.generator)
+@step
+def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
+    """A tick in which something happens; where it is a command pulse alone, its moment does not matter."""
+    steer_rate(p.generator, c.generator)
+    if not is_quiet(c, lines):
+        run_clocks(p, c, lines)
+    elif skip_clocks(p, c, CLOCKS, 0):
+        decide(p, c, lines)
 
 
 @hot_step
@@ -333,11 +336,11 @@ def end_tick(p: FilteredControllerParams, c: FilteredController, lines: Filtered
 @hot_step
 def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Ten microseconds."""
-    ramp(p, c)
-    if not is_quiet(c, lines):
-        run_clocks(p, c, lines)
-    elif skip_clocks(p, c, CLOCKS, 0):
-        decide(p, c, lines)
+    if unlikely(not (is_quiet(c, lines) and is_between_pulses(p.generator, c.generator, CLOCKS))):
+        work(p, c, lines)
+    else:
+        c.generator.phase += c.generator.present * CLOCKS
+        c.clock.left -= CLOCKS
     end_tick(p, c, lines)
 
 
@@ -345,7 +348,7 @@ def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
 def control_clock(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, k: int) -> None:
     """Clock `k` of a tick with every clock run, for timing diagrams: the same bits; after the last, what follows."""
     if k == 0:
-        ramp(p, c)
+        steer_rate(p.generator, c.generator)
         if c.deviation.reset:
             leave_reset(c)
     one_clock(p, c, lines, k)

@@ -1,5 +1,6 @@
 """The machine of a filtered servo: PWM and amplifier, motor, screw, slide, encoder, and the noise on its lines."""
 
+from detent.kernel.compiled import unlikely
 from detent.kernel.registers import Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.methods.filtered_servo.controller import CLOCKS, LEVELS, FilteredLines
@@ -107,7 +108,7 @@ def lay_lines(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int,
 @hot_step
 def sense(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
     """What happened on the lines during the last tick; the slide stands at `x` [m] now."""
-    if x >= plant.encoder.next_right or x < plant.encoder.next_left or tick >= plant.change:
+    if unlikely(x >= plant.encoder.next_right or x < plant.encoder.next_left or tick >= plant.change):
         lay_lines(p, plant, x, tick, lines)
     plant.sampled = x
 
@@ -135,7 +136,7 @@ def count_losses(r: Interference, lines: FilteredLines) -> None:
 def move(p: FilteredPlantParams, plant: FilteredPlant, train: DriveTrain, tick: int, lines: FilteredLines) -> None:
     """The plant moves through the tick; without drive it coasts, whatever the amplifier."""
     actuate(p.amplifier, plant.amplifier, lines)
-    if tick + 1 >= plant.change:  # the lines were not at rest
+    if unlikely(tick + 1 >= plant.change):  # the lines were not at rest
         count_losses(plant.interference, lines)
     train.force = push_force(p.push, tick)
     output = plant.amplifier.word * p.amplifier.per_count
