@@ -26,7 +26,7 @@ from detent.control.pulse_generator import (
 from detent.control.sample_clock import SampleClock, count_clock
 from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
-from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2
+from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2, u4
 from detent.kernel.step import hot_step, step
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, edge_direction, is_settled, preset_decoder
@@ -45,10 +45,10 @@ class FilteredLines(Registers):
     a: u2 = register("levels of channel A in the ten clocks of the tick, the first in bit 0", by=PLANT)
     b: u2 = register("levels of channel B in the ten clocks of the tick, the first in bit 0", by=PLANT)
     stray: i1 = register("pulses that noise puts on the counting lines in the first clock, signed", by=PLANT)
-    swallow: u1 = register("the counting line swallows pulses until `swallowed` is this", by=PLANT)
-    mask: u1 = register("the strobe line loses strobes until `missed` is this", by=PLANT)
-    swallowed: u1 = register("pulses swallowed so far, modulo 256", by=CONTROLLER)
-    missed: u1 = register("strobes lost so far, modulo 256", by=CONTROLLER)
+    swallow: u4 = register("the counting line swallows pulses until `swallowed` is this", by=PLANT)
+    mask: u4 = register("the strobe line loses strobes until `missed` is this", by=PLANT)
+    swallowed: u4 = register("pulses swallowed so far", by=CONTROLLER)
+    missed: u4 = register("strobes lost so far", by=CONTROLLER)
     word: f8 = register("drive word: E, saturated", unit="count", by=CONTROLLER)
     run: u1 = register("1 enables the amplifier", by=CONTROLLER)
 
@@ -222,7 +222,7 @@ def skip_rest(p: FilteredControllerParams, c: FilteredController, lines: Filtere
     skip_clocks(p, c, CLOCKS - k, moved)
 
 
-@step
+@hot_step
 def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Ten decoder clocks in which something happens, until the rest is calm, and what follows from them."""
     if c.deviation.reset:
@@ -237,7 +237,7 @@ def run_clocks(p: FilteredControllerParams, c: FilteredController, lines: Filter
     conclude(p, c, lines)
 
 
-@step
+@hot_step
 def conclude(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """After the clocks of a tick: is the decoder at rest, and what is the drive word now."""
     c.busy = 0 if is_settled(c.decoder, c.channel_a, c.channel_b) else 1
@@ -282,8 +282,8 @@ def leave_reset(c: FilteredController) -> None:
 @hot_step
 def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
     """True when no level changes in the tick, no noise and no strobe comes, and nothing is left to do."""
-    held = lines.a == c.channel_a * LEVELS and lines.b == c.channel_b * LEVELS
-    return held and lines.stray == 0 and c.busy == 0 and c.clock.left > CLOCKS
+    changes = (lines.a ^ c.channel_a * LEVELS) | (lines.b ^ c.channel_b * LEVELS)
+    return (changes | lines.stray | c.busy) == 0 and c.clock.left > CLOCKS
 
 
 @step

@@ -10,9 +10,6 @@ from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
 from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.interference import Interference, InterferenceParams, interfere
 
-MOST_PENDING = 255
-"""Losses that the lines can announce at once."""
-
 
 class AmplifierParams(Registers):
     """PWM and amplifier."""
@@ -43,7 +40,6 @@ class FilteredPlant(Registers):
     """State of the machine."""
 
     sampled: f8 = register("slide position at the last sample", unit="m")
-    change: i8 = register("tick in which the lines change, wherever the slide stands", unit="tick")
     encoder: Encoder = block("encoder disc")
     amplifier: Amplifier = block("PWM and amplifier")
     train: DriveTrain = block("motor and slide")
@@ -88,29 +84,29 @@ def pass_edges(p: EncoderParams, r: Encoder, lines: FilteredLines, start: float,
 
 
 @step
-def lay_lines(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
-    """Levels and noise of a tick in which the lines change; noise acts in its first clock."""
-    r, noise = plant.encoder, plant.interference
+def disturb(p: InterferenceParams, r: Interference, tick: int, lines: FilteredLines) -> None:
+    """Noise of this tick: pulses and an inverted sample in its first clock, and what will be lost on the way."""
+    interfere(p, r, tick)
+    lines.stray = r.plus - r.minus
+    lines.a ^= r.corrupt
+    lines.swallow, lines.mask = r.removed + r.remove, r.lost + r.lose_sample
+
+
+@hot_step
+def hold_levels(r: Encoder, lines: FilteredLines) -> None:
+    """The disc stands: the same levels in all clocks of the tick."""
     lines.a, lines.b = r.channel_a * LEVELS, r.channel_b * LEVELS
-    pass_edges(p.encoder, r, lines, plant.sampled, x)
-    if tick >= noise.next_tick:
-        interfere(p.interference, noise, tick)
-    lines.stray = noise.plus - noise.minus
-    lines.a ^= noise.corrupt
-    lines.swallow = noise.removed + min(noise.remove, MOST_PENDING)
-    lines.mask = noise.lost + min(noise.lose_sample, MOST_PENDING)
-    lasting = (
-        lines.a == r.channel_a * LEVELS and lines.b == r.channel_b * LEVELS and noise.remove + noise.lose_sample == 0
-    )
-    plant.change = noise.next_tick if lasting else tick + 1
 
 
 @hot_step
 def sense(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
     """What happened on the lines during the last tick; the slide stands at `x` [m] now."""
-    if unlikely(x >= plant.encoder.next_right or x < plant.encoder.next_left or tick >= plant.change):
-        lay_lines(p, plant, x, tick, lines)
+    hold_levels(plant.encoder, lines)
+    if unlikely(x >= plant.encoder.next_right or x < plant.encoder.next_left):
+        pass_edges(p.encoder, plant.encoder, lines, plant.sampled, x)
     plant.sampled = x
+    if unlikely(tick >= plant.interference.next_tick):
+        disturb(p.interference, plant.interference, tick, lines)
 
 
 @hot_step
@@ -125,18 +121,17 @@ def actuate(p: AmplifierParams, r: Amplifier, lines: FilteredLines) -> None:
 @step
 def count_losses(r: Interference, lines: FilteredLines) -> None:
     """Pulses swallowed and strobes lost in this tick."""
-    swallowed, missed = (lines.swallowed - r.removed) & 255, (lines.missed - r.lost) & 255
-    r.remove -= swallowed
-    r.removed += swallowed
-    r.lose_sample -= missed
-    r.lost += missed
+    r.remove -= lines.swallowed - r.removed
+    r.removed = lines.swallowed
+    r.lose_sample -= lines.missed - r.lost
+    r.lost = lines.missed
 
 
 @hot_step
 def move(p: FilteredPlantParams, plant: FilteredPlant, train: DriveTrain, tick: int, lines: FilteredLines) -> None:
     """The plant moves through the tick; without drive it coasts, whatever the amplifier."""
     actuate(p.amplifier, plant.amplifier, lines)
-    if unlikely(tick + 1 >= plant.change):  # the lines were not at rest
+    if unlikely(plant.interference.remove + plant.interference.lose_sample > 0):
         count_losses(plant.interference, lines)
     train.force = push_force(p.push, tick)
     output = plant.amplifier.word * p.amplifier.per_count

@@ -23,7 +23,7 @@ from detent.methods.filtered_servo.controller import (
     end_clocks,
     power_on,
 )
-from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, lay_lines, move, sense
+from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, hold_levels, move, sense
 from detent.plant.drive_train import DriveTrain
 from detent.sensing.encoder import stand_at
 from detent.sensing.interference import start_interference
@@ -89,5 +89,5 @@ def switch_on(p: FilteredServoParams, r: FilteredServo, position: float, sample_
     stand_at(p.plant.encoder, plant.encoder, position, seed)
     start_interference(p.plant.interference, plant.interference, seed ^ 0x5DEECE66D)
     plant.amplifier.left = 1
-    lay_lines(p.plant, plant, position, 0, r.lines)
+    hold_levels(plant.encoder, r.lines)
     power_on(r.controller, r.lines, sample_us)
