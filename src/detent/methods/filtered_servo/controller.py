@@ -287,10 +287,10 @@ def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
 
 
 @step
-def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
-    """A tick in which something happens; where it is a command pulse alone, its moment does not matter."""
+def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, quiet: bool) -> None:  # noqa: FBT001
+    """A tick in which something happens; on quiet lines it is a command pulse, whose moment does not matter."""
     steer_rate(p.generator, c.generator)
-    if not is_quiet(c, lines):
+    if not quiet:
         run_clocks(p, c, lines)
     elif skip_clocks(p, c, CLOCKS, 0):
         decide(p, c, lines)
@@ -336,8 +336,9 @@ def end_tick(p: FilteredControllerParams, c: FilteredController, lines: Filtered
 @hot_step
 def control(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """Ten microseconds."""
-    if unlikely(not (is_quiet(c, lines) and is_between_pulses(p.generator, c.generator, CLOCKS))):
-        work(p, c, lines)
+    quiet = is_quiet(c, lines)
+    if unlikely(not (quiet and is_between_pulses(p.generator, c.generator, CLOCKS))):
+        work(p, c, lines, quiet)
     else:
         c.generator.phase += c.generator.present * CLOCKS
         c.clock.left -= CLOCKS

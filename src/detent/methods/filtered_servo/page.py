@@ -1,21 +1,16 @@
 """What a filtered servo shows on the page of a list of moves: the following error, and the speed word it is held by."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, moves_page, true_speed
-from detent.methods.moves.run import MoveRun
-from detent.methods.moves.summary import move_summary
+from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, true_speed
 from detent.page.chart import Curve, Panel
-from detent.page.frame import Comparison, Page
 from detent.page.parts import Numbers
 from detent.page.run_page import Stretch
 from detent.page.words import CountUnit, count, number
-from detent.record.trace import Trace
 
 COMMAND, DEVIATION, WORD = "controller.generator.command", "controller.deviation.deviation", "lines.word"
 COUNTED, FILTERED, WINDOW = "controller.speed.word", "controller.filter.output", "controller.clock.period"
@@ -30,22 +25,6 @@ AT_ITS_END = (
     "Below: following error less filtered speed is the drive word. Look for: few swings around the target; the "
     "lag of the filter costs damping."
 )
-
-
-def filtered_page(
-    spec: FilteredServoSpec,
-    run: MoveRun,
-    trace: Trace | None,
-    comparisons: Sequence[Comparison] = (),
-    settings: dict[str, str] | None = None,
-) -> Page:
-    """The page of a run."""
-    return moves_page(FilteredView(spec), run, trace, comparisons, settings)
-
-
-def filtered_summary(spec: FilteredServoSpec, run: MoveRun) -> list[tuple[str, str]]:
-    """The figures of a run for the terminal."""
-    return move_summary(run, FilteredView(spec).unit)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,14 @@ import detent
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.method import SIGNALS
-from detent.methods.filtered_servo.page import FilteredView, command_speed, filtered_page, filtered_summary
+from detent.methods.filtered_servo.page import FilteredView, command_speed
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
-from detent.methods.moves.page import POSITION, TARGET, VELOCITY
+from detent.methods.moves.page import POSITION, TARGET, VELOCITY, moves_page
 from detent.methods.moves.run import MoveRun, run_moves
+from detent.methods.moves.summary import move_summary
 from detent.page.frame import Page
 from detent.record.recorder import Recorder
 from detent.record.trace import Trace
@@ -44,7 +45,7 @@ def test_what_is_drawn_is_what_is_recorded() -> None:
 
 def test_it_follows_its_command_at_a_distance() -> None:
     spec, run, trace = play(1e-3, 2e-3, -5e-3, speed=20e-3, dwell=0.05)
-    page = filtered_page(spec, run, trace)
+    page = moves_page(FilteredView(spec), run, trace)
     figure = next(figure for figure in page.figures if figure.events)
     assert figure.title.startswith("Move 2, ")
     assert [chart["id"] for chart in figure.charts] == ["move-speed", "move-counted", "move-deviation", "move-drive"]
@@ -65,13 +66,14 @@ def test_it_follows_its_command_at_a_distance() -> None:
     assert error.max() > 20e-3 / spec.pulse * 0.02
     assert abs(error[-1]) <= spec.method.in_position
     np.testing.assert_allclose(drive, np.clip(error - smooth, -128, 127), atol=0.006)
-    assert dict(filtered_summary(spec, run))["moves"] == "3 of 3"
+    assert dict(move_summary(run, FilteredView(spec).unit))["moves"] == "3 of 3"
     assert FilteredView(spec).unit.words == "pulses"
 
 
 def test_an_axis_that_has_given_up_comes_to_no_rest() -> None:
     pushed = tuple(f"disturbance.push.{key}" for key in ("force=-1000 N", "at=20 ms", "duration=2 s"))
-    page = filtered_page(*play(0.1, overrides=pushed))
+    spec, run, trace = play(0.1, overrides=pushed)
+    page = moves_page(FilteredView(spec), run, trace)
     figure = next(figure for figure in page.figures if figure.events)
     assert [event.text for event in figure.events] == ["the host asks for the move", "the run ends here"]
     assert math.isnan(curve_of(page, "move-speed", "commanded")[-1])
