@@ -33,34 +33,41 @@ class PhasePlant(Registers):
 
 @step
 def disturb(p: PhasePlantParams, plant: PhasePlant, lines: PhaseLines, tick: int) -> None:
-    """Noise of this tick: what it flips, and what it puts on the counting lines."""
+    """Noise of this tick: what it flips and puts in, and whether pulse and strobe to come shall be lost."""
     n = plant.interference
     interfere(p.interference, n, tick)
     lines.ps ^= n.corrupt
     lines.plus = n.plus
     lines.minus = n.minus
+    lines.swallow = n.remove > 0
+    lines.mask = n.lose_sample > 0
+
+
+@step
+def count_losses(n: Interference, lines: PhaseLines) -> None:
+    """What the lines have lost in this tick, noise need not take any more."""
+    if lines.swallowed:
+        take_away(n)
+    if lines.missed:
+        lose(n)
 
 
 @hot_step
 def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, tick: int) -> None:
     """What the electronics see in this tick; the comparator answers to the carrier's next count, that of this CK1."""
-    n = plant.interference
     lines.ps = compare(p.detector, plant.detector, lines.carrier + 1, x)
-    if tick >= n.next_tick:
+    if tick >= plant.interference.next_tick or lines.swallowed | lines.missed:
         disturb(p, plant, lines, tick)
-    lines.swallow = n.remove > 0
-    lines.mask = n.lose_sample > 0
 
 
 @hot_step
 def move(p: PhasePlantParams, plant: PhasePlant, train: DriveTrain, lines: PhaseLines, tick: int) -> None:
-    """The machine moves through the tick; what the lines have lost in it noise need not take any more."""
-    if lines.swallowed:
-        take_away(plant.interference)
-    if lines.missed:
-        lose(plant.interference)
+    """The machine moves through the tick."""
+    if lines.swallowed | lines.missed:
+        count_losses(plant.interference, lines)
     sense_current(p.bridge, plant.bridge, train.current)
-    drive_two(p.bridge, plant.bridge, lines.enable * lines.first_request, lines.enable * lines.request)
+    first, second = (lines.first_request, lines.request) if lines.enable else (0, 0)
+    drive_two(p.bridge, plant.bridge, first, second)
     train.force = push_force(p.push, tick)
     move_averaged(p.train, train, plant.bridge.positive, plant.bridge.negative)
     read_gauge(plant.gauge, tick, train.position, train.velocity)
