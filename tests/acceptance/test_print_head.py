@@ -376,7 +376,7 @@ def test_16_an_unread_status_is_never_overwritten():
     write_latch(head.status.latch, 0x55)
     for byte in (0x40, 0x41):
         write_latch(head.command_latch, byte)
-        decide(rig.p.controller, head, rig.r.controller.head.buffer)
+        decide(rig.p.controller, head)
         assert (head.status.latch.byte, head.status.latch.flag) == (0x55, 1)
     assert [rig.read_status() for _ in range(1)] == [0x55]
     assert [rig.next_status(0.01), rig.next_status(0.01)] == [0x0F, 0xA5]

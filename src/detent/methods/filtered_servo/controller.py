@@ -287,7 +287,7 @@ def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
 
 
 @step
-def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, quiet: bool) -> None:  # noqa: FBT001
+def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, quiet: bool) -> None:
     """A tick in which something happens; on quiet lines it is a command pulse, whose moment does not matter."""
     steer_rate(p.generator, c.generator)
     if not quiet:

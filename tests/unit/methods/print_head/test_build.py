@@ -193,9 +193,9 @@ def test_an_obstacle_bounds_the_side_the_head_does_not_stand_on(place: str, left
 
 def test_a_push_begins_and_ends_with_its_ticks() -> None:
     texts = ["disturbance.push.force=-3 N", "disturbance.push.at=2 s", "disturbance.push.duration=60 ms"]
-    push = build_print_head(load_spec(EXAMPLE, texts)).push
+    push = build_print_head(load_spec(EXAMPLE, texts)).plant.push
     assert (push.force, push.begin, push.end) == (-3.0, 50_000, 51_500)
-    none = build_print_head(load_spec(EXAMPLE)).push
+    none = build_print_head(load_spec(EXAMPLE)).plant.push
     assert (none.force, none.begin, none.end) == (0.0, 0, 0)
 
 
@@ -206,7 +206,7 @@ def test_jitter_is_counted_in_quarter_cycles() -> None:
 
 def test_a_substep_is_short_against_the_fastest_time_constant() -> None:
     for inductance in ("12 mH", "0.05 mH"):
-        t = build_print_head(load_spec(EXAMPLE, [f"motor.inductance={inductance}"])).train
+        t = build_print_head(load_spec(EXAMPLE, [f"motor.inductance={inductance}"])).plant.train
         assert t.substep <= 0.25 * t.inductance / t.resistance
         assert np.isfinite(t.substep)
         assert t.substep > 0
