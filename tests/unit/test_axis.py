@@ -141,7 +141,7 @@ def test_what_cannot_be_recorded_is_refused(signals: list[str] | None, every: in
 def test_signals_can_be_checked_before_a_run() -> None:
     axis = detent.load(AXIS)
     axis.check_signals(["controller.head.*", "all", "plant.train.current"])
-    with pytest.raises(DetentError, match=r"did you mean 'train\.current'"):
+    with pytest.raises(DetentError, match=r"did you mean 'plant\.train\.current'"):
         axis.check_signals(["plant.train.curent"])
 
 

@@ -2,7 +2,6 @@
 
 from detent.control.feed_forward import run_up, stop_distance_up
 from detent.control.head_computer import (
-    CALCULATE,
     CONTROLLED_RUN,
     ILLEGAL,
     NO_OPERATION,
@@ -10,11 +9,9 @@ from detent.control.head_computer import (
     OUT_OF_RANGE,
     OVERRUN,
     POSITION_HIGH,
-    POSITION_LOW,
     PRINT,
     QUEUE,
     REFUSED,
-    RUN,
     SET_SPEED,
     HeadComputer,
     HeadParams,
@@ -30,27 +27,16 @@ SLOWEST, FASTEST = 18, 240
 RUN_UP_RESERVE = 12
 """Emitters that a run back leaves beyond the run-up: more than a stop misses its target by, 11 at most."""
 
-CODE_PRINT, CODE_RUN, CODE_CONTROLLED, CODE_SPEED = 0x8D, 0x92, 0xA2, 0x99
-CODE_CALCULATE, CODE_HIGH, CODE_LOW = 0x01, 0x40, 0x41
+CODES = (0x8D, 0x92, 0x99, 0xA2, 0x01, 0x40, 0x41)
+"""First bytes, in the order of the operations from PRINT on."""
 
 
 @step
 def operation_of(first: int) -> int:
     """Operation of a first byte; REFUSED when it is none."""
-    if first == CODE_PRINT:
-        return PRINT
-    if first == CODE_RUN:
-        return RUN
-    if first == CODE_CONTROLLED:
-        return CONTROLLED_RUN
-    if first == CODE_SPEED:
-        return SET_SPEED
-    if first == CODE_CALCULATE:
-        return CALCULATE
-    if first == CODE_HIGH:
-        return POSITION_HIGH
-    if first == CODE_LOW:
-        return POSITION_LOW
+    for k in range(len(CODES)):
+        if CODES[k] == first:
+            return PRINT + k
     return REFUSED
 
 

@@ -93,16 +93,22 @@ def ramp_interval(p: HeadParams, c: HeadComputer, s: int) -> int:
 
 
 @step
-def begin_move(p: HeadParams, c: HeadComputer, turn: bool) -> None:
-    """Start the planned move, or continue the ramp of the last one when `turn` (3.6, 3.10, 3.13)."""
-    old_drive, direction, s = c.drive, c.plan.direction, c.plan.speed
-    c.moves += 1
-    c.direction, c.speed, c.target, c.expected_stop = direction, s, c.plan.target, c.plan.target
+def forget_emitters(c: HeadComputer) -> None:
+    """A motion begins: the emitters of the last one say nothing about it."""
     c.last_emitter_us = c.now_us
     c.emitter_seen = 0
     c.interval_us = 0
     c.too_fast = 0
     c.against = 0
+
+
+@step
+def begin_move(p: HeadParams, c: HeadComputer, turn: bool) -> None:
+    """Start the planned move, or continue the ramp of the last one when `turn` (3.6, 3.10, 3.13)."""
+    old_drive, direction, s = c.drive, c.plan.direction, c.plan.speed
+    c.moves += 1
+    c.direction, c.speed, c.target, c.expected_stop = direction, s, c.plan.target, c.plan.target
+    forget_emitters(c)
     c.phase_start = c.emitter
     c.steady = steady_value(p, c, direction, s)
     if c.operation == PRINT and not c.repositioning:

@@ -46,7 +46,7 @@ from detent.control.head_computer import (
     is_motion,
     line_of,
 )
-from detent.control.head_motion import begin_move, forget_drive, move_emitter, move_timer, put_drive
+from detent.control.head_motion import begin_move, forget_drive, forget_emitters, move_emitter, move_timer, put_drive
 from detent.control.latch import pass_on, send
 from detent.control.self_identification import identify
 from detent.control.speed_selection import HIGH_SPEED
@@ -98,11 +98,7 @@ def begin_homing(p: HeadParams, c: HeadComputer, state: int) -> None:
     """Creep towards a frame (3.2)."""
     c.state = state
     c.direction = -1 if state == HOME_LEFT else 1
-    c.last_emitter_us = c.now_us
-    c.emitter_seen = 0
-    c.interval_us = 0
-    c.too_fast = 0
-    c.against = 0
+    forget_emitters(c)
     c.drive = min(steady_drive(p.slope_default, p.friction_default, p.homing_speed), p.homing_limit)
     c.next_ramp_us = c.now_us + p.zero_speed_us
     put_drive(p, c, c.direction * c.drive)

@@ -11,19 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.head_computer import HIGH_STEADY, IDLE
+from detent.control.head_computer import HIGH_STEADY, IDLE, OK
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
 from detent.files.quantities import INCH
 from detent.kernel.loop import advance
 from detent.methods.print_head.build import build_print_head
-from detent.methods.print_head.controller import read_status, write_command
 from detent.methods.print_head.derive import Machine as Figures
+from detent.methods.print_head.run import print_head_machine
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
+from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, controlled_run_to, set_speed
 from detent.methods.print_head.system import TICK, PrintHead, switch_on
 from detent.page.chart import Chart, Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
+from detent.record.machine import Loop, Machine
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
@@ -52,7 +54,6 @@ COLOURS = ("muted", "left", "right")
 """Of the ways, in their order."""
 
 CALCULATION_TIME = 120.0
-CODE_CALCULATE, CODE_CONTROLLED, CODE_SPEED, OK = 0x01, 0xA2, 0x99, 0x00
 
 Numbers = NDArray[np.float64]
 
@@ -277,14 +278,14 @@ def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
 
 def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
     """Run CALCULATE PARAMETERS on the machine of `spec` and read what it found."""
-    p, r = build_print_head(spec), PrintHead()
-    switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
-    _put_byte(p, r, CODE_CALCULATE)
-    code = _next_status(p, r, CALCULATION_TIME)
-    if code != OK:
-        text = "no answer" if code is None else describe_sb1(code)
-        raise AxisError(f"comparison of drives: CALCULATE PARAMETERS failed: {text}")
-    head = r.controller.head
+    machine, answers = print_head_machine(spec), list[Answer]()
+    c, ack_last = machine.state.controller, spec.method.ack_last
+    supervisor = Supervisor(c, machine.pass_time, answers.append, ack_last, CALCULATION_TIME)
+    supervisor.send(calculate_parameters())
+    supervisor.finish()
+    if answers[0].byte != OK:
+        raise AxisError(f"comparison of drives: CALCULATE PARAMETERS failed: {describe_sb1(answers[0].byte)}")
+    head = c.head
     return DriveConstants(
         slope_right=head.right.slope,
         slope_left=head.left.slope,
@@ -346,29 +347,13 @@ class MeasuringBench:
         head.emitter, head.width, head.homed, head.state = begin, BENCH_EMITTERS, 1, IDLE
         head.right.slope, head.right.friction = way.slope_right, way.friction_right
         head.left.slope, head.left.friction = way.slope_left, way.friction_left
-        for byte in (CODE_SPEED, speed_value(speed), CODE_CONTROLLED, target >> 8):
-            _put_byte(p, r, byte)
-            _next_status(p, r, 0.01)  # an acknowledge, or for the speed value the answer
-        write_command(r.controller, target & 0xFF)
+        machine = Machine(p, r, Loop(TICK, advance))
+        supervisor = Supervisor(r.controller, machine.pass_time, lambda _: None, self.spec.method.ack_last)
+        supervisor.send(set_speed(speed_value(speed)))
+        supervisor.finish()
+        supervisor.send(controlled_run_to(target))
         ticks, before = round(seconds / TICK), r.tick
         rows = np.zeros((ticks, len(self._picks)), np.uint8)
         done = advance(p, r, ticks, rows, self._picks, 1)
         order = np.arange(before + 1, before + done + 1) % ticks
         return rows[order].view(self._row)[:, 0]
-
-
-def _put_byte(p: Any, r: PrintHead, byte: int) -> None:
-    """Write the command latch and let the computer take the byte."""
-    write_command(r.controller, byte)
-    advance(p, r, 1, *_NO_ROWS, 0)
-
-
-def _next_status(p: Any, r: PrintHead, seconds: float) -> int | None:
-    """Take the next status byte; None if none comes within `seconds`."""
-    latch = r.controller.head.status.latch
-    if not latch.flag:
-        advance(p, r, round(seconds / TICK), *_NO_ROWS, 0)
-    return read_status(r.controller) if latch.flag else None
-
-
-_NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.column_timer import COLUMNS
+from detent.control.feed_forward import steady_drive
 from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
+from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
 from detent.kernel.loop import advance
@@ -352,16 +354,13 @@ class _Runner:
         p = self.machine.params.controller
         true = TrueMachine(self.spec)
 
-        def default_drive(s: int) -> int:
-            return ((p.slope_default * s) >> 8) + p.friction_default
-
         return Direction(
             slope=line.slope,
             friction=line.friction,
             speed_fast=line.speed_fast,
             speed_slow=line.speed_slow,
-            drive_fast=default_drive(p.run_speed),
-            drive_slow=default_drive(60),
+            drive_fast=steady_drive(p.slope_default, p.friction_default, p.run_speed),
+            drive_slow=steady_drive(p.slope_default, p.friction_default, HIGH_SPEED),
             true_slope=true.slope[side],
             true_friction=true.coulomb_counts[side],
             default_slope=p.slope_default,

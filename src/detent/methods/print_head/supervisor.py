@@ -54,6 +54,11 @@ def run_to(emitter: int, tag: int = -1) -> Command:
     return Command(bytes([0x92, emitter >> 8, emitter & 0xFF]), motion=True, text=f"RUN TILL {emitter}", tag=tag)
 
 
+def controlled_run_to(emitter: int) -> Command:
+    """CONTROLLED RUN TILL a position [emitter]: no faster than the preselected speed."""
+    return Command(bytes([0xA2, emitter >> 8, emitter & 0xFF]), motion=True, text=f"CONTROLLED RUN TILL {emitter}")
+
+
 def print_from(start: int, end: int, tag: int = -1) -> Command:
     """PRINT FROM `start` [1/256 emitter] TO `end` [emitter]."""
     data = bytes([0x8D, start >> 16, (start >> 8) & 0xFF, start & 0xFF, end >> 8, end & 0xFF])
