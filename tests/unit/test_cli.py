@@ -518,7 +518,7 @@ def test_a_comparison_on_an_obstructed_axis_is_status_1() -> None:
 def test_plot_without_signals_lists_them(trace: Path) -> None:
     answer = call("plot", trace)
     assert answer.status == 0
-    assert re.search(r"^train\.current +A +\S", answer.out, flags=re.MULTILINE)
+    assert re.search(r"^plant\.train\.current +A +\S", answer.out, flags=re.MULTILINE)
     assert [line.split()[0] for line in answer.out.splitlines()] == list(default_signals())
     rows = call("plot", trace, "--json").data
     assert [row["name"] for row in rows] == list(default_signals())
