@@ -144,5 +144,5 @@ def test_a_stretch_that_cannot_be_shown_is_refused_with_what_to_do(at, duration,
 
 
 def test_an_unknown_signal_names_the_nearest():
-    with pytest.raises(DetentError, match=r"did you mean .detector\.ps"):
-        captured("phase_servo.toml", signals=("detector.p",))
+    with pytest.raises(DetentError, match=r"did you mean .lines\.plus"):
+        captured("phase_servo.toml", signals=("lines.plu",))

@@ -31,7 +31,7 @@ from detent.control.phase_sequencer import (
     take_command,
 )
 from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
-from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.compiled import copy_back, local_copy, unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
@@ -206,12 +206,12 @@ def sample(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> N
     lines.carrier = k.carrier.count
     convert(p.converters, k, lines.ps)
     next_period(c.clocks)
-    if k.tracking.plus | k.tracking.minus | lines.plus | lines.minus:
+    if unlikely(k.tracking.plus + k.tracking.minus + lines.plus + lines.minus > 0):
         receive_pulses(p, c, lines)
     c.changed |= k.absolute.latched | c.sequencer.strobe
-    if integrate_strobe(p.clocks, c.clocks):
+    if unlikely(integrate_strobe(p.clocks, c.clocks)):
         tick_integrator(p, c)
-    if sample_strobe(p.clocks, c.clocks):
+    if unlikely(sample_strobe(p.clocks, c.clocks)):
         sample_speed(p, c, lines)
         protect(p, c, lines)
 
@@ -221,7 +221,7 @@ def sample(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> N
 def control(p: PhaseControllerParams, c: PhaseController, lines: PhaseLines) -> None:
     """One period of the reference clocks."""
     sample(p, c, lines)
-    if c.changed or reference_period(c.clocks) >= c.wake:
+    if unlikely(c.changed > 0 or reference_period(c.clocks) >= c.wake):
         decide(p, c)
     lines.first_request = count_sawtooth(p.pwm, c.pwm, c.law.word)
     lines.request = count_sawtooth(p.pwm, c.pwm, c.law.word)

@@ -1,6 +1,7 @@
 """The machine of a phase servo: resolver and comparator, bridge, motor and carriage, and the noise on the lines."""
 
 from detent.drive.split_bridge import SplitBridge, SplitBridgeParams, drive_two, sense_current
+from detent.kernel.compiled import unlikely
 from detent.kernel.registers import Registers, block
 from detent.kernel.step import hot_step, step
 from detent.methods.phase_servo.controller import PhaseLines
@@ -56,14 +57,14 @@ def count_losses(n: Interference, lines: PhaseLines) -> None:
 def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, tick: int) -> None:
     """What the electronics see in this tick; the comparator answers to the carrier's next count, that of this CK1."""
     lines.ps = compare(p.detector, plant.detector, lines.carrier + 1, x)
-    if tick >= plant.interference.next_tick or lines.swallowed | lines.missed:
+    if unlikely(tick >= plant.interference.next_tick or lines.swallowed + lines.missed > 0):
         disturb(p, plant, lines, tick)
 
 
 @hot_step
 def move(p: PhasePlantParams, plant: PhasePlant, train: DriveTrain, lines: PhaseLines, tick: int) -> None:
     """The machine moves through the tick."""
-    if lines.swallowed | lines.missed:
+    if unlikely(lines.swallowed + lines.missed > 0):
         count_losses(plant.interference, lines)
     sense_current(p.bridge, plant.bridge, train.current)
     first, second = (lines.first_request, lines.request) if lines.enable else (0, 0)

@@ -7,7 +7,7 @@ import pytest
 from tests.unit.methods.moves.samples import STEP, TOLERANCE, View, record, run_of, six_moves, trace_of
 from tests.unit.page.samples import plain_chart
 
-from detent.methods.moves.page import POSITION, TARGET, moves_page
+from detent.methods.moves.page import POSITION, TARGET, VELOCITY, moves_page
 from detent.methods.moves.run import MoveRun
 from detent.page.figure import Figure
 from detent.page.frame import Page
@@ -231,7 +231,7 @@ def test_parts_that_are_absent_leave_no_trace() -> None:
 
 
 @pytest.mark.parametrize(("left_out", "drawn"), [
-    ("word", ["job", "rest"]), (TARGET, ["rest"]), (POSITION, ["rest"]), ("train.velocity", ["job", "rest"]),
+    ("word", ["job", "rest"]), (TARGET, ["rest"]), (POSITION, ["rest"]), (VELOCITY, ["job", "rest"]),
 ])  # fmt: skip
 def test_a_trace_without_a_needed_signal_gives_a_page_without_its_figures(left_out: str, drawn: list[str]) -> None:
     trace = trace_of(six_moves())

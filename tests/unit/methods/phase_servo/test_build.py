@@ -232,7 +232,7 @@ def test_noise_and_push_count_in_base_ticks() -> None:
 def test_a_weak_secondary_lets_offset_and_noise_displace_the_edges_farther() -> None:
     faults = ["detector.jitter=20 ns", "detector.offset_error=10 %"]
     full, weak, strong = (
-        build_phase_servo(load_spec(EXAMPLE, [*faults, f"detector.amplitude={share} %"])).detector
+        build_phase_servo(load_spec(EXAMPLE, [*faults, f"detector.amplitude={share} %"])).plant.detector
         for share in (100, 50, 200)
     )
     assert weak.jitter == pytest.approx(2 * full.jitter)
