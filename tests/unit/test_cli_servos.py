@@ -29,7 +29,14 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_run_makes_the_moves_and_leaves_report_and_trace(axis: str, job: str, signals: tuple[str, ...]) -> None:
     answer = call(
-        "run", axis, "--job", job, "-o", "out", "--signals", "plant.encoder.edge" if axis == FILTERED else "controller.wake"
+        "run",
+        axis,
+        "--job",
+        job,
+        "-o",
+        "out",
+        "--signals",
+        "plant.encoder.edge" if axis == FILTERED else "controller.wake",
     )
     assert answer.status == 0, answer.out
     assert ": every move arrived on " in answer.out.splitlines()[0]
