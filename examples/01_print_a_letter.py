@@ -22,7 +22,7 @@ for side, line in found.identified.items():
 
 # %% The trace: numpy arrays with units, named like the registers of the machine.
 current = run.trace["plant.train.current"]
-print(f"{len(run.trace)} rows, current up to {abs(current).max():.2f} {run.trace.units['train.current']}")
+print(f"{len(run.trace)} rows, current up to {abs(current).max():.2f} {run.trace.units['plant.train.current']}")
 
 # %% Files for other tools, a figure of the first line, the report.
 folder = Path("runs/example")

@@ -349,7 +349,7 @@ def test_every_kind_of_trace_holds_the_same_with_units(tmp_path: Path) -> None:
             np.testing.assert_array_equal(trace[name], traces[0][name])
     with (tmp_path / "out" / "trace.csv").open(encoding="utf-8", newline="") as stream:
         header = next(csv.reader(stream))
-    assert header[:3] == ["t [s]", "train.position [m]", "train.velocity [m/s]"]
+    assert header[:3] == ["t [s]", "plant.train.position [m]", "plant.train.velocity [m/s]"]
     assert traces[0].attributes["job"] == "letter.txt"
 
 

@@ -147,3 +147,31 @@ class PushTable(Table, frozen=True):
     force: Force = required("force on the carriage, + to the right", '"3 N"', ge=-1e5, le=1e5)
     at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
     duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)
+
+
+class ProtectionTable(Table, frozen=True):
+    """What ends a motion that is not what was asked for; a time of 0 switches its watch off."""
+
+    saturation_time: Time = optional("how long the command may stay at its limit", 1.0, ge=0.0, le=1000.0)
+    stuck_time: Time = optional("how long the sensor may stand under effort", 0.05, ge=0.0, le=10.0)
+    stuck_effort: float = optional(
+        "effort under which the axis must move, as a share of the largest", math.nan,
+        derived="twice the static friction, from 0.3 to 1", ge=0.01, le=1.0,
+    )  # fmt: skip
+
+
+class MotionProtectionTable(ProtectionTable, frozen=True):
+    """The same of an axis whose controller can trust what its sensor counts, from sample to sample and for good."""
+
+    overspeed: float = optional("speed that is a fault, as a share of limits.speed; 0: any", 1.1, ge=0.0, le=100.0)
+    jump: float = optional(
+        "movement in one sample that is a jump of the sensor, as a share of what limits.speed makes; 0: any",
+        1.5, ge=0.0, le=100.0,
+    )  # fmt: skip
+    reversed_time: Time = optional("how long the axis may speed up against its effort", 0.02, ge=0.0, le=10.0)
+    travel: bool = optional("switch off beyond an end of the travel", default=True)
+
+
+def breaking_effort(static: float, effort: float) -> float:
+    """Share of the largest effort [N or N.m] under which the axis must move, with this static friction."""
+    return min(max(0.3, 2.0 * static / effort), 1.0) if effort > 0.0 else 1.0

@@ -1,14 +1,15 @@
 import pytest
 
-from detent.axisfile.protection import TravelProtectionTable, breaking_effort, fill_guard, guard_text, samples
-from detent.control.guard import GuardParams
+from detent.axisfile.protection import describe_fault, fill_guard, samples
+from detent.axisfile.tables import MotionProtectionTable, ProtectionTable, breaking_effort
+from detent.control.guard import FOLLOWING, TRAVEL, Guard, GuardParams
 
 
 def guard_of(sample=1e-3, speed=10_000.0, **keys):
     p = GuardParams()
     fill_guard(
         p,
-        TravelProtectionTable.model_construct(**(TravelProtectionTable().model_dump() | keys)),
+        MotionProtectionTable.model_construct(**(MotionProtectionTable().model_dump() | keys)),
         sample=sample,
         speed=speed,
     )
@@ -53,4 +54,12 @@ def test_the_effort_that_must_move_the_axis_follows_its_friction(static, share):
 
 
 def test_a_text_names_the_limit():
-    assert "0.5 mm" in guard_text(10, following="0.5 mm")
+    table = MotionProtectionTable()
+    assert "0.5 mm" in describe_fault(Guard(code=FOLLOWING), table, following="0.5 mm")
+    assert "upper end of its way, 2 m" in describe_fault(Guard(code=TRAVEL, side=1), table, lower="0 m", upper="2 m")
+
+
+def test_an_axis_whose_counts_noise_may_change_watches_no_speed():
+    p = GuardParams()
+    fill_guard(p, ProtectionTable(), sample=1e-3, speed=10_000.0)
+    assert {path for path, value in p.values().items() if value} == {"saturated", "stuck"}

@@ -287,12 +287,12 @@ def test_a_current_against_the_motion_brakes_to_rest_and_not_beyond():
 
 
 def test_default_plant_accelerates_at_600_in_s2_with_96_counts_of_ir():
-    t = Rig().p.train
+    t = Rig().p.plant.train
     assert 96 * 38 / 300 / t.resistance * t.force_constant / t.mass == pytest.approx(600 * 0.0254, rel=1e-3)
 
 
 def test_default_plant_is_that_of_the_specification():
-    p = Rig().p.train
+    p = Rig().p.plant.train
     assert p.emf_constant == p.force_constant == pytest.approx(19.870, rel=1e-4)
     assert p.mass == pytest.approx(1.3212, rel=1e-3)
     assert p.friction.coulomb_right == pytest.approx(7.55, rel=1e-3)

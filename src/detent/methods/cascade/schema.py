@@ -10,8 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from detent.axisfile.motion import unit_in
-from detent.axisfile.protection import ProtectionTable, breaking_effort
-from detent.axisfile.tables import AxisSpec, AxisTable, MotorTable
+from detent.axisfile.tables import AxisSpec, AxisTable, MotionProtectionTable, MotorTable, breaking_effort
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
     Acceleration,
@@ -255,7 +254,7 @@ class CascadeSpec(AxisSpec, frozen=True):
     encoder: EncoderTable
     load_encoder: EncoderTable | None = None
     method: MethodTable = Field(default_factory=MethodTable)
-    protection: ProtectionTable = Field(default_factory=ProtectionTable)
+    protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     def unit(self, linear: str) -> str:

@@ -8,15 +8,16 @@ from typing import Literal
 
 from pydantic import Field
 
-from detent.axisfile.protection import TravelProtectionTable, breaking_effort
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
     EncoderTable,
     FrictionTables,
     InterferenceTable,
+    MotionProtectionTable,
     MotorTable,
     PushTable,
+    breaking_effort,
 )
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
@@ -148,7 +149,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
     mechanics: MechanicsTable
     encoder: EncoderTable
     method: MethodTable = Field(default_factory=MethodTable)
-    protection: TravelProtectionTable = Field(default_factory=TravelProtectionTable)
+    protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property

@@ -104,7 +104,7 @@ class PhaseLines(Registers):
     first_request: i1 = register(
         "request of the PWM in the tick's first oscillator period: 1 plus, -1 minus, 0 neither", by=CONTROLLER
     )
-    request: i1 = register("the same in its second", by=CONTROLLER)
+    request: i1 = register("request of the PWM in its second: 1 plus, -1 minus, 0 neither", by=CONTROLLER)
     enable: u1 = register("1 once the bridge may drive", by=CONTROLLER)
 
 

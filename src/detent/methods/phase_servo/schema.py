@@ -9,8 +9,16 @@ from typing import Annotated, Literal, TypeVar
 from annotated_types import Ge, Le
 from pydantic import Field
 
-from detent.axisfile.protection import ProtectionTable, breaking_effort
-from detent.axisfile.tables import AxisSpec, AxisTable, FrictionTables, InterferenceTable, MotorTable, PushTable
+from detent.axisfile.tables import (
+    AxisSpec,
+    AxisTable,
+    FrictionTables,
+    InterferenceTable,
+    MotorTable,
+    ProtectionTable,
+    PushTable,
+    breaking_effort,
+)
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
     INCH,

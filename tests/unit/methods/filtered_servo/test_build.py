@@ -10,7 +10,7 @@ from functools import cache
 import pytest
 from tests.filtered_servo_rig import EXAMPLE
 
-from detent.axisfile.protection import TravelProtectionTable
+from detent.axisfile.tables import MotionProtectionTable
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.controller import acknowledge, go_to
@@ -93,7 +93,7 @@ ELSEWHERE = {
     "motor.max_current": "test_cautions.py: current of the largest drive word",
     "method.timeout": "test_rules.py: timeout; the jobs of the axis",
 } | dict.fromkeys(
-    (f"protection.{key}" for key in TravelProtectionTable.model_fields),
+    (f"protection.{key}" for key in MotionProtectionTable.model_fields),
     "tests/unit/axisfile/test_protection.py: each moves its own register; test_guard.py: what the registers do",
 )
 

@@ -121,7 +121,9 @@ def test_a_noisy_detector_that_never_locks_is_told():
 
 def test_a_move_that_is_held_back_does_not_arrive():
     push = [f"disturbance.push.{text}" for text in ("force=-250 N", "at=0 s", "duration=100 s")]
-    found = run_moves(phase(*push), job({"target": 2 * INCH}))
+    found = run_moves(
+        phase(*push, "protection.stuck_time=0 s", "protection.saturation_time=0 s"), job({"target": 2 * INCH})
+    )
     assert not found.done
     assert "did not arrive within" in found.failure or "stands" in found.failure
 

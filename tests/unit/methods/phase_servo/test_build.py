@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from tests.phase_servo_rig import EXAMPLE
 
-from detent.axisfile.protection import ProtectionTable
+from detent.axisfile.tables import ProtectionTable
 from detent.control.phase_sequencer import NEVER
 from detent.errors import InputError
 from detent.kernel.turn_table import TURN

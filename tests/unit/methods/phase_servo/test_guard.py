@@ -3,7 +3,7 @@
 import pytest
 from tests.phase_servo_rig import EXAMPLE
 
-from detent.control.guard import NO_ARRIVAL, OVERSPEED, SATURATED, STUCK
+from detent.control.guard import NO_ARRIVAL, SATURATED, STUCK
 from detent.methods.load import load_spec
 from detent.methods.moves.job import one_move
 from detent.methods.moves.run import run_moves
@@ -62,14 +62,6 @@ def test_a_move_that_does_not_arrive_is_told_and_held():
     assert code == NO_ARRIVAL
     assert "did not arrive" in failure
     assert host.machine.state.lines.enable == 1
-
-
-def test_a_carriage_that_is_driven_too_fast():
-    push = ("disturbance.push.force=300 N", "disturbance.push.at=600 ms", "disturbance.push.duration=1 s")
-    host = host_of(*push, "protection.reversed_time=0 s")
-    host.start()
-    host.machine.pass_time(0.7)
-    assert host.controller.guard.code == OVERSPEED
 
 
 def test_after_a_fault_it_acquires_anew():
