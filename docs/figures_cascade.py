@@ -81,7 +81,7 @@ def which_encoder() -> None:
             part = run.trace.between(begin, run.result.moves[0].end)
             t = part.time - run.result.moves[0].arrived
             for name, colour, text in (("motor", GREY, "motor"), ("load", BLUE, "table")):
-                off = np.degrees(part[f"machine.{name}.position"]) - 45
+                off = np.degrees(part[f"plant.machine.{name}.position"]) - 45
                 area.plot(1e3 * t, off, color=colour, linewidth=1.6, label=text)
             area.axhline(0, color="black", linewidth=0.8)
             area.set_ylim(-0.3, 0.3)

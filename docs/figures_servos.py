@@ -176,8 +176,8 @@ def clock_order() -> None:
             axis = phase_axis(*push, *overrides)
             sample = axis.simulated.sample_job().moves[0]
             job = MoveJob("pushed", "moves", (replace(sample, dwell=0.25),))
-            done = axis.run(job, signals=("train.position",), every=64)
-            displacement = (done.trace["train.position"] - done.result.moves[0].target) / axis.spec.step
+            done = axis.run(job, signals=("plant.train.position",), every=64)
+            displacement = (done.trace["plant.train.position"] - done.result.moves[0].target) / axis.spec.step
             area.plot(done.trace.time * 1e3, displacement, color=colour, linewidth=1.2, label=text)
         area.axvline(35, color=GREY, linestyle="--", linewidth=1)
         label(area, "push", (35, -3.0), (4, 0))

@@ -115,7 +115,12 @@ def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
     with mpl.rc_context(STYLE):
         figure = figures.Figure(figsize=(width, height), layout="constrained")
         yield figure
-        # No date inside: the same figure gives the same file.
+        # The same figure gives the same file: no date inside, and places free of the last bits, in which the solver of
+        # the layout goes by where its variables lie in memory.
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        for area in figure.axes:
+            area.set_position(area.get_position().from_extents(area.get_position().extents.round(6)))
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
         with writing(path):
             figure.savefig(path, metadata=metadata)
