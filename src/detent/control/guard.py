@@ -34,7 +34,6 @@ class GuardParams(Registers):
         "samples at rest under an effort that breaks the axis loose until that is a fault", unit="count"
     )
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
-    period: i4 = register("time between two samples, of a controller that has no slower clock of its own", unit="tick")
 
 
 class Guard(Registers):
@@ -50,7 +49,7 @@ class Guard(Registers):
     pushed: i4 = register("samples of effort in one direction in the running window", unit="count")
     push: i1 = register("direction of that effort")
     began: i8 = register("movement in the first sample of the window", unit="count")
-    awaited: i8 = register("time in which the axis must still arrive; 0: none waits for it", unit="tick")
+    awaited: i8 = register("ticks or samples in which the axis must still arrive; 0: none waits", unit="count")
 
 
 @step
@@ -63,7 +62,7 @@ def enable_guard(g: Guard) -> None:
 
 @step
 def await_arrival(g: Guard, ticks: int) -> None:
-    """Host action: the axis must arrive within so many ticks; 0 lifts it."""
+    """Host action: the axis must arrive within so many calls of `is_overdue`; 0 lifts it."""
     g.awaited = ticks
     if ticks and g.code == NO_ARRIVAL:
         g.code = 0
@@ -137,7 +136,7 @@ def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing:
 
 @hot_step
 def is_overdue(g: Guard) -> bool:
-    """Of one tick of an arrival that is awaited: true in the last. That is told, and the drive goes on holding."""
+    """Count a tick or sample down; true when the arrival is overdue. That is told, and the drive goes on holding."""
     g.awaited -= 1
     if g.awaited:
         return False

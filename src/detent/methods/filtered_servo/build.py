@@ -43,7 +43,7 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     fill_interference(m.interference, spec.disturbance.lines, TICK)
     fill_push(m.push, spec.disturbance.push, TICK)
     fill_guard(c.guard, spec.protection, sample=GUARD_PERIOD, speed=spec.limits.speed / spec.pulse)
-    c.guard.period = round(GUARD_PERIOD / TICK)
+    c.look_ticks = round(GUARD_PERIOD / TICK)
     c.breaking = spec.protection.stuck_effort * c.deviation.word_limit
     start = spec.mechanics.start_position
     c.lowest = round(-start / spec.pulse) - method.in_position

@@ -63,6 +63,7 @@ class FilteredControllerParams(Registers):
     window: i8 = register("deviation that counts as in position", unit="count")
     window_ticks: i8 = register("time inside it until the axis says so", unit="tick")
     guard: GuardParams = block("protection")
+    look_ticks: i8 = register("time between two looks of the guard", unit="tick")
     breaking: f8 = register("drive word that breaks the slide loose", unit="count")
     lowest: i8 = register("lower end of the travel, from where the slide stood at power-on", unit="count")
     highest: i8 = register("upper end of the travel", unit="count")
@@ -310,7 +311,7 @@ def watch_arrival(c: FilteredController) -> None:
 @step
 def protect(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """The guard looks: effort by the drive word, way by the counted pulses."""
-    c.look = p.guard.period
+    c.look = p.look_ticks
     d, moved = c.deviation, c.deviation.position - c.watched
     c.watched = d.position
     if d.state != RUN:
