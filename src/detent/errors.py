@@ -8,8 +8,7 @@ register, and its text stands here.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-MOST_PROBLEMS = 20
-"""Problems of one job or recording told at most: a file of another kind would have one in each line."""
+MOST_PROBLEMS = 20  # problems of one job or recording told at most: a file of another kind would have one in each line
 
 
 class DetentError(Exception):

@@ -71,8 +71,7 @@ COMMON_UNITS: dict[str, dict[str, Fraction]] = {
 """Factors met in nearly every file, by target unit, beside that unit itself: with these alone a file is read without
 waiting for pint's import (0.2 s). A test holds each of them to pint's."""
 
-IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}
-"""Units that people read in degrees."""
+IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}  # as people read them
 
 _NUMBER_THEN_UNIT = re.compile(
     r"\s*([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(\S.*)?", re.DOTALL

@@ -5,8 +5,7 @@ import math
 from detent.axisfile.tables import FrictionTables, MotorTable
 from detent.plant.drive_train import DriveTrainParams, fill_period
 
-SUBSTEP_SHARE = 0.25
-"""Longest substep of the power series, as a share of the fastest time constant."""
+SUBSTEP_SHARE = 0.25  # longest substep of the power series, as a share of the fastest time constant
 
 
 def fill_drive_train(  # noqa: PLR0913 - what a drive train is made of

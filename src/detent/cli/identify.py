@@ -14,11 +14,8 @@ if TYPE_CHECKING:
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
 
-METHODS = {"regression": "regression", "output-error": "output error"}
-"""Words of --method, and what the identification calls them."""
-
+METHODS = {"regression": "regression", "output-error": "output error"}  # words of --method: the identification's
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
-
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
 Mapping = Annotated[Path | None, map_option("Mapping")]

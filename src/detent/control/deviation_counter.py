@@ -4,8 +4,8 @@ from detent.kernel.registers import Registers, f8, i4, i8, register, u1
 from detent.kernel.step import step
 
 RESET, RUN, FAULT = 0, 1, 2
+# Causes of a fault; the texts of two stand in `errors.SERVO_FAULT_TEXT`, of the third in `errors.GUARD_TEXT`.
 DEVIATION_RANGE, SPEED_RANGE, GUARDED = 1, 2, 3
-"""Causes of a fault; the texts of two stand in `errors.SERVO_FAULT_TEXT`, of the third in `errors.GUARD_TEXT`."""
 
 
 class DeviationParams(Registers):

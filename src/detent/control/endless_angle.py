@@ -8,8 +8,7 @@ unit. Registers have their names of the specification.
 from detent.kernel.registers import Registers, i8, register, u1
 from detent.kernel.step import step
 
-TURN_COUNTER, FLAG, RAW = 0, 1, 2
-"""Forms of the extension."""
+TURN_COUNTER, FLAG, RAW = 0, 1, 2  # forms of the extension
 
 
 class EndlessAngleParams(Registers):

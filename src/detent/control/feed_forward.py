@@ -6,8 +6,7 @@ Drive = IR part (while accelerating or braking) + Coulomb friction part + back-E
 
 from detent.kernel.step import step
 
-TURN_AROUND_US = 133000
-"""Turn-around time at 40 in/s: 2 x 40 / 600 s, rounded as in the patent."""
+TURN_AROUND_US = 133000  # turn-around time at 40 in/s: 2 x 40 / 600 s, rounded as in the patent
 
 
 @step

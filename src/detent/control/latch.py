@@ -3,8 +3,7 @@
 from detent.kernel.registers import Registers, block, register, u1, u1_array
 from detent.kernel.step import step
 
-QUEUE_LENGTH = 32
-"""Status bytes that can wait; a power of two."""
+QUEUE_LENGTH = 32  # status bytes that can wait; a power of two
 
 
 class Latch(Registers):

@@ -7,13 +7,9 @@ table; from then on, until the next command, it is the absolute error within the
 from detent.kernel.registers import Registers, i1, i2_array, i4, i8, register, u1, u2
 from detent.kernel.step import step
 
-ACQUIRE, SPEED, SETTLE_BUSY, SETTLE_READY, HOLD = 0, 1, 2, 3, 4
-"""States of specification 4."""
-
+ACQUIRE, SPEED, SETTLE_BUSY, SETTLE_READY, HOLD = 0, 1, 2, 3, 4  # states of specification 4
 SPEED_MODE, POSITION_MODE = 0, 1
-TABLE = 4096
-"""Entries of the velocity table at most; a larger distance takes the last one in use."""
-
+TABLE = 4096  # entries of the velocity table at most; a larger distance takes the last one in use
 NEVER = 1 << 62
 
 

@@ -7,9 +7,7 @@ smaller angles, or to the angle as commanded, counted from 0 of the present turn
 from detent.kernel.registers import Registers, i8, i8_array, register, u1_array
 from detent.kernel.step import step
 
-SHORTEST, POSITIVE, NEGATIVE, AS_COMMANDED = 0, 1, 2, 3
-"""Direction policies."""
-
+SHORTEST, POSITIVE, NEGATIVE, AS_COMMANDED = 0, 1, 2, 3  # direction policies
 POSITIONS = 128
 
 

@@ -9,11 +9,8 @@ import math
 from detent.kernel.registers import Registers, f8, i1, i8, register
 from detent.kernel.step import hot_step, step
 
-PER_PULSE = 1_000_000
-"""Rate of one pulse per second."""
-
-FULL = 1_000_000 * PER_PULSE
-"""Phase of one pulse."""
+PER_PULSE = 1_000_000  # rate of one pulse per second
+FULL = 1_000_000 * PER_PULSE  # phase of one pulse
 
 
 class PulseGeneratorParams(Registers):

@@ -2,11 +2,8 @@
 
 from detent.kernel.step import step
 
-FLOOR = 30
-"""5 in/s: the search does not go below it."""
-
-HIGH_SPEED = 60
-"""10 in/s: from here on the high-speed algorithm."""
+FLOOR = 30  # 5 in/s: the search does not go below it
+HIGH_SPEED = 60  # 10 in/s: from here on the high-speed algorithm
 
 
 @step

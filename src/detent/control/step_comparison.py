@@ -10,13 +10,9 @@ from detent.control.step_rule import ACCEL, CRUISE, DECEL, IDLE, REST, STEP, Ste
 from detent.kernel.registers import Registers, f8, f8_array, i8, i8_array, register, u1
 from detent.kernel.step import hot_step
 
-BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY, CONSTANT_FREQUENCY = 1, 2, 3
-"""Conventional A, conventional B, and the naive drive."""
-
+BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY, CONSTANT_FREQUENCY = 1, 2, 3  # conventional A, conventional B, the naive drive
 ZONES = 33
-
-ROUNDING = 1e-6
-"""Steps that rounding may add to a braking distance; without it a ramp of whole steps would brake one step early."""
+ROUNDING = 1e-6  # steps that rounding may add to a braking distance: a ramp of whole steps would brake one step early
 
 
 class ComparisonParams(Registers):

@@ -16,21 +16,11 @@ from detent.kernel.step import hot_step
 
 Entries = NDArray[np.int16]
 
-REST, ACCEL, CRUISE, DECEL, TURN, FAULT = 0, 1, 2, 3, 4, 5
-"""States of specification 4."""
-
-IDLE, STEP, PAUSE = 0, 1, 2
-"""What comes next: nothing, a step with the frequency of `word`, or the waiting time of a reversal."""
-
-INFEASIBLE, OUT_OF_RANGE = 1, 2
-"""Causes of a fault."""
-
-AT_REST = -1
-"""Ramp index of a motor that stands; also the entry of a step that is not allowed."""
-
-OUTSIDE = -2
-"""In place of an entry: the motor is beyond the ends of the table."""
-
+REST, ACCEL, CRUISE, DECEL, TURN, FAULT = 0, 1, 2, 3, 4, 5  # states of specification 4
+IDLE, STEP, PAUSE = 0, 1, 2  # what comes next: nothing, a step with the frequency of `word`, the wait of a reversal
+INFEASIBLE, OUT_OF_RANGE = 1, 2  # causes of a fault
+AT_REST = -1  # ramp index of a motor that stands; also the entry of a step that is not allowed
+OUTSIDE = -2  # in place of an entry: the motor is beyond the ends of the table
 RAMP = 2048
 LIMITS = 16
 

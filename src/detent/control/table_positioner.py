@@ -23,20 +23,13 @@ from detent.control.position_table import AS_COMMANDED, PositionTable, way_to
 from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
 from detent.kernel.step import step
 
+# States of specification 4; JOG-RAW and JOG-EXT differ in FLG and n only.
 POWER_ON, HOLD, JOG, STOPPING, MOVE = 0, 1, 2, 3, 4
-"""States of specification 4; JOG-RAW and JOG-EXT differ in FLG and n only."""
-
-BY_THEORETICAL, BY_ACTUAL = 0, 1
-"""Remaining angle that the judge looks at."""
-
+BY_THEORETICAL, BY_ACTUAL = 0, 1  # remaining angle that the judge looks at
+# How steps 118 and 120 are stored; in the last two an interrupt can come between.
 ATOMIC, FLAG_FIRST, REMAINING_FIRST = 0, 1, 2
-"""How steps 118 and 120 are stored; in the last two an interrupt can come between."""
-
-BUSY, NO_SUCH_POSITION, TOO_FAR = 1, 2, 3
-"""Reasons for a refusal."""
-
-LONGEST_WAY = 1 << 31
-"""Ways are shorter: IR has 32 bits before its point [count]."""
+BUSY, NO_SUCH_POSITION, TOO_FAR = 1, 2, 3  # reasons for a refusal
+LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count]
 
 
 class PositionerParams(Registers):

@@ -10,8 +10,7 @@ import math
 from detent.kernel.registers import Registers, f8, f8_array, i8, register
 from detent.kernel.step import step
 
-MEMORY = 64
-"""Samples kept; the delay is shorter."""
+MEMORY = 64  # samples kept; the delay is shorter
 
 
 class EffortSourceParams(Registers):

@@ -3,8 +3,7 @@
 from detent.kernel.registers import Registers, register, u1, u2
 from detent.kernel.step import hot_step, step
 
-CLOCKS_PER_PERIOD = 300
-"""7.5 MHz / 25 kHz: drive counts and timer clocks are the same number."""
+CLOCKS_PER_PERIOD = 300  # 7.5 MHz / 25 kHz: drive counts and timer clocks are the same number
 
 
 class PwmTimer(Registers):

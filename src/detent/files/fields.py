@@ -16,10 +16,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from detent.units import QuantityError, describe_kind, format_quantity, parse_quantity
 
 LIST_EXAMPLE = "[20000, 20096]"  # list of whole numbers shown for a key that has no example of its own
-
-
-IN_SI: Final = "values are in SI units"
-"""Context of a validation of numbers that a program gives, where a file would have text with a unit."""
+IN_SI: Final = "values are in SI units"  # context of a validation of numbers from a program: no text with a unit
 
 
 class AnyName(str):

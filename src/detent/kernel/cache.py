@@ -12,16 +12,11 @@ import sys
 from functools import cache
 from pathlib import Path
 
+# What a step can be made of, beside the `SYSTEM` of each method; other rooms are not part of any compiled code.
 STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "errors.py", "units.py")
-"""What a step can be made of, beside the `SYSTEM` of each method; other rooms are not part of any compiled code."""
-
-SYSTEM = "methods/*/system.py"
-"""The wiring and the tick of a method."""
-
+SYSTEM = "methods/*/system.py"  # the wiring and the tick of a method
 PACKAGE = Path(__file__).resolve().parent.parent
-
-KEPT_FOLDERS = 6
-"""Compiled folders that stay: a few checkouts and versions side by side, not every edit ever made."""
+KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made
 
 
 def user_cache_root() -> Path:

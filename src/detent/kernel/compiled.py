@@ -79,8 +79,8 @@ def _typeof_host_array(value: Any, _context: Any) -> HostArrayType | None:
     return None if width is None else HostArrayType(width)
 
 
+# What a host lays ready: table entries and signals.
 _HOST_WIDTHS: dict[Any, Width] = {part.ctype: part for part in (get_args(i2)[1], get_args(f8)[1])}
-"""What a host lays ready: table entries and signals."""
 
 
 def _called(function: Any, obj: Any, c: Any) -> Any:

@@ -16,17 +16,13 @@ from detent.kernel.step import step
 
 LOG2_E = 1.44269504088896338700
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-HIGHEST, LOWEST = 709.782712893383973096, -745.13321910194110842
-"""Exponents beyond which the result is infinite, or 0."""
-
+HIGHEST, LOWEST = 709.782712893383973096, -745.13321910194110842  # exponents beyond which the result is infinite, or 0
 TWO_OVER_PI = 6.36619772367581382433e-01
+# A quarter turn in three parts of 33 bits, of which whole multiples up to 2^20 are exact, and what is left of it.
 HALF_PI_1, HALF_PI_2 = 1.57079632673412561417, 6.07710050630396597660e-11
 HALF_PI_3, HALF_PI_REST = 2.02226624871116645580e-21, 8.47842766036889956997e-32
-"""A quarter turn in three parts of 33 bits, of which whole multiples up to 2^20 are exact, and what is left of it."""
-
+# Angle up to which they suffice [rad]; beyond it whole turns are taken off first, and the turn itself is rounded.
 FARTHEST = 1.6e6
-"""Angle up to which they suffice [rad]; beyond it whole turns are taken off first, and the turn itself is rounded."""
-
 FULL_TURN = 6.283185307179586
 
 
@@ -105,8 +101,7 @@ def less_whole_turns(x: float) -> float:
     return x
 
 
-SERIES_UP_TO = 0.5
-"""Beyond it, `one_less_exp` is its difference: less than a bit and a half is lost there."""
+SERIES_UP_TO = 0.5  # beyond it, `one_less_exp` is its difference: less than a bit and a half is lost there
 
 
 def one_less_exp(x: float) -> float:

@@ -23,10 +23,7 @@ Offsets = NDArray[np.int64]
 F = TypeVar("F", bound=Callable[..., object])
 
 extending: Any = numba.extending  # it publishes no types
-
-HostArray = Any
-"""A ctypes array; compiled code reads ``array[k]`` and ``len(array)``."""
-
+HostArray = Any  # a ctypes array; compiled code reads ``array[k]`` and ``len(array)``
 _TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
 
 _CONTROLS: dict[type[Registers], Callable[..., Any]] = {}

@@ -104,8 +104,8 @@ class Leaf:
     by: str = ""
 
 
+# Who writes a wire: sensor words and switches come from the plant, actuator words and enables from the controller.
 PLANT, CONTROLLER = "plant", "controller"
-"""Who writes a wire: sensor words and switches come from the plant, actuator words and enables from the controller."""
 
 
 def register(doc: str, *, unit: str = "", length: int = 0, by: str = "") -> Any:

@@ -10,8 +10,7 @@ from detent.kernel.step import hot_step
 
 TURN = 1 << 32
 FRACTION = TURN - 1
-POINTS = 256
-"""Entries per turn; the last repeats the first."""
+POINTS = 256  # entries per turn; the last repeats the first
 
 
 class TurnTable(Registers):

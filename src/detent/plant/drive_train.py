@@ -14,11 +14,8 @@ from detent.kernel.registers import Registers, block, f8, i1, i8, register
 from detent.kernel.step import hot_step, step
 from detent.plant.friction import Friction
 
-NO_CURRENT = 1e-9
-"""Current of a held motor that counts as none [A]: its exponential decay would otherwise never end."""
-
-SERIES_TERMS = 10
-"""Terms of the power series per substep: with |M h| <= 0.25 the remainder is below 1e-14 of the step."""
+NO_CURRENT = 1e-9  # current of a held motor that counts as none [A]: its exponential decay would otherwise never end
+SERIES_TERMS = 10  # terms of the power series per substep: with |M h| <= 0.25 the remainder is below 1e-14 of the step
 
 
 class Transition(Registers):

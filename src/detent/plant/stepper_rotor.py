@@ -14,8 +14,7 @@ from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, f8, f8_array, i8, register
 from detent.kernel.step import hot_step, step
 
-INTERVALS = 256
-"""Stretches of the torque curve; a straight line over 1/256 of the range errs by some 1e-5."""
+INTERVALS = 256  # stretches of the torque curve; a straight line over 1/256 of the range errs by some 1e-5
 
 
 class RotorParams(Registers):

@@ -14,8 +14,7 @@ from detent.kernel.elementary import exp
 from detent.kernel.registers import Registers, block, f8, register
 from detent.kernel.step import hot_step
 
-NOTHING_LEFT = 40.0
-"""Square of the speed, in Stribeck velocities, from which on the difference is below rounding: exp(-40) is 4e-18."""
+NOTHING_LEFT = 40.0  # square of the speed, in Stribeck velocities, from which on exp(-40), 4e-18, is below rounding
 
 
 class DirectionFriction(Registers):

@@ -26,8 +26,7 @@ from detent.kernel.step import hot_step
 from detent.plant.dc_winding import WindingParams, current_rate, motor_force
 from detent.plant.stribeck import StribeckFriction, friction_force, holding_force, is_dry
 
-State = tuple[float, float, float, float, float]
-"""Current [A], position [m] and velocity [m/s] of the motor, of the load."""
+State = tuple[float, float, float, float, float]  # current [A], position [m], velocity [m/s] of the motor, of the load
 
 
 class MassParams(Registers):

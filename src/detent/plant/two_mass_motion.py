@@ -15,14 +15,9 @@ from detent.plant.dc_winding import flowing_current
 from detent.plant.stribeck import is_dry
 from detent.plant.two_mass import State, TwoMass, TwoMassParams, find_senses, flow
 
-MOTOR_REVERSES, LOAD_REVERSES, POSITIVE_FLANK, NEGATIVE_FLANK = 1, 2, 3, 4
-"""What ends a regime; at a flank that is met or left."""
-
-PIECES = 8
-"""Regimes in one tick at most; what is left of it then runs to its end in the last one."""
-
-ROOT_STEPS = 40
-"""Steps of the search for the moment of an event; some six are usual."""
+MOTOR_REVERSES, LOAD_REVERSES, POSITIVE_FLANK, NEGATIVE_FLANK = 1, 2, 3, 4  # ends of a regime; a flank is met or left
+PIECES = 8  # regimes in one tick at most; what is left of it then runs to its end in the last one
+ROOT_STEPS = 40  # steps of the search for the moment of an event; some six are usual
 
 
 @hot_step

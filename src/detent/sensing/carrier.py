@@ -7,8 +7,7 @@ capacitor across each coil keeps the fundamental: what the detector sees is that
 from detent.kernel.registers import Registers, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 
-LARGE = 3.0
-"""Current through the small resistor R461, in units of the other's (1/R462): about 3 (block 461)."""
+LARGE = 3.0  # current through the small resistor R461, in units of the other's (1/R462): about 3 (block 461)
 
 
 class CarrierParams(Registers):

@@ -10,9 +10,7 @@ from detent.kernel.registers import Registers, block, f8_array, i8, i8_array, re
 from detent.kernel.step import step
 
 INSERT_PLUS, INSERT_MINUS, REMOVE, LOSE_SAMPLE, CORRUPT, INSERT = 0, 1, 2, 3, 4, 5
-RATES = 4
-"""Kinds that come at random: `REMOVE`, `LOSE_SAMPLE`, `CORRUPT` and `INSERT`, an inserted pulse of either sign."""
-
+RATES = 4  # kinds that come at random: `REMOVE`, `LOSE_SAMPLE`, `CORRUPT` and `INSERT`, a pulse put in of either sign
 ENTRIES = 64
 NEVER = 1 << 62
 

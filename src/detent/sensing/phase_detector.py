@@ -16,9 +16,7 @@ from detent.kernel.turn_table import FRACTION, POINTS, TURN, TurnTable, at_phase
 
 QUARTER = TURN >> 2
 HALF = TURN >> 1
-
-JITTER_LIMIT = 0.2
-"""An edge is never displaced by more turns than this: the two edges of a cycle cannot meet."""
+JITTER_LIMIT = 0.2  # an edge is never displaced by more turns than this: the two edges of a cycle cannot meet
 
 
 class DetectorParams(Registers):

@@ -8,8 +8,7 @@ constant of the filter.
 from detent.kernel.registers import Registers, f8, f8_array, i8, register
 from detent.kernel.step import step
 
-MEMORY = 64
-"""Samples kept; delay and span together are shorter."""
+MEMORY = 64  # samples kept; delay and span together are shorter
 
 
 class EncoderWord(Registers):
