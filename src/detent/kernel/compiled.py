@@ -9,6 +9,7 @@ fields in machine registers.
 import ctypes
 import math
 import operator
+from collections.abc import Callable
 from typing import Any, get_args
 
 import numba.extending
@@ -25,7 +26,7 @@ templates: Any = untyped_templates
 cgutils: Any = untyped_cgutils
 
 BYTE = ir.IntType(8)
-INT32 = ir.IntType(32)
+INT32, WORD = ir.IntType(32), ir.IntType(64)
 
 
 class RegistersType(types.Type):
@@ -108,7 +109,7 @@ def _unbox_host_array(typ: HostArrayType, obj: Any, c: Any) -> Any:
     """Address and length; the caller's reference keeps the memory alive during the call."""
     value = c.context.get_constant_undef(typ)
     value = c.builder.insert_value(value, _called(ctypes.addressof, obj, c), 0)
-    length = c.builder.ptrtoint(_called(len, obj, c), ir.IntType(64))
+    length = c.builder.ptrtoint(_called(len, obj, c), WORD)
     return _native(c.builder.insert_value(value, length, 1), c)
 
 
@@ -126,7 +127,7 @@ def _load(builder: Any, address: Any, width: Width, place: str) -> Any:
     if width.is_float or width.size == 8:
         return value
     widen = builder.sext if width.is_signed else builder.zext
-    return widen(value, ir.IntType(64))
+    return widen(value, WORD)
 
 
 def _store(builder: Any, address: Any, width: Width, value: Any, place: str) -> None:
@@ -142,8 +143,8 @@ def _mark(builder: Any, access: Any, place: str) -> None:
     """
     module = builder.module
     root = module.add_metadata([ir.MetaDataString(module, "detent registers")])
-    kind = module.add_metadata([ir.MetaDataString(module, place), root, ir.Constant(ir.IntType(64), 0)])
-    access.set_metadata("tbaa", module.add_metadata([kind, kind, ir.Constant(ir.IntType(64), 0)]))
+    kind = module.add_metadata([ir.MetaDataString(module, place), root, ir.Constant(WORD, 0)])
+    access.set_metadata("tbaa", module.add_metadata([kind, kind, ir.Constant(WORD, 0)]))
 
 
 def _place(registers: type[Registers], attr: str) -> str:
@@ -190,63 +191,50 @@ def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> 
     _store(builder, _field_address(builder, target, field.offset), field.width, wide, place)
 
 
-@templates.infer_global(operator.getitem)
-class _ArrayRead(templates.AbstractTemplate):
-    def generic(self, args: Any, _kws: Any) -> Any:
-        """``array[int]`` is a wide value."""
-        array, index = args
-        if isinstance(array, (RegisterArrayType, HostArrayType)) and isinstance(index, types.Integer):
-            return templates.signature(_scalar_type(array.width), array, types.int64)
-        return None
+def _compiles(function: Any, gives: types.Type | Callable[[Any], Any], *kinds: Any) -> Any:
+    """What is decorated writes the instructions of a call of `function` with arguments of these kinds.
 
+    It takes whole numbers as int64, the rest as it comes; `gives` is the type of the result, or finds it from that of
+    the first argument.
+    """
 
-@templates.infer_global(operator.setitem)
-class _ArrayWrite(templates.AbstractTemplate):
-    def generic(self, args: Any, _kws: Any) -> Any:
-        """``array[int] = value`` takes a wide value."""
-        array, index, _value = args
-        if isinstance(array, RegisterArrayType) and isinstance(index, types.Integer):
-            return templates.signature(types.none, array, types.int64, _scalar_type(array.width))
-        return None
+    def register(instructions: Any) -> Any:
+        @templates.infer_global(function)
+        class _Typing(templates.AbstractTemplate):  # pyright: ignore[reportUnusedClass] - numba keeps it
+            def generic(self, args: Any, _kws: Any) -> Any:
+                """The signature; None where the call is somebody else's."""
+                if len(args) != len(kinds) or not all(map(isinstance, args, kinds)):
+                    return None
+                taken = (types.int64 if isinstance(one, types.Integer) else one for one in args)
+                return templates.signature(gives if isinstance(gives, types.Type) else gives(args[0]), *taken)
+
+        return extending.lower_builtin(function, *kinds)(instructions)
+
+    return register
 
 
 def _element_address(builder: Any, array: Any, width: Width, index: Any) -> Any:
-    offset = builder.mul(index, ir.Constant(ir.IntType(64), width.size))
+    offset = builder.mul(index, ir.Constant(WORD, width.size))
     return builder.gep(array, [offset], source_etype=BYTE)
 
 
-@extending.lower_builtin(operator.getitem, RegisterArrayType, types.Integer)
+@_compiles(operator.getitem, lambda array: _scalar_type(array.width), RegisterArrayType, types.Integer)
 def _read_element(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
     typ = sig.args[0]
     return _load(builder, _element_address(builder, args[0], typ.width, args[1]), typ.width, str(typ))
 
 
-@extending.lower_builtin(operator.getitem, HostArrayType, types.Integer)
-def _read_host_array(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    typ = sig.args[0]
-    address = builder.extract_value(args[0], 0)
-    return _load(builder, _element_address(builder, address, typ.width, args[1]), typ.width, str(typ))
+@_compiles(operator.getitem, lambda array: _scalar_type(array.width), HostArrayType, types.Integer)
+def _read_host_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _read_element(context, builder, sig, (builder.extract_value(args[0], 0), args[1]))
 
 
-@extending.intrinsic
-def host_array_length(_typingctx: Any, array: Any) -> Any:
-    """Number of entries."""
-
-    def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-        return builder.extract_value(args[0], 1)
-
-    return types.int64(array), codegen
+@_compiles(len, types.int64, HostArrayType)
+def _length(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    return builder.extract_value(args[0], 1)
 
 
-@extending.overload(len)
-def _length(array: Any) -> Any:
-    def compiled(array: Any) -> Any:
-        return host_array_length(array)
-
-    return compiled if isinstance(array, HostArrayType) else None
-
-
-@extending.lower_builtin(operator.setitem, RegisterArrayType, types.Integer, types.Any)
+@_compiles(operator.setitem, types.none, RegisterArrayType, types.Integer, types.Type)
 def _write_element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     array, index, value = args
     typ = sig.args[0]
@@ -256,105 +244,7 @@ def _write_element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 
 def _copy_memory(builder: Any, target: Any, source: Any, size: int) -> None:
-    cgutils.raw_memcpy(builder, target, source, ir.Constant(ir.IntType(64), size), 1)
-
-
-@extending.intrinsic
-def stack_copy(_typingctx: Any, registers: Any) -> Any:
-    """Copy a register file into a stack slot."""
-
-    def codegen(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        """Reserve the slot and fill it."""
-        size = ctypes.sizeof(sig.args[0].registers)
-        slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), (size + 7) // 8))
-        address = builder.bitcast(slot, BYTE.as_pointer())
-        _copy_memory(builder, address, args[0], size)
-        return address
-
-    return registers(registers), codegen
-
-
-@extending.intrinsic
-def copy_over(_typingctx: Any, target: Any, source: Any) -> Any:
-    """Copy one register file over another."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        _copy_memory(builder, args[0], args[1], ctypes.sizeof(sig.args[0].registers))
-        return context.get_dummy_value()
-
-    return types.none(target, source), codegen
-
-
-@extending.intrinsic
-def read_byte(_typingctx: Any, registers: Any, _offset: Any) -> Any:
-    """Load one byte."""
-
-    def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-        return builder.zext(builder.load(builder.gep(args[0], [args[1]], source_etype=BYTE)), ir.IntType(64))
-
-    return types.int64(registers, types.int64), codegen
-
-
-@extending.intrinsic
-def write_byte(_typingctx: Any, registers: Any, _offset: Any, _value: Any) -> Any:
-    """Store one byte."""
-
-    def codegen(context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-        place = builder.gep(args[0], [args[1]], source_etype=BYTE)
-        builder.store(builder.trunc(args[2], BYTE), place)
-        return context.get_dummy_value()
-
-    return types.none(registers, types.int64, types.int64), codegen
-
-
-@extending.intrinsic
-def shifted_one(_typingctx: Any, _exponent: Any) -> Any:
-    """The float whose exponent this is: its bits alone, no call."""
-
-    def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-        wide = ir.IntType(64)
-        biased = builder.add(args[0], ir.Constant(wide, 1023))
-        return builder.bitcast(builder.shl(biased, ir.Constant(wide, 52)), ir.DoubleType())
-
-    return types.float64(types.int64), codegen
-
-
-def power_of_two(exponent: int) -> float:
-    """Two to a whole power from -1022 to 1023, exactly."""
-    return math.ldexp(1.0, exponent)
-
-
-@extending.overload(power_of_two, inline="always")
-def _power_of_two(exponent: Any) -> Any:
-    def compiled(exponent: Any) -> Any:
-        return shifted_one(exponent)
-
-    return compiled
-
-
-@extending.intrinsic
-def expect_false(_typingctx: Any, condition: Any) -> Any:
-    """Hand a condition on with LLVM's hint that it seldom holds."""
-
-    def codegen(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-        bit = ir.IntType(1)
-        hint = cgutils.get_or_insert_function(builder.module, ir.FunctionType(bit, [bit, bit]), "llvm.expect.i1")
-        return builder.call(hint, [args[0], ir.Constant(bit, 0)])
-
-    return types.boolean(condition), codegen
-
-
-def unlikely(condition: bool) -> bool:  # noqa: FBT001 - a condition
-    """The condition itself; compiled code is laid out for the case that it does not hold."""
-    return condition
-
-
-@extending.overload(unlikely, inline="always")
-def _unlikely(condition: Any) -> Any:
-    def compiled(condition: Any) -> bool:
-        return expect_false(condition)
-
-    return compiled
+    cgutils.raw_memcpy(builder, target, source, ir.Constant(WORD, size), 1)
 
 
 def local_copy(registers: Any) -> Any:
@@ -362,9 +252,24 @@ def local_copy(registers: Any) -> Any:
     return registers.copy()
 
 
+@_compiles(local_copy, lambda registers: registers, RegistersType)
+def _local_copy(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    size = ctypes.sizeof(sig.args[0].registers)
+    slot = cgutils.alloca_once(builder, ir.ArrayType(WORD, (size + 7) // 8))
+    address = builder.bitcast(slot, BYTE.as_pointer())
+    _copy_memory(builder, address, args[0], size)
+    return address
+
+
 def copy_back(target: Any, source: Any) -> None:
     """Write the whole of `source` over `target` of the same class."""
     ctypes.memmove(ctypes.addressof(target), ctypes.addressof(source), ctypes.sizeof(target))
+
+
+@_compiles(copy_back, types.none, RegistersType, RegistersType)
+def _copy_back(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    _copy_memory(builder, args[0], args[1], ctypes.sizeof(sig.args[0].registers))
+    return context.get_dummy_value()
 
 
 def byte_at(registers: Any, offset: int) -> int:
@@ -372,38 +277,41 @@ def byte_at(registers: Any, offset: int) -> int:
     return ctypes.c_uint8.from_buffer(registers, offset).value
 
 
+@_compiles(byte_at, types.int64, RegistersType, types.Integer)
+def _byte_at(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    return builder.zext(builder.load(builder.gep(args[0], [args[1]], source_etype=BYTE)), WORD)
+
+
 def put_byte(registers: Any, offset: int, value: int) -> None:
     """Set a raw byte of the register memory: what a replay copies."""
     ctypes.c_uint8.from_buffer(registers, offset).value = value
 
 
-@extending.overload(local_copy, inline="always")
-def _local_copy(registers: Any) -> Any:
-    def compiled(registers: Any) -> Any:
-        return stack_copy(registers)
-
-    return compiled
-
-
-@extending.overload(copy_back, inline="always")
-def _copy_back(target: Any, source: Any) -> Any:
-    def compiled(target: Any, source: Any) -> Any:
-        return copy_over(target, source)
-
-    return compiled
+@_compiles(put_byte, types.none, RegistersType, types.Integer, types.Integer)
+def _put_byte(context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    place = builder.gep(args[0], [args[1]], source_etype=BYTE)
+    builder.store(builder.trunc(args[2], BYTE), place)
+    return context.get_dummy_value()
 
 
-@extending.overload(byte_at, inline="always")
-def _byte_at_overload(registers: Any, offset: Any) -> Any:
-    def compiled(registers: Any, offset: Any) -> Any:
-        return read_byte(registers, offset)
-
-    return compiled
+def power_of_two(exponent: int) -> float:
+    """Two to a whole power from -1022 to 1023, exactly; compiled, the bits of its exponent alone, no call."""
+    return math.ldexp(1.0, exponent)
 
 
-@extending.overload(put_byte, inline="always")
-def _put_byte_overload(registers: Any, offset: Any, value: Any) -> Any:
-    def compiled(registers: Any, offset: Any, value: Any) -> None:
-        write_byte(registers, offset, value)
+@_compiles(power_of_two, types.float64, types.Integer)
+def _power_of_two(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    biased = builder.add(args[0], ir.Constant(WORD, 1023))
+    return builder.bitcast(builder.shl(biased, ir.Constant(WORD, 52)), ir.DoubleType())
 
-    return compiled
+
+def unlikely(condition: bool) -> bool:  # noqa: FBT001 - a condition
+    """The condition itself; compiled code is laid out for the case that it does not hold."""
+    return condition
+
+
+@_compiles(unlikely, types.boolean, types.Boolean)
+def _unlikely(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    bit = ir.IntType(1)
+    hint = cgutils.get_or_insert_function(builder.module, ir.FunctionType(bit, [bit, bit]), "llvm.expect.i1")
+    return builder.call(hint, [args[0], ir.Constant(bit, 0)])

@@ -33,7 +33,7 @@ def ticks(params: type[Registers], local: str = "") -> Callable[[F], F]:
     """State the tick of a system: ``tick(params, state, *feed)``.
 
     It counts the state's field ``tick`` up and gives True; False where nothing happens before the host has looked.
-    Where a benchmark shows a gain, `local` names a block, "plant" or "plant.train": a stretch of ticks works on a copy
+    Where a benchmark shows a gain, `local` names a block of a block, "plant.train": a stretch of ticks works on a copy
     of it in a stack slot, so that it stays in machine registers. The tick is then
     ``tick(params, state, block, *feed)``, and does not touch the one in the state.
     """
@@ -97,14 +97,6 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
         return n
 
     def on_a_copy(p: Any, r: Any, most: Any, *feed: Any) -> int:
-        block = local_copy(getattr(r, outer))
-        n = 0
-        while n < most and tick(p, r, block, *feed):
-            n += 1
-        copy_back(getattr(r, outer), block)
-        return n
-
-    def on_a_copy_within(p: Any, r: Any, most: Any, *feed: Any) -> int:
         block = local_copy(getattr(getattr(r, outer), inner))
         n = 0
         while n < most and tick(p, r, block, *feed):
@@ -112,7 +104,7 @@ def _run_stretch(p: Any, r: Any, most: Any, *feed: Any) -> Any:  # noqa: ARG001 
         copy_back(getattr(getattr(r, outer), inner), block)
         return n
 
-    return on_a_copy_within if inner else on_a_copy if local else plain
+    return on_a_copy if local else plain
 
 
 def lay_ready(values: NDArray[Any]) -> HostArray:

@@ -9,16 +9,15 @@ reference tables all derive from the one declaration.
 import ctypes
 import inspect
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     # The metaclass of ctypes.Structure has no public name.
     from _ctypes import _PyCStructType as type_of_structure  # pyright: ignore[reportPrivateUsage, reportAttributeAccessIssue, reportUnknownVariableType]
+
+    import numpy as np
+    from numpy.typing import NDArray
 else:
     type_of_structure = type(ctypes.Structure)
 
@@ -63,32 +62,17 @@ f8_array = Annotated[list[float], Width("f8", ctypes.c_double, "double")]
 
 
 @dataclass(frozen=True)
-class _Declaration:
-    """What `register` and `block` leave in the class body until the structure is laid out."""
-
-    doc: str
-    unit: str
-    length: int
-    by: str
-
-
-@dataclass(frozen=True)
 class Field:
-    """One declared field of a register file.
+    """One declared field of a register file; name, place and type are known when the structure is laid out."""
 
-    `width` is None for a nested block, whose class is then `block`; `length` is 0 for a single value, else the number
-    of elements of an array. `offset` counts bytes from the start of the structure. `by` names who writes a wire between
-    controller and plant; it is empty elsewhere.
-    """
-
-    name: str
     doc: str
-    unit: str
-    offset: int
-    width: Width | None
-    block: "type[Registers] | None"
-    length: int
-    by: str = ""
+    unit: str = ""
+    length: int = 0  # number of elements of an array; 0 for a single value
+    by: str = ""  # who writes a wire between controller and plant; empty elsewhere
+    name: str = ""
+    offset: int = 0  # bytes from the start of the structure
+    width: Width | None = None  # None for a nested block
+    block: "type[Registers] | None" = None  # its class
 
 
 @dataclass(frozen=True)
@@ -110,24 +94,25 @@ PLANT, CONTROLLER = "plant", "controller"
 
 def register(doc: str, *, unit: str = "", length: int = 0, by: str = "") -> Any:
     """Declare a register; a wire says by whom it is written, `PLANT` or `CONTROLLER`."""
-    return _Declaration(doc, unit, length, by)
+    return Field(doc, unit, length, by)
 
 
 def block(doc: str, *, by: str = "") -> Any:
     """Declare a nested register file; of wires, by whom all of it is written."""
-    return _Declaration(doc, "", 0, by)
+    return Field(doc, by=by)
 
 
-def _ctypes_field(name: str, hint: Any, declared: _Declaration) -> tuple[str, Any, Width | None]:
+def _storage(name: str, hint: Any, length: int) -> tuple[Any, Width | None]:
+    """Type of a field for ctypes; its width where it is no block."""
     if isinstance(hint, type) and issubclass(hint, Registers):
-        return name, hint, None
+        return hint, None
     widths = [part for part in get_args(hint)[1:] if isinstance(part, Width)]
     if len(widths) != 1:
         raise TypeError(
             f"register {name!r}: came {hint!r}; allowed: a width such as i8 or f8, or a Registers class; declare one"
         )
     ctype = widths[0].ctype
-    return name, ctype * declared.length if declared.length else ctype, widths[0]
+    return ctype * length if length else ctype, widths[0]
 
 
 class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIssues] - see above
@@ -135,25 +120,22 @@ class _RegistersMeta(type_of_structure):  # pyright: ignore[reportGeneralTypeIss
 
     def __init__(self, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **kwargs: Any) -> None:
         super().__init__(name, bases, namespace, **kwargs)
-        declared = {key: value for key, value in namespace.items() if isinstance(value, _Declaration)}
+        declared = {key: value for key, value in namespace.items() if isinstance(value, Field)}
         if not declared:
             return
         hints = inspect.get_annotations(self, eval_str=True)
-        rows = [_ctypes_field(key, hints[key], value) for key, value in declared.items()]
+        stored = {key: _storage(key, hints[key], field.length) for key, field in declared.items()}
         structure: Any = self
-        structure._fields_ = [(key, ctype) for key, ctype, _ in rows]
+        structure._fields_ = [(key, ctype) for key, (ctype, _) in stored.items()]
         structure.__fields__ = {
-            key: Field(
+            key: replace(
+                declared[key],
                 name=key,
-                doc=declared[key].doc,
-                unit=declared[key].unit,
                 offset=int(getattr(structure, key).offset),
                 width=width,
                 block=None if width else ctype,
-                length=declared[key].length,
-                by=declared[key].by,
             )
-            for key, ctype, width in rows
+            for key, (ctype, width) in stored.items()
         }
 
 
@@ -239,9 +221,10 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
 
     def __str__(self) -> str:
         """One line per leaf: path, value, unit and meaning."""
-        rows = [(leaf, self.values()[leaf.path]) for leaf in type(self).leaves()]
-        width = max((len(leaf.path) for leaf, _ in rows), default=0)
-        return "\n".join(f"{leaf.path:<{width}}  {_shown(value)} {leaf.unit}".rstrip() for leaf, value in rows)
+        values = self.values()
+        width = max(map(len, values), default=0)
+        rows = (f"{leaf.path:<{width}}  {_shown(values[leaf.path])} {leaf.unit}" for leaf in type(self).leaves())
+        return "\n".join(row.rstrip() for row in rows)
 
     @classmethod
     def markdown_table(cls) -> str:
