@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
-from vcd.common import VarType
+from vcd.common import TimescaleUnit, VarType
 from vcd.reader import TokenKind, VarDecl, tokenize
 
-from detent.record.vcd_file import DEFAULT_TITLE, UNIT_PS
+from detent.record.vcd_file import DEFAULT_TITLE
 from detent.record.waveforms import MAX_BITS, Waveform, Waveforms
+
+UNIT_PS = {TimescaleUnit.picosecond: 1, TimescaleUnit.nanosecond: 10**3, TimescaleUnit.microsecond: 10**6}
 
 
 def load_vcd(path: Path) -> Waveforms:

@@ -3,8 +3,9 @@
 Everything else that knows about keys (validation, messages, the printed axis, the reference) reads these declarations.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import operator
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Literal, Union, cast, get_args, get_origin
 
@@ -17,6 +18,15 @@ from detent.units import QuantityError, describe_kind, format_quantity, parse_qu
 
 LIST_EXAMPLE = "[20000, 20096]"  # list of whole numbers shown for a key that has no example of its own
 IN_SI: Final = "values are in SI units"  # context of a validation of numbers from a program: no text with a unit
+
+
+# Bounds of a number: how one is told, and whether a number keeps to it.
+BOUNDS: dict[type, tuple[str, Callable[[Any, Any], bool]]] = {
+    Gt: ("above", operator.gt),
+    Ge: ("from", operator.ge),
+    Lt: ("below", operator.lt),
+    Le: ("up to", operator.le),
+}
 
 
 class AnyName(str):
@@ -116,6 +126,11 @@ def file_key(name: str, field: FieldInfo) -> str:
     return field.alias or name
 
 
+def keys_of(table: type[Table]) -> dict[str, FieldInfo]:
+    """Declaration of each key of a table, as written in the file."""
+    return {file_key(name, field): field for name, field in table.model_fields.items()}
+
+
 def unit_of(field: FieldInfo) -> str:
     """SI unit of a dimensional field; empty for pure numbers, words and switches."""
     units = [entry.symbol for entry in _annotations_of(field) if isinstance(entry, Unit)]
@@ -145,10 +160,9 @@ def is_list(field: FieldInfo) -> bool:
 
 def list_example(field: FieldInfo) -> str:
     """Give an example of a list, as TOML text."""
-    held: object = field.default
-    if unit_of(field):
-        return example_of(field) or f'["{describe_kind(unit_of(field))[1]}"]'
-    return example_of(field) or (str(cast("list[int]", held)) if held and isinstance(held, list) else LIST_EXAMPLE)
+    held, unit = cast("object", field.default), unit_of(field)
+    whole_numbers = str(cast("list[int]", held)) if held and isinstance(held, list) else LIST_EXAMPLE
+    return example_of(field) or (f'["{describe_kind(unit)[1]}"]' if unit else whole_numbers)
 
 
 def extra_of(field: FieldInfo, name: str) -> str:
@@ -167,9 +181,8 @@ def leaf_fields(table: type[Table], prefix: tuple[str, ...] = ()) -> Iterator[tu
 
     Where the user names the tables, `AnyName` stands in the path.
     """
-    for name, field in table.model_fields.items():
-        path = (*prefix, file_key(name, field))
-        below = table_of(field)
+    for key, field in keys_of(table).items():
+        path, below = (*prefix, key), table_of(field)
         if below is None:
             yield path, field
         elif is_named(field):
@@ -227,9 +240,8 @@ def describe_allowed(field: FieldInfo) -> str:
 
 def options_of(field: FieldInfo) -> tuple[str, ...]:
     """Words a field may hold, when it is a choice."""
-    if get_origin(type_of(field)) is Literal:
-        return tuple(str(option) for option in get_args(type_of(field)))
-    return ()
+    kind = type_of(field)
+    return tuple(map(str, get_args(kind))) if get_origin(kind) is Literal else ()
 
 
 def _describe_list(field: FieldInfo) -> str:
@@ -265,34 +277,24 @@ def _describe_number(field: FieldInfo) -> str:
 def _describe_bounds(field: FieldInfo, unit: str) -> str:
     """Bounds of a number in words, with units; empty when there are none."""
     texts: list[str] = []
-    for entry in _annotations_of(field):
-        if isinstance(entry, Gt):
-            texts.append(f"above {_bound_text(entry.gt, unit)}")
-        elif isinstance(entry, Ge):
-            texts.append(f"from {_bound_text(entry.ge, unit)}")
-        elif isinstance(entry, Lt):
-            texts.append(f"below {_bound_text(entry.lt, unit)}")
-        elif isinstance(entry, Le):
-            texts.append(f"up to {_bound_text(entry.le, unit)}")
+    for kind, bound in bounds_of(field):
+        in_full = isinstance(bound, int) and not unit
+        texts.append(f"{BOUNDS[kind][0]} {bound if in_full else format_quantity(float(bound), unit)}")
     return " and ".join(texts).replace(" and up to", " up to")
 
 
-def _bound_text(bound: object, unit: str) -> str:
-    """Write a bound with its unit; whole numbers in full."""
-    if isinstance(bound, int) and not unit:
-        return str(bound)
-    return format_quantity(float(str(bound)), unit)
+def bounds_of(field: FieldInfo) -> Iterator[tuple[type, Any]]:
+    """Bounds of a number: the kind of each, as in `BOUNDS`, and the bound."""
+    for entry in _annotations_of(field):
+        if isinstance(entry, Gt | Ge | Lt | Le):
+            yield type(entry), astuple(entry)[0]
 
 
 def _annotations_of(field: FieldInfo) -> Iterator[object]:
     """Annotations of a field, those inside ``... | None`` and ``list[...]`` included."""
     yield from field.metadata
-    yield from _annotations_inside(get_args(field.annotation))
-
-
-def _annotations_inside(candidates: Sequence[object]) -> Iterator[object]:
-    """Annotations of the types that a type is made of."""
-    for candidate in candidates:
+    inside = list(get_args(field.annotation))
+    for candidate in inside:
         yield from getattr(candidate, "__metadata__", ())
         if get_origin(candidate) is list:
-            yield from _annotations_inside(get_args(candidate))
+            inside += get_args(candidate)

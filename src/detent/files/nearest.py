@@ -3,10 +3,7 @@
 import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
-from annotated_types import Ge, Gt, Le, Lt
-from pydantic.fields import FieldInfo
-
-from detent.files.fields import Table, unit_of
+from detent.files.fields import BOUNDS, Table, bounds_of, unit_of
 from detent.files.problems import field_at
 from detent.units import IN_DEGREES, format_quantity, in_degrees, parse_quantity
 
@@ -82,18 +79,5 @@ class Remedies:
         else:
             value = _rounded(value, digits, rounding)
             written = f"{value:.{digits}g}"
-        return put(key, written) if _accepts(field, value) else otherwise
-
-
-def _accepts(field: FieldInfo, value: float) -> bool:
-    """True when a value lies within the bounds of a field."""
-    for bound in field.metadata:
-        if isinstance(bound, Ge | Gt):
-            least = float(str(bound.ge if isinstance(bound, Ge) else bound.gt))
-            if value < least or (value == least and isinstance(bound, Gt)):
-                return False
-        elif isinstance(bound, Le | Lt):
-            most = float(str(bound.le if isinstance(bound, Le) else bound.lt))
-            if value > most or (value == most and isinstance(bound, Lt)):
-                return False
-    return True
+        keeps = all(BOUNDS[kind][1](value, bound) for kind, bound in bounds_of(field))
+        return put(key, written) if keeps else otherwise

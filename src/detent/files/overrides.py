@@ -4,7 +4,6 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, cast
 
 from pydantic.fields import FieldInfo
@@ -17,35 +16,27 @@ from detent.files.problems import dotted
 _NUMBER = re.compile(r"[+-]?[0-9][0-9_]*(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 
-@dataclass(slots=True)
-class Overrides:
-    """What overrides came to."""
-
-    # by path: the value as written, of each override that was put into the tables
-    texts: dict[Path, str] = field(default_factory=dict[Path, str])
-    problems: list[FileProblem] = field(default_factory=list[FileProblem])  # what is wrong with the others
-
-
-def apply_overrides(tables: dict[str, Any], overrides: Sequence[str], model: type[Table]) -> Overrides:
-    """Put values of ``--set`` over those of a file; an unknown key is a problem at once."""
-    known, found = dict(leaf_fields(model)), Overrides()
+def apply_overrides(
+    tables: dict[str, Any], overrides: Sequence[str], model: type[Table]
+) -> tuple[dict[Path, str], list[FileProblem]]:
+    """Put values of ``--set`` over those of a file: by path each as written, and what is wrong with the others."""
+    known, texts, problems = dict(leaf_fields(model)), dict[Path, str](), list[FileProblem]()
     for text in overrides:
         key, equals, value = (part.strip() for part in text.partition("="))
         path = tuple(key.split("."))
         wanted = next((leaf for pattern, leaf in known.items() if fits(pattern, path)), None)
         if not equals or not value:
             remedy = f"write it as in --set '{_example_override(tables, known.items())}'"
-            found.problems.append(FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", remedy))
+            problems.append(FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", remedy))
         elif wanted is None:
             near = difflib.get_close_matches(key, _keys_near(tables, known, path), n=1, cutoff=0.5)
             remedy = f'did you mean "{near[0]}"?' if near else "`detent check` lists the keys"
-            found.problems.append(
-                FileProblem("--set", 0, 0, key, f'the unknown key "{key}"', "a key of the axis file", remedy)
-            )
+            came, allowed = f'the unknown key "{key}"', "a key of the axis file"
+            problems.append(FileProblem("--set", 0, 0, key, came, allowed, remedy))
         else:
             put_value(tables, path, _override_value(wanted, value))
-            found.texts[path] = value
-    return found
+            texts[path] = value
+    return texts, problems
 
 
 def _example_override(tables: dict[str, Any], known: Iterable[tuple[Path, FieldInfo]]) -> str:

@@ -15,10 +15,10 @@ from detent.files.fields import (
     describe_allowed,
     example_of,
     extra_of,
-    file_key,
     is_list,
     is_named,
     is_rows,
+    keys_of,
     leaf_fields,
     list_example,
     named_as,
@@ -88,7 +88,8 @@ class Reporter:
         """Unknown key: name the nearest known one, or the table it belongs to."""
         *around, key = path
         keys = known_keys(self._root, tuple(around))
-        is_table = isinstance(value, dict) or _is_rows_value(value)
+        is_rows = isinstance(value, list) and all(isinstance(part, dict) for part in cast("list[object]", value))
+        is_table = isinstance(value, dict) or is_rows
         what = f"the unknown table [{dotted(path)}]" if is_table else f'the unknown key "{_shortened(key)}"'
         place = f"in {self._header(tuple(around))}" if around else "at the top of the file"
         near = nearest_key(self._root, path)
@@ -168,7 +169,9 @@ class Reporter:
             allowed = str(error["ctx"].get("allowed", allowed)) if error["type"] == "refused" else allowed
             remedy = str(error["ctx"].get("remedy", remedy))
         elif options_of(field):
-            remedy = f'write "{_nearest_option(str(error["input"]), options_of(field))}"'
+            options = options_of(field)
+            near = difflib.get_close_matches(str(error["input"]).lower(), options, n=1, cutoff=0.0)
+            remedy = f'write "{(near or options)[0]}"'
         elif error["type"].endswith("_type"):
             remedy = _type_remedy(path[-1], field, error["input"])
         return self.problem(path, came, allowed, remedy)
@@ -208,12 +211,9 @@ def field_at(root: type[Table], path: Path) -> FieldInfo:
         if field is not None and (is_named(field) or isinstance(key, Index)):
             # One of the tables, whatever its name or number: a required table like any other.
             field = FieldInfo(annotation=table, description=field.description)
-            continue
-        fields = {
-            file_key(name, candidate): candidate for name, candidate in (table.model_fields if table else {}).items()
-        }
-        field = fields[key]
-        table = table_of(field)
+        else:
+            field = keys_of(table)[key] if table else None
+            table = table_of(field) if field else None
     if field is None:
         raise KeyError(path)
     return field
@@ -225,7 +225,7 @@ def known_keys(root: type[Table], path: Path) -> list[str]:
     if field is not None and is_named(field):
         return [AnyName(extra_of(field, "name"))]
     table = root if field is None else table_of(field)
-    return [file_key(name, field) for name, field in table.model_fields.items()] if table else []
+    return list(keys_of(table)) if table else []
 
 
 def nearest_key(root: type[Table], path: Path) -> str:
@@ -239,8 +239,7 @@ def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[
     if not isinstance(tables, dict):
         return
     held = cast("dict[str, object]", tables)
-    for name, field in root.model_fields.items():
-        key = file_key(name, field)
+    for key, field in keys_of(root).items():
         below, value = table_of(field), held.get(key)
         if below is None or not isinstance(value, dict):
             continue
@@ -272,11 +271,6 @@ def _written(value: object) -> str:
     return repr(value)
 
 
-def _is_rows_value(value: object) -> bool:
-    """True for a list of tables, as the parser gives it."""
-    return isinstance(value, list) and all(isinstance(part, dict) for part in cast("list[object]", value))
-
-
 def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
     """Tell which elements of a list are wrong, the first of them in full."""
     for error in errors[:MAX_ELEMENTS]:
@@ -286,12 +280,6 @@ def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
         yield f"{_shortened(text)} as element {index + 1}"
     if len(errors) > MAX_ELEMENTS:
         yield f"and {len(errors) - MAX_ELEMENTS} more"
-
-
-def _nearest_option(came: str, options: tuple[str, ...]) -> str:
-    """The option most like what came; the first when none is."""
-    near = difflib.get_close_matches(came.lower(), options, n=1, cutoff=0.0)
-    return near[0] if near else options[0]
 
 
 def _type_remedy(key: str, field: FieldInfo, value: object) -> str:
@@ -315,10 +303,7 @@ def default_text(field: FieldInfo) -> str:
     """Default of a key in words; empty when it has none."""
     if field.is_required():
         return ""
-    derived = extra_of(field, "derived")
-    if derived:
-        return derived
-    return format_value(field, field.default)
+    return extra_of(field, "derived") or format_value(field, field.default)
 
 
 def format_value(field: FieldInfo, value: object) -> str:

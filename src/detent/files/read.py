@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NoReturn, TypeVar, cast
 from pydantic import ValidationError
 
 from detent.errors import MOST_PROBLEMS, DetentError, FileProblem, InputError
-from detent.files.fields import IN_SI, Table, example_of, file_key, is_rows, table_of, unit_of
+from detent.files.fields import IN_SI, Table, example_of, is_rows, keys_of, table_of, unit_of
 from detent.files.locate import Index, Path
 from detent.files.problems import Reporter, key_path, nearest_key
 from detent.files.source import Source
@@ -27,7 +27,7 @@ class Row(Table, frozen=True):
     @classmethod
     def known(cls) -> tuple[str, ...]:
         """Keys that a row may have."""
-        return tuple(file_key(name, field) for name, field in cls.model_fields.items())
+        return tuple(keys_of(cls))
 
     @classmethod
     def faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
@@ -44,7 +44,7 @@ class Row(Table, frozen=True):
 
 def example_value(model: type[Table], key: str) -> str:
     """A value that a key may have, as TOML text."""
-    field = next(field for name, field in model.model_fields.items() if file_key(name, field) == key)
+    field = keys_of(model)[key]
     return example_of(field) or f'"{describe_kind(unit_of(field))[1]}"'
 
 
@@ -57,7 +57,7 @@ def read_tables(source: Source, model: type[AnyTable]) -> AnyTable:
     try:
         found = model.model_validate(source.tables)
     except ValidationError as error:
-        told = told_errors(entries_of(error), reporter, model, is_whole=source.is_whole)
+        told = told_errors(error, reporter, model, is_whole=source.is_whole)
         problems += (problem for _, problem, _ in islice(told, MOST_PROBLEMS))
         found = None
     problems += islice(_row_faults(source, model, reporter), MOST_PROBLEMS)
@@ -72,7 +72,7 @@ def refuse(problems: Iterable[FileProblem]) -> NoReturn:
 
 
 def told_errors(
-    found: Iterable[dict[str, Any]],
+    found: ValidationError | Iterable[dict[str, Any]],
     reporter: Reporter,
     model: type[Table],
     *,
@@ -84,7 +84,8 @@ def told_errors(
     Nothing lacks inside `doubtful` tables, nor anywhere where lines were left out.
     """
     by_key: dict[Path, list[dict[str, Any]]] = {}
-    for entry in found:
+    errors = found.errors(include_url=False) if isinstance(found, ValidationError) else found
+    for entry in map(dict[str, Any], errors):
         by_key.setdefault(key_path(entry["loc"]), []).append(entry)
     unknown = [path for path, entries in by_key.items() if entries[0]["type"] == "extra_forbidden"]
     misspelt = {(*path[:-1], nearest_key(model, path)) for path in unknown}
@@ -107,8 +108,8 @@ def check_values(model: type[Row], where: str, values: Mapping[str, object]) -> 
         model.model_validate(stated, context=IN_SI)
     except ValidationError as error:
         reporter = Reporter("", {}, {}, model)
-        told = [problem for _, problem, _ in told_errors(entries_of(error), reporter, model)]
-        units = {file_key(name, field): f" {unit_of(field)}".rstrip() for name, field in model.model_fields.items()}
+        told = [problem for _, problem, _ in told_errors(error, reporter, model)]
+        units = {key: f" {unit_of(field)}".rstrip() for key, field in keys_of(model).items()}
         problems = [replace(one, came=f"{one.key} {one.came}{units.get(one.key, '')}") for one in told] + problems
     for problem in problems[:1]:
         raise DetentError(f"{where}: came {problem.came}; allowed: {problem.allowed}; do: {problem.remedy}")
@@ -120,16 +121,10 @@ def _plain(value: object) -> object:
     return item() if callable(item) else value
 
 
-def entries_of(error: ValidationError) -> list[dict[str, Any]]:
-    """Errors of a validation, as `told_errors` takes them."""
-    return [dict(entry) for entry in error.errors(include_url=False)]
-
-
 def _row_faults(source: Source, model: type[Table], reporter: Reporter) -> Iterator[FileProblem]:
     """What is wrong with the keys of each row together."""
-    for name, field in model.model_fields.items():
-        key, row = file_key(name, field), table_of(field)
-        tables = source.tables.get(key)
+    for key, field in keys_of(model).items():
+        row, tables = table_of(field), source.tables.get(key)
         if not is_rows(field) or row is None or not issubclass(row, Row) or not isinstance(tables, list):
             continue
         known = set(row.known())

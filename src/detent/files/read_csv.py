@@ -14,10 +14,10 @@ from typing import Generic, TypeVar
 from pydantic import ValidationError
 
 from detent.errors import MOST_PROBLEMS, FileProblem
-from detent.files.fields import describe_allowed, file_key, type_of, unit_of
+from detent.files.fields import describe_allowed, keys_of, type_of, unit_of
 from detent.files.locate import Path, Place
 from detent.files.problems import Reporter
-from detent.files.read import Row, entries_of, refuse, told_errors
+from detent.files.read import Row, refuse, told_errors
 from detent.files.text import short
 from detent.units import QuantityError, describe_kind, parse_quantity
 
@@ -53,9 +53,10 @@ class CsvRows(Generic[AnyRow]):
     def __init__(self, file: str, text: str, model: type[AnyRow]) -> None:
         self.problems: list[FileProblem] = []
         self._file, self.model = file, model
-        self.fields = {file_key(name, field): field for name, field in model.model_fields.items()}
+        self.fields = keys_of(model)
         self._whole_numbers = {key for key, field in self.fields.items() if type_of(field) is int}
-        self._lines = _telling_lines(text)
+        lines = enumerate(re.split(r"\r\n|\r|\n", text), start=1)
+        self._lines = ((k, line) for k, line in lines if line.strip() and not line.lstrip().startswith("#"))
         number, header = next(self._lines, (0, ""))
         self.separator = ";" if ";" in header else ","
         cells = list(self._split(number, header)) if number else []
@@ -175,7 +176,7 @@ class CsvRows(Generic[AnyRow]):
         try:
             row = self.model.model_validate(values)
         except ValidationError as error:
-            told = told_errors(entries_of(error), self._reporter(line), self.model, is_whole=self._is_whole)
+            told = told_errors(error, self._reporter(line), self.model, is_whole=self._is_whole)
             self.problems += (problem for _, problem, _ in told)
         for fault in self.model.faults(stated, is_whole=self._is_whole):
             self.problems.append(self._reporter(line).placed((), fault))
@@ -231,13 +232,6 @@ def split_heading(cell: str) -> tuple[str, str | None]:
     match = _HEADING.fullmatch(cell)
     name, unit = match.groups() if match else (cell, None)
     return name, unit
-
-
-def _telling_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Lines that say something, with their numbers."""
-    for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            yield number, line
 
 
 def _place_of(line: str, index: int, separator: str) -> int:

@@ -1,6 +1,7 @@
 """The text of an axis file: read, parsed as far as it can be, with every error of syntax."""
 
 import re
+import string
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -37,7 +38,11 @@ class Source:
 
 def read_source(path: Path | str) -> Source:
     """Read and parse an axis file."""
-    return parse_source(str(path), _read_text(Path(path)))
+    allowed, remedy = "an axis file (TOML)", "name an axis file; `detent examples` copies one to start from"
+    content = read_head(Path(path), MAX_BYTES, allowed, remedy)
+    if len(content) > MAX_BYTES:
+        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", allowed, remedy)
+    return parse_source(str(path), decode_utf8(Path(path), content))
 
 
 def parse_source(file: str, text: str) -> Source:
@@ -61,38 +66,24 @@ def parse_source(file: str, text: str) -> Source:
     return Source(file, {}, {}, tuple(problems), is_whole=False, is_readable=False)
 
 
-def _read_text(path: Path) -> str:
-    """Text of a file, or an `InputError` that says why there is none."""
-    allowed, remedy = "an axis file (TOML)", "name an axis file; `detent examples` copies one to start from"
-    content = read_head(path, MAX_BYTES, allowed, remedy)
-    if len(content) > MAX_BYTES:
-        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", allowed, remedy)
-    return decode_utf8(path, content)
-
-
 def _where(error: Exception, lines: list[str]) -> tuple[int, int, str]:
     """Line, column and reason of a parser's error; places past the end become the last line that says something."""
     if isinstance(error, RecursionError):
-        return _deepest(lines), 1, "brackets nested too deeply"
+        return _line_with_most("[{", lines), 1, "brackets nested too deeply"
     found = _POSITION.search(str(error))
     reason = str(error)[: found.start()] if found else str(error)
     if found and found.group(1):
         row, column = int(found.group(1)), int(found.group(2))
         return min(row, len(lines)), column, reason
-    if found is None:
-        return _longest_number(lines), 1, reason
+    if found is None:  # the only error without a place is a whole number of thousands of digits
+        return _line_with_most(string.digits, lines), 1, reason
     row = next((index for index in range(len(lines), 0, -1) if lines[index - 1].strip()), 1)
     return row, len(lines[row - 1]) + 1, reason
 
 
-def _deepest(lines: list[str]) -> int:
-    """Line with the most opening brackets."""
-    return max(range(len(lines)), key=lambda index: lines[index].count("[") + lines[index].count("{")) + 1
-
-
-def _longest_number(lines: list[str]) -> int:
-    """Line with the most digits: the only error without a place is a whole number of thousands of digits."""
-    return max(range(len(lines)), key=lambda index: sum(char.isdigit() for char in lines[index])) + 1
+def _line_with_most(chars: str, lines: list[str]) -> int:
+    """Line in which these characters stand most often."""
+    return max(range(len(lines)), key=lambda index: sum(char in chars for char in lines[index])) + 1
 
 
 def _syntax_problem(file: str, row: int, column: int, reason: str, line: str) -> FileProblem:

@@ -76,8 +76,8 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
     method = _method_of(source, overrides)
     model = method.spec
     tables = copy.deepcopy(source.tables)
-    overridden = apply_overrides(tables, overrides, model)
-    layers = _Layers(tables, overridden.texts, problems=overridden.problems)
+    texts, problems = apply_overrides(tables, overrides, model)
+    layers = _Layers(tables, texts, problems=problems)
     reporter = Reporter(source.file, source.places, layers.overrides, model)
     _apply_catalogue(layers, reporter, method)
     layers.problems += [reporter.wrong_name(path, field) for path, field in bad_names(model, layers.tables)]

@@ -56,7 +56,7 @@ def _texts(values: Column) -> list[str]:
 
 def _write_parquet(table: "_Table", path: Path) -> None:
     """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
-    arrow, parquet = _pyarrow()
+    arrow, parquet = need_parquet()
     fields = [
         arrow.field(
             name,
@@ -150,7 +150,7 @@ def load_trace(path: str | Path) -> Trace:
 
 
 def _load_parquet(path: Path) -> Trace:
-    _, parquet = _pyarrow()
+    _, parquet = need_parquet()
     table = parquet.read_table(path)
     head: dict[bytes, bytes] = table.schema.metadata or {}
     attributes: dict[str, Attribute] = json.loads(head.get(b"detent", b"{}"))
@@ -197,12 +197,8 @@ def _read_columns(path: Path, first: list[str]) -> list[Column]:
     return [np.ascontiguousarray(table[f"c{index}"]) for index in range(len(kinds))]
 
 
-def need_parquet() -> None:
-    """Refuse before any work what cannot be written at its end."""
-    _pyarrow()
-
-
-def _pyarrow() -> tuple[Any, Any]:
+def need_parquet() -> tuple[Any, Any]:
+    """The modules for Parquet; asked for before any work, so that nothing fails at its end."""
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError as error:

@@ -8,7 +8,7 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from detent.record.trace import TIME, Attribute, Column, Trace, check_columns
 
 CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 GROUP = "trace"
-
 FORMAT = "detent trace 1"
 
 
@@ -54,43 +53,41 @@ class TraceWriter:
         docs: Mapping[str, str] | None = None,
         attributes: Mapping[str, Attribute] | None = None,
     ) -> None:
-        names = tuple(dtype.names or ())
+        self._names = tuple(dtype.names or ())
         # An empty trace of these columns must be a trace: this checks the names and the kinds of number.
-        Trace(
-            columns={name: np.empty(0, dtype[name]) for name in names}, units=dict(units or {}), docs=dict(docs or {})
+        empty = Trace(
+            columns={name: np.empty(0, dtype[name]) for name in self._names},
+            units=dict(units or {}),
+            docs=dict(docs or {}),
+            attributes=dict(attributes or {}),
         )
         self.path = Path(path)
         self.rows = 0
-        self._names = names
         self._last_time = -np.inf
         self._part = part_of(self.path)
         with writing(self.path):
             self._file: Any = _h5py().File(self._part, "w")
-        self._write_head(dtype, dict(units or {}), dict(docs or {}), dict(attributes or {}))
+        self._write_head(empty)
 
-    def _write_head(
-        self, dtype: np.dtype[Any], units: dict[str, str], docs: dict[str, str], attributes: dict[str, Attribute]
-    ) -> None:
+    def _write_head(self, empty: Trace) -> None:
         from detent import __version__
 
         root = self._file.attrs
-        for name, value in {"detent_version": __version__, **attributes}.items():
+        for name, value in {"detent_version": __version__, **empty.attributes}.items():
             # A file name need not be valid UTF-8; HDF5 text must be.
             root[name] = value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
         root["format"] = FORMAT
         # A copy of a trace that broke off stays one that broke off.
-        self._whole = bool(attributes.get("complete", 1))
+        self._whole = bool(empty.attributes.get("complete", 1))
         root["complete"] = 0
         group = self._file.create_group(GROUP)
         group.attrs["columns"] = list(self._names)  # HDF5 itself lists datasets by name, not in order
         self._sets: dict[str, Any] = {}
-        for name in self._names:
-            dataset = group.create_dataset(
-                name, (0,), dtype[name], maxshape=(None,), chunks=(CHUNK_ROWS,), compression="gzip", compression_opts=1,
-                shuffle=True,
-            )  # fmt: skip
-            dataset.attrs["unit"] = units.get(name, "")
-            dataset.attrs["doc"] = docs.get(name, "")
+        kept: dict[str, Any] = {"maxshape": (None,), "chunks": (CHUNK_ROWS,), "shuffle": True}
+        for name, column in empty.columns.items():
+            dataset = group.create_dataset(name, (0,), column.dtype, compression="gzip", compression_opts=1, **kept)
+            dataset.attrs["unit"] = empty.units.get(name, "")
+            dataset.attrs["doc"] = empty.docs.get(name, "")
             self._sets[name] = dataset
 
     def append(self, block: NDArray[np.void]) -> None:
@@ -169,12 +166,8 @@ def open_store(path: Path) -> Generator[Any]:
 
 def attributes_of(file: Any) -> dict[str, Attribute]:
     """What the run said about itself; the format is the store's own."""
-    return {name: _plain(value) for name, value in file.attrs.items() if name != "format"}
-
-
-def _plain(value: Any) -> Attribute:
-    """Turn an HDF5 attribute (NumPy scalar or text) into Python's own type."""
-    return cast("Attribute", value.item() if isinstance(value, np.generic) else value)
+    held = {name: value for name, value in file.attrs.items() if name != "format"}
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in held.items()}
 
 
 def part_of(path: Path) -> Path:

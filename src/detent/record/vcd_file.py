@@ -25,20 +25,9 @@ from detent.errors import DetentError
 from detent.record.trace_store import part_of, writing
 from detent.record.waveforms import Waveform, Waveforms
 
-UNIT_PS: dict[TimescaleUnit, int] = {
-    TimescaleUnit.picosecond: 1,
-    TimescaleUnit.nanosecond: 10**3,
-    TimescaleUnit.microsecond: 10**6,
-}
-"""Picoseconds per unit of time that a file counts in."""
-
-WRITTEN = [
-    (magnitude, unit)
-    for unit in (TimescaleUnit.microsecond, TimescaleUnit.nanosecond, TimescaleUnit.picosecond)
-    for magnitude in (100, 10, 1)
-]
-"""Timescales written, coarsest first."""
-
+_UNITS = ((10**6, TimescaleUnit.microsecond), (10**3, TimescaleUnit.nanosecond), (1, TimescaleUnit.picosecond))
+# Timescales that a file counts in, coarsest first, with their length [ps].
+SCALES = [(number * length, Timescale(number, unit)) for length, unit in _UNITS for number in (100, 10, 1)]
 DEFAULT_TITLE = "detent"  # name of the outermost scope of waveforms without title
 
 
@@ -66,18 +55,13 @@ def _write(waveforms: Waveforms, stream: Any) -> None:
     variables: list[Any] = []
     for signal in waveforms.signals:
         *blocks, name = signal.name.split(".")
-        kind = VarType.real if signal.is_float else _integer_kind(signal)
+        word = VarType.wire if signal.bits == 1 else VarType.integer if signal.signed else VarType.reg
+        kind = VarType.real if signal.is_float else word
         first = signal.values[0].item()
         variables.append(writer.register_var((top, *blocks), name, kind, size=signal.bits, init=first))
     for time, index, value in _merged(waveforms.signals):
         writer.change(variables[index], time // scale, value)
     writer.close(waveforms.end // scale)
-
-
-def _integer_kind(signal: Waveform) -> VarType:
-    if signal.bits == 1:
-        return VarType.wire
-    return VarType.integer if signal.signed else VarType.reg
 
 
 def _merged(signals: tuple[Waveform, ...]) -> Iterable[tuple[int, int, int | float]]:
@@ -93,11 +77,7 @@ def _merged(signals: tuple[Waveform, ...]) -> Iterable[tuple[int, int, int | flo
 def _coarsest(waveforms: Waveforms) -> tuple[int, Timescale]:
     """Coarsest timescale that divides every moment, with its length [ps]."""
     common = math.gcd(waveforms.begin, waveforms.end, *(int(np.gcd.reduce(s.times)) for s in waveforms.signals))
-    return next(
-        (magnitude * UNIT_PS[unit], Timescale(magnitude, unit))
-        for magnitude, unit in WRITTEN
-        if common % (magnitude * UNIT_PS[unit]) == 0
-    )
+    return next((length, scale) for length, scale in SCALES if common % length == 0)
 
 
 def _scope_name(title: str) -> str:
