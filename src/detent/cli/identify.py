@@ -87,20 +87,18 @@ def identify(
     from detent.identify.identified import identify_axis
 
     _check_outputs(axis, write, job, report)
-    chosen = cast("Method", _method(method))
-    reading = _reading(mapping, columns or [])
+    if method not in METHODS:
+        raise DetentError(f"--method: came {method!r}; allowed: {' or '.join(METHODS)}; choose one of these")
+    chosen = cast("Method", METHODS[method])
+    # Options that read the logs in the same way once more.
+    options = ["--map", str(mapping)] if mapping is not None else []
+    options += [part for column in columns or [] for part in ("--column", column)]
     say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         done = identify_axis(
-            logs,
-            mapping=mapping,
-            columns=columns or [],
-            effort=effort,
-            method=chosen,
-            axis=axis,
-            progress=progress,
-            reading=reading,
-        )
+            logs, mapping=mapping, columns=columns or [], effort=effort, method=chosen, axis=axis, progress=progress,
+            reading=shlex.join(options),
+        )  # fmt: skip
         outside = done.contrasts()
         progress(0.97, "writing")
         written, errors = _write(done, write, job, report)
@@ -120,17 +118,10 @@ def identify(
         raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in errors)]))
 
 
-def _method(word: str) -> str:
-    if word not in METHODS:
-        raise DetentError(f"--method: came {word!r}; allowed: {' or '.join(METHODS)}; choose one of these")
-    return METHODS[word]
-
-
 def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
     """Refuse what could not be written, before the work is done."""
-    for option, path, ending in zip(
-        ("--write", "--job", "--report"), targets, (".toml", ".toml", ".html"), strict=True
-    ):
+    endings = {"--write": ".toml", "--job": ".toml", "--report": ".html"}
+    for (option, ending), path in zip(endings.items(), targets, strict=True):
         if path is None:
             continue
         if path.suffix.lower() != ending:
@@ -142,14 +133,6 @@ def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
     write, job, _ = targets
     if job is not None and job in (write, axis):
         raise DetentError(f"--job {job}: came the name of the axis file; allowed: a file of its own; choose another")
-
-
-def _reading(mapping: Path | None, columns: list[str]) -> str:
-    """Options that read the logs in the same way once more."""
-    options = ["--map", str(mapping)] if mapping is not None else []
-    for column in columns:
-        options += ["--column", column]
-    return shlex.join(options)
 
 
 def _write(

@@ -89,7 +89,10 @@ def run(
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
     wanted = [*axis.simulated.signals, *split_names(signals)]
     axis.check_signals(wanted)
-    _make_folder(folder)
+    # Without the files of an earlier run: a report must not stand beside another run's trace.
+    with folder_for("--output", folder):
+        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
+            (folder / name).unlink(missing_ok=True)
     say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         store = folder / "trace.h5" if kinds else None
@@ -132,13 +135,6 @@ def _trace_kinds(formats: str) -> list[str]:
 
         need_parquet()
     return list(dict.fromkeys(kinds))
-
-
-def _make_folder(folder: Path) -> None:
-    """An output folder without the files of an earlier run: a report must not stand beside another run's trace."""
-    with folder_for("--output", folder):
-        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
-            (folder / name).unlink(missing_ok=True)
 
 
 def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
