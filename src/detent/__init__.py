@@ -48,13 +48,7 @@ def examples() -> list[Path]:
 
 
 def example(name: str) -> Path:
-    """Path of a packaged example.
-
-    Raises
-    ------
-    DetentError
-        There is none of that name; the message lists those there are.
-    """
+    """Path of a packaged example; a `DetentError` lists those there are where there is none of that name."""
     from detent.errors import DetentError
 
     found = {path.name: path for path in examples()}

@@ -27,13 +27,7 @@ KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rat
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis as its file describes it.
-
-    Attributes
-    ----------
-    file : AxisFile
-        The specification with the origin of every value.
-    """
+    """An axis as its file describes it: `file` is the specification with the origin of every value."""
 
     file: AxisFile
 
@@ -62,28 +56,11 @@ class Axis:
         return check_spec(self.file)
 
     def check_signals(self, names: Sequence[str]) -> None:
-        """Refuse names and patterns that are no register of the axis, before any work is done.
-
-        Raises
-        ------
-        DetentError
-            A name is unknown; the message names the nearest.
-        """
+        """Refuse names and patterns that are no register of the axis, before any work is done, and name the nearest."""
         choose_leaves(self.simulated.registers, names)
 
     def load_job(self, path: str | Path) -> Job:
-        """Read a job of the kind the axis takes.
-
-        Parameters
-        ----------
-        path : path
-            What its method takes; ``detent run --help`` lists it.
-
-        Raises
-        ------
-        InputError
-            Everything that is wrong with it.
-        """
+        """Read a job of the kind the axis takes, as ``detent run --help`` lists it, or tell all that is wrong."""
         return self.simulated.load(Path(path))
 
     def _job(self, job: str | Path | Job) -> Job:
@@ -196,26 +173,16 @@ class Axis:
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:
         """Hold the method against the ways it was made to better, on this axis.
 
-        Returns
-        -------
-        tuple
-            Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo:
-            one `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and
-            a `JerkComparison`. Cascade: one `ProfileComparison`.
+        Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo: one
+        `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and a
+        `JerkComparison`. Cascade: one `ProfileComparison`.
         """
         return self.method.compare(self.spec, progress)
 
     def envelopes(self) -> Mapping[str, Any]:
-        """Tables of permissible frequencies of each motor, between its extremes at power-on.
+        """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.
 
-        Returns
-        -------
-        dict of Envelope by motor
-
-        Raises
-        ------
-        DetentError
-            The axis has no steppers.
+        An axis without steppers has none: a `DetentError`.
         """
         return self._brought("envelopes", "whose motors have a table of permissible frequencies")(self.spec)
 
@@ -260,13 +227,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Timing:
-    """Clocked signals over a short stretch.
-
-    Attributes
-    ----------
-    waveforms : Waveforms
-        Each signal as its changes over time.
-    """
+    """Clocked signals over a short stretch: `waveforms` has each as its changes over time."""
 
     waveforms: Waveforms
 
@@ -358,18 +319,7 @@ class Run:
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
-    """Load an axis file.
-
-    Parameters
-    ----------
-    path : path
-        TOML file.
-    overrides : sequence of str
-        ``"dotted.key=value"`` texts that replace or add values, checked like the file.
-
-    Returns
-    -------
-    Axis
+    """Load an axis file (TOML); `overrides`, ``"dotted.key=value"``, replace or add values and are checked like it.
 
     Raises
     ------

@@ -14,10 +14,7 @@ MOST_PROBLEMS = 20  # problems of one job or recording told at most: a file of a
 class DetentError(Exception):
     """Root of every error detent raises on purpose.
 
-    Attributes
-    ----------
-    exit_status : int
-        What a command returns to the shell: 1 for an axis that did not do it, 2 for input that is wrong.
+    Its `exit_status` is what a command returns to the shell: 1 for an axis that did not do it, 2 for wrong input.
     """
 
     exit_status: int = 2
@@ -64,13 +61,7 @@ class FileProblem:
 
 
 class InputError(DetentError):
-    """An input (axis file, override, job) is wrong; holds all that is wrong with it.
-
-    Parameters
-    ----------
-    problems : iterable of FileProblem
-        At least one; kept in order of their place in the text.
-    """
+    """An input (axis file, override, job) is wrong; holds all that is wrong with it, in the order of the text."""
 
     exit_status = 2
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.coil_currents import LARGE, coil_currents
 from tests.phase_servo_rig import START, ConverterBench, Rig
 
 from detent.control.clock_chain import ClockChain, next_period
@@ -27,7 +28,7 @@ from detent.control.phase_sequencer import (
 from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.methods.phase_servo.plant import move
 from detent.sensing.absolute_converter import absolute_error, count_absolute
-from detent.sensing.carrier import LARGE, Carrier, CarrierParams, coil_currents, count_carrier, reset_carrier
+from detent.sensing.carrier import Carrier, CarrierParams, count_carrier, reset_carrier
 from detent.sensing.interference import INSERT_MINUS, INSERT_PLUS
 from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.bench.race import compile_c
+from tests.c_struct import c_struct
 from tests.print_head_rig import Rig
 
 from detent.control.head_computer import PRINT
@@ -56,7 +57,7 @@ class Stretch:
 
 def tick_in_c(folder: Path, *flags: str) -> Engine:
     """The tick in C, compiled against the register files' own declarations."""
-    (folder / "print_head_registers.h").write_text(PrintHeadParams.c_struct() + PrintHead.c_struct())
+    (folder / "print_head_registers.h").write_text(c_struct(PrintHeadParams, PrintHead))
     function: Any = compile_c(SOURCE, folder, *flags).advance
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64], ctypes.c_int64
     return lambda p, r, ticks: function(ctypes.addressof(p), ctypes.addressof(r), ticks)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import pytest
 from tests.bench.race import COMPILER, OPTIMISED, Race, compile_c, first_line, needs_c, timed
+from tests.c_struct import c_struct
 from tests.phase_servo_rig import make_spec
 
 from detent.methods.phase_servo.build import build_phase_servo
@@ -84,7 +85,7 @@ def compiled(p, stimulus, ticks):
 
 
 def declare(folder):
-    (folder / "converters_registers.h").write_text(ConverterParams.c_struct() + Converters.c_struct())
+    (folder / "converters_registers.h").write_text(c_struct(ConverterParams, Converters))
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import pytest
 from tests.bench import accel_stepper
 from tests.bench.race import COMPILER, OPTIMISED, Race, compile_c, first_line, needs_c, timed
+from tests.c_struct import c_struct
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, NO_TRACE, RAMP, RELOAD_CLOCK_HZ, START_HZ, Rig
 
 from detent.control import step_rule
@@ -74,7 +75,7 @@ def compiled(rig, steps=LONGEST):
 
 def rule_in_c(folder, *flags):
     """The same in C, compiled against the register files' own declarations."""
-    (folder / "step_rule_registers.h").write_text(StepperControllerParams.c_struct() + StepperController.c_struct())
+    (folder / "step_rule_registers.h").write_text(c_struct(StepperControllerParams, StepperController))
     function: Any = compile_c(SOURCE, folder, *flags).advance
     function.argtypes, function.restype = [ctypes.c_void_p] * 4 + [ctypes.c_int64] * 2, ctypes.c_int64
 

@@ -86,12 +86,16 @@ class Positioner(Registers):
 @step
 def interrupt(p: PositionerParams, r: Positioner, d: int) -> None:
     """Interrupt S8 with the detected angle: steps 200 to 228."""
-    if r.state == POWER_ON:
-        hold_first(r, d)
+    if r.state == POWER_ON:  # the table is held where the first angle finds it
+        first_angle(r.angle, d)
+        r.oar = d
+        r.z = 1
+        r.state = HOLD
     manual = r.state in (JOG, STOPPING)
     read_angle(p.angle, r.angle, d, manual)
     extend(p.angle, r.angle, r.z)
-    r.arr = remaining(p, r)
+    distance = r.oar - r.angle.aar  # steps 214 to 218: from R to M, along Z [count]
+    r.arr = abs(distance) if p.unsigned_remaining else r.z * distance
     interpolate(p.interpolator, r.interpolator, speed_limit(p, r))
     r.dr = (r.arr << p.interpolator.fraction) - r.interpolator.irr
     r.s4 = speed_word(p, r)
@@ -107,22 +111,6 @@ def speed_limit(p: PositionerParams, r: Positioner) -> int:
     if r.state == STOPPING:  # from rest it must still use up the fraction of a count that is left
         return max(r.interpolator.speed, p.interpolator.acceleration)
     return max(r.dial, 0)
-
-
-@step
-def hold_first(r: Positioner, d: int) -> None:
-    """The table is held where the first angle finds it."""
-    first_angle(r.angle, d)
-    r.oar = d
-    r.z = 1
-    r.state = HOLD
-
-
-@step
-def remaining(p: PositionerParams, r: Positioner) -> int:
-    """Steps 214 to 218: distance from R to M along Z [count]."""
-    distance = r.oar - r.angle.aar
-    return abs(distance) if p.unsigned_remaining else r.z * distance
 
 
 @step

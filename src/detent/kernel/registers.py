@@ -2,8 +2,8 @@
 
 A class of registers is a `ctypes.Structure`, so an instance is one flat piece of memory in the layout of the C
 compiler. Plain Python reads full integers from it and every store wraps to the width of the field; compiled steps work
-on the same memory with the same rule (`kernel.compiled`). The numpy dtype, the C struct, the trace columns and the
-reference tables all derive from the one declaration.
+on the same memory with the same rule (`kernel.compiled`). The numpy dtype, the trace columns and the reference tables
+all derive from the one declaration.
 """
 
 import ctypes
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from _ctypes import _PyCStructType as type_of_structure  # pyright: ignore[reportPrivateUsage, reportAttributeAccessIssue, reportUnknownVariableType]
 
     import numpy as np
-    from numpy.typing import NDArray
 else:
     type_of_structure = type(ctypes.Structure)
 
@@ -169,18 +168,6 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
 
         return np.dtype(cls)
 
-    @classmethod
-    def c_struct(cls) -> str:
-        """C99 declarations of this structure and of the blocks in it, inner ones first."""
-        return "".join(_c_types(cls).values())
-
-    def view(self) -> "NDArray[Any]":
-        """The same memory as a numpy array of shape (1,); writes go both ways."""
-        import numpy as np
-
-        memory: Any = self
-        return np.frombuffer(memory, dtype=type(self).dtype())
-
     def snapshot(self) -> bytes:
         """Copy of the whole state."""
         return bytes(self)
@@ -242,21 +229,3 @@ def _shown(value: Any) -> str:
         shown: list[Any] = value[:8]  # pyright: ignore[reportUnknownVariableType] - element type is the field's
         return "[" + ", ".join(str(v) for v in shown) + (", ...]" if len(value) > len(shown) else "]")  # pyright: ignore[reportUnknownArgumentType]
     return repr(value)
-
-
-def _c_member(field: Field, inner: dict[str, str]) -> str:
-    if field.width is not None:
-        array = f"[{field.length}]" if field.length else ""
-        return f"    {field.width.c_name} {field.name}{array};\n"
-    if field.block is not None:
-        # An inner block brings the blocks inside it; each type is declared once, before its first use.
-        inner.update((name, text) for name, text in _c_types(field.block).items() if name not in inner)
-        return f"    {field.block.__name__} {field.name};\n"
-    return ""
-
-
-def _c_types(block: type[Registers]) -> dict[str, str]:
-    """C declaration per structure name, inner ones first."""
-    inner: dict[str, str] = {}
-    body = "".join(_c_member(field, inner) for field in block.__fields__.values())
-    return inner | {block.__name__: f"typedef struct {{\n{body}}} {block.__name__};\n"}

@@ -12,7 +12,6 @@ reaching zero in a bridge that lets it flow one way only.
 
 from detent.kernel.registers import Registers, block, f8, i1, i8, register
 from detent.kernel.step import hot_step, step
-from detent.plant.friction import Friction
 
 NO_CURRENT = 1e-9  # current of a held motor that counts as none [A]: its exponential decay would otherwise never end
 SERIES_TERMS = 10  # terms of the power series per substep: with |M h| <= 0.25 the remainder is below 1e-14 of the step
@@ -33,6 +32,17 @@ class Transition(Registers):
     x_v: f8 = register("travel from velocity", unit="s")
     x_u: f8 = register("travel from voltage", unit="m/V")
     x_f: f8 = register("travel from force", unit="m/N")
+
+
+class Friction(Registers):
+    """Friction of the guide, Coulomb, static and viscous, each direction its own; all values are magnitudes."""
+
+    coulomb_right: f8 = register("Coulomb friction moving right", unit="N")
+    coulomb_left: f8 = register("Coulomb friction moving left", unit="N")
+    static_right: f8 = register("force that breaks loose to the right", unit="N")
+    static_left: f8 = register("force that breaks loose to the left", unit="N")
+    viscous_right: f8 = register("viscous friction moving right", unit="N.s/m")
+    viscous_left: f8 = register("viscous friction moving left", unit="N.s/m")
 
 
 class DriveTrainParams(Registers):
@@ -211,7 +221,8 @@ def fill_transition(p: DriveTrainParams, target: Transition, sense: int, *, cond
     force ``k u / R`` and the viscous friction ``k^2 / R``.
     """
     at_once = conducting and p.inductance == 0.0
-    mechanics = without_friction(p)
+    mechanics = p.copy()
+    mechanics.friction.coulomb_right = mechanics.friction.coulomb_left = 0.0  # taken as a force
     if at_once:
         drag = p.force_constant * p.emf_constant / p.resistance
         mechanics.friction.viscous_right += drag
@@ -235,19 +246,11 @@ def fill_transition(p: DriveTrainParams, target: Transition, sense: int, *, cond
         setattr(target, "x_" + name, r.position)
 
 
-def without_friction(p: DriveTrainParams) -> DriveTrainParams:
-    """Copy of the constants without Coulomb friction, which the whole-period matrices take as a force."""
-    mechanics = p.copy()
-    mechanics.friction.coulomb_right = mechanics.friction.coulomb_left = 0.0
-    return mechanics
-
-
 def fill_period(p: DriveTrainParams) -> None:
     """Compute every whole-period matrix of `p` from its constants."""
-    fill_transition(p, p.right, 1, conducting=True)
-    fill_transition(p, p.left, -1, conducting=True)
-    fill_transition(p, p.coast_right, 1, conducting=False)
-    fill_transition(p, p.coast_left, -1, conducting=False)
+    for sense, driven, coasting in ((1, p.right, p.coast_right), (-1, p.left, p.coast_left)):
+        fill_transition(p, driven, sense, conducting=True)
+        fill_transition(p, coasting, sense, conducting=False)
     if p.inductance == 0.0:
         p.held_i, p.held_u = 0.0, 1.0 / p.resistance
         return

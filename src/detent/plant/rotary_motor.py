@@ -99,7 +99,6 @@ def fill_response(p: RotaryMotorParams, target: Response, stiffness: float) -> N
     k = (p.viscous + stiffness) / p.inertia
     lag = k * h
     first = one_less_exp(lag) / lag if lag > 0.0 else 1.0
-    # (1 - first) / lag cancels for a small lag: its series there is exact to rounding.
     second = (1.0 - first) / lag if lag > 1e-2 else _second(lag)
     target.v_v = exp(-lag)
     target.v_t = h / p.inertia * first
@@ -108,7 +107,7 @@ def fill_response(p: RotaryMotorParams, target: Response, stiffness: float) -> N
 
 
 def _second(lag: float) -> float:
-    """``(lag - 1 + exp(-lag)) / lag^2`` by its series."""
+    """``(lag - 1 + exp(-lag)) / lag^2`` by its series, exact to rounding where the difference cancels."""
     term, total = 0.5, 0.5
     for n in range(3, 12):
         term *= -lag / n

@@ -196,16 +196,11 @@ def move_in_pieces(p: TwoMassParams, r: TwoMass) -> None:
 def finish(p: TwoMassParams, r: TwoMass, left: float) -> None:
     """The rest of a tick, whatever comes in it: who has turned round is at rest, who has met a flank is in contact."""
     after = flow_piece(p, r, left)
-    motor_turned = left_of_regime(p, r, MOTOR_REVERSES, after) < 0.0
-    load_turned = left_of_regime(p, r, LOAD_REVERSES, after) < 0.0
-    positive_passed = left_of_regime(p, r, POSITIVE_FLANK, after) < 0.0
-    negative_passed = left_of_regime(p, r, NEGATIVE_FLANK, after) < 0.0
+    passed = 0  # a bit for each event
+    for event in range(MOTOR_REVERSES, NEGATIVE_FLANK + 1):
+        if left_of_regime(p, r, event, after) < 0.0:
+            passed |= 1 << event
     accept(p, r, after)
-    if positive_passed:
-        end_regime(p, r, POSITIVE_FLANK)
-    if negative_passed:
-        end_regime(p, r, NEGATIVE_FLANK)
-    if motor_turned:
-        end_regime(p, r, MOTOR_REVERSES)
-    if load_turned:
-        end_regime(p, r, LOAD_REVERSES)
+    for event in range(MOTOR_REVERSES, NEGATIVE_FLANK + 1):
+        if passed >> event & 1:
+            end_regime(p, r, event)

@@ -5,7 +5,7 @@ Columns are called by the dotted path of the register they came from (``motor.cu
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -78,68 +78,26 @@ class Trace:
         return tuple(name for name in self.columns if name != TIME)
 
     def label(self, name: str) -> str:
-        """Give a column's name with its unit, as headers and axes show it.
-
-        Parameters
-        ----------
-        name : str
-            Column name.
-
-        Returns
-        -------
-        str
-            Such as ``motor.current [A]``; the bare name where there is no unit.
-        """
+        """Give a column's name with its unit, such as ``motor.current [A]``; the bare name where there is no unit."""
         unit = self.units.get(name, "")
         return f"{name} [{unit}]" if unit else name
 
     def between(self, start: float, stop: float) -> "Trace":
-        """Cut out a stretch of time.
+        """Cut out a stretch of time, from the first to the last moment [s], both included; no copy of the columns.
 
-        Parameters
-        ----------
-        start, stop : float
-            First and last moment [s]; both ends belong to the stretch.
-
-        Returns
-        -------
-        Trace
-            Views into the same columns, no copy.
-
-        Raises
-        ------
-        DetentError
-            Nothing was recorded in the stretch.
+        A `DetentError` says so where nothing was recorded in the stretch.
         """
         first = int(np.searchsorted(self.time, start, side="left"))
         last = int(np.searchsorted(self.time, stop, side="right"))
         if first >= last:
             held = f"{self.time[0]:g} s to {self.time[-1]:g} s" if len(self) else "nothing"
             raise DetentError(f"trace: no rows from {start:g} s to {stop:g} s; it holds {held}; choose a time in there")
-        return Trace(
-            columns={name: values[first:last] for name, values in self.columns.items()},
-            units=self.units,
-            docs=self.docs,
-            attributes=self.attributes,
-        )
+        return replace(self, columns={name: values[first:last] for name, values in self.columns.items()})
 
     def match(self, patterns: Sequence[str]) -> tuple[str, ...]:
-        """Find the columns that a person means.
+        """Find the columns that a person means by names, or by patterns with ``*`` such as ``motor.*``.
 
-        Parameters
-        ----------
-        patterns : sequence of str
-            Names, or patterns with ``*`` such as ``motor.*``.
-
-        Returns
-        -------
-        tuple of str
-            The columns in the order asked, each once; never ``t``.
-
-        Raises
-        ------
-        DetentError
-            A pattern fits no column.
+        They come in the order asked, each once, never ``t``; a pattern that fits no column is a `DetentError`.
         """
         found: dict[str, None] = {}
         for pattern in patterns:

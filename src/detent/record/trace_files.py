@@ -57,14 +57,9 @@ def _texts(values: Column) -> list[str]:
 def _write_parquet(table: "_Table", path: Path) -> None:
     """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
     arrow, parquet = need_parquet()
-    fields = [
-        arrow.field(
-            name,
-            arrow.from_numpy_dtype(values.dtype),
-            metadata={"unit": table.units.get(name, ""), "doc": table.docs.get(name, "")},
-        )
-        for name, values in table.columns.items()
-    ]
+    kinds = {name: arrow.from_numpy_dtype(values.dtype) for name, values in table.columns.items()}
+    told = {name: {"unit": table.units.get(name, ""), "doc": table.docs.get(name, "")} for name in kinds}
+    fields = [arrow.field(name, kind, metadata=told[name]) for name, kind in kinds.items()]
     schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **table.attributes})})
     part = part_of(path)
     with writing(path):
@@ -155,14 +150,9 @@ def _load_parquet(path: Path) -> Trace:
     head: dict[bytes, bytes] = table.schema.metadata or {}
     attributes: dict[str, Attribute] = json.loads(head.get(b"detent", b"{}"))
     attributes.pop("format", None)
-    columns: dict[str, Column] = {}
-    units: dict[str, str] = {}
-    docs: dict[str, str] = {}
-    for field in table.schema:
-        metadata: dict[bytes, bytes] = field.metadata or {}
-        columns[field.name] = table.column(field.name).to_numpy()
-        units[field.name] = metadata.get(b"unit", b"").decode()
-        docs[field.name] = metadata.get(b"doc", b"").decode()
+    told: dict[str, dict[bytes, bytes]] = {field.name: field.metadata or {} for field in table.schema}
+    columns: dict[str, Column] = {name: table.column(name).to_numpy() for name in told}
+    units, docs = ({name: held.get(key, b"").decode() for name, held in told.items()} for key in (b"unit", b"doc"))
     return Trace(columns=columns, units=units, docs=docs, attributes=attributes)
 
 

@@ -172,22 +172,10 @@ class Waveforms:
         raise DetentError(f"waveforms: no signal {name!r}; allowed: {held}; name one of these")
 
     def window(self, begin: int, end: int) -> "Waveforms":
-        """Cut out a stretch of time.
+        """Cut out a stretch of time [ps] since power-on; what lies outside of these waveforms is left out.
 
-        Parameters
-        ----------
-        begin, end : int
-            The stretch [ps] since power-on; what lies outside of these waveforms is left out.
-
-        Returns
-        -------
-        Waveforms
-            The same signals; each begins with the value that holds at the new begin.
-
-        Raises
-        ------
-        DetentError
-            The stretch holds nothing of these waveforms.
+        Each signal begins with the value that holds at the new begin. A `DetentError` says so where the stretch holds
+        nothing of these waveforms.
         """
         first, last = max(begin, self.begin), min(end, self.end)
         if first >= last:

@@ -7,8 +7,6 @@ capacitor across each coil keeps the fundamental: what the detector sees is that
 from detent.kernel.registers import Registers, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 
-LARGE = 3.0  # current through the small resistor R461, in units of the other's (1/R462): about 3 (block 461)
-
 
 class CarrierParams(Registers):
     """Length of the carrier cycle."""
@@ -46,13 +44,6 @@ def set_switches(r: Carrier, slot: int) -> None:
     a_delayed = r.delayed_msb ^ (b2 ^ 1)
     b_delayed = r.delayed_msb ^ b1
     r.switches = a | b << 1 | a_delayed << 2 | b_delayed << 3
-
-
-@hot_step
-def coil_currents(r: Carrier, large: float) -> tuple[float, float]:
-    """Currents of both coils in units of supply / R462; `large` is the ratio R462 / R461."""
-    s = r.switches
-    return large * (s & 1) + (s >> 1 & 1), large * (s >> 2 & 1) + (s >> 3 & 1)
 
 
 @step

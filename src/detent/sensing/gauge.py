@@ -1,7 +1,10 @@
-"""A gauge beside the carriage: how the present move went, for whoever watches. No part of the control."""
+"""Gauges beside a carriage and a rotary table: how the present move or step went, for whoever watches.
+
+No part of the control.
+"""
 
 from detent.kernel.registers import Registers, f8, i8, register
-from detent.kernel.step import hot_step
+from detent.kernel.step import hot_step, step
 
 
 class Gauge(Registers):
@@ -30,3 +33,22 @@ def set_gauge(r: Gauge, tick: int, start: float, target: float, tolerance: float
     r.target, r.tolerance = target, tolerance
     r.direction = 1.0 if target >= start else -1.0
     r.outside, r.beyond, r.peak_speed = tick, -abs(target - start), 0.0
+
+
+class AngleGauge(Registers):
+    """Readings of the present step of a rotary table."""
+
+    peak_speed: f8 = register("largest motor speed at an interrupt so far", unit="rad/s")
+    peak_deviation: i8 = register("largest magnitude of dR so far", unit="count/2^f")
+
+
+@step
+def read_angle_gauge(r: AngleGauge, velocity: float, deviation: int) -> None:
+    """One interrupt with the motor at `velocity` [rad/s]."""
+    r.peak_speed = max(r.peak_speed, abs(velocity))
+    r.peak_deviation = max(r.peak_deviation, abs(deviation))
+
+
+def set_angle_gauge(r: AngleGauge) -> None:
+    """A step begins."""
+    r.peak_speed, r.peak_deviation = 0.0, 0

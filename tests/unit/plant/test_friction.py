@@ -1,4 +1,4 @@
-from detent.plant.friction import Friction
+from detent.plant.drive_train import Friction
 
 
 def test_every_kind_of_friction_has_both_directions_and_a_unit():

@@ -1,6 +1,6 @@
 import pytest
 
-from detent.sensing.angle_gauge import AngleGauge, read_angle_gauge, set_angle_gauge
+from detent.sensing.gauge import AngleGauge, read_angle_gauge, set_angle_gauge
 
 
 @pytest.mark.parametrize("sign", [1, -1])

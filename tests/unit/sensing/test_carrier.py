@@ -2,8 +2,9 @@ import math
 
 import numpy as np
 import pytest
+from tests.coil_currents import LARGE, coil_currents
 
-from detent.sensing.carrier import LARGE, Carrier, CarrierParams, coil_currents, count_carrier, reset_carrier
+from detent.sensing.carrier import Carrier, CarrierParams, count_carrier, reset_carrier
 
 SLOTS = [(0, 0), (0, 1), (1, 0), (1, 1), (1, 1), (1, 0), (0, 1), (0, 0)]
 """Switches (a, b) of the first coil through a cycle."""

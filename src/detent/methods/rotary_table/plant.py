@@ -7,7 +7,7 @@ from detent.kernel.step import hot_step, step
 from detent.methods.rotary_table.controller import TableLines
 from detent.plant.gearing import PHASE_PER_RADIAN, Gear, GearParams, follow, output_phase
 from detent.plant.rotary_motor import LoadTorque, RotaryMotor, RotaryMotorParams, load_torque, rotate
-from detent.sensing.angle_gauge import AngleGauge
+from detent.sensing.gauge import AngleGauge
 from detent.sensing.resolver_counter import ResolverParams, count_phase
 
 

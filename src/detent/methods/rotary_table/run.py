@@ -12,7 +12,7 @@ from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Se
 from detent.methods.rotary_table.table_observer import TableObserver
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Progress
 from detent.record.run import RunRecord
-from detent.sensing.angle_gauge import set_angle_gauge
+from detent.sensing.gauge import set_angle_gauge
 from detent.units import format_quantity
 
 SEQUENCE_SIGNALS = (

@@ -16,7 +16,7 @@ from detent.kernel.step import hot_step
 from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines, control, power_on
 from detent.methods.rotary_table.plant import TablePlant, TablePlantParams, Train, move, sense
 from detent.plant.rotary_motor import stand_at
-from detent.sensing.angle_gauge import read_angle_gauge
+from detent.sensing.gauge import read_angle_gauge
 
 TICK_US = 100
 TICK = TICK_US * 1e-6
