@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
+from tests.difference import diff
 
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
@@ -84,7 +85,7 @@ def test_01_a_controller_does_the_same_on_recorded_lines(make):
                 memory[k] = value
             controller.restore(bytes(memory))
             replay(p.controller, controller, lines, one.rows, picks, *one.feed)
-            assert controller.diff(one.controller) == {}
+            assert diff(controller, one.controller) == {}
             assert out_of(lines) == one.out
             passed += len(one.rows)
         assert passed >= TICKS

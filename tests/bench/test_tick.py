@@ -5,6 +5,7 @@ from functools import partial
 import pytest
 from tests.bench.print_lines import LINES, Stretch, tick_in_c
 from tests.bench.race import COMPILER, OPTIMISED, Race, first_line, needs_c, timed
+from tests.difference import diff
 from tests.print_head_rig import NO_TRACE
 
 from detent.control.head_computer import IDLE
@@ -49,7 +50,7 @@ def test_c_ends_on_the_same_bits(in_c, overrides):
     assert stretch.r.controller.head.turn_arounds == len(LINES)
     assert stretch.r.controller.head.columns.fired > 5000
     for name, engine in in_c.items():
-        assert to_the_end(stretch, engine) == end, (name, stretch.r.diff(end))
+        assert to_the_end(stretch, engine) == end, (name, diff(stretch.r, end))
 
 
 @needs_c

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
-from detent.axisfile.tables import BurstTable, FrictionTables
+from detent.axisfile.tables import BurstTable, FrictionTable, FrictionTables
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, at_least, at_most, put
 from detent.units import format_quantity as text
@@ -13,29 +13,15 @@ from detent.units import format_quantity as text
 BURST = "disturbance.lines.burst"
 
 
-class Rubbing(Protocol):
-    """A table of friction in one direction."""
-
-    @property
-    def static(self) -> float:
-        """Friction at rest."""
-        ...
-
-    @property
-    def coulomb(self) -> float:
-        """Friction of any motion."""
-        ...
-
-
-def static_friction(tables: Mapping[str, Rubbing], unit: str = "N") -> Iterator[Contradiction]:
-    """Static friction is at least the Coulomb friction, in each table."""
+def static_friction(tables: Mapping[str, Any], unit: str = "N") -> Iterator[Contradiction]:
+    """Static friction, `static`, is at least the Coulomb friction, `coulomb`, in each table of one direction."""
     for key, table in tables.items():
         if table.static < table.coulomb:
             least = f"at least the Coulomb friction, {text(table.coulomb, unit)}; left out it is 1.15 x coulomb"
             yield wrong(f"{key}.static {key}.coulomb", least, put(f"{key}.static", at_least(table.coulomb, unit)))
 
 
-def sides(friction: FrictionTables) -> dict[str, Rubbing]:
+def sides(friction: FrictionTables) -> dict[str, FrictionTable]:
     """Friction to the right and to the left by the keys of its tables."""
     return {"mechanics.friction.right": friction.right, "mechanics.friction.left": friction.left}
 

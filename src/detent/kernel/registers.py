@@ -196,23 +196,6 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
             found[leaf.path] = list(raw) if leaf.length else raw[0]
         return found
 
-    def diff(self, other: "Registers | bytes") -> dict[str, tuple[Any, Any]]:
-        """Paths whose value differs, with (own, other's) value; `other` may be a snapshot."""
-        if isinstance(other, bytes):
-            theirs = type(self)()
-            theirs.restore(other)
-        else:
-            theirs = other
-        mine, them = self.values(), theirs.values()
-        return {path: (value, them[path]) for path, value in mine.items() if value != them[path]}
-
-    def __str__(self) -> str:
-        """One line per leaf: path, value, unit and meaning."""
-        values = self.values()
-        width = max(map(len, values), default=0)
-        rows = (f"{leaf.path:<{width}}  {_shown(values[leaf.path])} {leaf.unit}" for leaf in type(self).leaves())
-        return "\n".join(row.rstrip() for row in rows)
-
     @classmethod
     def markdown_table(cls) -> str:
         """Reference table (Markdown) of every leaf: path, width, unit, meaning."""
@@ -222,10 +205,3 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
             writer = f"; written by the {leaf.by}" if leaf.by else ""
             rows.append(f"| `{leaf.path}` | {width} | {leaf.unit} | {leaf.doc}{writer} |")
         return "\n".join(rows) + "\n"
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, list):
-        shown: list[Any] = value[:8]  # pyright: ignore[reportUnknownVariableType] - element type is the field's
-        return "[" + ", ".join(str(v) for v in shown) + (", ...]" if len(value) > len(shown) else "]")  # pyright: ignore[reportUnknownArgumentType]
-    return repr(value)

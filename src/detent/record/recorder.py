@@ -60,26 +60,15 @@ class Recorder:
         picked = choose_leaves(registers, ["tick", *names])
         self.leaves, self.picks = picked[1:], byte_places(picked)
         self.every, self.period = every, period
+        # Of the rows handed to the sink: their type, and unit and meaning per column.
+        self.dtype: Any = np.dtype([("t", "<f8"), *((leaf.path, "<" + leaf.width.code) for leaf in self.leaves)])
+        self.units = {"t": "s"} | {leaf.path: leaf.unit for leaf in self.leaves}
+        self.docs = {"t": "simulated time since power-on"} | {leaf.path: leaf.doc for leaf in self.leaves}
         self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
         self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
         self._blocks: list[NDArray[np.void]] = []
         self._sink = sink or self._blocks.append
         self._next_row = 1
-
-    @property
-    def dtype(self) -> Any:
-        """Structured type of the rows handed to the sink."""
-        return np.dtype([("t", "<f8"), *((leaf.path, "<" + leaf.width.code) for leaf in self.leaves)])
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Unit per column."""
-        return {"t": "s"} | {leaf.path: leaf.unit for leaf in self.leaves}
-
-    @property
-    def docs(self) -> dict[str, str]:
-        """Meaning per column."""
-        return {"t": "simulated time since power-on"} | {leaf.path: leaf.doc for leaf in self.leaves}
 
     def room(self, tick: int) -> int:
         """Ticks that may still pass from `tick` before `flush` must be called."""

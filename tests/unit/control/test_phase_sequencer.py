@@ -1,4 +1,5 @@
 import pytest
+from tests.difference import diff
 
 from detent.control.phase_sequencer import (
     ACQUIRE,
@@ -66,7 +67,7 @@ def test_a_command_before_ready_is_refused_and_changes_nothing_else(state):
     before = r.copy()
     r.strobe, r.command, r.backward = 1, 640, 1
     assert not take_command(r)
-    assert set(r.diff(before)) == {"refused", "command", "backward"}
+    assert set(diff(r, before)) == {"refused", "command", "backward"}
     assert r.refused == 1
 
 

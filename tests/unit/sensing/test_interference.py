@@ -1,6 +1,7 @@
 from itertools import pairwise
 
 import pytest
+from tests.difference import diff
 
 from detent.kernel.noise import NoiseSource, uniform
 from detent.sensing.interference import (
@@ -55,7 +56,7 @@ def test_each_kind_changes_its_own_registers_and_no_other(kind, changed):
     r = Interference()
     before = r.copy()
     strike(r, kind)
-    assert r.diff(before) == {name: (value, 0) for name, value in changed.items()}
+    assert diff(r, before) == {name: (value, 0) for name, value in changed.items()}
 
 
 def test_the_sign_of_an_inserted_pulse_is_drawn():

@@ -10,6 +10,7 @@ from functools import cache
 import pytest
 from tests.bad_files import example_text
 from tests.cascade_rig import Rig
+from tests.difference import diff
 
 from detent.files.source import parse_source
 from detent.methods.cascade.build import (
@@ -185,7 +186,7 @@ def test_every_key_is_tried():
 @pytest.mark.parametrize("key", GUARDED)
 def test_a_key_changes_the_guard(key):
     p, other = (build_cascade(load("cascade", *change)).controller for change in ((), (f"{key}={GUARDED[key]}",)))
-    changed = p.diff(other)
+    changed = diff(p, other)
     assert changed
     assert all(path.startswith(("guard.", "limits.")) for path in changed)
 

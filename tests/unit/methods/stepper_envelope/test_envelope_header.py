@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.bench.race import COMPILER, compile_c
+from tests.difference import diff
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, turn_envelopes
 
 from detent.control.step_rule import (
@@ -149,7 +150,7 @@ class Twins:
     def compare(self) -> None:
         for ours, theirs in ((self.r.rule, self.c.rule), (self.r.timer, self.c.timer)):
             if bytes(ours) != bytes(theirs):  # the quick look first: bytes between registers may differ
-                assert ours.diff(theirs) == {}
+                assert diff(ours, theirs) == {}
 
     def run(self, steps: int = 10**6) -> None:
         """So many steps, or to rest."""
