@@ -48,7 +48,17 @@ def registers() -> str:
             ("State", STATE, method.registers()),
             ("Parameters", PARAMETERS, method.parameters()),
         ):
-            parts.append(f"### {title}\n\n{what} Class `{declared.__name__}`.\n\n{declared.markdown_table()}")
+            rows = [
+                (
+                    code(leaf.path),
+                    leaf.width.code + (f" x {leaf.length}" if leaf.length else ""),
+                    leaf.unit,
+                    leaf.doc + (f"; written by the {leaf.by}" if leaf.by else ""),
+                )
+                for leaf in declared.leaves()
+            ]
+            parts.append(f"### {title}\n\n{what} Class `{declared.__name__}`.\n")
+            parts.append(table(("register", "width", "unit", "meaning"), rows))
     return "\n".join(parts)
 
 

@@ -223,11 +223,6 @@ def release(r: StepRule) -> None:
     r.manual, r.request, r.request_word, r.event = 1, AT_REST, 0, 0
 
 
-def reset(r: StepRule) -> None:
-    """Leave a fault, once the motor rests."""
-    r.reset = 1
-
-
 def acknowledge(r: StepRule) -> None:
     """The host has seen the event: time may pass on."""
     r.event = 0

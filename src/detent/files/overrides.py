@@ -1,7 +1,6 @@
 """Values of ``--set``: which key they are for, what they mean, and what is wrong with them."""
 
 import difflib
-import re
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, cast
@@ -12,8 +11,6 @@ from detent.errors import FileProblem
 from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_fields, named_as, options_of, unit_of
 from detent.files.locate import Path
 from detent.files.problems import dotted
-
-_NUMBER = re.compile(r"[+-]?[0-9][0-9_]*(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 
 def apply_overrides(
@@ -73,26 +70,16 @@ def _override_value(field: FieldInfo, text: str) -> object:
     """Value of an override: what the same words mean in a file, quotes being optional."""
     if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
         return text[1:-1]
-    if is_list(field) and text.startswith("["):
-        return _list_value(text)
-    if field.annotation is str or options_of(field):
+    if field.annotation is str or options_of(field) or (text in {"true", "false"} and unit_of(field)):
         return text
-    if text in {"true", "false"} and not unit_of(field):
-        return text == "true"
-    match = _NUMBER.fullmatch(text)
-    if match is None or len(text) > 40:
-        return text
-    return float(text) if match.group(1) or match.group(2) else int(text)
-
-
-def _list_value(text: str) -> object:
-    """Value of a list in an override; what is no TOML stays text, and validation refuses it."""
     try:
         tables = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError):  # what is no TOML stays text, and validation refuses it
         return text
+    value: object = tables["value"]
     # After a line break anything could follow.
-    return tables["value"] if len(tables) == 1 else text
+    kinds: tuple[type, ...] = (list,) if is_list(field) else (bool, int, float)
+    return value if len(tables) == 1 and type(value) in kinds else text
 
 
 def as_table(value: object) -> dict[str, Any]:

@@ -38,25 +38,18 @@ def source_hash() -> str:
     import numba
 
     digest = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__}".encode())
-    for source in step_sources():
+    for source in sorted(step_sources()):
         digest.update(str(source.relative_to(PACKAGE)).encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:20]
 
 
-def step_sources() -> list[Path]:
-    """The hashed sources, sorted."""
+@cache
+def step_sources() -> frozenset[Path]:
+    """The files whose edits change the hash: only their functions may be cached."""
     rooms = [PACKAGE / room for room in STEP_ROOMS]
     found = [s for room in rooms for s in ([room] if room.is_file() else room.rglob("*.py"))]
-    return sorted([*found, *PACKAGE.glob(SYSTEM)])
-
-
-def is_step_source(source: Path) -> bool:
-    """True for a file whose edits change the hash: only its functions may be cached."""
-    if not source.is_relative_to(PACKAGE):
-        return False
-    place = source.relative_to(PACKAGE)
-    return place.parts[0] in STEP_ROOMS or place.match(SYSTEM)
+    return frozenset([*found, *PACKAGE.glob(SYSTEM)])
 
 
 @cache

@@ -195,13 +195,3 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
             raw = (leaf.width.ctype * count).from_buffer_copy(state, leaf.offset)
             found[leaf.path] = list(raw) if leaf.length else raw[0]
         return found
-
-    @classmethod
-    def markdown_table(cls) -> str:
-        """Reference table (Markdown) of every leaf: path, width, unit, meaning."""
-        rows = ["| register | width | unit | meaning |", "|---|---|---|---|"]
-        for leaf in cls.leaves():
-            width = leaf.width.code + (f" x {leaf.length}" if leaf.length else "")
-            writer = f"; written by the {leaf.by}" if leaf.by else ""
-            rows.append(f"| `{leaf.path}` | {width} | {leaf.unit} | {leaf.doc}{writer} |")
-        return "\n".join(rows) + "\n"

@@ -16,7 +16,7 @@ from numba.core import types as untyped_types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 
 import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
-from detent.kernel.cache import compiled_folder, is_step_source, source_hash
+from detent.kernel.cache import compiled_folder, source_hash, step_sources
 
 numba: Any = untyped_numba  # its annotations leave out an option that we use
 types: Any = untyped_types
@@ -114,7 +114,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
     if config.DISABLE_JIT:
         return cast("F", made)
     _compile_once(made)
-    if is_step_source(Path(function.__code__.co_filename).resolve()):
+    if Path(function.__code__.co_filename).resolve() in step_sources():
         with suppress(RuntimeError):  # numba finds no locator where the cache cannot be written: each process compiles
             made._cache = _PackageCache(function)  # noqa: SLF001 - numba offers no public way to choose the folder
     return cast("F", made)

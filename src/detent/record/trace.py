@@ -23,6 +23,8 @@ TIME = "t"
 class Trace:
     """What a run recorded: columns of equal length over time, with units.
 
+    A `DetentError` tells why columns do not make a trace: no ``t`` in front, unequal lengths, values not numbers.
+
     Parameters
     ----------
     columns : mapping of str to ndarray
@@ -33,11 +35,6 @@ class Trace:
         What each column holds, in a few words; may be incomplete.
     attributes : mapping of str to str, float or int
         What is true of the whole trace: ``axis``, ``job``, ``seed``.
-
-    Raises
-    ------
-    DetentError
-        The columns do not make a trace: no ``t`` in front, unequal lengths, values that are not numbers.
     """
 
     columns: dict[str, Column]

@@ -49,6 +49,8 @@ class Phase:
 class Waveform:
     """One signal over time: each value holds from its moment to the next.
 
+    A `DetentError` tells where times and values do not fit together, or a value does not fit the width.
+
     Parameters
     ----------
     name : str
@@ -67,11 +69,6 @@ class Waveform:
         Moments since power-on [ps], rising, shape (n,), n >= 1; the first is where the signal begins.
     values : ndarray
         Value from each moment on, shape (n,); booleans, integers or floats.
-
-    Raises
-    ------
-    DetentError
-        Times and values do not fit together, or a value does not fit the width.
     """
 
     name: str
@@ -125,7 +122,7 @@ class Waveform:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waveforms:
-    """Signals over one stretch of time.
+    """Signals over one stretch of time; a `DetentError` tells where it is empty, or a signal does not fit it.
 
     Parameters
     ----------
@@ -135,11 +132,6 @@ class Waveforms:
         Each begins at `begin`, changes before `end`, and has a name of its own.
     title : str
         What the whole shows, such as the axis; "" for nothing.
-
-    Raises
-    ------
-    DetentError
-        The stretch is empty, or a signal does not fit it.
     """
 
     begin: int

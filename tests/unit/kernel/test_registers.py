@@ -157,14 +157,6 @@ def test_diff_names_what_differs_against_state_or_snapshot():
     assert diff(r, r.copy()) == {}
 
 
-def test_markdown_has_a_row_per_leaf():
-    rows = Outer.markdown_table().splitlines()
-    assert rows[0] == "| register | width | unit | meaning |"
-    assert "| `middle.inner.count` | u1 | count | pulses |" in rows
-    assert "| `table` | f8 x 20 | V | curve |" in rows
-    assert len(rows) == 2 + len(list(Outer.leaves()))
-
-
 def test_numpy_dtype_is_that_of_the_memory():
     r = Outer()
     view = np.frombuffer(r, dtype=Outer.dtype())

@@ -3,7 +3,7 @@
 import pytest
 from tests.stepper_rig import Rig
 
-from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release, reset
+from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release
 from detent.methods.stepper_envelope.controller import StepperLines, call_at, control
 
 
@@ -76,6 +76,6 @@ def test_a_fault_is_left_by_a_reset():
     rig = Rig(at=-1).start()
     said(rig, 1)
     assert (rig.rule.state, rig.rule.event) == (FAULT, 1)
-    reset(rig.rule)
+    rig.rule.reset = 1
     said(rig, 1)
     assert rig.rule.state == REST
