@@ -15,17 +15,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "Axis",
-    "Run",
-    "Timing",
-    "__version__",
-    "example",
-    "examples",
-    "identify_axis",
-    "load",
-    "load_trace",
-]
+__all__ = ["Axis", "Run", "Timing", "__version__", "example", "examples", "identify_axis", "load", "load_trace"]
 
 
 def __getattr__(name: str) -> Any:

@@ -2,14 +2,7 @@
 
 from detent.axisfile.tables import InterferenceTable, PushTable
 from detent.plant.push import Push
-from detent.sensing.interference import (
-    CORRUPT,
-    INSERT_MINUS,
-    INSERT_PLUS,
-    LOSE_SAMPLE,
-    REMOVE,
-    InterferenceParams,
-)
+from detent.sensing.interference import CORRUPT, INSERT_MINUS, INSERT_PLUS, LOSE_SAMPLE, REMOVE, InterferenceParams
 
 KINDS = {"+": INSERT_PLUS, "-": INSERT_MINUS, "remove": REMOVE, "lose sample": LOSE_SAMPLE, "corrupt": CORRUPT}
 

@@ -58,11 +58,7 @@ class MotorTable(Table, frozen=True):
     catalogue: str = optional("motor of the catalogue that gives the constants not stated here", "", max_length=80)
     torque_constant: TorqueConstant = required("torque per current", '"0.241 N*m/A"', ge=1e-6, le=100.0)
     back_emf_constant: BackEmfConstant = optional(
-        "voltage per speed",
-        _stated_torque_constant,
-        derived="motor.torque_constant",
-        ge=1e-6,
-        le=100.0,
+        "voltage per speed", _stated_torque_constant, derived="motor.torque_constant", ge=1e-6, le=100.0
     )
     resistance: Resistance = required("winding and brushes", '"12 ohm"', ge=1e-3, le=1e5)
     inductance: Inductance = required("winding", '"12 mH"', ge=1e-9, le=10.0)
@@ -76,11 +72,7 @@ class FrictionTable(Table, frozen=True):
     coulomb: Force = required("friction while moving, at any speed", '"7.5 N"', ge=0.0, le=1e5)
     viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e5)
     static: Force = optional(
-        "force that breaks the carriage loose",
-        _usual_stiction,
-        derived="1.15 x coulomb",
-        ge=0.0,
-        le=1e5,
+        "force that breaks the carriage loose", _usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
     )
 
 
