@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.difference import values_of
 from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
@@ -189,6 +190,6 @@ def test_the_drive_keeps_its_limits_and_no_number_is_lost(servo, effort, lines, 
     else:
         assert np.array_equal(word, np.clip(error, -most, most))
     assert set(run["controller.deviation.state"][alive:]) <= {FAULT}
-    numbers = [value for value in rig.r.values().values() if isinstance(value, float)]
+    numbers = [value for value in values_of(rig.r).values() if isinstance(value, float)]
     assert len(numbers) > 20
     assert all(math.isfinite(value) for value in numbers)

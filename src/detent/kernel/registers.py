@@ -2,8 +2,8 @@
 
 A class of registers is a `ctypes.Structure`, so an instance is one flat piece of memory in the layout of the C
 compiler. Plain Python reads full integers from it and every store wraps to the width of the field; compiled steps work
-on the same memory with the same rule (`kernel.compiled`). The numpy dtype, the trace columns and the reference tables
-all derive from the one declaration.
+on the same memory with the same rule (`kernel.compiled`). The trace columns and the reference tables derive from the
+one declaration, and numpy takes the class for a dtype.
 """
 
 import ctypes
@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, get_args
 if TYPE_CHECKING:
     # The metaclass of ctypes.Structure has no public name.
     from _ctypes import _PyCStructType as type_of_structure  # pyright: ignore[reportPrivateUsage, reportAttributeAccessIssue, reportUnknownVariableType]
-
-    import numpy as np
 else:
     type_of_structure = type(ctypes.Structure)
 
@@ -161,13 +159,6 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
             elif field.width is not None:
                 yield Leaf(path, field.doc, field.unit, place, field.width, field.length, writer)
 
-    @classmethod
-    def dtype(cls) -> "np.dtype[Any]":
-        """Numpy structured dtype of the same memory, aligned as in C."""
-        import numpy as np
-
-        return np.dtype(cls)
-
     def snapshot(self) -> bytes:
         """Copy of the whole state."""
         return bytes(self)
@@ -185,13 +176,3 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
     def copy(self) -> Self:
         """Independent copy."""
         return type(self).from_buffer_copy(self)
-
-    def values(self) -> dict[str, Any]:
-        """Value per dotted path; arrays as lists."""
-        state = bytes(self)
-        found: dict[str, Any] = {}
-        for leaf in type(self).leaves():
-            count = max(leaf.length, 1)
-            raw = (leaf.width.ctype * count).from_buffer_copy(state, leaf.offset)
-            found[leaf.path] = list(raw) if leaf.length else raw[0]
-        return found

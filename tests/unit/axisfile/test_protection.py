@@ -1,4 +1,5 @@
 import pytest
+from tests.difference import values_of
 
 from detent.axisfile.protection import describe_fault, fill_guard, samples
 from detent.axisfile.tables import MotionProtectionTable, ProtectionTable, breaking_effort
@@ -17,7 +18,7 @@ def guard_of(sample=1e-3, speed=10_000.0, **keys):
 
 
 def test_every_watch_is_on_by_default():
-    assert all(value > 0 for path, value in guard_of().values().items() if path != "following")
+    assert all(value > 0 for path, value in values_of(guard_of()).items() if path != "following")
 
 
 def test_windows_are_in_samples_and_speeds_in_counts_of_one():
@@ -37,10 +38,10 @@ def test_windows_are_in_samples_and_speeds_in_counts_of_one():
     ],
 )
 def test_zero_switches_a_watch_off_and_no_other(key, register):
-    off = guard_of(**{key: 0}).values()
+    off = values_of(guard_of(**{key: 0}))
     assert off[register] == 0
     assert {path: value for path, value in off.items() if path != register} == {
-        path: value for path, value in guard_of().values().items() if path != register
+        path: value for path, value in values_of(guard_of()).items() if path != register
     }
 
 
@@ -62,4 +63,4 @@ def test_a_text_names_the_limit():
 def test_an_axis_whose_counts_noise_may_change_watches_no_speed():
     p = GuardParams()
     fill_guard(p, ProtectionTable(), sample=1e-3, speed=10_000.0)
-    assert {path for path, value in p.values().items() if value} == {"saturated", "stuck"}
+    assert {path for path, value in values_of(p).items() if value} == {"saturated", "stuck"}

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 from tests.c_struct import c_struct
-from tests.difference import diff
+from tests.difference import diff, values_of
 
 from detent.kernel.registers import (
     Field,
@@ -88,7 +88,7 @@ def test_fields_are_zero_at_first_and_independent():
     r = Widths()
     assert r.snapshot() == bytes(ctypes.sizeof(Widths))
     r.word, r.speed = 65535, -1.5
-    assert {k: v for k, v in r.values().items() if v} == {"word": 65535, "speed": -1.5}
+    assert {k: v for k, v in values_of(r).items() if v} == {"word": 65535, "speed": -1.5}
 
 
 def test_fields_know_their_declaration():
@@ -159,13 +159,13 @@ def test_diff_names_what_differs_against_state_or_snapshot():
 
 def test_numpy_dtype_is_that_of_the_memory():
     r = Outer()
-    view = np.frombuffer(r, dtype=Outer.dtype())
+    view = np.frombuffer(r, dtype=Outer)
     view["middle"]["inner"]["gain"][0] = 4.5
     r.queue[2] = 17
     assert r.middle.inner.gain == 4.5
     assert view["queue"][0, 2] == 17
-    assert Outer.dtype().itemsize == ctypes.sizeof(Outer)
-    assert np.dtype(Outer.dtype()["table"].base) == np.float64
+    assert np.dtype(Outer).itemsize == ctypes.sizeof(Outer)
+    assert np.dtype(np.dtype(Outer)["table"].base) == np.float64
 
 
 @pytest.mark.parametrize("registers", [Widths, Outer, PrintHeadParams, PrintHead], ids=lambda c: c.__name__)

@@ -2,6 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.difference import values_of
 from tests.print_head_rig import EXAMPLE
 
 from detent.errors import DetentError
@@ -125,7 +126,7 @@ def test_a_recorded_axis_shows_its_registers_as_they_were(every: int) -> None:
     assert len(trace) == 200 // every
     for row in range(len(trace)):
         stepped.pass_time(every * TICK)
-        values = stepped.state.values()
+        values = values_of(stepped.state)
         assert trace.time[row] == stepped.time
         assert {name: trace[name][row] for name in names} == {name: values[name] for name in names}
     assert trace["plant.train.velocity"][-1] > 0

@@ -4,6 +4,7 @@ Nothing is shared but time (stepper-envelope specification 2.2): each motor is a
 that all of them reach. A record of the stage is put together from records of its motors.
 """
 
+import ctypes
 from collections.abc import Iterable
 from functools import cache
 from typing import Any
@@ -109,7 +110,7 @@ class Stage:
         for field in stage_registers(self.spec).__fields__.values():
             if field.block is None:
                 continue
-            end = field.offset + int(field.block.dtype().itemsize)
+            end = field.offset + ctypes.sizeof(field.block)
             columns = np.flatnonzero((recorder.picks >= field.offset) & (recorder.picks < end))
             motor = self.motors[field.name]
             self._columns[field.name] = columns

@@ -8,7 +8,7 @@ import sys
 import numba
 import numpy as np
 import pytest
-from tests.difference import diff
+from tests.difference import diff, values_of
 from tests.filtered_servo_rig import PLANT_B, PULSE, Rig, plant_a
 from tests.places import ROOT
 
@@ -147,7 +147,7 @@ def test_recorded_registers_equal_stepping():
     for _ in range(2000):
         stepped.run_ticks(1)
         if stepped.r.tick % 7 == 0:
-            values = stepped.r.values()
+            values = values_of(stepped.r)
             rows.append([values[name] for name in names])
     assert len(rows) == len(run["t"]) > 280
     for k, name in enumerate(names):
