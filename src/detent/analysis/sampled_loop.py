@@ -108,22 +108,16 @@ class SampledLoop:
     # ------------------------------------------------------------------------------------------------ one window
 
     def transition(self) -> Numbers:
-        """State (x, x', y) from one sample instant to the next, with the command at 0.
+        """State (x [count], x' [count/s], y [count]) from one sample instant to the next, shape (3, 3).
 
-        Returns
-        -------
-        ndarray
-            Shape (3, 3); x [count], x' [count/s], y [count].
+        The command is at 0.
         """
         return self._window()[:3, :3]
 
     def command_input(self) -> Numbers:
-        """What a command adds to the state (x, x', y) over a window.
+        """What a command adds to the state (x, x', y) over a window, shape (3, 2).
 
-        Returns
-        -------
-        ndarray
-            Shape (3, 2): for the command at the beginning of the window [count], and for its rate in it [count/s].
+        By the command at the beginning of the window [count], and by its rate in it [count/s].
         """
         return self._window()[:3, 3:]
 
@@ -141,12 +135,9 @@ class SampledLoop:
         return self.spectral_radius() < 1.0
 
     def poles(self) -> NDArray[np.complex128]:
-        """Modes of the loop as in continuous time, ln(z)/TS [1/s], the slowest to decay first.
+        """Modes of the loop as in continuous time, ln(z)/TS [1/s], the slowest to decay first, shape (3,).
 
-        Returns
-        -------
-        ndarray
-            Shape (3,). A mode that changes its sign at each sample has the imaginary part pi/TS and no partner.
+        A mode that changes its sign at each sample has the imaginary part pi/TS and no partner.
 
         Examples
         --------
@@ -163,14 +154,10 @@ class SampledLoop:
     def stability_limit(self) -> float:
         """Lowest gain K at which a mode no longer decays [1/s²]; the gain of the loop itself plays no part.
 
+        Infinite where there is none, as with little speed feedback on a strongly damped axis.
         For an ideal current drive cos(TS·sqrt(K1·K)) = 1 - A/(1 + A·B/K1), from Jury's criterion on the characteristic
         polynomial of `transition`. With mechanical damping the first zero of the criterion is searched upwards from
         half of that gain.
-
-        Returns
-        -------
-        float
-            The limit; infinite where there is none, as with little speed feedback on a strongly damped axis.
         """
         k1, a = self.position_gain, self.coefficient
         turn = 2.0 * asin(sqrt(0.5 * a / (1.0 + a * self.scale / k1)))  # 2·sin²(turn/2) = 1 - cos(turn)
@@ -195,7 +182,11 @@ class SampledLoop:
         is narrower than their steps.
         """
         CubicSpline: Any = import_module("scipy.interpolate").CubicSpline
-        margins = _jury_margins(self._transitions(turns**2 / self.position_gain))
+        stiffness = turns**2 / self.position_gain  # K·TS²
+        # Shape (..., 3, 3), with velocities in counts per window.
+        margins = _jury_margins(
+            self._closed(_expm(_generator(stiffness, self._damping, self.position_gain)[..., :3, :3]))
+        )
         zeros = [CubicSpline(turns, margin).roots(extrapolate=False) for margin in margins]
         return float(np.min(np.concatenate(zeros), initial=inf))
 
@@ -212,14 +203,9 @@ class SampledLoop:
     # ---------------------------------------------------------------------------------------------- a command
 
     def steady_following_error(self, rate: float) -> float:
-        """Mean following error at constant speed: rate·B·TS/K1 + rate/(tau_m·K·K1) [count].
+        """Mean following error at a constant speed of the command [count/s]: rate·B·TS/K1 + rate/(tau_m·K·K1) [count].
 
         The first term is what the speed word takes to balance; the second is the drive that holds the speed.
-
-        Parameters
-        ----------
-        rate : float
-            Speed of the command [count/s].
         """
         holding = rate / (self.tau_m * self.gain)
         return (rate * self.scale * self.sample_period + holding) / self.position_gain
@@ -265,7 +251,7 @@ class SampledLoop:
                 "do: state the speed of the command in each window"
             )
         require_count("points", points, 1, "how many instants of each window to compute")
-        part = self._flow(1.0 / points)
+        part, a = self._flow(1.0 / points), self.coefficient
         state = np.array([0.0, 0.0, 0.0, step, 0.0])
         rows = [state]
         for rate in speed:
@@ -274,20 +260,9 @@ class SampledLoop:
             for _ in range(points):
                 state = part @ state
                 rows.append(state)
-            state = self._latched(state, opened_at)
-            rows[-1] = state
-        return self._response(np.array(rows), points)
-
-    def _latched(self, state: Numbers, opened_at: float) -> Numbers:
-        """Close the window: the speed word takes up the mean speed since `opened_at` [count]."""
-        a = self.coefficient
-        latched = state.copy()
-        latched[2] = a * self.scale * (state[0] - opened_at) + (1.0 - a) * state[2]
-        return latched
-
-    def _response(self, rows: Numbers, points: int) -> Response:
-        """Name the columns of (x, x', y, X, X')."""
-        x, v, y, command = rows[:, :4].T.copy()
+            # The end of the window: the speed word takes up the mean speed in it.
+            state[2] = a * self.scale * (state[0] - opened_at) + (1.0 - a) * state[2]
+        x, v, y, command = np.array(rows)[:, :4].T.copy()
         error = command - x
         t = np.arange(len(rows)) * self.sample_period / points
         return Response(t, command, x, v, y, error, self.position_gain * error - y)
@@ -309,10 +284,6 @@ class SampledLoop:
         unit = np.array([1.0, self.sample_period, 1.0, 1.0, self.sample_period])  # velocities in counts per window
         flow = _expm(_generator(stiffness, self._damping, self.position_gain) * part)
         return flow * unit / unit[:, np.newaxis]
-
-    def _transitions(self, stiffness: Any) -> Numbers:
-        """Transitions for values of K·TS², shape (..., 3, 3), with velocities in counts per window."""
-        return self._closed(_expm(_generator(stiffness, self._damping, self.position_gain)[..., :3, :3]))
 
     def _closed(self, flow: Numbers) -> Numbers:
         """Flow over a whole window with its end: y takes up the difference of x between its two ends."""

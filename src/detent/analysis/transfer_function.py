@@ -66,23 +66,9 @@ class ServoTransfer:
     ) -> "ServoTransfer":
         """The servo whose speed is counted over a window: K2 = B·TS and Tf = TS/A.
 
-        Both are proportional to the sample period, so that Tf/(K2/K1) = K1/(A·B) does not depend on it.
-
-        Parameters
-        ----------
-        gain, position_gain : float
-            As in the class.
-        sample_period : float
-            TS [s].
-        scale : float
-            B, by which the count of a window is multiplied.
-        coefficient : float
-            A, 0 < A <= 1; 1 is no filter and gives Tf = 0.
-
-        Raises
-        ------
-        DetentError
-            A constant is out of range.
+        TS is `sample_period` [s]; B is `scale`, by which the count of a window is multiplied; A is `coefficient`,
+        0 < A <= 1, and 1 is no filter and gives Tf = 0. K2 and Tf are proportional to the sample period, so that
+        Tf/(K2/K1) = K1/(A·B) does not depend on it.
 
         Examples
         --------
@@ -128,10 +114,7 @@ class ServoTransfer:
     def denominator(self) -> NDArray[np.float64]:
         """Polynomial whose roots are the poles: Tf·s³/K + s²/K + (K2 + K1·Tf)·s + K1.
 
-        Returns
-        -------
-        ndarray
-            Coefficients from the highest power down; shape (4,), without filter (3,).
+        Coefficients from the highest power down; shape (4,), without filter (3,).
         """
         inertia = 1.0 / self.gain
         damping = self.speed_gain + self.position_gain * self.filter_time
@@ -139,44 +122,19 @@ class ServoTransfer:
         return np.array([*cubic, inertia, damping, self.position_gain])
 
     def poles(self) -> NDArray[np.complex128]:
-        """Poles of G [1/s], the slowest to decay first.
+        """Poles of G [1/s], the slowest to decay first, of a pair the one above the real axis.
 
-        Returns
-        -------
-        ndarray
-            Shape (3,), without filter (2,); of a pair the one above the real axis comes first.
+        Shape (3,), without filter (2,).
         """
         return slowest_first(np.roots(self.denominator()).astype(np.complex128))
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """G at a frequency: position over command, as a complex number.
-
-        Parameters
-        ----------
-        frequency_hz : array_like
-            Frequencies [Hz], any shape.
-
-        Returns
-        -------
-        ndarray
-            The same shape.
-        """
+        """G at frequencies of any shape [Hz]: position over command, complex numbers in the same shape."""
         s = _s(frequency_hz)
         return self.position_gain * (self.filter_time * s + 1.0) / np.polyval(self.denominator(), s)
 
     def first_order_response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """What the first-order form 1/((K2/K1)·s + 1) gives instead of `response`.
-
-        Parameters
-        ----------
-        frequency_hz : array_like
-            Frequencies [Hz], any shape.
-
-        Returns
-        -------
-        ndarray
-            The same shape.
-        """
+        """What the first-order form 1/((K2/K1)·s + 1) gives instead of `response`."""
         return 1.0 / (self.lag * _s(frequency_hz) + 1.0)
 
 
