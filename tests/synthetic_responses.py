@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts, response_deviation
-from detent.identify.analyse.two_mass_response import TwoMassModel, modes_of, respond_sampled
+from detent.identify.analyse.two_mass_response import TwoMassModel, respond_sampled
 from detent.methods.cascade.system import set_count
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 
@@ -19,12 +19,12 @@ def random_axis(rng):
     b1, b2 = rng.uniform(0.5, 8), 2 * damping_zero * omega * m2 - d
     delay = rng.uniform(0, 3e-3)
     parameters = np.array([np.log(ratio), np.log(omega), d, b1, b2, -np.log(mass), delay])
-    modes = modes_of(parameters)
+    modes = TwoMassModel().tell(parameters)
     truth = {
         "antiresonance": fz,
         "antiresonance.damping": damping_zero,
-        "resonance": modes.omega_pole / (2 * np.pi),
-        "resonance.damping": modes.damping_pole,
+        "resonance": modes["resonance"],
+        "resonance.damping": modes["resonance.damping"],
         "mass_ratio": ratio,
         "viscous": b1 + b2,
         "gain": 1 / mass,

@@ -11,7 +11,7 @@ and dry friction move a resonance with the amplitude; the frequencies are then t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,14 +21,7 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import FrequencyResponse
 from detent.identify.analyse.response_fit import Fit, Lines, fit_model, take_lines
-from detent.identify.analyse.two_mass_response import (
-    LoadModel,
-    RigidModel,
-    TwoMassModel,
-    constants_of,
-    modes_of,
-    respond_sampled,
-)
+from detent.identify.analyse.two_mass_response import LoadModel, RigidModel, TwoMassModel, constants_of
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Values
 from detent.logs.windows import scipy
@@ -60,11 +53,6 @@ class Resonances:
     scatter: float
     reason: str  # why the resonances are not to be trusted; empty where they are
 
-    @property
-    def is_trusted(self) -> bool:
-        """True where nothing speaks against the resonances."""
-        return not self.reason
-
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return {
@@ -74,7 +62,7 @@ class Resonances:
             "phase": np.unwrap(np.angle(self.fitted)).tolist(),
             "outputs": list(self.outputs),
             "scatter": self.scatter,
-            "trusted": self.is_trusted,
+            "trusted": not self.reason,
             "reason": self.reason,
         }
 
@@ -91,16 +79,20 @@ def fit_resonances(
         raise DetentError("identify: came no frequency response; allowed: that of the motor, of the load, or of both")
     outputs = tuple(name for name, response in (("motor", motor), ("load", load)) if response is not None)
     lines = take_lines(responses)
-    rigid = fit_model(RigidModel(len(outputs)), lines, _rigid_starts(lines), hold)
-    model = LoadModel() if motor is None else TwoMassModel(len(outputs))
-    fit = fit_model(model, lines, _load_starts(lines) if motor is None else _two_mass_starts(lines), hold)
+    low = 2 * np.pi * lines.frequency[0]
+    frictions = [np.array([low * part]) for part in (0.1, 1.0, 10.0, 100.0)]
+    rigid = fit_model(RigidModel(len(outputs)), lines, frictions, hold)
+    if motor is None:
+        fit = fit_model(LoadModel(), lines, _load_starts(lines), hold)
+    else:
+        fit = fit_model(TwoMassModel(len(outputs)), lines, _two_mass_starts(lines), hold)
     why = _is_no_better(fit, rigid, lines)
     reasons = [why] if why else _doubts(fit, responses)
     fit = rigid if why else fit
     return Resonances(
         estimates=_estimates(fit, responses[0]),
         frequency=lines.frequency,
-        fitted=fit.sign * respond_sampled(fit.model, fit.parameters, lines.frequency, hold),
+        fitted=fit.fitted,
         outputs=outputs,
         scatter=fit.scatter,
         reason="; ".join(reasons),
@@ -108,11 +100,6 @@ def fit_resonances(
 
 
 # -- starts ---------------------------------------------------------------------------------------------------
-
-
-def _rigid_starts(lines: Lines) -> list[Values]:
-    low = 2 * np.pi * lines.frequency[0]
-    return [np.array([low * part]) for part in (0.1, 1.0, 10.0, 100.0)]
 
 
 def _frequencies(lines: Lines, *, deepest: bool) -> list[float]:
@@ -154,35 +141,35 @@ def _load_starts(lines: Lines) -> list[Values]:
 
 def _is_no_better(fit: Fit, rigid: Fit, lines: Lines) -> str:
     """Why the axis is taken for rigid; empty where two masses explain it better (F test on the same weights)."""
+
+    def squares(one: Fit) -> float:
+        misfit = np.log(np.where(lines.used, lines.measured / one.fitted, 1.0))
+        return float(np.sum(np.abs(fit.weights * misfit) ** 2))
+
     more = len(fit.parameters) - len(rigid.parameters)
-    gain = (_weighted(rigid, fit, lines) - _weighted(fit, fit, lines)) / more
-    ratio = gain / (_weighted(fit, fit, lines) / fit.freedom)
+    gain = (squares(rigid) - squares(fit)) / more
+    ratio = gain / (squares(fit) / fit.freedom)
     if float(scipy("stats").f.sf(ratio, more, fit.freedom)) > NO_BETTER:
         return (
             f"one rigid mass explains the response as well as two (F = {ratio:.2g}): no resonance from "
             f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz stands out; excite higher frequencies, or take "
             "the axis for rigid"
         )
-    if not np.isfinite(fit.covariance).all() or _modes(fit, fit.parameters) is None:
+    if not np.isfinite(fit.covariance).all() or "resonance" not in fit.model.tell(fit.parameters):
         return "the damping found leaves no resonance; take the axis for rigid"
     return ""
 
 
-def _weighted(fit: Fit, weights_of: Fit, lines: Lines) -> float:
-    """Sum of the squared misfits of one fit on the weights of another."""
-    misfit = np.log(np.where(lines.used, lines.measured / fit.fitted, 1.0))
-    return float(np.sum(np.abs(weights_of.weights * misfit) ** 2))
-
-
 def _doubts(fit: Fit, responses: Sequence[FrequencyResponse]) -> list[str]:
     """Why the frequencies found are not to be trusted."""
-    found = ["resonance"] if isinstance(fit.model, LoadModel) else ["antiresonance", "resonance"]
+    found = fit.spread(fit.model.tell)
     doubts: list[str] = []
-    for name in found:
-        value, error = fit.spread(_quantities(fit)[name])
-        width = value * fit.spread(_quantities(fit)[f"{name}.damping"])[0]
-        # Motor and load see the resonance, the motor alone the anti-resonance.
-        doubts += _doubts_of(name, value, error, width, responses if name == "resonance" else responses[:1])
+    for name in ("antiresonance", "resonance"):
+        if name in found:
+            value, error = found[name]
+            width = value * found[f"{name}.damping"][0]
+            # Motor and load see the resonance, the motor alone the anti-resonance.
+            doubts += _doubts_of(name, value, error, width, responses if name == "resonance" else responses[:1])
     return doubts
 
 
@@ -195,7 +182,12 @@ def _doubts_of(
         outside = f"the {name} of {value:.4g} Hz lies outside the excited {low:.4g} to {high:.4g} Hz"
         return [f"{outside}: it is a guess from the slope; excite {0.5 * value:.3g} to {2 * value:.3g} Hz"]
     doubts: list[str] = []
-    near = [response.coherence[_lines_about(response, value, width)].mean() for response in responses]
+    near: list[float] = []
+    for response in responses:
+        # Lines within half a width of the resonance, and three at least.
+        distance = np.abs(response.frequency - value)
+        count = max(3, int(np.sum(distance <= max(width, _NEAR * value))))
+        near.append(response.coherence[np.argsort(distance)[:count]].mean())
     if max(near) < COHERENT:
         doubts.append(
             f"the coherence about the {name} of {value:.4g} Hz is {max(near):.2f}, below {COHERENT}: the response "
@@ -215,79 +207,36 @@ def _doubts_of(
     return doubts
 
 
-def _lines_about(response: FrequencyResponse, value: float, width: float) -> NDArray[np.intp]:
-    """Lines within half a width of a resonance, and three at least."""
-    distance = np.abs(response.frequency - value)
-    reach = max(width, _NEAR * value)
-    count = max(3, int(np.sum(distance <= reach)))
-    return np.argsort(distance)[:count]
-
-
 # -- estimates ------------------------------------------------------------------------------------------------
 
 
-def _modes(fit: Fit, parameters: Values) -> dict[str, float] | None:
-    """Frequencies [Hz] and damping ratios."""
-    if isinstance(fit.model, RigidModel):
-        return None
-    if isinstance(fit.model, LoadModel):
-        return {"resonance": float(np.exp(parameters[1])) / (2 * np.pi), "resonance.damping": float(parameters[2])}
-    modes = modes_of(parameters)
-    if modes is None:
-        return None
-    return {
-        "antiresonance": modes.omega_zero / (2 * np.pi),
-        "antiresonance.damping": modes.damping_zero,
-        "resonance": modes.omega_pole / (2 * np.pi),
-        "resonance.damping": modes.damping_pole,
-    }
-
-
-def _quantities(fit: Fit) -> dict[str, Callable[[Values], float]]:
-    """What is told of a fit, as functions of its parameters: pure numbers, [Hz], [1/s], [s], and the gain."""
-
-    def mode(name: str) -> Callable[[Values], float]:
-        return lambda parameters: (_modes(fit, parameters) or {}).get(name, np.nan)
-
-    found: dict[str, Callable[[Values], float]] = {name: mode(name) for name in _modes(fit, fit.parameters) or {}}
-    if isinstance(fit.model, TwoMassModel):
-        found["mass_ratio"] = lambda parameters: float(np.exp(parameters[0]))
-        found["viscous"] = lambda parameters: float(parameters[3] + parameters[4])
-    else:
-        found["viscous"] = lambda parameters: float(parameters[0])
-    found["gain"] = lambda parameters: fit.sign * float(np.exp(parameters[-2]))
+def _tell(fit: Fit, parameters: Values, *, is_force: bool) -> dict[str, float]:
+    """What is told of a fit with any parameters: what its model tells, gain and delay [s]; of a force the masses."""
+    told = fit.model.tell(parameters) | {"gain": fit.sign * float(np.exp(parameters[-2]))}
     if not isinstance(fit.model, LoadModel):
         # With the load alone it is less the advance that the coupling's damping makes.
-        found["delay"] = lambda parameters: float(parameters[-1])
-    return found
+        told["delay"] = float(parameters[-1])
+    total = float(np.exp(-parameters[-2]))
+    if is_force:
+        told["mass.total"] = total
+        if isinstance(fit.model, TwoMassModel):
+            parts = ("mass.motor", "mass.load", "stiffness", "damping")
+            told |= {name: part * total for name, part in zip(parts, constants_of(parameters), strict=False)}
+    return told
 
 
 def _estimates(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
-    """Everything that a fit tells, with its intervals."""
+    """Everything that a fit tells, with its intervals; masses, stiffness and damping where the effort is a force."""
     effort = f"({response.input_unit})" if "*" in response.input_unit else response.input_unit or "1"
     gain_unit = f"{response.output_unit or '1'}/s^2/{effort}"
     units = {"antiresonance": "Hz", "resonance": "Hz", "viscous": "1/s", "delay": "s", "gain": gain_unit}
+    is_force = response.input_unit == _FORCES.get(response.output_unit)
+    if is_force:
+        mass, units["stiffness"], units["damping"] = _MECHANICAL[response.output_unit]
+        units |= {"mass.total": mass, "mass.motor": mass, "mass.load": mass}
     method = "one mass fitted to the frequency response" if isinstance(fit.model, RigidModel) else _METHOD
-    found: dict[str, Estimate] = {}
-    for name, quantity in _quantities(fit).items():
-        value, error = fit.spread(quantity)
-        found[name] = estimate(name, value, units.get(name, "1"), error, method, fit.degrees)
-    return found | _constants(fit, response)
-
-
-def _constants(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
-    """Masses, stiffness and damping in units of mechanics, where a force tells the total mass."""
-    if response.output_unit not in _MECHANICAL or response.input_unit != _FORCES[response.output_unit]:
-        return {}
-    mass_unit, stiffness_unit, damping_unit = _MECHANICAL[response.output_unit]
-    per_mass: dict[str, tuple[str, Callable[[Values], float]]] = {"mass.total": (mass_unit, lambda _: 1.0)}
-    if isinstance(fit.model, TwoMassModel):
-        wanted = (("mass.motor", mass_unit), ("mass.load", mass_unit), ("stiffness", stiffness_unit),
-                  ("damping", damping_unit))  # fmt: skip
-        for index, (name, unit) in enumerate(wanted):
-            per_mass[name] = (unit, lambda parameters, index=index: constants_of(parameters)[index])
-    found: dict[str, Estimate] = {}
-    for name, (unit, part) in per_mass.items():
-        value, error = fit.spread(lambda parameters, part=part: part(parameters) * np.exp(-parameters[-2]))
-        found[name] = estimate(name, value, unit, error, _METHOD, fit.degrees)
-    return found
+    found = fit.spread(lambda parameters: _tell(fit, parameters, is_force=is_force))
+    return {
+        name: estimate(name, value, units.get(name, "1"), error, method, fit.degrees)
+        for name, (value, error) in found.items()
+    }

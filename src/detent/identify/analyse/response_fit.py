@@ -63,16 +63,16 @@ class Fit:
         """Independent misfits behind a standard error: those of the neighbours that are taken together."""
         return min(self.freedom, 2.0 * (2 * _NEIGHBOURS + 1))
 
-    def spread(self, quantity: Callable[[Values], float]) -> tuple[float, float]:
-        """Value and standard error of a function of the parameters, by its slopes (delta method); inf for no slope."""
-        deviation = np.sqrt(np.diag(self.covariance))
-        slopes = np.zeros(len(deviation))
-        for index, size in enumerate(deviation.tolist()):
-            step = np.zeros(len(deviation))
-            step[index] = 0.01 * size or 1e-9
-            slopes[index] = (quantity(self.parameters + step) - quantity(self.parameters - step)) / (2 * step[index])
-        variance = float(slopes @ self.covariance @ slopes)
-        return quantity(self.parameters), float(np.sqrt(variance)) if variance >= 0 else np.inf
+    def spread(self, tell: Callable[[Values], dict[str, float]]) -> dict[str, tuple[float, float]]:
+        """Values and standard errors of functions of the parameters, by their slopes (delta method); inf for none."""
+        steps = np.diag([0.01 * size or 1e-9 for size in np.sqrt(np.diag(self.covariance)).tolist()])
+        sides = [(tell(self.parameters + step), tell(self.parameters - step), 2 * step.sum()) for step in steps]
+        found: dict[str, tuple[float, float]] = {}
+        for name, value in tell(self.parameters).items():
+            slopes = np.array([(up.get(name, np.nan) - down.get(name, np.nan)) / way for up, down, way in sides])
+            variance = float(slopes @ self.covariance @ slopes)
+            found[name] = value, float(np.sqrt(variance)) if variance >= 0 else np.inf
+        return found
 
 
 def take_lines(responses: Sequence[FrequencyResponse]) -> Lines:

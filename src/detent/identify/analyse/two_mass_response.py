@@ -37,6 +37,10 @@ class ResponseModel(Protocol):
         """Responses up to the gain, shape (outputs, n), at complex frequencies `s` [rad/s], shape (n,)."""
         ...
 
+    def tell(self, parameters: Values) -> dict[str, float]:
+        """What a person is told: frequencies [Hz], damping ratios, ratio of the masses, friction per mass [1/s]."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class RigidModel:
@@ -48,6 +52,10 @@ class RigidModel:
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain."""
         return np.tile(1.0 / (s * (s + parameters[0])), (self.outputs, 1))
+
+    def tell(self, parameters: Values) -> dict[str, float]:
+        """Friction alone."""
+        return {"viscous": float(parameters[0])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +75,27 @@ class TwoMassModel:
         denominator = ((m1 * s + b1 + d) * s + k) * n - z * z
         return np.array([n, z][: self.outputs]) / denominator
 
+    def tell(self, parameters: Values) -> dict[str, float]:
+        """Anti-resonance and resonance, left out where the damping leaves none; ratio of the masses, friction.
+
+        >>> found = TwoMassModel().tell(np.array([np.log(3.0), np.log(20.0 * np.pi), 0.0, 0.0, 0.0]))
+        >>> round(found["antiresonance"], 6), round(found["resonance"], 6)
+        (10.0, 20.0)
+        """
+        m1, m2, k, d, b1, b2 = constants_of(parameters)
+        cubic = [m1 * m2, m1 * (d + b2) + m2 * (d + b1), k * (m1 + m2) + d * (b1 + b2) + b1 * b2, k * (b1 + b2)]
+        roots = np.roots(cubic)
+        pole = complex(roots[np.argmax(roots.imag)])
+        omega = float(np.sqrt(k / m2))
+        modes = {
+            "antiresonance": omega / (2 * np.pi),
+            "antiresonance.damping": (d + b2) / (2.0 * m2 * omega),
+            "resonance": abs(pole) / (2 * np.pi),
+            "resonance.damping": -pole.real / abs(pole),
+        }
+        ratio = {"mass_ratio": float(np.exp(parameters[0])), "viscous": float(parameters[3] + parameters[4])}
+        return modes | ratio if pole.imag > 0 else ratio
+
 
 @dataclass(frozen=True, slots=True)
 class LoadModel:
@@ -75,15 +104,19 @@ class LoadModel:
     The advance d / k and the delay can hardly be told apart below the resonance; neither is told of this model.
     """
 
-    count: ClassVar[int] = (
-        4  # the real pole [1/s], the logarithm of the resonance [rad/s], its damping ratio, advance [s]
-    )
+    # the real pole [1/s], the logarithm of the resonance [rad/s], its damping ratio, advance [s]
+    count: ClassVar[int] = 4
 
     def respond(self, parameters: Values, s: Complex) -> Complex:
         """Responses up to the gain."""
         pole, log_omega, ratio, advance = parameters.tolist()
         x = s / np.exp(log_omega)
         return ((1.0 + advance * s) / (s * (s + pole) * ((x + 2.0 * ratio) * x + 1.0)))[None, :]
+
+    def tell(self, parameters: Values) -> dict[str, float]:
+        """Resonance and friction."""
+        pole, log_omega, ratio, _ = parameters[:4].tolist()
+        return {"resonance": float(np.exp(log_omega)) / (2 * np.pi), "resonance.damping": ratio, "viscous": pole}
 
 
 def constants_of(parameters: Values) -> tuple[float, float, float, float, float, float]:
@@ -110,30 +143,3 @@ def respond_sampled(model: ResponseModel, parameters: Values, frequency: Values,
     held = -np.expm1(-all_s * hold) / (all_s * hold)
     answers = held * np.exp(-all_s * delay) * model.respond(own, all_s)
     return gain * answers.reshape(len(answers), len(turns), len(s)).sum(axis=1)
-
-
-@dataclass(frozen=True, slots=True)
-class Modes:
-    """Frequencies [rad/s] and damping ratios of the anti-resonance and the resonance."""
-
-    omega_zero: float
-    damping_zero: float
-    omega_pole: float
-    damping_pole: float
-
-
-def modes_of(parameters: Values) -> Modes | None:
-    """Anti-resonance and resonance of two masses; None where the damping leaves no resonance.
-
-    >>> found = modes_of(np.array([np.log(3.0), np.log(10.0), 0.0, 0.0, 0.0]))
-    >>> round(found.omega_zero, 6), round(found.omega_pole, 6)
-    (10.0, 20.0)
-    """
-    m1, m2, k, d, b1, b2 = constants_of(parameters)
-    cubic = [m1 * m2, m1 * (d + b2) + m2 * (d + b1), k * (m1 + m2) + d * (b1 + b2) + b1 * b2, k * (b1 + b2)]
-    roots = np.roots(cubic)
-    pole = complex(roots[np.argmax(roots.imag)])
-    if not pole.imag > 0:
-        return None
-    omega = float(np.sqrt(k / m2))
-    return Modes(omega, (d + b2) / (2.0 * m2 * omega), abs(pole), -pole.real / abs(pole))

@@ -10,7 +10,6 @@ from detent.identify.analyse.two_mass_response import (
     TwoMassModel,
     constants_of,
     laplace,
-    modes_of,
     respond_sampled,
 )
 
@@ -61,27 +60,28 @@ def test_a_held_effort_answers_as_the_sampled_solution(delay):
 
 
 def test_the_modes_are_the_zeros_and_poles():
-    modes = modes_of(OWN)
+    modes = TwoMassModel().tell(OWN)
     zeros = np.roots([M2, D + B2, K])
     poles = np.linalg.eigvals(A)
     pole = poles[np.argmax(poles.imag)]
-    assert modes.omega_zero == pytest.approx(abs(zeros[0]))
-    assert modes.damping_zero == pytest.approx(-zeros[0].real / abs(zeros[0]))
-    assert modes.omega_pole == pytest.approx(abs(pole))
-    assert modes.damping_pole == pytest.approx(-pole.real / abs(pole))
+    assert modes["antiresonance"] == pytest.approx(abs(zeros[0]) / (2 * np.pi))
+    assert modes["antiresonance.damping"] == pytest.approx(-zeros[0].real / abs(zeros[0]))
+    assert modes["resonance"] == pytest.approx(abs(pole) / (2 * np.pi))
+    assert modes["resonance.damping"] == pytest.approx(-pole.real / abs(pole))
 
 
 def test_no_resonance_is_left_by_much_damping():
-    assert modes_of(np.r_[OWN[:2], 1e4, 1.0, 1.0]) is None
+    assert TwoMassModel().tell(np.r_[OWN[:2], 1e4, 1.0, 1.0]).keys() == {"mass_ratio", "viscous"}
 
 
 def test_the_load_alone_is_the_same_by_its_poles():
     poles = np.linalg.eigvals(A)
     slow = -poles[np.argsort(np.abs(poles))[1]].real
-    modes = modes_of(OWN)
-    own = np.array([slow, np.log(modes.omega_pole), modes.damping_pole, D / K])
+    modes = TwoMassModel().tell(OWN)
+    omega = 2 * np.pi * modes["resonance"]
+    own = np.array([slow, np.log(omega), modes["resonance.damping"], D / K])
     whole = respond_sampled(TwoMassModel(2), np.r_[OWN, np.log(GAIN), 0.0], FREQUENCY, 0.0)[1]
-    gain = GAIN * K / (M1 * M2 * modes.omega_pole**2)
+    gain = GAIN * K / (M1 * M2 * omega**2)
     assert respond_sampled(LoadModel(), np.r_[own, np.log(gain), 0.0], FREQUENCY, 0.0)[0] == pytest.approx(whole)
     assert gain == pytest.approx(GAIN, rel=2e-3)
 
