@@ -14,6 +14,7 @@ from detent.logs.log import Values
 from detent.logs.windows import scipy
 
 LIKENESS = 0.9  # correlation of an excitation with itself a period later, from which it is taken for periodic
+INTERPOLATED = ", put on an even grid by straight lines"
 FEWEST = 3  # periods that a recording must hold to be called periodic: one to settle, two to compare
 _APART = 0.5
 _AS_GOOD = 0.02
@@ -88,9 +89,11 @@ def _summit(curve: Values, top: int) -> float:
 def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) -> Periods | None:
     """Cut signals along the periods of the first of them."""
     mean = float(t[-1] - t[0]) / (len(t) - 1)
+    even, said = count_samples(t)
+    # By counting the samples, and by their stamps where these are uneven.
+    clocks = [(even, f"{said}, taken for even"), (t, f"{said}{INTERPOLATED}")] if said else [(even, "")]
     best: Periods | None = None
-    for clock, grid in _clocks(t):
-        even: Values = t[0] + mean * np.arange(len(t), dtype=np.float64)
+    for clock, grid in clocks:
         rows = find_period(np.interp(even, clock, excitation))
         for times, text in _grids(clock, mean, rows, grid):
             found = _cut(clock, times, [excitation, *others], text)
@@ -99,15 +102,12 @@ def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) ->
     return best
 
 
-def _clocks(t: Values) -> list[tuple[Values, str]]:
-    """Times of the samples by counting them, and by their stamps where these are uneven."""
+def count_samples(t: Values) -> tuple[Values, str]:
+    """Times of samples by counting them, and by how much their stamps differ from that; empty where they do not."""
     steps = np.diff(t)
     mean = float(t[-1] - t[0]) / len(steps)
-    counted = t[0] + mean * np.arange(len(t))
-    if float(np.std(steps)) <= _EVEN * mean:
-        return [(counted, "")]
     said = f"stamps {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
-    return [(counted, f"{said}, taken for even"), (t, f"{said}, put on an even grid by straight lines")]
+    return t[0] + mean * np.arange(len(t)), "" if float(np.std(steps)) <= _EVEN * mean else said
 
 
 def _grids(clock: Values, mean: float, rows: float | None, said: str) -> list[tuple[Values, str]]:

@@ -14,13 +14,12 @@ Nothing leaks, and noise that a loop feeds back into the excitation averages out
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
-from detent.identify.analyse.excitation_period import FEWEST, Periods, cut_periods
+from detent.identify.analyse.excitation_period import FEWEST, INTERPOLATED, Periods, count_samples, cut_periods
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
 from detent.logs.windows import scipy
@@ -74,14 +73,6 @@ def response_deviation(coherence: Values, averages: float) -> Values:
     return np.sqrt((1.0 - safe) / (2.0 * averages * safe))
 
 
-class _Lines(NamedTuple):
-    """Spectra of the periods at the excited lines, of shapes (lines,), (periods, lines) and (periods, lines)."""
-
-    frequency: Values
-    excitation: Complex
-    answer: Complex
-
-
 def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
     """Response by the mean over periods, noise by the scatter between them.
 
@@ -96,10 +87,13 @@ def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
             f"identify: came {len(periods.signals[0])} periods, {settle} of them to settle; allowed: two or more "
             "behind those, and 0 or more to settle; record more periods"
         )
-    lines = _excited_lines(periods, settle)
-    mean = lines.excitation.mean(axis=0)
-    response = lines.answer.mean(axis=0) / mean
-    noise = np.sum(np.abs(lines.answer - response * lines.excitation) ** 2, axis=0) / (kept - 1)
+    # Spectra of the periods at the excited lines, shape (periods, lines).
+    spectra = [np.fft.rfft(_without_drift(values[settle:]))[:, 1:] for values in periods.signals[:2]]
+    chosen = _excited_lines(spectra[0], periods.signals[0].shape[1])
+    excitation, answer = (values[:, chosen] for values in spectra)
+    mean = excitation.mean(axis=0)
+    response = answer.mean(axis=0) / mean
+    noise = np.sum(np.abs(answer - response * excitation) ** 2, axis=0) / (kept - 1)
     power = np.abs(response * mean) ** 2
     level, slope = noise_parts(noise, power, max(_FEWEST_LINES, -(-_FREEDOM // (kept - 1))))
     coherence = 1.0 / (1.0 + level / power + slope)
@@ -107,7 +101,7 @@ def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
         f"mean of {kept} periods of {periods.duration:.6g} s behind {settle} to settle, {len(response)} excited lines"
     )
     return FrequencyResponse(
-        lines.frequency,
+        np.asarray((chosen + 1.0) / periods.duration, dtype=np.float64),
         response,
         coherence,
         response_deviation(coherence, kept),
@@ -117,14 +111,11 @@ def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
     )
 
 
-def _excited_lines(periods: Periods, settle: int) -> _Lines:
-    """Spectra of the periods at the lines that are excited."""
-    size = periods.signals[0].shape[1]
-    excitation, answer = (np.fft.rfft(_without_drift(values[settle:]))[:, 1:] for values in periods.signals[:2])
-    kept = len(excitation)
+def _excited_lines(excitation: Complex, size: int) -> NDArray[np.intp]:
+    """Lines that are excited, from the spectra of periods of so many samples, shape (periods, lines)."""
     strength = np.abs(excitation.mean(axis=0))
     # Of two periods a line may be alike by chance: the scatter of its neighbours tells.
-    scatter = np.sqrt(_smooth(np.var(excitation, axis=0, ddof=1) / kept, _FEWEST_LINES))
+    scatter = np.sqrt(_smooth(np.var(excitation, axis=0, ddof=1) / len(excitation), _FEWEST_LINES))
     clear = (strength > WEAKEST * strength.max()) & (strength > _CLEAR * scatter)
     # Nothing is known of what lies at half the sample rate.
     clear[(size - 1) // 2 :] = False
@@ -140,8 +131,7 @@ def _excited_lines(periods: Periods, settle: int) -> _Lines:
             "identify: came an excitation without a line that comes back in each period; allowed: a multisine or a "
             "chirp that repeats; record one"
         )
-    frequency = np.asarray((chosen + 1.0) / periods.duration, dtype=np.float64)
-    return _Lines(frequency, excitation[:, chosen], answer[:, chosen])
+    return chosen
 
 
 def _without_drift(values: Values) -> Values:
@@ -216,7 +206,10 @@ def _longest_stretch(t: Values, excitation: Values, answer: Values) -> tuple[Val
 
 def average_windows(t: Values, excitation: Values, answer: Values, step_hz: float | None = None) -> FrequencyResponse:
     """Response by Welch's method: Hann windows that overlap by half, ``H1 = S_uy / S_uu``."""
-    mean, excitation, answer, grid = _even(t, excitation, answer)
+    mean = float(t[-1] - t[0]) / (len(t) - 1)
+    even, uneven = count_samples(t)
+    if uneven:
+        excitation, answer = np.interp(even, t, excitation), np.interp(even, t, answer)
     rows = len(excitation) // WINDOWS if step_hz is None else round(1.0 / (step_hz * mean))
     if not FEWEST_ROWS // WINDOWS <= rows <= len(excitation) // 2 or not np.ptp(excitation) > 0:
         raise DetentError(
@@ -239,7 +232,7 @@ def average_windows(t: Values, excitation: Values, answer: Values, step_hz: floa
         response_deviation(coherence, averages),
         averages,
         1.5 / (rows * mean),
-        f"{said}; {grid}" if grid else said,
+        f"{said}; {uneven}{INTERPOLATED}" if uneven else said,
     )
 
 
@@ -254,14 +247,3 @@ def independent_windows(rows: int, window: int) -> float:
     """
     count = (rows - window) // (window - int(OVERLAP * window)) + 1
     return count / (1.0 + 2.0 * (count - 1) / count / 36.0)
-
-
-def _even(t: Values, excitation: Values, answer: Values) -> tuple[float, Values, Values, str]:
-    """Time between samples, signals on an even grid, and what was done for it."""
-    steps = np.diff(t)
-    mean = float(t[-1] - t[0]) / len(steps)
-    if float(np.std(steps)) <= 1e-6 * mean:
-        return mean, excitation, answer, ""
-    even: Values = t[0] + mean * np.arange(len(t), dtype=np.float64)
-    said = f"stamps {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart, put on an even grid by straight lines"
-    return mean, np.interp(even, t, excitation), np.interp(even, t, answer), said

@@ -235,7 +235,11 @@ def _covariance(misfits: Values, slopes: Values) -> Values:
     scale = np.sqrt(np.sum(slopes**2, axis=(0, 1)))
     by_line = slopes / np.where(scale > 0, scale, 1.0)
     inverse = np.asarray(np.linalg.pinv(np.einsum("kap,kaq->pq", by_line, by_line)), dtype=np.float64)
-    free = _freed(misfits, by_line, inverse)
+    # Misfits of lines that were left out of the fit: (1 - H)^-1 r, H the part of each line in its own fit.
+    hat = np.einsum("kap,pq,kbq->kab", by_line, inverse, by_line)
+    size, axes = np.linalg.eigh(np.eye(hat.shape[1]) - hat)
+    along = np.einsum("kab,ka->kb", axes, misfits) / np.maximum(size, _LEAST_FREE)
+    free = np.einsum("kab,kb->ka", axes, along)
     middle = np.einsum("kap,kab,kbq->pq", by_line, _local(free[:, :, None] * free[:, None, :]), by_line)
     count, channels = free.shape
     for lag in range(1, min(_FARTHEST_LINE, count // 4) + 1):
@@ -246,18 +250,7 @@ def _covariance(misfits: Values, slopes: Values) -> Values:
         middle += (1.0 - lag / (_FARTHEST_LINE + 1)) * (pair + pair.T)
     # A parameter that no line depends on is not known: nan.
     known = np.where(scale > 0.0, scale, np.nan)
-    return _at_least(inverse @ middle @ inverse) / np.outer(known, known)
-
-
-def _freed(misfits: Values, slopes: Values, inverse: Values) -> Values:
-    """Misfits of lines that were left out of the fit: ``(1 - H)^-1 r``, H the part of each line in its own fit."""
-    hat = np.einsum("kap,pq,kbq->kab", slopes, inverse, slopes)
-    size, axes = np.linalg.eigh(np.eye(hat.shape[1]) - hat)
-    along = np.einsum("kab,ka->kb", axes, misfits) / np.maximum(size, _LEAST_FREE)
-    return np.einsum("kab,kb->ka", axes, along)
-
-
-def _at_least(covariance: Values) -> Values:
-    """A covariance without negative variances, which negative correlations between lines could leave."""
+    covariance = inverse @ middle @ inverse
+    # Without the negative variances that negative correlations between lines could leave.
     size, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    return (axes * np.maximum(size, 0.0)) @ axes.T
+    return (axes * np.maximum(size, 0.0)) @ axes.T / np.outer(known, known)
