@@ -95,14 +95,10 @@ def _fit_decay(t: Values, y: Values, start: Values, noise: tuple[Values, float])
     turned = columns[:, 1] * linear[2] - columns[:, 2] * linear[1]
     slopes = np.column_stack([-t * wave, t * turned, columns])
     covariance, degrees = known_noise_covariance(slopes, y - columns @ linear, noise[0], floor=noise[1])
-    return _as_estimates(sigma, omega, covariance[:2, :2], degrees)
-
-
-def _as_estimates(sigma: float, omega: float, covariance: Values, degrees: int) -> tuple[Estimate, Estimate]:
     period = 2 * np.pi / omega
     size = float(np.hypot(sigma, omega))
     slope = np.array([omega**2, -sigma * omega]) / size**3
-    error = float(np.sqrt(slope @ covariance @ slope))
+    error = float(np.sqrt(slope @ covariance[:2, :2] @ slope))
     period_error = period / omega * float(np.sqrt(covariance[1, 1]))
     return (
         estimate("ringing_period", period, "s", period_error, METHOD, degrees),

@@ -26,6 +26,7 @@ from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.steady import mean_error
 from detent.logs.differences import resolution, runs_of
 from detent.logs.log import Log, Values
+from detent.logs.windows import fill_holes
 
 STILL = 1e-4  # change of the reference from sample to sample, as a part of its range, up to which it rests
 PAUSE = 10  # samples of a rest of the reference, at least; a shorter one is part of the step
@@ -62,13 +63,11 @@ class LocalPolynomial:
     def summit(self) -> float:
         """Time of the largest value in the range that it was fitted over."""
         curve = np.polynomial.Polynomial(self.coefficients)
-        inner = self._inside(curve.deriv())
-        return max([self.low, self.high, *inner], key=self.at)
+        return max([self.low, self.high, *self._inside(curve.deriv())], key=self.at)
 
     def solve(self, level: float) -> float:
         """Time nearest to its place at which it has a value; that of the nearest value where it does not reach it."""
-        curve = np.polynomial.Polynomial(self.coefficients) - level
-        times = self._inside(curve)
+        times = self._inside(np.polynomial.Polynomial(self.coefficients) - level)
         if times:
             return min(times, key=abs)
         return min((self.low, 0.0, self.high), key=lambda time: abs(self.at(time) - level))
@@ -154,17 +153,16 @@ def measure_steps(log: Log) -> StepResponse:
     moves = find_steps(log.signals["reference"])
     if not moves:
         return StepResponse(unit, reason="the reference takes no step between two rests; record a step and its answer")
-    size = [abs(move.target - move.start) for move in moves]
-    large = [move for move, one in zip(moves, size, strict=True) if one >= SMALL * max(size)]
-    notes = [f"{len(moves) - len(large)} steps below {SMALL:.0%} of the largest passed over"] * (
-        len(large) < len(moves)
-    )
+    least = SMALL * max(abs(move.target - move.start) for move in moves)
+    large = [move for move in moves if abs(move.target - move.start) >= least]
     long = [move for move in large if move.stop - move.first >= FEWEST]
-    if len(long) < len(large):
-        notes.append(f"{len(large) - len(long)} steps with an answer of fewer than {FEWEST} samples passed over")
-    if not long:
-        return StepResponse(unit, reason="no step is followed by a rest; record longer after the step", notes=(*notes,))
-    return StepResponse(unit, tuple(_measure(log, move, unit) for move in long), notes=tuple(notes))
+    passed = {
+        f"steps below {SMALL:.0%} of the largest": len(moves) - len(large),
+        f"steps with an answer of fewer than {FEWEST} samples": len(large) - len(long),
+    }
+    notes = tuple(f"{number} {which} passed over" for which, number in passed.items() if number)
+    reason = "" if long else "no step is followed by a rest; record longer after the step"
+    return StepResponse(unit, tuple(_measure(log, move, unit) for move in long), reason, notes)
 
 
 class Move(NamedTuple):
@@ -183,18 +181,13 @@ def find_steps(reference: Values) -> list[Move]:
     if not np.ptp(reference) > 0:
         return []
     changes = np.abs(np.diff(reference)) > STILL * float(np.ptp(reference))
-    runs = runs_of(changes).tolist()
-    joined: list[list[int]] = []
-    for first, stop in runs:
-        if joined and first - joined[-1][1] < PAUSE:
-            joined[-1][1] = stop
-        else:
-            joined.append([first, stop])
-    bounds = [0, *(first for first, _ in joined), len(reference)]
+    runs = runs_of(fill_holes(changes, PAUSE - 1)).tolist()
+    before = [0, *(stop for _, stop in runs)]
+    after = [*(first for first, _ in runs[1:]), len(reference)]
     return [
-        Move(joined[k - 1][1] if k else 0, first, stop, bounds[k + 2], float(reference[first]), float(reference[stop]))
-        for k, (first, stop) in enumerate(joined)
-        if reference[first] != reference[stop] and bounds[k + 2] - stop >= PAUSE
+        Move(begin, first, stop, end, float(reference[first]), float(reference[stop]))
+        for begin, (first, stop), end in zip(before, runs, after, strict=False)
+        if reference[first] != reference[stop] and end - stop >= PAUSE
     ]
 
 
@@ -207,10 +200,10 @@ class _Level(NamedTuple):
 
 
 class _Noise(NamedTuple):
-    """Noise of the position at rest, a series; that of rounding to counts, standard deviation."""
+    """Noise of the position at rest."""
 
     series: Values
-    rounding: float
+    rounding: float  # to counts, standard deviation
 
     @property
     def size(self) -> float:
@@ -329,22 +322,18 @@ class _Crossing(NamedTuple):
 
 
 def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Crossing | None:
+    """Where a level is first crossed, by a polynomial fitted to the samples about it."""
     above = np.flatnonzero(share >= level)
     if not len(above) or above[0] == 0:
         return None
     k = int(above[0])
-    fit = fit_local_polynomial(*_near(t, share, level, k), float(t[k]), *noise)
+    near = _around(np.abs(share - level) < ABOUT, k if abs(share[k] - level) < ABOUT else k - 1)
+    fit = fit_local_polynomial(t[near], share[near], float(t[k]), *noise)
     if fit is None:
         return _between(t, share, level, k, noise.size)
     place = fit.solve(level)
     slope = fit.at(place, 1)
     return _Crossing(place + float(t[k]), fit.error_at(place) / abs(slope), slope, fit.degrees)
-
-
-def _near(t: Values, share: Values, level: float, k: int) -> tuple[Values, Values]:
-    """Samples about a crossing that a polynomial can be fitted to."""
-    near = _around(np.abs(share - level) < ABOUT, k if abs(share[k] - level) < ABOUT else k - 1)
-    return t[near], share[near]
 
 
 def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _Crossing:
@@ -362,7 +351,5 @@ def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _C
 
 def _around(mask: NDArray[np.bool_], place: int) -> slice:
     """Run of True about a place; the place alone where it is False."""
-    for first, stop in runs_of(mask).tolist():
-        if first <= place < stop:
-            return slice(first, stop)
-    return slice(place, place + 1)
+    runs = (slice(first, stop) for first, stop in runs_of(mask).tolist() if first <= place < stop)
+    return next(runs, slice(place, place + 1))
