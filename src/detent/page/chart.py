@@ -9,12 +9,16 @@ from math import inf, isfinite
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from detent.page.parts import Event, Numbers
-from detent.page.thin import thin_indices
 
 Chart = dict[str, Any]  # one plot area, as template/report.js reads it; its "id" is that of the element it is drawn in
 POINTS = 3000  # points of one curve: three per pixel of a wide screen
+
+LANE_HEIGHT = 26  # height of a lane [px]
+FOOT_HEIGHT = 44  # height of what is above and below the lanes [px]
+PLACES = 600  # places at which the cursor stops besides the ends of the bars of lanes
 
 SCALES: dict[str, tuple[float, int]] = {"ms": (1e3, 3), "s": (1.0, 5)}
 """Per unit of time: factor from seconds, and digits that a chart keeps."""
@@ -84,6 +88,37 @@ class Heap:
     counts: Numbers  # how often each place occurs, shape (n,)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """A curve whose places need not rise."""
+
+    label: str  # and colour: as of a curve; loops of one label have one line in the legend
+    colour: str
+    x: Numbers  # and y: finite places and values in the units of the chart, shape (n,)
+    y: Numbers
+    width: float = 2.0  # width of the line [px]
+    digits: int = 3  # digits of values kept after the point
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A stretch of the horizontal axis."""
+
+    begin: float  # and end: its ends, in the unit of the axis
+    end: float
+    short: str  # written inside where there is room
+    text: str  # told below the chart while the cursor is over it
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """Bars of one kind."""
+
+    label: str  # name of the lane; about ten characters have room beside it
+    colour: str  # as of a curve
+    bars: Sequence[Bar]  # in any order
+
+
 def spans_of(t: Numbers, on: Numbers) -> list[tuple[float, float]]:
     """Find the stretches of time in which something holds [s].
 
@@ -101,16 +136,56 @@ def line_chart(panel: Panel, x: Numbers, label: str, *, digits: int = 4) -> Char
     return _chart(panel, slice(None)) | {"x": rounded(x, digits), "xLabel": label}
 
 
+def loop_chart(panel: Panel, x: Numbers, label: str, loops: Sequence[Loop], *, digits: int = 4) -> Chart:
+    """Draw curves over any horizontal axis, and loops above them."""
+    chart = line_chart(panel, x, label, digits=digits)
+    named = {loop.label: loop for loop in loops}
+    nothing = np.full(len(x), np.nan)
+    legend = [Curve(label=loop.label, colour=loop.colour, width=loop.width, y=nothing) for loop in named.values()]
+    chart["series"] += line_chart(Panel(name="", label="", curves=legend), x, label)["series"]
+    chart["loops"] = [
+        {"colour": loop.colour, "width": loop.width, "x": rounded(loop.x, digits), "y": rounded(loop.y, loop.digits)}
+        for loop in loops
+    ]
+    return chart
+
+
+def lane_chart(name: str, lanes: Sequence[Lane], span: tuple[float, float], label: str, *, sync: str = "") -> Chart:
+    """Draw lanes above one another."""
+    shown: list[Chart] = []
+    ends: list[float] = []
+    for lane in lanes:
+        bars = [bar for bar in lane.bars if bar.end > span[0] and bar.begin < span[1] and bar.end > bar.begin]
+        told = [[round(bar.begin, 4), round(bar.end, 4), bar.short, bar.text] for bar in bars]
+        shown.append({"label": lane.label, "colour": lane.colour, "bars": told})
+        ends += [place for bar in bars for place in (bar.begin, bar.end)]
+    x = np.unique(np.clip(np.concatenate((np.linspace(*span, PLACES), ends)), *span))
+    chart: Chart = {
+        "id": name,
+        "x": rounded(x, 4),
+        "xLabel": label,
+        "height": LANE_HEIGHT * len(lanes) + FOOT_HEIGHT + (0 if sync else 20),
+        "yRange": [0, len(lanes)],
+        "lanes": shown,
+        "series": [],
+    }
+    return chart | ({"sync": sync, "foot": False} if sync else {})
+
+
 def time_charts(timeline: Timeline, panels: Sequence[Panel]) -> list[Chart]:
     """Draw plot areas above one another over the same time, with as many rows as a screen can show."""
     scale, digits = SCALES[timeline.unit]
     chosen = [thin_indices(curve.y, curve.thin) for panel in panels for curve in panel.curves if curve.thin]
     kept = np.unique(np.concatenate(chosen or [thin_indices(timeline.t, POINTS)]))
+    bands: list[Chart] = []
+    for band in timeline.bands:
+        spans = [[round(moment * scale, digits) for moment in span] for span in band.spans]
+        bands.append({"spans": spans, "colour": band.colour, "label": band.label})
     shared: Chart = {
         "x": rounded(timeline.t[kept] * scale, digits),
         "xLabel": f"{timeline.label} [{timeline.unit}]",
         "sync": timeline.name,
-        "bands": [_band(band, scale, digits) for band in timeline.bands],
+        "bands": bands,
         "events": [round(event.t * scale, digits + 1) for event in timeline.events],
     }
     charts = [_chart(panel, kept) | shared for panel in panels]
@@ -126,7 +201,10 @@ def histogram_chart(
     """Count values per bin, centred on zero, in one or two groups side by side."""
     seen = [float(np.abs(heap.at[heap.counts > 0]).max(initial=0.0)) for heap in heaps]
     largest = max(*seen, finest / 2)
-    step = max(_nice_step(largest / 15), finest)
+    # Rounded up to 1, 2 or 5 times a power of ten.
+    wanted, power = largest / 15, 10.0 ** np.floor(np.log10(largest / 15))
+    nice = float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= wanted * 0.999))
+    step = max(nice, finest)
     half = int(np.ceil(largest / step + 0.5))
     edges = (np.arange(-half, half + 2) - 0.5) * step
     sides = (0,) if len(heaps) == 1 else (1, -1)
@@ -148,6 +226,29 @@ def histogram_chart(
     }
 
 
+def thin_indices(values: NDArray[Any], points: int) -> NDArray[np.intp]:
+    """Choose rows that draw like all rows: the smallest and the largest of each of `points` / 2 equal stretches.
+
+    >>> import numpy as np
+    >>> spike = np.zeros(1000)
+    >>> spike[617] = 5.0
+    >>> 617 in thin_indices(spike, 20)
+    True
+    """
+    rows = len(values)
+    if rows <= points:
+        return np.arange(rows, dtype=np.intp)
+    bins = points // 2
+    width = -(-rows // bins)
+    # The last stretch is filled up with the last value, which may be chosen again: `unique` removes it.
+    padded = np.pad(np.asarray(values, dtype=np.float64), (0, width * bins - rows), mode="edge").reshape(bins, width)
+    first = np.arange(bins) * width
+    low = first + np.where(np.isnan(padded), np.inf, padded).argmin(axis=1)
+    high = first + np.where(np.isnan(padded), -np.inf, padded).argmax(axis=1)
+    chosen = np.unique(np.concatenate(([0], low, high, [rows - 1])))
+    return chosen[chosen < rows].astype(np.intp)
+
+
 def rounded(values: Numbers, digits: int) -> list[float | None]:
     """Round numbers for a page; what is not finite becomes a gap.
 
@@ -165,22 +266,11 @@ def _chart(panel: Panel, kept: Numbers | slice) -> Chart:
     told: Chart = {"title": panel.title, "about": panel.about, "zero": panel.zero}
     told |= {"yRange": panel.span and list(panel.span), "levels": levels}
     given = {name: value for name, value in told.items() if value}
-    return chart | given | {"series": [_series(curve, kept) for curve in panel.curves]}
-
-
-def _series(curve: Curve, kept: Numbers | slice) -> Chart:
-    look = {"width": curve.width, "dash": curve.dash and list(curve.dash), "points": curve.rings}
-    look |= {"step": curve.step or None, "fill": curve.fill or None}
-    given = {name: value for name, value in look.items() if value is not None}
-    return {"label": curve.label, "colour": curve.colour} | given | {"y": rounded(curve.y[kept], curve.digits)}
-
-
-def _band(band: Band, scale: float, digits: int) -> Chart:
-    spans = [[round(moment * scale, digits) for moment in span] for span in band.spans]
-    return {"spans": spans, "colour": band.colour, "label": band.label}
-
-
-def _nice_step(wanted: float) -> float:
-    """Round up to 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= wanted * 0.999))
+    series: list[Chart] = []
+    for curve in panel.curves:
+        look = {"width": curve.width, "dash": curve.dash and list(curve.dash), "points": curve.rings}
+        look |= {"step": curve.step or None, "fill": curve.fill or None}
+        one: Chart = {"label": curve.label, "colour": curve.colour}
+        one |= {name: value for name, value in look.items() if value is not None}
+        series.append(one | {"y": rounded(curve.y[kept], curve.digits)})
+    return chart | given | {"series": series}

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from detent.page.chart import Chart
 from detent.page.figure import Figure
-from detent.page.plots import Axes, check_figure_path, new_figure
+from detent.page.plots import ABOVE, Axes, check_figure_path, new_figure
 from detent.page.table import Table
 from detent.page.words import GAP
 
@@ -29,9 +29,6 @@ COLOURS = {
 """Those of template/report.css on white."""
 
 BANDS = {"good": ("#0a7d55", 0.11), "brake": ("#d67814", 0.16)}
-
-ABOVE: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "fontsize": 8}
-"""Place of a legend: above the curves, never over them."""
 
 Part = tuple[float, Callable[[Any, Any], None]]  # height [in], and what draws it into a place of the picture
 
@@ -134,7 +131,7 @@ def draw_chart(area: Axes, chart: Chart) -> None:
     if chart.get("foot") is not False:
         area.set_xlabel(plain(chart["xLabel"]), fontsize=9)
     if any(series["label"] for series in chart["series"]):
-        area.legend(**ABOVE, ncols=4)
+        area.legend(**ABOVE, ncols=4, fontsize=8)
 
 
 def _floats(values: Sequence[float | None]) -> Any:

@@ -134,7 +134,12 @@ def comparison_section(found: Sequence[Comparison]) -> Section:
 
 def comparison_page(axis_name: str, found: Sequence[Comparison], settings: Mapping[str, str] | None = None) -> Page:
     """The page that `detent compare` writes: every figure, and the terminal's table where no figure has one."""
-    sections = [Section(one.table.title, comparison_figures(one)) for one in found]
+    sections: list[Section] = []
+    for one in found:
+        figures = list(one.figures())
+        if not any(figure.table for figure in figures):
+            figures.append(Figure(title="In figures", table=one.table.on_page))
+        sections.append(Section(one.table.title, figures))
     return Page(
         title=f"{axis_name}: compared",
         headline=Headline(
@@ -147,11 +152,3 @@ def comparison_page(axis_name: str, found: Sequence[Comparison], settings: Mappi
         sections=sections,
         settings=settings or {},
     )
-
-
-def comparison_figures(one: Comparison) -> list[Figure]:
-    """Figures of one comparison, with the terminal's table where none of them has one."""
-    figures = list(one.figures())
-    if not any(figure.table for figure in figures):
-        figures.append(Figure(title="In figures", table=one.table.on_page))
-    return figures

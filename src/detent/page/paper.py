@@ -37,9 +37,8 @@ class Marks:
     strikes: Numbers = field(default_factory=_no_numbers)
 
     def __post_init__(self) -> None:
-        struck = len(self.characters)
-        for name in ("page", "line", "baseline", "column", "landed", "width", "direction", "strikes"):
-            given = len(getattr(self, name))
+        for name in self.__slots__:
+            given, struck = len(getattr(self, name)), len(self)
             if given != struck:
                 raise DetentError(f"report: {struck} characters but {given} values of {name!r}; give one per character")
 
@@ -53,35 +52,27 @@ class Marks:
 
 
 def paper_figure(title: str, caption: str, marks: Marks, limit: float) -> Figure:
-    """The printed pages under a title; a figure of nothing if nothing was struck."""
-    return Figure(title=title, caption=caption, paper=printed_pages(marks, limit) if len(marks) else None)
+    """Pages line by line, with at most `MARKS` characters where they landed; a figure of nothing if none was struck.
 
-
-def printed_pages(marks: Marks, limit: float) -> dict[str, Any]:
-    """Pages line by line, for drawing at most `MARKS` characters where they landed; `limit` is of good offsets [m].
-
-    Columns and widths are in 1/120 in, heights in 1/48 in, offsets in micrometres.
+    `limit` is of good offsets [m]. Columns and widths are in 1/120 in, heights in 1/48 in, offsets in micrometres.
     """
+    if not len(marks):
+        return Figure(title=title, caption=caption)
     numbers, sizes = np.unique(marks.page, return_counts=True)
     kept = numbers[: max(1, int(np.searchsorted(np.cumsum(sizes), MARKS, side="right")))]
-    worst = float(np.abs(marks.offset).max()) if len(marks) else 0.0
+    # The factor that draws the worst error a character wide or a little less.
+    worst = float(np.abs(marks.offset).max())
+    factors = [n * 10**k for k in range(7) for n in (1, 2, 5)]
     column = np.round(marks.column / INCH * 120, 2)
-    extent = float((column + marks.width / INCH * 120).max()) if len(marks) else 0.0
-    return {
+    extent = float((column + marks.width / INCH * 120).max())
+    paper = {
         "pages": [_one_page(marks, int(number)) for number in kept],
         "leftOut": len(numbers) - len(kept),
         "limit": round(limit * 1e6, 2),
         "columns": round(extent, 1),
-        "magnify": _magnification(worst),
+        "magnify": max((n for n in factors if worst > 0 and n <= 0.1 * INCH / worst), default=1),
     }
-
-
-def _magnification(worst: float) -> int:
-    """Choose the factor that draws the worst error [m] a character wide or a little less."""
-    if worst <= 0:
-        return 1
-    wanted = 0.1 * INCH / worst
-    return max((n for k in range(7) for n in (10**k, 2 * 10**k, 5 * 10**k) if n <= wanted), default=1)
+    return Figure(title=title, caption=caption, paper=paper)
 
 
 def _one_page(marks: Marks, number: int) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.page.thin import thin_indices
+from detent.page.chart import thin_indices
 from detent.record.trace import Trace
 from detent.record.trace_store import writing
 
@@ -26,6 +26,9 @@ POINTS = 8000  # points of one curve: more than a printed page resolves
 
 # Okabe and Ito's colours, told apart by colour-blind readers, with the yellow that is too light on white left out.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+
+ABOVE: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
+"""Place of a legend: above the curves, never over them."""
 
 STYLE: dict[str, Any] = {
     "font.size": 10,
@@ -83,15 +86,13 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
         colour = COLOURS[index % len(COLOURS)]
         dash = ("-", "--", ":")[index // len(COLOURS) % 3]
         drawn = np.asarray(values[kept], dtype=np.float64)
-        area.plot(
-            trace.time[kept] * scale, drawn, dash, color=colour, linewidth=1.2, label=name, drawstyle=style
-        )  # fmt: skip
+        times = trace.time[kept] * scale
+        area.plot(times, drawn, dash, color=colour, linewidth=1.2, label=name, drawstyle=style)
     if len(names) == 1:
         area.set_ylabel(f"{names[0]}\n[{unit}]" if unit else names[0])  # two lines, for the side of a low plot area
     else:
         area.set_ylabel(f"[{unit}]" if unit else "")
-        # Above the curves, never over them.
-        area.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=9, borderaxespad=0.2)
+        area.legend(**ABOVE, ncols=3, fontsize=9)
     if all(trace[name].dtype.kind == "b" for name in names):
         area.set_yticks([0, 1], ["off", "on"])
 

@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from detent import __version__
@@ -38,27 +38,23 @@ def write_page(path: str | Path, page: Page) -> None:
 def render_page(page: Page) -> str:
     """A whole HTML document."""
     order = list(LEVELS)
-    return (
-        _templates()
-        .get_template("page.html.j2")
-        .render(
-            page=page,
-            notes=sorted(page.notes, key=lambda note: order.index(note.level)),
-            charts=[{key: value for key, value in chart.items() if key not in FOR_THE_PAGE} for chart in page.charts],
-            version=page.version or __version__,
-            signs=SIGNS,
-            levels=LEVELS,
-            asset=_asset,
-            embedded=_embedded,
-            about=about,
-            further=further,
-        )
+    return _template().render(
+        page=page,
+        notes=sorted(page.notes, key=lambda note: order.index(note.level)),
+        charts=[{key: value for key, value in chart.items() if key not in FOR_THE_PAGE} for chart in page.charts],
+        version=page.version or __version__,
+        signs=SIGNS,
+        levels=LEVELS,
+        asset=_asset,
+        embedded=_embedded,
+        about=about,
+        further=further,
     )
 
 
 @cache
-def _templates() -> Environment:
-    return Environment(
+def _template() -> Template:
+    made = Environment(
         loader=PackageLoader("detent.page", "template"),
         autoescape=True,
         trim_blocks=True,
@@ -66,6 +62,7 @@ def _templates() -> Environment:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
+    return made.get_template("page.html.j2")
 
 
 def _asset(name: str) -> Markup:

@@ -15,12 +15,9 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.page.plots import COLOURS, check_figure_path, new_figure
-from detent.page.thin import thin_indices
+from detent.page.chart import thin_indices
+from detent.page.plots import COLOURS, Axes, check_figure_path, new_figure
 from detent.record.waveforms import Waveform, Waveforms
-
-# matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
-Axes = Any
 
 MAX_SIGNALS = 40  # more rows than these do not fit a page that can be read
 WIDTH = 11.0  # width of the figure [in]
@@ -44,20 +41,13 @@ Segment = tuple[float, float, int | None]
 
 @dataclass(frozen=True)
 class _Row:
-    """A signal's place: the middle of its row and half the height it may use, in rows from the top, downwards < 0."""
+    """A signal's place, in rows from the top, downwards < 0: middle of its row, lowest and highest it may use."""
 
     signal: Waveform
     middle: float
-    half: float
+    low: float
+    high: float
     colour: str
-
-    @property
-    def low(self) -> float:
-        return self.middle - self.half
-
-    @property
-    def high(self) -> float:
-        return self.middle + self.half
 
 
 @dataclass(frozen=True)
@@ -98,27 +88,19 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
         _label_time(area, scale)
         for (time, text), rank in zip(marks, ranks, strict=True):
             _draw_mark(area, scale.of(time), text, rank, depth)
-        words = _draw_rows(area, rows, scale)
+        for row in rows:
+            if row.signal.is_float:
+                _draw_curve(area, row, scale)
+            elif row.signal.bits == 1:
+                _draw_levels(area, row, _segments(row.signal, scale))
+            else:
+                _draw_lozenges(area, row, _segments(row.signal, scale), scale)
         # Only once everything has its place is it known how much room a value has.
         figure.draw_without_rendering()
-        inches = area.get_position().width * WIDTH
-        for row, segments in words:
-            _write_values(area, row, segments, scale.span / inches)
-
-
-def _draw_rows(area: Axes, rows: list[_Row], scale: _Scale) -> list[tuple[_Row, list[Segment]]]:
-    """Draw every signal; returns the words, whose values are still to be written."""
-    words: list[tuple[_Row, list[Segment]]] = []
-    for row in rows:
-        if row.signal.is_float:
-            _draw_curve(area, row, scale)
-        elif row.signal.bits == 1:
-            _draw_levels(area, row, _segments(row.signal, scale))
-        else:
-            segments = _segments(row.signal, scale)
-            _draw_lozenges(area, row, segments, scale)
-            words.append((row, segments))
-    return words
+        per_inch = scale.span / (area.get_position().width * WIDTH)
+        for row in rows:
+            if not row.signal.is_float and row.signal.bits > 1:
+                _write_values(area, row, _segments(row.signal, scale), per_inch)
 
 
 def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -> None:
@@ -140,9 +122,13 @@ def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -
 
 def _scale(waveforms: Waveforms) -> _Scale:
     """Choose the unit that gives the axis of time numbers from 2 to 2000."""
-    span = waveforms.end - waveforms.begin
-    unit_ps, unit = next(((size, name) for size, name in _UNITS if span >= 2 * size), (1, "ps"))
+    unit_ps, unit = _unit_of((waveforms.end - waveforms.begin) / 2)
     return _Scale(waveforms.begin, waveforms.end, unit_ps, unit)
+
+
+def _unit_of(time: float) -> tuple[int, str]:
+    """The largest unit that goes into a time [ps]: its size [ps] and name."""
+    return next(((size, name) for size, name in _UNITS if time >= size), (1, "ps"))
 
 
 def _arrange(signals: Sequence[Waveform]) -> tuple[list[_Row], list[tuple[str, float, str]], float]:
@@ -162,7 +148,8 @@ def _arrange(signals: Sequence[Waveform]) -> tuple[list[_Row], list[tuple[str, f
             depth += SLOT_HEADING / 2
         for signal in members:
             slot = SLOT_FLOAT if signal.is_float else 1.0
-            rows.append(_Row(signal, -depth - slot / 2, (slot - 1 + LEVEL) / 2, colour))
+            middle, half = -depth - slot / 2, (slot - 1 + LEVEL) / 2
+            rows.append(_Row(signal, middle, middle - half, middle + half, colour))
             depth += slot
     return rows, headings, depth + 0.3
 
@@ -183,16 +170,12 @@ def _segments(signal: Waveform, scale: _Scale) -> list[Segment]:
 
 
 def _draw_levels(area: Axes, row: _Row, segments: list[Segment]) -> None:
-    times: list[float] = []
-    levels: list[float] = []
-    for start, stop, value in segments:
-        level = np.nan if value is None else row.high if value else row.low
-        times += [start, stop]
-        levels += [level, level]
+    times = [place for start, stop, _ in segments for place in (start, stop)]
+    levels = np.repeat([np.nan if value is None else row.high if value else row.low for *_, value in segments], 2)
     area.plot(times, levels, color=row.colour, linewidth=1.2, solid_joinstyle="miter")
     for wanted, alpha in ((1, 0.13), (None, 0.6)):
         bars = [(start, stop - start) for start, stop, value in segments if value == wanted]
-        area.broken_barh(bars, (row.low, 2 * row.half), facecolor=row.colour, alpha=alpha, linewidth=0)
+        area.broken_barh(bars, (row.low, row.high - row.low), facecolor=row.colour, alpha=alpha, linewidth=0)
 
 
 def _draw_lozenges(area: Axes, row: _Row, segments: list[Segment], scale: _Scale) -> None:
@@ -209,17 +192,14 @@ def _draw_lozenges(area: Axes, row: _Row, segments: list[Segment], scale: _Scale
                 (right, row.middle), (right - slant, row.low), (left + slant, row.low),
             ]
         )  # fmt: skip
-    for busy, fill in ((False, _pale(row.colour)), (True, row.colour)):
+    # A value is as pale as its colour with nine parts of white.
+    parts = [int(row.colour[index : index + 2], 16) for index in (1, 3, 5)]
+    pale = "#" + "".join(f"{round(255 - 0.1 * (255 - part)):02x}" for part in parts)
+    for busy, fill in ((False, pale), (True, row.colour)):
         chosen = [shape for shape, (_, _, value) in zip(shapes, segments, strict=True) if (value is None) == busy]
         area.add_collection(
             collections.PolyCollection(chosen, facecolors=fill, edgecolors=row.colour, linewidths=0.9), autolim=False
         )
-
-
-def _pale(colour: str) -> str:
-    """Mix a colour with nine parts of white."""
-    parts = [int(colour[index : index + 2], 16) for index in (1, 3, 5)]
-    return "#" + "".join(f"{round(255 - 0.1 * (255 - part)):02x}" for part in parts)
 
 
 def _write_values(area: Axes, row: _Row, segments: list[Segment], per_inch: float) -> None:
@@ -229,9 +209,8 @@ def _write_values(area: Axes, row: _Row, segments: list[Segment], per_inch: floa
             continue
         text = _minus(str(value))
         if _text_width(text, VALUE_SIZE) * per_inch <= 0.92 * (stop - start):
-            area.text(
-                (start + stop) / 2, row.middle, text, ha="center", va="center_baseline", fontsize=VALUE_SIZE, color=INK
-            )  # fmt: skip
+            middle = (start + stop) / 2
+            area.text(middle, row.middle, text, ha="center", va="center_baseline", fontsize=VALUE_SIZE, color=INK)
 
 
 def _text_width(text: str, size: float) -> float:
@@ -249,7 +228,7 @@ def _draw_curve(area: Axes, row: _Row, scale: _Scale) -> None:
     for level in (row.low, row.high):
         area.axhline(level, color=GREY, linewidth=0.5, linestyle=(0, (1, 3)))
     if low < high:
-        drawn = row.low + (values - low) / (high - low) * 2 * row.half
+        drawn = row.low + (values - low) / (high - low) * (row.high - row.low)
         _beside(area, row.high, high)
         _beside(area, row.low, low)
     else:
@@ -272,7 +251,10 @@ def _minus(text: str) -> str:
 def _label_rows(area: Axes, rows: list[_Row], headings: list[tuple[str, float, str]]) -> None:
     """Write names to the left, descriptions to the right."""
     places = [row.middle for row in rows] + [middle for _, middle, _ in headings]
-    area.set_yticks(places, [_shown_name(row.signal) for row in rows] + [text for text, _, _ in headings])
+    # Names inside the block, with the unit; that a word counts something its description says.
+    units = ["" if row.signal.unit in {"", "count", "code"} else f" [{row.signal.unit}]" for row in rows]
+    names = [row.signal.name.rpartition(".")[2] + unit for row, unit in zip(rows, units, strict=True)]
+    area.set_yticks(places, names + [text for text, _, _ in headings])
     for label, (_, _, colour) in zip(area.get_yticklabels()[len(rows) :], headings, strict=True):
         label.set(fontweight="bold", color=colour)
     for _, middle, _ in headings:
@@ -287,17 +269,11 @@ def _label_rows(area: Axes, rows: list[_Row], headings: list[tuple[str, float, s
         )  # fmt: skip
 
 
-def _shown_name(signal: Waveform) -> str:
-    """Name inside the block, and the unit; that a word counts something its description says."""
-    name = signal.name.rpartition(".")[2]
-    return f"{name} [{signal.unit}]" if signal.unit not in {"", "count", "code"} else name
-
-
 def _label_time(area: Axes, scale: _Scale) -> None:
     area.grid(visible=False, axis="y")
     area.spines["left"].set_visible(False)
     if scale.begin:
-        unit_ps, unit = next(((size, name) for size, name in _UNITS if scale.begin >= size), (1, "ps"))
+        unit_ps, unit = _unit_of(scale.begin)
         begin = f"{(Decimal(scale.begin) / unit_ps).normalize():f}"
         area.set_xlabel(f"t = {begin} {unit} + … [{scale.unit}]")
     else:

@@ -3,11 +3,24 @@
 import numpy as np
 from markupsafe import Markup
 
-from detent.page.chart import Band, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts
+from detent.page.chart import (
+    Band,
+    Bar,
+    Chart,
+    Curve,
+    Heap,
+    Lane,
+    Loop,
+    Panel,
+    Timeline,
+    histogram_chart,
+    lane_chart,
+    line_chart,
+    loop_chart,
+    time_charts,
+)
 from detent.page.figure import Figure
 from detent.page.frame import Card, Headline, Page, Section
-from detent.page.lanes import Bar, Lane, lane_chart
-from detent.page.loops import Loop, loop_chart
 from detent.page.parts import Event, Note
 from detent.page.table import Cell, Table, bar_cell, offset_cell, way_cell
 

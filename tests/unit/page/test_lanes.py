@@ -1,6 +1,6 @@
 import json
 
-from detent.page.lanes import Bar, Lane, lane_chart
+from detent.page.chart import Bar, Lane, lane_chart
 
 LANES = [
     Lane("go to", "right", [Bar(0.0, 2.0, "1", "step 1"), Bar(3.0, 20.0, "2", "step 2")]),

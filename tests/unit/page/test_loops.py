@@ -2,8 +2,7 @@ from importlib import resources
 
 import numpy as np
 
-from detent.page.chart import Curve, Panel, line_chart
-from detent.page.loops import Loop, loop_chart
+from detent.page.chart import Curve, Loop, Panel, line_chart, loop_chart
 
 
 def test_loops_lie_over_the_curves_and_have_a_line_each_in_the_legend() -> None:

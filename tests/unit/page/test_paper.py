@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,11 +42,12 @@ def test_no_marks_at_all_is_a_page_without_ink() -> None:
 
 def test_nothing_on_paper_is_no_figure(marks: Marks) -> None:
     assert not paper_figure("The page", "", Marks(), 50e-6)
-    assert paper_figure("The page", "", marks, 50e-6).paper == paper.printed_pages(marks, 50e-6)
+    assert paper_figure("The page", "", marks, 50e-6)
 
 
 def test_the_page_keeps_text_place_and_offset(marks: Marks) -> None:
-    data = paper.printed_pages(marks, 50e-6)
+    data = paper_figure("The page", "", marks, 50e-6).paper
+    assert data is not None
     assert data["leftOut"] == 0
     assert data["limit"] == 50.0
     assert data["columns"] == 48.0
@@ -63,7 +66,8 @@ def test_the_page_keeps_text_place_and_offset(marks: Marks) -> None:
 
 def test_too_many_marks_leave_whole_pages_out(marks: Marks, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paper, "MARKS", 3)
-    data = paper.printed_pages(marks, 50e-6)
+    data = paper_figure("The page", "", marks, 50e-6).paper
+    assert data is not None
     assert [page["number"] for page in data["pages"]] == [1]
     assert data["leftOut"] == 1
 
@@ -72,5 +76,8 @@ def test_too_many_marks_leave_whole_pages_out(marks: Marks, monkeypatch: pytest.
     ("worst", "factor"),
     [(0.0, 1), (10.0, 1), (1.9e-6, 1000), (60e-6, 20), (0.1 * INCH / 50 * 0.999, 50), (0.1 * INCH / 50 * 1.01, 20)],
 )
-def test_errors_are_magnified_to_at_most_a_character(worst: float, factor: int) -> None:
-    assert paper._magnification(worst) == factor
+def test_errors_are_magnified_to_at_most_a_character(marks: Marks, worst: float, factor: int) -> None:
+    landed = marks.column + np.array([worst, 0.0, 0.0, 0.0])
+    made = paper_figure("", "", replace(marks, landed=landed), 1e-3).paper
+    assert made is not None
+    assert made["magnify"] == factor

@@ -60,7 +60,11 @@ def estimate_resolution(position: Values) -> Resolution:
     span = float(np.ptp(position)) if len(position) else 0.0
     if len(distinct) < FEWEST or not span > 0:
         return Resolution(np.nan, 0, 0.0, f"{len(distinct)} different positions, {FEWEST} or more are needed")
-    differences = _differences(position, distinct, span)
+    steps = np.abs(np.diff(position))
+    # Between samples that follow one another, between neighbours in size, and over the whole travel.
+    ways = [_thin(steps[steps > _ROUNDING * span]), _thin(np.diff(distinct)), _thin(distinct - distinct[0])]
+    differences = np.sort(np.concatenate(ways))
+    differences = differences[differences > _ROUNDING * span]
     grids = [_grid(position, _fit(differences, start)) for start in _candidates(differences)]
     found = [grid for grid in grids if grid.share >= SHARE]
     if not found:
@@ -88,15 +92,6 @@ def _grid(position: Values, step: float) -> _Grid:
     on_grid = off < OFF_GRID
     error = step * float(np.sqrt(np.mean(off[on_grid] ** 2))) if on_grid.any() else np.inf
     return _Grid(step, float(np.mean(on_grid)), error)
-
-
-def _differences(position: Values, distinct: Values, span: float) -> Values:
-    """Differences between samples that follow one another, between neighbours in size, and over the whole travel."""
-    steps = np.abs(np.diff(position))
-    found = np.concatenate(
-        [_thin(steps[steps > _ROUNDING * span]), _thin(np.diff(distinct)), _thin(distinct - distinct[0])]
-    )
-    return np.sort(found[found > _ROUNDING * span])
 
 
 def _thin(values: Values) -> Values:

@@ -95,8 +95,18 @@ def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) ->
     best: Periods | None = None
     for clock, grid in clocks:
         rows = find_period(np.interp(even, clock, excitation))
-        for times, text in _grids(clock, mean, rows, grid):
-            found = _cut(clock, times, [excitation, *others], text)
+        if rows is None:
+            continue
+        whole = round(rows)
+        # The samples as they are, and between them for a period with a fraction.
+        between = (mean * rows / whole, f"{rows:.4f} rows in a period, put on {whole} of them")
+        for step, text in ((mean, ""), between):
+            periods = int((len(clock) - 1 + 1e-6) * mean / step + 1) // whole
+            if periods < 2:
+                continue
+            times = clock[0] + step * np.arange(periods * whole).reshape(periods, whole)
+            told = ", ".join(part for part in (grid, text) if part)
+            found = _cut(clock, times, [excitation, *others], told)
             if best is None or found.mismatch * _BETTER < best.mismatch:
                 best = found
     return best
@@ -108,23 +118,6 @@ def count_samples(t: Values) -> tuple[Values, str]:
     mean = float(t[-1] - t[0]) / len(steps)
     said = f"stamps {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
     return t[0] + mean * np.arange(len(t)), "" if float(np.std(steps)) <= _EVEN * mean else said
-
-
-def _grids(clock: Values, mean: float, rows: float | None, said: str) -> list[tuple[Values, str]]:
-    """Times of samples, as many in each period: the samples as they are, and between them for a period with a fraction.
-
-    Shape of each: (periods, samples of a period).
-    """
-    if rows is None:
-        return []
-    whole = round(rows)
-    found: list[tuple[Values, str]] = []
-    for step, text in ((mean, ""), (mean * rows / whole, f"{rows:.4f} rows in a period, put on {whole} of them")):
-        periods = int((len(clock) - 1 + 1e-6) * mean / step + 1) // whole
-        times = clock[0] + step * np.arange(periods * whole).reshape(periods, whole)
-        if periods >= 2:
-            found.append((times, ", ".join(part for part in (said, text) if part)))
-    return found
 
 
 def _cut(clock: Values, times: Values, signals: Sequence[Values], said: str) -> Periods:

@@ -77,7 +77,9 @@ def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) 
     moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)
     units = (role, log.units[role], speed_unit)
     if not len(moving.place):
-        return _without_result(units, mass, _nothing_moves(mass))
+        steady = "no steady speed in this log; record passes at steady speeds, or state the mass"
+        driven = "the axis does not move in this log; record moves to and fro at several speeds"
+        return _without_result(units, mass, driven if mass > 0 else steady)
     return _mapped(moving, units, mass, bins)
 
 
@@ -89,12 +91,6 @@ class _Moving:
     v: Values
     friction: Values
     lowest: float
-
-
-def _nothing_moves(mass: float) -> str:
-    if mass > 0:
-        return "the axis does not move in this log; record moves to and fro at several speeds"
-    return "no steady speed in this log; record passes at steady speeds, or state the mass"
 
 
 def _without_result(
@@ -123,18 +119,13 @@ def _driven(log: Log, role: str, mass: float) -> _Moving:
     v, a = (slope, curvature) if is_placed else (value, slope)
     f = smooth(log.signals[role], log.t, rows)[1][0]
     top = float(np.abs(v).max(initial=0.0))
-    noise = _velocity_noise(log, base, rows)
+    # Standard deviation of the slope (of a position) or mean (of a velocity) of a window.
+    per_grain = float(np.sqrt(12.0 / rows**3)) / log.period if is_placed else 1.5 / float(np.sqrt(rows))
+    noise = grain(base) * per_grain
     lowest = max(top / RANGE, OVER_NOISE * noise)
     # A window that reaches into rest or a reversal mixes the effort of two directions.
     kept = np.convolve(np.abs(v) <= 0.5 * lowest, np.ones(rows), "same") <= 0.5
     return _Moving(place[kept], v[kept], (f - mass * a)[kept], lowest)
-
-
-def _velocity_noise(log: Log, base: Values, rows: int) -> float:
-    """Standard deviation of the slope (of a position) or mean (of a velocity) of a window of rows."""
-    if "position" in log.signals:
-        return grain(base) * float(np.sqrt(12.0 / rows**3)) / log.period
-    return grain(base) * 1.5 / float(np.sqrt(rows))
 
 
 class _Bin(NamedTuple):

@@ -173,23 +173,10 @@ def _smooth(values: Values, half: int) -> Values:
 
 
 def measure_response(t: Values, excitation: Values, answer: Values) -> FrequencyResponse:
-    """Measure a frequency response, by periods where the excitation has some, otherwise by windows."""
-    t, excitation, answer = _longest_stretch(t, excitation, answer)
-    periods = cut_periods(t, excitation, [answer])
-    is_periodic = periods is not None and len(periods.signals[0]) >= FEWEST
-    return average_periods(periods) if periods and is_periodic else average_windows(t, excitation, answer)
+    """Measure a frequency response in the longest part without a gap.
 
-
-def response_of(log: Log, effort: str = "", position: str = "position") -> FrequencyResponse:
-    """Measure the response of the position to the effort in a log."""
-    chosen = log.effort(effort)
-    log.need(position)
-    found = measure_response(log.t, log.signals[chosen], log.signals[position])
-    return replace(found, input_unit=log.units.get(chosen, ""), output_unit=log.units.get(position, ""))
-
-
-def _longest_stretch(t: Values, excitation: Values, answer: Values) -> tuple[Values, Values, Values]:
-    """The longest part without a gap."""
+    By periods where the excitation has some, otherwise by windows.
+    """
     if not len(t) == len(excitation) == len(answer) or len(t) < FEWEST_ROWS:
         raise DetentError(
             f"identify: came {len(t)} times, {len(excitation)} values of the input, {len(answer)} of the output; "
@@ -201,7 +188,18 @@ def _longest_stretch(t: Values, excitation: Values, answer: Values) -> tuple[Val
             f"identify: came {part.stop - part.start} samples between two gaps; allowed: {FEWEST_ROWS} or more; record "
             "without missing rows"
         )
-    return t[part], excitation[part], answer[part]
+    t, excitation, answer = t[part], excitation[part], answer[part]
+    periods = cut_periods(t, excitation, [answer])
+    is_periodic = periods is not None and len(periods.signals[0]) >= FEWEST
+    return average_periods(periods) if periods and is_periodic else average_windows(t, excitation, answer)
+
+
+def response_of(log: Log, effort: str = "", position: str = "position") -> FrequencyResponse:
+    """Measure the response of the position to the effort in a log."""
+    chosen = log.effort(effort)
+    log.need(position)
+    found = measure_response(log.t, log.signals[chosen], log.signals[position])
+    return replace(found, input_unit=log.units.get(chosen, ""), output_unit=log.units.get(position, ""))
 
 
 def average_windows(t: Values, excitation: Values, answer: Values, step_hz: float | None = None) -> FrequencyResponse:

@@ -86,51 +86,34 @@ def _fit_direction(
     name: str, series: tuple[Values, Values, Values], parts: list[slice], units: tuple[str, str, str]
 ) -> SpeedLine:
     """The line of one direction, or why there is none."""
-    measured = _measured(series, parts, 0.0)
-    reason = _refusal(name, measured, units[2])
-    if reason:
-        return SpeedLine(name, measured, reason=reason)
-    slope = 0.0
-    for _ in range(ROUNDS):
-        line = _weighted_line(measured)
-        slope = float(line.values[0])
-        measured = _measured(series, parts, slope)
+    unit, unit_of_slope, speed_unit = units
+    measured = tuple(measure_stretch(*series, part, 0.0) for part in parts)
+    speeds = [abs(stretch.speed) for stretch in measured]
+    advice = "record passes at two steady speeds that differ by half or more"
+    if not measured:
+        return SpeedLine(name, measured, reason=f"no steady speed in {name} direction; {advice}")
+    if max(speeds) - min(speeds) < APART * max(speeds):
+        only = f"only one steady speed in {name} direction ({max(speeds):.4g} {speed_unit}); {advice}"
+        return SpeedLine(name, measured, reason=only)
     line = _weighted_line(measured)
+    for _ in range(ROUNDS):
+        measured = tuple(measure_stretch(*series, part, float(line.values[0])) for part in parts)
+        line = _weighted_line(measured)
+    notes = [f"holds from {min(speeds):.4g} to {max(speeds):.4g} {speed_unit}; friction at rest is not measured"]
+    if line.between > 0:
+        text = "position-dependent friction, or friction that is no line over the speed"
+        notes.append(f"stretches scatter about the line by {line.between:.3g} {unit} beside their errors: {text}")
     method = f"two-speed method, {len(measured)} stretches"
+    slope, height = line.values.tolist()
     errors: list[float] = np.sqrt(np.diag(line.covariance)).tolist()
-    sign = DIRECTIONS[name]
     return SpeedLine(
         name,
         measured,
-        estimate(f"slope.{name}", float(line.values[0]), units[1], errors[0], method, line.degrees[0]),
-        estimate(f"coulomb.{name}", sign * float(line.values[1]), units[0], errors[1], method, line.degrees[1]),
+        estimate(f"slope.{name}", slope, unit_of_slope, errors[0], method, line.degrees[0]),
+        estimate(f"coulomb.{name}", DIRECTIONS[name] * height, unit, errors[1], method, line.degrees[1]),
         line.between,
-        notes=_notes(line, measured, units),
+        notes=tuple(notes),
     )
-
-
-def _measured(series: tuple[Values, Values, Values], parts: list[slice], slope: float) -> tuple[SteadyStretch, ...]:
-    return tuple(measure_stretch(*series, part, slope) for part in parts)
-
-
-def _refusal(name: str, measured: tuple[SteadyStretch, ...], unit: str) -> str:
-    """Why a direction has no line; empty where it has one."""
-    advice = "record passes at two steady speeds that differ by half or more"
-    if not measured:
-        return f"no steady speed in {name} direction; {advice}"
-    speeds = sorted(abs(stretch.speed) for stretch in measured)
-    if speeds[-1] - speeds[0] < APART * speeds[-1]:
-        return f"only one steady speed in {name} direction ({speeds[-1]:.4g} {unit}); {advice}"
-    return ""
-
-
-def _notes(line: "_Line", measured: tuple[SteadyStretch, ...], units: tuple[str, str, str]) -> tuple[str, ...]:
-    speeds = [abs(stretch.speed) for stretch in measured]
-    notes = [f"holds from {min(speeds):.4g} to {max(speeds):.4g} {units[2]}; friction at rest is not measured"]
-    if line.between > 0:
-        text = "position-dependent friction, or friction that is no line over the speed"
-        notes.append(f"stretches scatter about the line by {line.between:.3g} {units[0]} beside their errors: {text}")
-    return tuple(notes)
 
 
 @dataclass(frozen=True, slots=True)

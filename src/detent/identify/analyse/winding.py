@@ -28,12 +28,10 @@ from detent.identify.analyse.winding_fit import (
     FEWEST,
     METHOD,
     POLES,
-    Constants,
     Piece,
     WindingFit,
     iterate,
     make_pieces,
-    physical_constants,
     solve_instruments,
     torque_role,
 )
@@ -44,6 +42,7 @@ from detent.logs.stamps import stretches
 
 EVEN = 0.1  # largest deviation of a time step from their mean, as a part of it
 TOGETHER = 0.95  # correlation of two constants from which they may be inseparable
+_TORQUE_UNITS = {"V*s/rad": "N*m/A", "V*s/m": "N/A"}
 CLEARLY_BETTER = 0.8  # residual, as a part of the present one, with which another delay of the voltage fits better
 
 
@@ -112,28 +111,22 @@ def _refusal(log: Log, *, is_locked: bool) -> str:
 
 def _told(pieces: list[Piece], fit: WindingFit | None, unit: str) -> Winding:
     """Constants of a motor that moves, as far as the data tell them apart."""
-    found = physical_constants(fit, pieces[0].step) if fit is not None else None
-    partner = _partner(pieces, found)
+    partner = _partner(pieces, fit)
     if partner:
         return _without_speed(pieces, partner)
-    if fit is None or found is None:
-        return Winding(reason=_NO_WINDING)
     told = _still(pieces, fit)
-    if told.reason:
+    if told.reason or fit is None:
         return told
-    if found.is_vague(3):
+    if fit.is_vague(3):
         return replace(told, notes=(*told.notes, "the speed is too low to show a back-EMF; record higher speeds"))
-    ke = found.estimate(3, "back_emf_constant", unit)
+    ke = fit.estimate(3, "back_emf_constant", unit)
     if ke.value < 0:
         reason = "the back-EMF constant comes out negative: speed and voltage have opposite signs; turn one"
         return Winding(reason=reason)
     return replace(told, back_emf_constant=ke)
 
 
-_NO_WINDING = "the current does not follow the voltage as that of a winding does; check columns, units and signs"
-
-
-def _partner(pieces: list[Piece], found: Constants | None) -> str:
+def _partner(pieces: list[Piece], found: WindingFit | None) -> str:
     """What the back-EMF constant cannot be told apart from: ``resistance``, ``offset``, or nothing."""
     if found is not None:
         is_possible = found.pole[0] < 1.0 and found.values[0] > 0 and found.values[3] > 0
@@ -165,11 +158,11 @@ def _without_speed(pieces: list[Piece], partner: str) -> Winding:
     return replace(found, resistance=None, apparent_resistance=apparent, notes=(*found.notes, note))
 
 
-def _still(pieces: list[Piece], fit: WindingFit | None) -> Winding:
+def _still(pieces: list[Piece], found: WindingFit | None) -> Winding:
     """Resistance, inductance and offset of a fit."""
-    if fit is None:
-        return Winding(reason=_NO_WINDING)
-    found = physical_constants(fit, pieces[0].step)
+    if found is None:
+        reason = "the current does not follow the voltage as that of a winding does; check columns, units and signs"
+        return Winding(reason=reason)
     notes: list[str] = []
     if found.values[0] < 0 and not found.is_vague(0):
         return Winding(reason="the resistance comes out negative: voltage and current have opposite signs; turn one")
@@ -188,7 +181,7 @@ def _still(pieces: list[Piece], fit: WindingFit | None) -> Winding:
         found.estimate(0, "resistance", "ohm"),
         inductance,
         offset=found.estimate(2, "voltage_offset", "V"),
-        relative_error=float(fit.residual.std() / current.std()),
+        relative_error=float(found.residual.std() / current.std()),
         notes=tuple(notes),
     )
 
@@ -216,19 +209,12 @@ def _with_torque(log: Log, pieces: list[Piece], fit: WindingFit, found: Winding)
     return replace(found, torque_constant=kt)
 
 
-_TORQUE_UNITS = {"V*s/rad": "N*m/A", "V*s/m": "N/A"}
-
-
 def _delay_notes(fit: WindingFit, earlier: WindingFit | None, later: WindingFit | None) -> tuple[str, ...]:
     """What to try where the voltage acts at another time than it is recorded."""
-    size = float(fit.residual.std())
-    better = {
-        word: float(other.residual.std())
-        for word, other in (("earlier", earlier), ("later", later))
-        if other is not None and float(other.residual.std()) < CLEARLY_BETTER * size
-    }
-    if not better:
+    others = (("earlier", earlier), ("later", later))
+    shares = {word: float(other.residual.std()) / float(fit.residual.std()) for word, other in others if other}
+    word = min(shares, key=shares.__getitem__, default="")
+    if not word or shares[word] >= CLEARLY_BETTER:
         return ()
-    word = min(better, key=lambda key: better[key])
-    note = f"a voltage that acts a sample {word} leaves {better[word] / size:.0%} of the residual"
+    note = f"a voltage that acts a sample {word} leaves {shares[word]:.0%} of the residual"
     return (f"{note}; state by how much it is late",)

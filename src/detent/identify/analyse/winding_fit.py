@@ -33,13 +33,30 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindingFit:
-    """Outcome of the iteration: a, g, g*u0 and g*ke (absent when locked), covariance, degrees, residual, currents."""
+    """R, L, u0 and ke (absent when locked), their covariance and degrees of freedom."""
 
     values: Values
     covariance: Values
     degrees: int
-    residual: Values
-    made: list[Values]
+    pole: tuple[float, float]  # interval of a
+    residual: Values  # of the equation behind the filter
+    made: list[Values]  # currents that the model makes, piece by piece
+
+    def correlation(self, one: int, other: int) -> float:
+        """Correlation of two constants, by their places."""
+        return float(self.covariance[one, other]) / (self.error(one) * self.error(other) or 1.0)
+
+    def error(self, which: int) -> float:
+        """Standard error of a constant."""
+        return float(np.sqrt(self.covariance[which, which]))
+
+    def estimate(self, which: int, name: str, unit: str) -> Estimate:
+        """A constant with its interval."""
+        return estimate(name, float(self.values[which]), unit, self.error(which), METHOD, self.degrees)
+
+    def is_vague(self, which: int) -> bool:
+        """True for a constant that is not told from zero, or hardly."""
+        return not self.error(which) < VAGUE * abs(float(self.values[which]))
 
 
 def make_pieces(log: Log, late: int, *, is_locked: bool) -> list[Piece]:
@@ -51,7 +68,13 @@ def make_pieces(log: Log, late: int, *, is_locked: bool) -> list[Piece]:
         if count < FEWEST:
             continue
         step = float(log.t[part][-1] - log.t[part][0]) / (count - 1)
-        v = np.zeros(count - 1) if is_locked else _speed_between(log, part, step)
+        # Mean speed from each sample to the next.
+        if is_locked:
+            v = np.zeros(count - 1)
+        elif "position" in log.signals:
+            v = np.diff(log.signals["position"][part]) / step
+        else:
+            v = 0.5 * (log.signals["velocity"][part][1:] + log.signals["velocity"][part][:-1])
         smooth = np.asarray(scipy("ndimage").uniform_filter1d(v, SMOOTH, mode="nearest"), float)
         u, i = log.signals["voltage"][part], log.signals["current"][part]
         begin, end = max(late, 0), count - 1 - max(-late, 0)
@@ -59,14 +82,6 @@ def make_pieces(log: Log, late: int, *, is_locked: bool) -> list[Piece]:
         torque = log.signals[role][part][begin:end] if role else np.empty(0)
         pieces.append(Piece(i[begin : end + 1], held, v[begin:end], smooth[begin:end], torque, step))
     return pieces
-
-
-def _speed_between(log: Log, part: slice, step: float) -> Values:
-    """Mean speed from each sample to the next."""
-    if "position" in log.signals:
-        return np.diff(log.signals["position"][part]) / step
-    v = log.signals["velocity"][part]
-    return 0.5 * (v[1:] + v[:-1])
 
 
 def iterate(pieces: list[Piece], *, is_moving: bool) -> WindingFit | None:
@@ -86,8 +101,25 @@ def iterate(pieces: list[Piece], *, is_moving: bool) -> WindingFit | None:
             residual = target - columns @ values
             # The residual alone would say too little where a few steps of the voltage hold most of what is known of L.
             covariance, degrees = known_noise_covariance(columns, residual, residual, instruments)
-            return WindingFit(values, covariance, degrees, residual, made)
+            physical, slope = _physical_constants(values, pieces[0].step)
+            reach = quantile(degrees) * float(np.sqrt(covariance[0, 0]))
+            interval = (float(values[0]) - reach, float(values[0]) + reach)
+            return WindingFit(physical, slope @ covariance @ slope.T, degrees, interval, residual, made)
     return None
+
+
+def _physical_constants(values: Values, step: float) -> tuple[Values, Values]:
+    """Physical constants of a, g, g*u0 and g*ke (absent when locked), and their derivatives by these (delta method)."""
+    g, a = float(values[1]), float(np.clip(values[0], *POLES))
+    resistance, log_a = (1.0 - float(values[0])) / g, float(np.log(a))
+    count = len(values)
+    slope = np.zeros((count, count))
+    slope[0, :2] = -1.0 / g, -resistance / g
+    slope[1] = -step / log_a * slope[0]
+    slope[1, 0] += resistance * step / (a * log_a**2)
+    for row in range(2, count):
+        slope[row, 1], slope[row, row] = -float(values[row]) / g**2, 1.0 / g
+    return np.concatenate([[resistance, -resistance * step / log_a], values[2:] / g]), slope
 
 
 def _simulated(piece: Piece, values: Values) -> Values:
@@ -124,49 +156,6 @@ def solve_instruments(columns: Values, instruments: Values, target: Values) -> V
         return None
     values = np.asarray(np.linalg.solve(matrix, (instruments / length).T @ target), float) / size
     return values if np.all(np.isfinite(values)) else None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Constants:
-    """R, L, u0 and ke (absent when locked), their covariance, degrees of freedom; interval of a."""
-
-    values: Values
-    covariance: Values
-    degrees: int
-    pole: tuple[float, float]
-
-    def correlation(self, one: int, other: int) -> float:
-        """Correlation of two constants, by their places."""
-        return float(self.covariance[one, other]) / (self.error(one) * self.error(other) or 1.0)
-
-    def error(self, which: int) -> float:
-        """Standard error of a constant."""
-        return float(np.sqrt(self.covariance[which, which]))
-
-    def estimate(self, which: int, name: str, unit: str) -> Estimate:
-        """A constant with its interval."""
-        return estimate(name, float(self.values[which]), unit, self.error(which), METHOD, self.degrees)
-
-    def is_vague(self, which: int) -> bool:
-        """True for a constant that is not told from zero, or hardly."""
-        return not self.error(which) < VAGUE * abs(float(self.values[which]))
-
-
-def physical_constants(fit: WindingFit, step: float) -> Constants:
-    """Physical constants of a fit, their covariance by the derivatives (delta method)."""
-    g, a = float(fit.values[1]), float(np.clip(fit.values[0], *POLES))
-    resistance, log_a = (1.0 - float(fit.values[0])) / g, float(np.log(a))
-    count = len(fit.values)
-    slope = np.zeros((count, count))
-    slope[0, :2] = -1.0 / g, -resistance / g
-    slope[1] = -step / log_a * slope[0]
-    slope[1, 0] += resistance * step / (a * log_a**2)
-    for row in range(2, count):
-        slope[row, 1], slope[row, row] = -float(fit.values[row]) / g**2, 1.0 / g
-    values = np.concatenate([[resistance, -resistance * step / log_a], fit.values[2:] / g])
-    reach = quantile(fit.degrees) * float(np.sqrt(fit.covariance[0, 0]))
-    pole = (float(fit.values[0]) - reach, float(fit.values[0]) + reach)
-    return Constants(values, slope @ fit.covariance @ slope.T, fit.degrees, pole)
 
 
 def torque_role(log: Log) -> str:

@@ -1,7 +1,7 @@
 """Plots over the logarithm of the frequency, drawn as SVG without a script."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,11 +39,11 @@ LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
 def frequency_plots(plots: Sequence[Plot]) -> Markup:
     """Draw plots above one another over the same frequencies, the axis logarithmic."""
     low, high = (float(f(plots[0].lines[0].x)) for f in (np.min, np.max))
-    named = [line for line in plots[0].lines if line.label]
     legend = " ".join(
         f'<span class="nowrap"><svg width="26" height="10"><path d="M1 5h24" style="{_stroke(line, 2.5)}"/></svg> '
         f"{escape(line.label)}</span>"
-        for line in named
+        for line in plots[0].lines
+        if line.label
     )
     drawn = "".join(_plot(plot, low, high, last=plot is plots[-1]) for plot in plots)
     return Markup(f'{drawn}<p class="hint">{legend}</p>')  # noqa: S704 - texts are escaped where they are put in
@@ -65,7 +65,16 @@ def _plot(plot: Plot, low: float, high: float, *, last: bool) -> str:
         share = np.log(y / bottom) / math.log(top / bottom) if plot.logarithmic else (y - bottom) / (top - bottom)
         return TOP + inner * (1.0 - share)
 
-    parts = [_grid_x(low, high, right, plot.height), _grid_y(plot, bottom, top, down)]
+    parts: list[str] = []
+    for f, text in _decades(low, high):
+        at = float(right(np.array([f]))[0])
+        parts.append(f'<path d="M{at:.1f} {TOP}V{plot.height - FOOT}" style="stroke:var(--grid)"/>')
+        if text:
+            parts.append(f'<text x="{at:.1f}" y="{plot.height - 6}" text-anchor="middle">{text}</text>')
+    for value, text in _powers(bottom, top) if plot.logarithmic else _steps(bottom, top):
+        at = float(down(np.array([value]))[0])
+        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--grid)"/>')
+        parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')
     for level in plot.levels:
         at = float(down(np.array([level]))[0])
         parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--soft);stroke-dasharray:3 3"/>')
@@ -108,41 +117,20 @@ def _path(x: Numbers, y: Numbers) -> str:
     return "".join(text)
 
 
-def _grid_x(low: float, high: float, right: Callable[[Numbers], Numbers], height: int) -> str:
+def _decades(low: float, high: float) -> list[tuple[float, str]]:
     """Lines at 1 to 9 of each decade, figures at 1, 2 and 5, or at 1 alone of many decades."""
     figures = (1, 2, 5) if high / low < 2e3 else (1,)
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [(digit * 10.0**decade, digit) for decade in decades for digit in range(1, 10)]
-    parts: list[str] = []
-    for f, digit in ticks:
-        if not low <= f <= high:
-            continue
-        at = float(right(np.array([f]))[0])
-        parts.append(f'<path d="M{at:.1f} {TOP}V{height - FOOT}" style="stroke:var(--grid)"/>')
-        if digit in figures:
-            parts.append(f'<text x="{at:.1f}" y="{height - 6}" text-anchor="middle">{f:g}</text>')
-    return "".join(parts)
-
-
-def _grid_y(plot: Plot, bottom: float, top: float, down: Callable[[Numbers], Numbers]) -> str:
-    ticks = _powers(bottom, top) if plot.logarithmic else _steps(bottom, top)
-    parts: list[str] = []
-    for value, text in ticks:
-        at = float(down(np.array([value]))[0])
-        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--grid)"/>')
-        parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')
-    return "".join(parts)
+    return [(f, f"{f:g}" if digit in figures else "") for f, digit in ticks if low <= f <= high]
 
 
 def _powers(bottom: float, top: float) -> list[tuple[float, str]]:
     """Powers of ten, every second or third of many."""
     powers = range(math.ceil(math.log10(bottom)), math.floor(math.log10(top)) + 1)
     every = max(1, math.ceil(len(powers) / 6))
-    return [(10.0**k, _power_text(k)) for k in powers if k % every == 0]
-
-
-def _power_text(power: int) -> str:
-    return f'10<tspan dy="-5" font-size="9">{str(power).replace("-", chr(0x2212))}</tspan>'
+    raised = '10<tspan dy="-5" font-size="9">{}</tspan>'
+    return [(10.0**k, raised.format(str(k).replace("-", "\u2212"))) for k in powers if k % every == 0]
 
 
 def _steps(bottom: float, top: float) -> list[tuple[float, str]]:

@@ -9,7 +9,6 @@ from markupsafe import Markup
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
-from detent.identify.fit.ladder import Climb
 from detent.identify.page.words import (
     UNKNOWN,
     constant_name,
@@ -44,10 +43,8 @@ def constant_figures(found: Identification) -> list[Figure]:
         ("constant", False), ("value and 95 % limits", True), (f"interval, scale ±{percent(reach)}", False),
         ("", True), ("trusted", False),
     ]  # fmt: skip
-    warning = (
-        Markup("<b>For diagnosis only: none of these is to be used.</b> ") if found.verdict == "refused" else Markup()
-    )
-    caption = warning + (
+    warning = "<b>For diagnosis only: none of these is to be used.</b> " if found.verdict == "refused" else ""
+    caption = Markup(warning) + (  # noqa: S704 - our own
         "With a chance of 95\u202f% the true value lies within the limits. They allow for residuals that depend on "
         "one another, and for other models that explain the recording as well. The bar is the interval over the value: "
         "short is good, arrows mean wider than the scale."
@@ -113,18 +110,18 @@ def ladder_figures(found: Identification) -> list[Figure]:
     if not found.climbs:
         return []
     longest = max(c.error for c in found.climbs)
-    rows = [_ladder_row(c, longest, chosen=c.rung is found.rung) for c in found.climbs]
+    rows: list[list[str]] = []
+    for climb in found.climbs:
+        chosen = climb.rung is found.rung
+        bar = long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
+        told = _step_text(climb.gain, possible=climb.possible, chosen=chosen)
+        rows.append([sentence(climb.rung.text), bar, told])
     caption = (
         "Each model is fitted to all of the recording but one stretch and foretells that one, stretch by stretch. A "
         "larger model is taken only if it foretells better; a better fit alone would not do."
     )
     heads = [("model", False), ("error on stretches it did not see, over the effort", False), ("", False)]
     return [Figure(title="Models from the simplest up", caption=caption, table=Table(heads=heads, rows=rows))]
-
-
-def _ladder_row(climb: Climb, longest: float, *, chosen: bool) -> list[str]:
-    bar = long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
-    return [sentence(climb.rung.text), bar, _step_text(climb.gain, possible=climb.possible, chosen=chosen)]
 
 
 def _step_text(gain: float, *, possible: bool, chosen: bool) -> str:
@@ -156,10 +153,8 @@ def correlation_figures(constants: Constants | None, estimates: Sequence[Estimat
         "Errors of two constants with a correlation near 1 or \u22121 go together: the recording tells their sum or "
         "difference better than each of them. Their limits allow for that."
     )
-    return [
-        Figure(title="Correlation of the constants", caption=caption, drawing=_pairs_told(names, r),
-               table=heat_map(names, r, limit=ALIKE))
-    ]  # fmt: skip
+    told, table = _pairs_told(names, r), heat_map(names, r, limit=ALIKE)
+    return [Figure(title="Correlation of the constants", caption=caption, drawing=told, table=table)]
 
 
 def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
@@ -168,7 +163,11 @@ def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
     if not pairs:
         return Markup("<p><b>None above {}: the recording tells all constants apart.</b></p>").format(ALIKE)
     pairs.sort(key=lambda pair: -abs(float(r[pair])))
-    texts = [_pair_text(names[i], names[j], float(r[i, j])) for i, j in pairs[:MOST_PAIRS]]
+    ways = {True: "if one is too large, so is the other", False: "if one is too large, the other is too small"}
+    texts = [
+        f"{names[i]} and {names[j]} ({signed(float(r[i, j]))}): {ways[bool(r[i, j] > 0)]}"
+        for i, j in pairs[:MOST_PAIRS]
+    ]
     if len(pairs) > MOST_PAIRS:
         texts.append(f"{further(len(pairs) - MOST_PAIRS, 'pair')} framed below.")
     items = Markup().join(Markup("<li>{}</li>").format(text) for text in texts)
@@ -176,11 +175,6 @@ def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
         "<p><b>Hardly separated, above {}:</b></p><ul>{}</ul><p>More different speeds, slow ones too, separate the "
         "parts of friction; short ramps separate mass and delay.</p>"
     ).format(ALIKE, items)
-
-
-def _pair_text(one: str, other: str, r: float) -> str:
-    so = "if one is too large, so is the other" if r > 0 else "if one is too large, the other is too small"
-    return f"{one} and {other} ({signed(r)}): {so}"
 
 
 def heat_map(names: Sequence[str], correlation: Numbers, *, limit: float) -> Table:

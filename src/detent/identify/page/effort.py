@@ -7,17 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from detent.identify.fit.equations import HOPS, Motion
+from detent.identify.fit.equations import HOPS
 from detent.identify.fit.estimate import rms
 from detent.identify.fit.identification import Identification, prepare_all
 from detent.identify.fit.prepare import Run
-from detent.identify.fit.regression import Fit
 from detent.identify.page.words import SINCE, effort_scale, label_of, peak_of, scaled
 from detent.methods.cascade.units import percent
-from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, line_chart, time_charts
+from detent.page.chart import (
+    POINTS,
+    Chart,
+    Curve,
+    Heap,
+    Panel,
+    Timeline,
+    histogram_chart,
+    line_chart,
+    thin_indices,
+    time_charts,
+)
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
-from detent.page.thin import thin_indices
 from detent.page.words import number
 
 LAGS = 60  # lags of the autocorrelation, in rows of the regression
@@ -42,28 +51,25 @@ def windows_of(found: Identification) -> tuple[Windows, ...]:
     fit = found.fit
     if fit is None:
         return ()
-    motions = [p.motion for p in prepare_all(found.runs, fit.instruments)]
-    ends = np.cumsum([len(motion.rows) for motion in motions])
-    return tuple(
-        _windows(fit, run, motion, slice(int(end) - len(motion.rows), int(end)))
-        for run, motion, end in zip(found.runs, motions, ends, strict=True)
-    )
-
-
-def _windows(fit: Fit, run: Run, motion: Motion, part: slice) -> Windows:
-    rows = motion.rows
-    hop = max(motion.kernel.half // HOPS, 1)
-    first = int(rows[0]) if len(rows) else 0
-    return Windows(
-        t=rows * run.step,
-        effort=fit.effort[part],
-        fitted=fit.effort[part] - fit.residual[part],
-        residual=fit.residual[part],
-        velocity=motion.velocity,
-        place=(rows - first) // hop,
-        hop=hop * run.step,
-        width=(2 * motion.kernel.half + 1) * run.step,
-    )
+    made: list[Windows] = []
+    stop = 0
+    for run, prepared in zip(found.runs, prepare_all(found.runs, fit.instruments), strict=True):
+        motion, rows = prepared.motion, prepared.motion.rows
+        part = slice(stop, stop := stop + len(rows))
+        hop = max(motion.kernel.half // HOPS, 1)
+        made.append(
+            Windows(
+                t=rows * run.step,
+                effort=fit.effort[part],
+                fitted=fit.effort[part] - fit.residual[part],
+                residual=fit.residual[part],
+                velocity=motion.velocity,
+                place=(rows - (int(rows[0]) if len(rows) else 0)) // hop,
+                hop=hop * run.step,
+                width=(2 * motion.kernel.half + 1) * run.step,
+            )
+        )
+    return tuple(made)
 
 
 def autocorrelation(windows: Sequence[Windows]) -> tuple[Numbers, Numbers]:
@@ -113,7 +119,13 @@ def effort_figures(found: Identification, windows: Sequence[Windows], shown: int
 def effort_charts(windows: Windows, run: Run) -> list[Chart]:
     """Draw what drove the axis, measured and by the model, and what is left."""
     gaps = np.flatnonzero(np.diff(windows.place) > 1) + 1
-    t, (effort, fitted, residual) = _with_gaps(windows.t, gaps, [windows.effort, windows.fitted, windows.residual])
+    series = [windows.effort, windows.fitted, windows.residual]
+    # Rows that draw like all of them, with a gap in every curve before some rows: the chart's own thinning looks for
+    # extremes, and would drop the gaps.
+    kept = np.unique(np.concatenate([gaps, *(thin_indices(curve, POINTS) for curve in series)])).astype(np.intp)
+    holes = np.searchsorted(kept, gaps)
+    t = np.insert(windows.t[kept], holes, 0.5 * (windows.t[gaps - 1] + windows.t[gaps]))
+    effort, fitted, residual = (np.insert(curve[kept], holes, np.nan) for curve in series)
     scale = effort_scale(run.effort_unit, peak_of(effort))
     curves = [
         scaled("by the model", "speed", fitted, scale, width=2.5, thin=len(t)),
@@ -124,17 +136,6 @@ def effort_charts(windows: Windows, run: Run) -> list[Chart]:
         Panel(name="effort-both", label=label_of(run.effort_name, scale.name), curves=curves, zero=True),
         Panel(name="effort-left", label=label_of("residual", scale.name), curves=[left], zero=True, height=150),
     ])  # fmt: skip
-
-
-def _with_gaps(t: Numbers, before: Numbers, curves: Sequence[Numbers]) -> tuple[Numbers, list[Numbers]]:
-    """Rows that draw like all of them, with a gap in every curve before some rows.
-
-    Thinning looks for extremes, and would drop the gaps.
-    """
-    kept = np.unique(np.concatenate([before, *(thin_indices(curve, POINTS) for curve in curves)])).astype(np.intp)
-    holes = np.searchsorted(kept, before)
-    times = np.insert(t[kept], holes, 0.5 * (t[before - 1] + t[before]))
-    return times, [np.insert(curve[kept], holes, np.nan) for curve in curves]
 
 
 def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:

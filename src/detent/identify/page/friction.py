@@ -39,7 +39,9 @@ def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit
     every = max(1, -(-len(velocity) // DOTS))
     velocity, residual = velocity[::every], residual[::every]
     friction = friction_at(constants, constants.values, velocity) + residual
-    x = _places(velocity)
+    # Velocities of the windows, and between them as many as a smooth curve needs; 0 is one of them.
+    top, bottom = max(float(velocity.max()), 0.0), min(float(velocity.min()), 0.0)
+    x = np.unique(np.concatenate([velocity, np.linspace(bottom, 0.0, 200), np.linspace(0.0, top, 200)]))
     dots = np.full(len(x), np.nan)
     dots[np.searchsorted(x, velocity)] = friction
     # At standstill friction is whatever holds the axis: no curve.
@@ -59,12 +61,6 @@ def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit
     return line_chart(panel, places, label_of("velocity", speed.name), digits=digits_for(peak_of(places)))
 
 
-def _places(velocity: Numbers) -> Numbers:
-    """Velocities of the windows, and between them as many as a smooth curve needs; 0 is one of them."""
-    top, bottom = max(float(velocity.max()), 0.0), min(float(velocity.min()), 0.0)
-    return np.unique(np.concatenate([velocity, np.linspace(bottom, 0.0, 200), np.linspace(0.0, top, 200)]))
-
-
 def friction_at(constants: Constants, values: Numbers, velocity: Numbers) -> Numbers:
     """Friction of the model, signed as the velocity, with any values of its constants."""
     known = dict(zip(constants.names, values.tolist(), strict=True))
@@ -74,9 +70,8 @@ def friction_at(constants: Constants, values: Numbers, velocity: Numbers) -> Num
         coulomb = known.get(f"coulomb.{way}", 0.0)
         excess = known.get(f"static.{way}", coulomb) - coulomb
         bristle = np.exp(-np.minimum((speed / known["stribeck"]) ** 2, 50.0)) if known.get("stribeck") else 0.0
-        total += np.where(
-            speed > 0.0, sign * (coulomb + excess * bristle + known.get(f"viscous.{way}", 0.0) * speed), 0.0
-        )
+        friction = coulomb + excess * bristle + known.get(f"viscous.{way}", 0.0) * speed
+        total += np.where(speed > 0.0, sign * friction, 0.0)
     return total
 
 

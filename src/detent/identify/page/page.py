@@ -30,12 +30,15 @@ def identify_page(found: Identification) -> Page:
     held, windows = hold_out(found), windows_of(found)
     shown = max(range(len(held)), key=lambda k: held[k].rms_restarted) if held else 0
     ways, effort_unit = Ways(found.runs[0].position_unit), found.runs[0].effort_unit
-    title = _title(found)
+    first, more = found.logs[0].name, len(found.logs) - 1
+    title = f"{first} and {more} more" if more else first
+    # What concerns all constants stands right below the verdict.
+    general = [r for r in found.refusals if not r.constants]
     return Page(
         title=f"{title}: {found.verdict}",
         headline=_headline(found, title, ways),
         cards=_cards(found, ways),
-        notes=_notes(found),
+        notes=[Note("error", f"{sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in general],
         sections=[
             Section("Constants", constant_figures(found)),
             Section("What was found in the log", recording_figures(found, shown, simulated=bool(held))),
@@ -56,47 +59,32 @@ def identify_page(found: Identification) -> Page:
 # ---- what came out, in one glance
 
 
-def _title(found: Identification) -> str:
-    first, more = found.logs[0].name, len(found.logs) - 1
-    return f"{first} and {more} more" if more else first
-
-
 def _headline(found: Identification, title: str, ways: Ways) -> Headline:
-    recordings = count(len(found.logs), "recording")
-    return Headline(
-        level=LOOKS[found.verdict],
-        verdict=sentence(found.verdict),
-        name=title,
-        kicker=f"Constants of an axis, identified from {recordings}",
-        lead=_lead(found, ways),
-    )
+    kicker = f"Constants of an axis, identified from {count(len(found.logs), 'recording')}"
+    verdict = sentence(found.verdict)
+    return Headline(level=LOOKS[found.verdict], verdict=verdict, name=title, kicker=kicker, lead=_lead(found, ways))
 
 
 def _lead(found: Identification, ways: Ways) -> str:
     if found.verdict == "refused":
-        subjects = list(dict.fromkeys(r.subject for r in found.refusals if not r.constants)) or [
-            r.subject for r in found.refusals
-        ]
+        general = [r for r in found.refusals if not r.constants]
+        subjects = dict.fromkeys(r.subject for r in general or found.refusals)
         return f"No constant of this log can be trusted: {'; '.join(subjects)}. Below stands what to record instead."
     good = count(len(found.trusted), "constant")
     if found.verdict == "trusted":
         first = f"All {good} can be trusted."
     else:
         first = f"{good} can be trusted; not {_listed(_missing(found))}."
-    return f"{first} {_tested(_telling(found.horizons), ways)}".strip()
-
-
-def _tested(h: Horizon | None, ways: Ways) -> str:
-    """The simulation over a second, or what is next to it, in a sentence."""
-    if h is None:
-        return ""
+    if not (h := _telling(found.horizons)):
+        return first
     return (
-        f"Tested on the last quarter of the recording, which the fit had not seen: simulated for {h.name}, the axis "
-        f"ends {ways.error(h.rms)} from where it was; without a model it would be {ways.error(h.naive)}."
+        f"{first} Tested on the last quarter of the recording, which the fit had not seen: simulated for {h.name}, the "
+        f"axis ends {ways.error(h.rms)} from where it was; without a model it would be {ways.error(h.naive)}."
     )
 
 
 def _telling(horizons: Sequence[Horizon]) -> Horizon | None:
+    """The simulation over a second, or what is next to it."""
     timed = [h for h in horizons if h.name not in {"one step", "free run"} and h.duration <= 1.01]
     return timed[-1] if timed else None
 
@@ -138,13 +126,6 @@ def _constant_card(e: Estimate, *, trusted: bool) -> Card:
     below = f"±{GAP}{percent(relative_half(e))}" if is_known(e) else ""
     below = below if trusted else f"{below} not trusted".strip()
     return Card(sentence(name), text.value if is_known(e) else "\u2013", text.unit, below, bad=not trusted)
-
-
-def _notes(found: Identification) -> list[Note]:
-    """What concerns all constants, right below the verdict."""
-    return [
-        Note("error", f"{sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in found.refusals if not r.constants
-    ]
 
 
 def _settings(found: Identification) -> dict[str, str]:

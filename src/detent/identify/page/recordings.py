@@ -22,23 +22,20 @@ _COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "sof
 
 def recording_figures(found: Identification, shown: int, *, simulated: bool) -> list[Figure]:
     """What one log holds over time, the faults of all, what was read from which column."""
+    run, log = found.runs[shown], found.logs[shown]
+    share = 1.0 - float(run.usable.mean())
+    used = f"Shaded: {share:.0%} of the samples, which are not used." if share > 0.0 else "Every sample is used."
+    caption = f"{log.name}: {duration(float(run.t[-1]))} at {1.0 / run.step:.4g} Hz. {used}"
     listed = [_log_figure(found.logs, shown, simulated=simulated)] if len(found.logs) > 1 else []
     return [
-        _recorded_figure(found.runs[shown], found.logs[shown]),
+        Figure(title="What was recorded", caption=caption, charts=recorded_charts(run)),
         _fault_figure(found),
         *listed,
-        _column_figure(found.logs[shown]),
+        _column_figure(log),
     ]
 
 
 # ---- over time
-
-
-def _recorded_figure(run: Run, log: Log) -> Figure:
-    share = 1.0 - float(run.usable.mean())
-    used = f"Shaded: {share:.0%} of the samples, which are not used." if share > 0.0 else "Every sample is used."
-    caption = f"{log.name}: {duration(float(run.t[-1]))} at {1.0 / run.step:.4g} Hz. {used}"
-    return Figure(title="What was recorded", caption=caption, charts=recorded_charts(run))
 
 
 def recorded_charts(run: Run) -> list[Chart]:
@@ -48,7 +45,11 @@ def recorded_charts(run: Run) -> list[Chart]:
     if run.reference is not None:
         curves.append(scaled("reference", "left", run.reference, place, dash=(5, 4)))
     effort = [scaled(run.effort_name, "drive", run.effort, scale)]
-    unused = _joined(spans_of(run.t, ~run.usable), float(run.t[-1]) / MOST_BANDS)
+    unused: list[tuple[float, float]] = []
+    for begin, end in spans_of(run.t, ~run.usable):
+        # Stretches closer together than can be seen are one.
+        near = unused and begin - unused[-1][1] < float(run.t[-1]) / MOST_BANDS
+        unused.append((unused.pop()[0] if near else begin, end))
     bands = [Band(label="not used", colour="brake", spans=unused)]
     above, below = label_of("position", place.name), label_of(run.effort_name, scale.name)
     return time_charts(Timeline(name="recorded", t=run.t, label=SINCE, unit="s", bands=bands), [
@@ -57,25 +58,13 @@ def recorded_charts(run: Run) -> list[Chart]:
     ])  # fmt: skip
 
 
-def _joined(spans: list[tuple[float, float]], least: float) -> list[tuple[float, float]]:
-    """Stretches with those closer together than can be seen made one."""
-    joined: list[tuple[float, float]] = []
-    for begin, end in spans:
-        if joined and begin - joined[-1][1] < least:
-            joined[-1] = (joined[-1][0], end)
-        else:
-            joined.append((begin, end))
-    return joined
-
-
 # ---- faults
 
 
 def _fault_figure(found: Identification) -> Figure:
     several = len(found.logs) > 1
-    told = [(log, finding) for log in found.logs for finding in log.findings]
-    order = list(_COLOURS)
-    told.sort(key=lambda pair: order.index(pair[1].severity))
+    told = [(log, finding) for severity in _COLOURS for log in found.logs for finding in log.findings
+            if finding.severity is severity]  # fmt: skip
     if not told:
         more = "what the motion itself tells stands below" if found.refusals else "no gaps, jumps, wrong signs or units"
         return Figure(title="Faults", drawing=Markup("<p>None found in the file: {}.</p>").format(more))
@@ -150,15 +139,10 @@ def refused_figures(found: Identification) -> list[Figure]:
     units = {e.name: e.unit for e in found.estimates}
     heads = [("what is wrong", False), ("what was found", False), ("do instead", False), ("not trusted for it", False)]
     bold = Markup("<b>{}</b>")
-    rows = [
-        [
-            bold.format(r.subject),
-            r.text,
-            bold.format(r.record),
-            "; ".join(constant_name(name, units.get(name, "")) for name in r.constants) or "all constants",
-        ]
-        for r in found.refusals
-    ]
+    rows: list[list[str]] = []
+    for r in found.refusals:
+        lost = "; ".join(constant_name(name, units.get(name, "")) for name in r.constants)
+        rows.append([bold.format(r.subject), r.text, bold.format(r.record), lost or "all constants"])
     caption = (
         "A constant that the recording does not tell is refused rather than guessed. Each row says what would tell it."
     )

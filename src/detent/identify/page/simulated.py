@@ -57,7 +57,9 @@ def _simulated(constants: Constants, run: Run, cut: int) -> HeldOut:
     unseen = run.part(cut, len(run.position))
     free = free_run(constants, unseen)
     begin = len(unseen.position) - len(free)
-    samples = max(round(_restart_of(len(free) * run.step) / run.step), 2)
+    # A second, or the longest of the usual horizons that goes twice into a shorter stretch.
+    fitting = (h for h in HORIZONS if h <= RESTART and 2.0 * h <= len(free) * run.step)
+    samples = max(round(max(fitting, default=min(HORIZONS)) / run.step), 2)
     plant, velocity = Plant(constants, run.step), start_velocities(unseen)
     pieces: list[Numbers] = []
     for start in range(begin, len(unseen.position), samples):
@@ -66,11 +68,6 @@ def _simulated(constants: Constants, run: Run, cut: int) -> HeldOut:
         pieces.append(plant.run(unseen.effort, start, number, at, speed) if number > 1 else np.array([at]))
     t = (cut + begin + np.arange(len(free))) * run.step
     return HeldOut(t, unseen.position[begin:], np.concatenate(pieces), free, samples * run.step)
-
-
-def _restart_of(seconds: float) -> float:
-    """A second, or the longest of the usual horizons that goes twice into a shorter stretch."""
-    return max((h for h in HORIZONS if h <= RESTART and 2.0 * h <= seconds), default=min(HORIZONS))
 
 
 # ---- figures
@@ -142,13 +139,11 @@ def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
         "far below 100\u202f%. One step shows little but the noise of the encoder; the free run is one stretch, and "
         "its errors are over all of it."
     )
-    rows = [_horizon_row(h, ways) for h in horizons]
+    rows: list[list[str]] = []
+    for h in horizons:
+        share = h.rms / h.naive if h.naive > 0.0 else math.nan
+        name = f"free run, {duration(float(h.duration))}" if h.name == "free run" else h.name
+        bar = long_bar(share / 1.5, percent(share), chosen=share < 1.0)
+        errors = [ways.error(value) for value in (h.rms, h.largest, h.naive)]
+        rows.append([name, count(h.starts), *errors, bar, ways.error(h.moved)])
     return Figure(title="How far it can be foretold", caption=caption, table=Table(heads=heads, rows=rows))
-
-
-def _horizon_row(h: Horizon, ways: Ways) -> list[str]:
-    share = h.rms / h.naive if h.naive > 0.0 else math.nan
-    name = f"free run, {duration(float(h.duration))}" if h.name == "free run" else h.name
-    bar = long_bar(share / 1.5, percent(share), chosen=share < 1.0)
-    errors = [ways.error(value) for value in (h.rms, h.largest, h.naive)]
-    return [name, count(h.starts), *errors, bar, ways.error(h.moved)]

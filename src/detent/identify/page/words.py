@@ -93,9 +93,19 @@ class Written:
 
 def written(found: Estimate) -> Written:
     """Write an estimate so that its last digit is the second of its uncertainty; a delay in ms."""
-    if found.unit == "s":
-        return _written(found.value * 1e3, found.half * 1e3, "ms")
-    return _written(found.value, found.half, unit_text(found.unit))
+    factor, unit = (1e3, "ms") if found.unit == "s" else (1.0, unit_text(found.unit))
+    value, half = found.value * factor, found.half * factor
+    if not 0.0 < half < math.inf:
+        return Written(number(value), "0", unit)
+    size = max(abs(value), half)
+    # The power of ten that is set apart: none for a number that reads well without.
+    power = 0 if 1e-3 <= size < 1e6 else 3 * math.floor(math.log10(size) / 3)
+    scaled, reach = value / 10.0**power, half / 10.0**power
+    places = min(max(0, 1 - math.floor(math.log10(reach))), 9)
+    text = f"{scaled:.{places}f}".replace("-", "\u2212")
+    raised = str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    times = f"{GAP}·{GAP}10{raised}" if power else ""
+    return Written(text + times, f"{reach:.{places}f}{times}", unit)
 
 
 def relative_half(found: Estimate) -> float:
@@ -110,31 +120,9 @@ def is_known(found: Estimate) -> bool:
     return relative_half(found) < UNKNOWN
 
 
-def _written(value: float, half: float, unit: str) -> Written:
-    if not 0.0 < half < math.inf:
-        return Written(number(value), "0", unit)
-    power = _power(max(abs(value), half))
-    scaled, reach = value / 10.0**power, half / 10.0**power
-    places = min(max(0, 1 - math.floor(math.log10(reach))), 9)
-    text = f"{scaled:.{places}f}".replace("-", "\u2212")
-    times = f"{GAP}·{GAP}10{_raised(power)}" if power else ""
-    return Written(text + times, f"{reach:.{places}f}{times}", unit)
-
-
-def _power(size: float) -> int:
-    """Power of ten that is set apart: none for a number that reads well without."""
-    if 1e-3 <= size < 1e6:
-        return 0
-    return 3 * math.floor(math.log10(size) / 3)
-
-
-def _raised(power: int) -> str:
-    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
 def long_bar(share: float, text: str, *, chosen: bool) -> Markup:
     """A bar, of at most `LONGEST`, with its figure."""
-    width = max(round(LONGEST * min(max(share, 0.0), 1.0)), 1)
+    width = max(round(LONGEST * min(max(0.0, share), 1.0)), 1)
     colour = "good" if chosen else "muted"
     return Markup(
         '<span class="bar" style="width:{}px;background:var(--{})"></span><span class="nowrap">{}</span>'

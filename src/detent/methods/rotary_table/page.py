@@ -11,10 +11,9 @@ from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change
 from detent.methods.rotary_table.summary import SequenceFigures, rollovers, times, turns, whose
-from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
+from detent.page.chart import Bar, Chart, Curve, Lane, Panel, Timeline, lane_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
-from detent.page.lanes import Bar, Lane, lane_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import (
     Stretch,

@@ -21,12 +21,11 @@ from detent.methods.stepper_envelope.stage_trace import (
     travel_envelope,
 )
 from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
-from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, time_charts
+from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, thin_indices, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Section
 from detent.page.parts import Event, Numbers
 from detent.page.run_page import Stretch, stretch
-from detent.page.thin import thin_indices
 from detent.page.words import GAP, count, number
 from detent.record.trace import Trace
 

@@ -8,8 +8,7 @@ import numpy as np
 from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
 from detent.methods.stepper_envelope.stage_trace import Arc, Envelope
 from detent.methods.stepper_envelope.summary import stated
-from detent.page.chart import Chart, Curve, Panel
-from detent.page.loops import Loop, loop_chart
+from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.words import GAP, count
 
