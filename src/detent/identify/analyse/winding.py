@@ -23,27 +23,170 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from detent.errors import DetentError
-from detent.identify.analyse.winding_fit import (
-    FEWEST,
-    METHOD,
-    POLES,
-    Piece,
-    WindingFit,
-    iterate,
-    make_pieces,
-    solve_instruments,
-    torque_role,
-)
-from detent.identify.fit.coloured import coloured_covariance
-from detent.identify.fit.estimate import Estimate, estimate
-from detent.logs.log import Log
+from detent.identify.fit.coloured import coloured_covariance, known_noise_covariance
+from detent.identify.fit.estimate import Estimate, estimate, quantile
+from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
+from detent.logs.windows import scipy
 
 EVEN = 0.1  # largest deviation of a time step from their mean, as a part of it
 TOGETHER = 0.95  # correlation of two constants from which they may be inseparable
 _TORQUE_UNITS = {"V*s/rad": "N*m/A", "V*s/m": "N/A"}
 CLEARLY_BETTER = 0.8  # residual, as a part of the present one, with which another delay of the voltage fits better
+FEWEST = 100  # samples of a record, at least
+SMOOTH = 9  # samples over which the speed is averaged to be its own instrument
+ROUNDS = 50  # times, at most, that instruments and constants are found in turn
+SETTLED = 1e-7  # change of the constants, relative, at which they are found
+POLES = (0.01, 0.9999)  # limits of ``a`` in the filter; what lies outside is judged when it has settled
+VAGUE = 0.3  # relative error from which a constant is not found
+METHOD = "refined instrumental variable"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A part without gaps: current, held voltage, mean speed between samples, the same smoothed; torque; time step."""
+
+    i: Values
+    u: Values
+    v: Values
+    smooth: Values
+    torque: Values
+    step: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindingFit:
+    """R, L, u0 and ke (absent when locked), their covariance and degrees of freedom."""
+
+    values: Values
+    covariance: Values
+    degrees: int
+    pole: tuple[float, float]  # interval of a
+    residual: Values  # of the equation behind the filter
+    made: list[Values]  # currents that the model makes, piece by piece
+
+    def correlation(self, one: int, other: int) -> float:
+        """Correlation of two constants, by their places."""
+        return float(self.covariance[one, other]) / (self.error(one) * self.error(other) or 1.0)
+
+    def error(self, which: int) -> float:
+        """Standard error of a constant."""
+        return float(np.sqrt(self.covariance[which, which]))
+
+    def estimate(self, which: int, name: str, unit: str) -> Estimate:
+        """A constant with its interval."""
+        return estimate(name, float(self.values[which]), unit, self.error(which), METHOD, self.degrees)
+
+    def is_vague(self, which: int) -> bool:
+        """True for a constant that is not told from zero, or hardly."""
+        return not self.error(which) < VAGUE * abs(float(self.values[which]))
+
+
+def make_pieces(log: Log, late: int = 0) -> list[Piece]:
+    """Parts of a log without gaps; where the voltage is late, both ends are cut."""
+    role = torque_role(log)
+    pieces: list[Piece] = []
+    for part in stretches(log.t):
+        count = part.stop - part.start
+        if count < FEWEST:
+            continue
+        step = float(log.t[part][-1] - log.t[part][0]) / (count - 1)
+        # Mean speed from each sample to the next.
+        if "position" in log.signals:
+            v = np.diff(log.signals["position"][part]) / step
+        else:
+            v = 0.5 * (log.signals["velocity"][part][1:] + log.signals["velocity"][part][:-1])
+        smooth = np.asarray(scipy("ndimage").uniform_filter1d(v, SMOOTH, mode="nearest"), float)
+        u, i = log.signals["voltage"][part], log.signals["current"][part]
+        begin, end = max(late, 0), count - 1 - max(-late, 0)
+        held = u[begin - late : end - late]
+        torque = log.signals[role][part][begin:end] if role else np.empty(0)
+        pieces.append(Piece(i[begin : end + 1], held, v[begin:end], smooth[begin:end], torque, step))
+    return pieces
+
+
+def iterate(pieces: list[Piece], *, is_moving: bool) -> WindingFit | None:
+    """Find constants and instruments in turn; None where that does not settle."""
+    columns, target = _stacked(pieces, 0.0, None, is_moving=is_moving)
+    values = solve_instruments(columns, columns, target)
+    for _ in range(ROUNDS):
+        if values is None:
+            return None
+        before = values
+        pole = float(np.clip(before[0], *POLES))
+        made = [_simulated(piece, np.concatenate([[pole], before[1:]])) for piece in pieces]
+        columns, target = _stacked(pieces, pole, None, is_moving=is_moving)
+        instruments, _ = _stacked(pieces, pole, made, is_moving=is_moving)
+        values = solve_instruments(columns, instruments, target)
+        if values is not None and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
+            residual = target - columns @ values
+            # The residual alone would say too little where a few steps of the voltage hold most of what is known of L.
+            covariance, degrees = known_noise_covariance(columns, residual, residual, instruments)
+            physical, slope = _physical_constants(values, pieces[0].step)
+            reach = quantile(degrees) * float(np.sqrt(covariance[0, 0]))
+            interval = (float(values[0]) - reach, float(values[0]) + reach)
+            return WindingFit(physical, slope @ covariance @ slope.T, degrees, interval, residual, made)
+    return None
+
+
+def _physical_constants(values: Values, step: float) -> tuple[Values, Values]:
+    """Physical constants of a, g, g*u0 and g*ke (absent when locked), and their derivatives by these (delta method)."""
+    g, a = float(values[1]), float(np.clip(values[0], *POLES))
+    resistance, log_a = (1.0 - float(values[0])) / g, float(np.log(a))
+    count = len(values)
+    slope = np.zeros((count, count))
+    slope[0, :2] = -1.0 / g, -resistance / g
+    slope[1] = -step / log_a * slope[0]
+    slope[1, 0] += resistance * step / (a * log_a**2)
+    for row in range(2, count):
+        slope[row, 1], slope[row, row] = -float(values[row]) / g**2, 1.0 / g
+    return np.concatenate([[resistance, -resistance * step / log_a], values[2:] / g]), slope
+
+
+def _simulated(piece: Piece, values: Values) -> Values:
+    """Current that the model makes of voltage and speed, shape as the current."""
+    emf = values[3] * piece.smooth if len(values) > 3 else 0.0
+    drive = values[1] * piece.u - values[2] - emf
+    made, _ = scipy("signal").lfilter([1.0], [1.0, -values[0]], drive, zi=[values[0] * piece.i[0]])
+    return np.concatenate([[piece.i[0]], np.asarray(made, float)])
+
+
+def _stacked(pieces: list[Piece], pole: float, made: list[Values] | None, *, is_moving: bool) -> tuple[Values, Values]:
+    """Columns of the equation and its left side behind the filter; with currents that were made, the instruments."""
+    columns: list[Values] = []
+    targets: list[Values] = []
+    for number, piece in enumerate(pieces):
+        i = piece.i if made is None else made[number]
+        v = piece.v if made is None else piece.smooth
+        parts = [i[:-1], piece.u, -np.ones(len(piece.u)), *([-v] if is_moving else [])]
+        series = np.column_stack([*parts, i[1:]])
+        filtered = np.asarray(scipy("signal").lfilter([1.0], [1.0, -pole], series, axis=0), float)
+        columns.append(filtered[:, :-1])
+        targets.append(filtered[:, -1])
+    return np.concatenate(columns), np.concatenate(targets)
+
+
+def solve_instruments(columns: Values, instruments: Values, target: Values) -> Values | None:
+    """Constants of the instrumental-variable equation; None where it cannot be solved."""
+    size: Values = np.asarray(np.linalg.norm(columns, axis=0), float)
+    length: Values = np.asarray(np.linalg.norm(instruments, axis=0), float)
+    if not np.all(size > 0) or not np.all(length > 0):
+        return None
+    matrix = (instruments / length).T @ (columns / size)
+    if not np.linalg.cond(matrix) < 1e12:
+        return None
+    values = np.asarray(np.linalg.solve(matrix, (instruments / length).T @ target), float) / size
+    return values if np.all(np.isfinite(values)) else None
+
+
+def torque_role(log: Log) -> str:
+    """Role of a torque or force that was measured, not computed from the current; empty without one."""
+    source = log.columns.get("current")
+    for role in ("torque", "force"):
+        own = log.columns.get(role)
+        if role in log.signals and (own is None or source is None or own.column != source.column):
+            return role
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,35 +211,30 @@ class Winding:
         return tuple(one for one in (*found, self.apparent_resistance) if one is not None)
 
 
-def fit_winding(log: Log, *, is_locked: bool = False, late: int = 0) -> Winding:
+def fit_winding(log: Log) -> Winding:
     """Constants of the winding from a recording."""
     log.need("voltage", "current")
-    if late < 0:
-        raise DetentError(
-            f"winding: came a delay of {late} samples; allowed: 0 or more; a voltage acts after it is set"
-        )
-    reason = _refusal(log, is_locked=is_locked)
+    reason = _refusal(log)
     if reason:
         return Winding(reason=reason)
-    pieces = make_pieces(log, late, is_locked=is_locked)
+    pieces = make_pieces(log)
     is_moving = any(np.any(piece.v != 0) for piece in pieces)
     fit = iterate(pieces, is_moving=is_moving)
-    way = "" if is_locked else log.units["position" if "position" in log.signals else "velocity"].removesuffix("/s")
+    way = log.units["position" if "position" in log.signals else "velocity"].removesuffix("/s")
     found = _told(pieces, fit, f"V*s/{way}") if is_moving else _still(pieces, fit)
     if found.reason or fit is None:
         return found
     found = _with_torque(log, pieces, fit, found)
-    others = (make_pieces(log, other, is_locked=is_locked) for other in (late - 1, late + 1))
-    earlier, later = (iterate(other, is_moving=is_moving) for other in others)
+    earlier, later = (iterate(make_pieces(log, late), is_moving=is_moving) for late in (-1, 1))
     return replace(found, notes=(*found.notes, *_delay_notes(fit, earlier, later)))
 
 
-def _refusal(log: Log, *, is_locked: bool) -> str:
+def _refusal(log: Log) -> str:
     """Why a log says nothing about a winding; empty where it may."""
-    if not is_locked and not {"velocity", "position"} & set(log.signals):
+    if not {"velocity", "position"} & set(log.signals):
         return (
             "neither speed nor position is recorded: back-EMF and resistance cannot be told apart; "
-            "record one of them, or state that the rotor is locked"
+            "record one of them, with a locked rotor too"
         )
     if max(part.stop - part.start for part in stretches(log.t)) < FEWEST:
         return f"no {FEWEST} samples without a gap; record longer"

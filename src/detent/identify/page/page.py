@@ -6,8 +6,7 @@ from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.identification import Identification, Verdict
 from detent.identify.page.constants import constant_figures, correlation_figures, ladder_figures
-from detent.identify.page.effort import effort_figures, windows_of
-from detent.identify.page.friction import friction_figures
+from detent.identify.page.effort import effort_figures, friction_figures, windows_of
 from detent.identify.page.recordings import recording_figures, refused_figures
 from detent.identify.page.response import response_figures
 from detent.identify.page.simulated import hold_out, simulated_figures

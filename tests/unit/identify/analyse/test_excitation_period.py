@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from detent.identify.analyse.excitation_period import autocorrelation, cut_periods, find_period
+from detent.identify.analyse.measure_response import autocorrelation, cut_periods, find_period
 
 
 def multisine(moments, period, lines=60, seed=1):

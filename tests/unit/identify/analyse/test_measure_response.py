@@ -6,10 +6,11 @@ from scipy import signal
 from tests.synthetic_responses import within
 
 from detent.errors import DetentError
-from detent.identify.analyse.excitation_period import Periods, cut_periods
 from detent.identify.analyse.measure_response import (
+    Periods,
     average_periods,
     average_windows,
+    cut_periods,
     independent_windows,
     measure_response,
     noise_parts,

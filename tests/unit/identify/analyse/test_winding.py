@@ -76,14 +76,10 @@ def test_noise_of_the_current_does_not_make_the_inductance_smaller():
 
 def test_a_locked_rotor_gives_resistance_and_inductance_only():
     t, signals, _, _ = record(np.random.default_rng(3), is_still=True)
-    for log in (
-        turning(t, signals),
-        make_log(t, voltage=signals["voltage"], current=signals["current"]),
-    ):
-        found = fit_winding(log, is_locked="position" not in log.signals)
-        assert set(values(found)) == {"resistance", "inductance", "voltage_offset"}
-        assert found.resistance.holds(2.0)
-        assert found.inductance.value == pytest.approx(2e-3, rel=0.05)
+    found = fit_winding(turning(t, signals))
+    assert set(values(found)) == {"resistance", "inductance", "voltage_offset"}
+    assert found.resistance.holds(2.0)
+    assert found.inductance.value == pytest.approx(2e-3, rel=0.05)
     hits = []
     for seed in range(100):
         t, signals, _, _ = record(np.random.default_rng(seed), count=1500, is_still=True)
@@ -151,11 +147,7 @@ def test_an_inductance_that_settles_within_a_sample_is_only_bounded():
 def test_a_voltage_that_acts_later_is_said():
     t, signals, _, _ = record(np.random.default_rng(9), noise=0.02)
     signals["voltage"] = np.r_[signals["voltage"][1:], 0.0]
-    log = turning(t, signals)
-    assert "a voltage that acts a sample later" in fit_winding(log).notes[-1]
-    mended = fit_winding(log, late=1)
-    assert mended.notes == ()
-    assert mended.inductance.holds(2e-3)
+    assert "a voltage that acts a sample later" in fit_winding(turning(t, signals)).notes[-1]
 
 
 def test_signs_that_do_not_fit_are_refused():
@@ -218,5 +210,3 @@ def test_wrong_input_is_an_error():
     t, signals, _, _ = record(np.random.default_rng(1))
     with pytest.raises(DetentError, match="name the column: current=COLUMN"):
         fit_winding(make_log(t, voltage=signals["voltage"]))
-    with pytest.raises(DetentError, match="a delay of -1 samples"):
-        fit_winding(turning(t, signals), late=-1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.page_reader import Reader
 
-from detent.identify.page.bode import FOOT, FULL, LEFT, RIGHT, TOP, Line, Plot, frequency_plots
+from detent.identify.page.response import FOOT, FULL, LEFT, RIGHT, TOP, Line, Plot, frequency_plots
 
 F = np.array([1.0, 10.0, 100.0])
 

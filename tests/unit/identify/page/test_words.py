@@ -87,4 +87,5 @@ def test_bars_are_relative_and_bounded() -> None:
     assert "width:110px" in long_bar(0.5, "a<b", chosen=False)
     assert "width:220px" in long_bar(3.0, "", chosen=True)
     assert "width:1px" in long_bar(0.0, "", chosen=False)
+    assert "width:1px" in long_bar(float("nan"), "\u2013", chosen=False)
     assert "a&lt;b" in long_bar(0.5, "a<b", chosen=False)
