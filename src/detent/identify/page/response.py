@@ -5,7 +5,7 @@ Plots over the logarithm of the frequency are drawn as SVG, without a script.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup, escape
@@ -15,6 +15,7 @@ from detent.identify.analyse.measure_response import FrequencyResponse, response
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.identification import Identification
 from detent.identify.page.words import unit_text
+from detent.page.chart import Curve, Panel
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 
@@ -25,79 +26,60 @@ BROADEST = 3.0  # highest over lowest coherent frequency, at least
 MOST_LINES = 800  # frequencies drawn
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """One curve of a plot over the frequency."""
-
-    label: str  # as in the legend; empty for none
-    colour: str  # name of a colour of template/report.css
-    x: Numbers  # and y: frequency [Hz] and value, NaN for a gap, shape (n,)
-    y: Numbers
-    dash: str = ""  # of the line, as SVG writes it; empty for a solid one
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plot:
-    """A plot over the logarithm of the frequency."""
-
-    label: str  # of the vertical axis
-    lines: Sequence[Line]  # the first is drawn first
-    logarithmic: bool = False  # the values are, too
-    span: tuple[float, float] | None = None  # of the values; by the first line unless given
-    height: int = 200  # [px]
-    levels: Sequence[float] = ()  # marked values
-
-
 LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
 
 
-def frequency_plots(plots: Sequence[Plot]) -> Markup:
-    """Draw plots above one another over the same frequencies, the axis logarithmic."""
-    low, high = (float(f(plots[0].lines[0].x)) for f in (np.min, np.max))
+def frequency_plots(f: Numbers, panels: Sequence[Panel], *, logarithmic: int = 0) -> Markup:
+    """Draw panels above one another over frequencies [Hz], the axis logarithmic, that of so many panels' values too."""
     legend = " ".join(
         f'<span class="nowrap"><svg width="26" height="10"><path d="M1 5h24" style="{_stroke(line, 2.5)}"/></svg> '
         f"{escape(line.label)}</span>"
-        for line in plots[0].lines
+        for line in panels[0].curves
         if line.label
     )
-    drawn = "".join(_plot(plot, low, high, last=plot is plots[-1]) for plot in plots)
+    last = len(panels) - 1
+    drawn = "".join(_plot(panel, f, is_log=k < logarithmic, last=k == last) for k, panel in enumerate(panels))
     return Markup(f'{drawn}<p class="hint">{legend}</p>')  # noqa: S704 - texts are escaped where they are put in
 
 
-def _stroke(line: Line, width: float) -> str:
-    dash = f";stroke-dasharray:{line.dash}" if line.dash else ""
+def _stroke(line: Curve, width: float) -> str:
+    dash = ";stroke-dasharray:{} {}".format(*line.dash) if line.dash else ""
     return f"fill:none;stroke:var(--{line.colour});stroke-width:{width}{dash}"
 
 
-def _plot(plot: Plot, low: float, high: float, *, last: bool) -> str:
-    bottom, top = plot.span or _span(plot)
+def _plot(plot: Panel, f: Numbers, *, is_log: bool, last: bool) -> str:
+    """One panel; its values reach as far as the first curve does, with some room, unless it says how far."""
+    low, high = float(f.min()), float(f.max())
+    values = plot.curves[0].y[np.isfinite(plot.curves[0].y)]
+    bottom, top = float(values.min()), float(values.max())
+    room = max(0.1 * (top - bottom), 10.0)
+    bottom, top = plot.span or ((bottom / 2.0, top * 2.0) if is_log else (bottom - room, top + room))
     inner = plot.height - TOP - FOOT
 
-    def right(f: Numbers) -> Numbers:
+    def right(f: Any) -> Any:
         return LEFT + (FULL - LEFT - RIGHT) * np.log(f / low) / math.log(high / low)
 
-    def down(y: Numbers) -> Numbers:
-        share = np.log(y / bottom) / math.log(top / bottom) if plot.logarithmic else (y - bottom) / (top - bottom)
+    def down(y: Any) -> Any:
+        share = np.log(y / bottom) / math.log(top / bottom) if is_log else (y - bottom) / (top - bottom)
         return TOP + inner * (1.0 - share)
 
     parts: list[str] = []
-    for f, text in _decades(low, high):
-        at = float(right(np.array([f]))[0])
+    for tick, text in _decades(low, high):
+        at = right(tick)
         parts.append(f'<path d="M{at:.1f} {TOP}V{plot.height - FOOT}" style="stroke:var(--grid)"/>')
         if text:
             parts.append(f'<text x="{at:.1f}" y="{plot.height - 6}" text-anchor="middle">{text}</text>')
-    for value, text in _powers(bottom, top) if plot.logarithmic else _steps(bottom, top):
-        at = float(down(np.array([value]))[0])
+    for value, text in _powers(bottom, top) if is_log else _steps(bottom, top):
+        at = down(value)
         parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--grid)"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')
-    for level in plot.levels:
-        at = float(down(np.array([level]))[0])
-        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--soft);stroke-dasharray:3 3"/>')
+    for level, _ in plot.levels:
+        parts.append(
+            f'<path d="M{LEFT} {down(level):.1f}H{FULL - RIGHT}" style="stroke:var(--soft);stroke-dasharray:3 3"/>'
+        )
     wide = FULL - LEFT - RIGHT
     clip = f'<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{inner}" viewBox="{LEFT} {TOP} {wide} {inner}">'
-    curves = "".join(
-        f'<path d="{_path(right(one.x), down(one.y))}" style="{_stroke(one, 1.8)}"/>' for one in plot.lines
-    )
+    curves = "".join(f'<path d="{_path(right(f), down(one.y))}" style="{_stroke(one, 1.8)}"/>' for one in plot.curves)
     foot = f'<text x="{FULL / 2}" y="{plot.height + 14}" text-anchor="middle">frequency [Hz]</text>' if last else ""
     height = plot.height + (18 if last else 0)
     turned = f"translate(14 {TOP + inner / 2:.0f}) rotate(-90)"
@@ -109,27 +91,11 @@ def _plot(plot: Plot, low: float, high: float, *, last: bool) -> str:
     )
 
 
-def _span(plot: Plot) -> tuple[float, float]:
-    """By the first line, with some room."""
-    values = plot.lines[0].y[np.isfinite(plot.lines[0].y)]
-    low, high = float(values.min()), float(values.max())
-    if plot.logarithmic:
-        return low / 2.0, high * 2.0
-    room = max(0.1 * (high - low), 10.0)
-    return low - room, high + room
-
-
 def _path(x: Numbers, y: Numbers) -> str:
     """A line through points, broken where one is missing."""
-    text: list[str] = []
-    pen = "M"
-    for a, b in zip(x.tolist(), y.tolist(), strict=True):
-        if not math.isfinite(b):
-            pen = "M"
-            continue
-        text.append(f"{pen}{a:.1f} {b:.1f}")
-        pen = "L"
-    return "".join(text)
+    known = np.isfinite(y)
+    pens = np.where(np.r_[False, known[:-1]], "L", "M")
+    return "".join(f"{pen}{a:.1f} {b:.1f}" for pen, a, b in zip(pens[known], x[known], y[known], strict=True))
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:
@@ -211,19 +177,20 @@ def bode_plot(r: FrequencyResponse, constants: Constants | None) -> Markup:
     every = max(1, -(-len(r) // MOST_LINES))
     f, response, coherence = r.frequency[::every], r.response[::every], r.coherence[::every]
     model = respond(constants, f) if constants is not None else None
-    size = [Line(label="recorded", colour="speed", x=f, y=np.abs(response))]
-    angle = [Line(label="", colour="speed", x=f, y=_phase(response, model))]
+    size = [Curve(label="recorded", colour="speed", y=np.abs(response))]
+    angle = [Curve(label="", colour="speed", y=_phase(response, model))]
     if model is not None:
         turned = np.degrees(np.unwrap(np.angle(model)))
-        size.append(Line(label="mass and viscous friction", colour="left", x=f, y=np.abs(model), dash="6 4"))
-        angle.append(Line(label="", colour="left", x=f, y=turned, dash="6 4"))
-    explained = Line(label="", colour="good", x=f, y=coherence)
+        size.append(Curve(label="mass and viscous friction", colour="left", y=np.abs(model), dash=(6, 4)))
+        angle.append(Curve(label="", colour="left", y=turned, dash=(6, 4)))
+    explained = Curve(label="", colour="good", y=coherence)
     unit = f"{unit_text(r.output_unit) or '1'}/{unit_text(r.input_unit) or '1'}"
-    return frequency_plots([
-        Plot(label=f"magnitude [{unit}]", lines=size, logarithmic=True, height=260),
-        Plot(label="phase [deg]", lines=angle, height=180),
-        Plot(label="coherence", lines=[explained], span=(0.0, 1.05), height=130, levels=[COHERENT]),
-    ])  # fmt: skip
+    panels = [
+        Panel(name="", label=f"magnitude [{unit}]", curves=size, height=260),
+        Panel(name="", label="phase [deg]", curves=angle, height=180),
+        Panel(name="", label="coherence", curves=[explained], span=(0.0, 1.05), height=130, levels=[(COHERENT, "")]),
+    ]
+    return frequency_plots(f, panels, logarithmic=1)
 
 
 def _phase(response: Numbers, model: Numbers | None) -> Numbers:
