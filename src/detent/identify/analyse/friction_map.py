@@ -16,7 +16,7 @@ Assumptions: the velocity is known well enough that samples fall in their own bi
 friction of both directions, with opposite signs.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -75,12 +75,30 @@ def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) 
     role = log.effort(effort)
     _, speed_unit, _ = find_velocity(log)
     moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)
-    units = (role, log.units[role], speed_unit)
+    none = np.empty(0)
+    nothing = FrictionMap(role, log.units[role], speed_unit, mass, none, none, none, none, none, none, none)
     if not len(moving.place):
         steady = "no steady speed in this log; record passes at steady speeds, or state the mass"
         driven = "the axis does not move in this log; record moves to and fro at several speeds"
-        return _without_result(units, mass, driven if mass > 0 else steady)
-    return _mapped(moving, units, mass, bins)
+        return replace(nothing, reason=driven if mass > 0 else steady)
+    averages = _averages(moving, bins)
+    found = [one for one in averages if one.windows >= FEWEST_WINDOWS]
+    refused = tuple(
+        f"about {one.speed:.3g} {speed_unit}: {one.samples} samples are worth {one.windows:.1f} independent "
+        f"windows, not {FEWEST_WINDOWS:.0f}; record this speed longer or more often"
+        for one in averages
+        if one.windows < FEWEST_WINDOWS
+    )
+    if not found:
+        reason = "no speed was held long enough for an interval; record longer, or each speed more often"
+        return replace(nothing, refused=refused, reason=reason)
+    speed, friction, error, windows, samples = np.array(found, dtype=np.float64).T
+    reach = error * np.array([quantile(one.windows - 1.0) for one in found])
+    limits = (friction - reach, friction + reach)
+    dips = tuple(_dip(name, found, nothing.unit) for name in ("positive", "negative"))
+    return FrictionMap(
+        role, nothing.unit, speed_unit, mass, speed, friction, error, *limits, windows, samples, dips, refused
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,13 +109,6 @@ class _Moving:
     v: Values
     friction: Values
     lowest: float
-
-
-def _without_result(
-    units: tuple[str, str, str], mass: float, reason: str, refused: tuple[str, ...] = ()
-) -> FrictionMap:
-    none = np.empty(0)
-    return FrictionMap(*units, mass, none, none, none, none, none, none, none, refused=refused, reason=reason)
 
 
 def _steady(log: Log, role: str) -> _Moving:
@@ -138,31 +149,12 @@ class _Bin(NamedTuple):
     samples: int
 
 
-def _mapped(moving: _Moving, units: tuple[str, str, str], mass: float, bins: int) -> FrictionMap:
-    """The map of samples in motion."""
+def _averages(moving: _Moving, bins: int) -> list[_Bin]:
+    """Mean friction of each bin of speed and direction."""
     member = _members(moving, bins)
     window = moving.place // _window_rows(moving, member)
-    found: list[_Bin] = []
-    refused: list[str] = []
-    for number in sorted(set(member[member != 0].tolist())):
-        inside = member == number
-        one = _average(moving.v[inside], moving.friction[inside], window[inside])
-        if one.windows >= FEWEST_WINDOWS:
-            found.append(one)
-        else:
-            refused.append(
-                f"about {one.speed:.3g} {units[2]}: {one.samples} samples are worth {one.windows:.1f} independent "
-                f"windows, not {FEWEST_WINDOWS:.0f}; record this speed longer or more often"
-            )
-    if not found:
-        reason = "no speed was held long enough for an interval; record longer, or each speed more often"
-        return _without_result(units, mass, reason, tuple(refused))
-    speed, friction, error, windows, samples = np.array(found, dtype=np.float64).T
-    reach = error * np.array([quantile(one.windows - 1.0) for one in found])
-    dips = tuple(_dip(name, found, units[1]) for name in ("positive", "negative"))
-    return FrictionMap(
-        *units, mass, speed, friction, error, friction - reach, friction + reach, windows, samples, dips, tuple(refused)
-    )
+    insides = [member == number for number in sorted(set(member[member != 0].tolist()))]
+    return [_average(moving.v[inside], moving.friction[inside], window[inside]) for inside in insides]
 
 
 def _members(moving: _Moving, bins: int) -> NDArray[np.int64]:

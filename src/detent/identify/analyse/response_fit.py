@@ -12,17 +12,16 @@ correlations between magnitude and phase, between two encoders and between neigh
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts
-from detent.identify.analyse.two_mass_response import ResponseModel, laplace, respond_sampled
+from detent.identify.analyse.two_mass_response import Complex, ResponseModel, laplace, respond_sampled
 from detent.logs.log import Values
 from detent.logs.windows import scipy
-
-Complex = NDArray[np.complex128]
 
 MOST_DEVIATION = 0.3  # standard deviation of a line from which it is left out: the response there is noise
 LINES_PER_PARAMETER = 2  # lines below which a fit says nothing
@@ -77,12 +76,10 @@ class Fit:
 
 def take_lines(responses: Sequence[FrequencyResponse]) -> Lines:
     """Put responses of one excitation together."""
-    frequency = responses[0].frequency
-    for response in responses[1:]:
-        frequency = frequency[np.isin(frequency, response.frequency)]
-    held = [np.isin(response.frequency, frequency) for response in responses]
-    measured = np.array([response.response[mask] for response, mask in zip(responses, held, strict=True)])
-    deviation = np.array([response.deviation[mask] for response, mask in zip(responses, held, strict=True)])
+    frequency = reduce(np.intersect1d, [one.frequency for one in responses])
+    held = [(one, np.isin(one.frequency, frequency)) for one in responses]
+    measured = np.array([one.response[mask] for one, mask in held])
+    deviation = np.array([one.deviation[mask] for one, mask in held])
     # No recording is free of noise; without a least one, simulated ones would divide by 0.
     deviation = np.maximum(deviation, 1e-9)
     return Lines(frequency, measured, deviation, (deviation < MOST_DEVIATION) & (np.abs(measured) > 0))

@@ -16,7 +16,7 @@ section 7.4). Both are part of the models where a hold is given.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,20 +26,6 @@ from detent.logs.log import Values
 Complex = NDArray[np.complex128]
 
 ALIASES = 3  # multiples of the sample rate, to both sides, that are counted
-
-
-class ResponseModel(Protocol):
-    """Model of the answers of some outputs to one effort."""
-
-    count: ClassVar[int]  # parameters
-
-    def respond(self, parameters: Values, s: Complex) -> Complex:
-        """Responses up to the gain, shape (outputs, n), at complex frequencies `s` [rad/s], shape (n,)."""
-        ...
-
-    def tell(self, parameters: Values) -> dict[str, float]:
-        """What a person is told: frequencies [Hz], damping ratios, ratio of the masses, friction per mass [1/s]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +103,14 @@ class LoadModel:
         """Resonance and friction."""
         pole, log_omega, ratio, _ = parameters[:4].tolist()
         return {"resonance": float(np.exp(log_omega)) / (2 * np.pi), "resonance.damping": ratio, "viscous": pole}
+
+
+ResponseModel = RigidModel | TwoMassModel | LoadModel
+"""Model of the answers of some outputs to one effort.
+
+`respond` gives responses up to the gain, shape (outputs, n), at complex frequencies [rad/s], shape (n,). `tell` gives
+what a person is told: frequencies [Hz], damping ratios, ratio of the masses, friction per mass [1/s].
+"""
 
 
 def constants_of(parameters: Values) -> tuple[float, float, float, float, float, float]:
