@@ -55,13 +55,9 @@ class _Scale:
     """From picoseconds since power-on to what the axis of time shows."""
 
     begin: int
-    end: int
     unit_ps: int
     unit: str
-
-    @property
-    def span(self) -> float:
-        return self.of(self.end)
+    span: float
 
     def of(self, time: Any) -> Any:
         return (time - self.begin) / self.unit_ps
@@ -122,8 +118,9 @@ def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -
 
 def _scale(waveforms: Waveforms) -> _Scale:
     """Choose the unit that gives the axis of time numbers from 2 to 2000."""
-    unit_ps, unit = _unit_of((waveforms.end - waveforms.begin) / 2)
-    return _Scale(waveforms.begin, waveforms.end, unit_ps, unit)
+    span = waveforms.end - waveforms.begin
+    unit_ps, unit = _unit_of(span / 2)
+    return _Scale(waveforms.begin, unit_ps, unit, span / unit_ps)
 
 
 def _unit_of(time: float) -> tuple[int, str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -33,8 +33,8 @@ class Analysis:
     details: dict[str, Any]  # all of it, as plain data for JSON
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; a number that is not finite is None."""
-        return {"analysis": self.name, "log": self.log, "reason": self.reason, **_finite(self.details)}
+        """Plain data for JSON, but for numbers that are not finite."""
+        return {"analysis": self.name, "log": self.log, "reason": self.reason, **self.details}
 
 
 Found = tuple[tuple[Estimate, ...], str, tuple[str, ...], dict[str, Any]]
@@ -63,7 +63,8 @@ def _friction_map(log: Log, effort: str, mass: float) -> Found:
         for dip in found.dips
         if dip.is_found and dip.depth is not None
     )
-    return bins, found.reason, (*dips, *found.refused), asdict(found)
+    details = {name: one.tolist() if isinstance(one, np.ndarray) else one for name, one in asdict(found).items()}
+    return bins, found.reason, (*dips, *found.refused), details
 
 
 def _winding(log: Log, _: str, __: float) -> Found:
@@ -139,18 +140,3 @@ def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysi
     except DetentError as error:
         return Analysis(name, title, log.name, (), str(error), (), {})
     return Analysis(name, title, log.name, estimates, reason, notes, details)
-
-
-def _finite(value: Any) -> Any:
-    """Plain data with None for every number that is not finite."""
-    if isinstance(value, dict):
-        known = cast("dict[str, Any]", value)
-        return {key: _finite(one) for key, one in known.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in cast("list[Any]", value)]
-    if isinstance(value, np.ndarray):
-        return _finite(value.tolist())
-    if isinstance(value, float | np.floating):
-        number = float(value)  # pyright: ignore[reportUnknownArgumentType]
-        return number if np.isfinite(number) else None
-    return value

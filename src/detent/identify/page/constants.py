@@ -61,17 +61,14 @@ def _constant_row(found: Identification, e: Estimate, reach: float) -> list[str]
         name += Markup('<br><small style="color:var(--soft)">{}</small>').format(meaning)
     value = str(written(e)) if is_known(e) else "not known"
     share = f"±{GAP}{percent(relative_half(e))}" if is_known(e) and relative_half(e) < UNKNOWN else "\u2013"
-    return [name, value, interval_bar(e, reach, trusted=trusted), share, _why(found, e, trusted=trusted)]
-
-
-def _why(found: Identification, e: Estimate, *, trusted: bool) -> Markup:
     if trusted:
-        zero = ", but may be 0" if e.holds(0.0) else ""
-        return Markup('<span style="color:var(--good)" class="nowrap">✔ yes</span>{}').format(zero)
-    reasons = [r for r in found.refusals if e.name in r.constants]
-    general = [r for r in found.refusals if not r.constants]
-    texts = ", ".join(dict.fromkeys(r.subject for r in (reasons or general)))
-    return Markup('<span style="color:var(--bad)" class="nowrap">✘ no</span>: {}').format(texts)
+        said = '<span style="color:var(--good)" class="nowrap">✔ yes</span>{}'
+        why = ", but may be 0" if e.holds(0.0) else ""
+    else:
+        said = '<span style="color:var(--bad)" class="nowrap">✘ no</span>: {}'
+        reasons = [r for r in found.refusals if e.name in r.constants] or [r for r in found.refusals if not r.constants]
+        why = ", ".join(dict.fromkeys(r.subject for r in reasons))
+    return [name, value, interval_bar(e, reach, trusted=trusted), share, Markup(said).format(why)]  # noqa: S704
 
 
 def reach_of(estimates: Sequence[Estimate]) -> float:

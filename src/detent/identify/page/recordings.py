@@ -7,7 +7,7 @@ from markupsafe import Markup
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.prepare import Run
 from detent.identify.page.words import SINCE, Ways, constant_name, effort_scale, label_of, peak_of, scaled, unit_text
-from detent.logs.log import Action, Finding, Log, Severity, tell_rows
+from detent.logs.log import Action, Log, Severity, tell_rows
 from detent.page.chart import Band, Chart, Panel, Timeline, spans_of, time_charts
 from detent.page.figure import Figure
 from detent.page.table import Table
@@ -69,25 +69,19 @@ def _fault_figure(found: Identification) -> Figure:
         more = "what the motion itself tells stands below" if found.refusals else "no gaps, jumps, wrong signs or units"
         return Figure(title="Faults", drawing=Markup("<p>None found in the file: {}.</p>").format(more))
     heads = [("", False), ("rows", False), ("signal", False), ("what", False), ("what was done", False), ("do", False)]
-    rows = [_finding_row(log, finding, several=several) for log, finding in told[:MOST_FINDINGS]]
+    rows: list[list[str]] = []
+    for log, finding in told[:MOST_FINDINGS]:
+        look = Markup('<b style="color:var(--{})">{}</b>').format(_COLOURS[finding.severity], finding.severity.value)
+        what = Markup("<b>{}</b>: {}").format(finding.kind.value, finding.text)
+        done = "left as it is" if finding.action is Action.LEFT else finding.action.value
+        where = f"{log.name}: {tell_rows(finding.rows)}" if several else tell_rows(finding.rows)
+        rows.append([look, where, finding.signal or "all", what, done, finding.advice or "nothing"])
     return Figure(
         title="Faults",
         caption="Rows are counted from 1 below the header of the file.",
         table=Table(heads=heads, rows=rows, tall=len(rows) > TALL),
         hint=_not_listed(len(told) - MOST_FINDINGS, "finding"),
     )
-
-
-def _finding_row(log: Log, finding: Finding, *, several: bool) -> list[str]:
-    where = tell_rows(finding.rows)
-    return [
-        Markup('<b style="color:var(--{})">{}</b>').format(_COLOURS[finding.severity], finding.severity.value),
-        f"{log.name}: {where}" if several else where,
-        finding.signal or "all",
-        Markup("<b>{}</b>: {}").format(finding.kind.value, finding.text),
-        "left as it is" if finding.action is Action.LEFT else finding.action.value,
-        finding.advice or "nothing",
-    ]
 
 
 def _not_listed(left: int, word: str) -> str:

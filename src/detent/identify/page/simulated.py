@@ -13,7 +13,7 @@ from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, sta
 from detent.identify.fit.identification import HELD_OUT, Identification
 from detent.identify.fit.prepare import Run
 from detent.identify.page.words import SINCE, Ways, label_of, long_bar, peak_of, scaled
-from detent.methods.cascade.units import Scale, percent
+from detent.methods.cascade.units import percent
 from detent.page.chart import Chart, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
@@ -76,13 +76,9 @@ def _simulated(constants: Constants, run: Run, cut: int) -> HeldOut:
 def simulated_figures(found: Identification, held: Sequence[HeldOut], shown: int) -> list[Figure]:
     """The simulation of one log over time, and how far that of all can be trusted."""
     ways = Ways(found.runs[0].position_unit)
-    return [
-        *([_held_figure(found, held, shown, ways)] if held else []),
-        *([_horizon_figure(found.horizons, ways)] if found.horizons else []),
-    ]
-
-
-def _held_figure(found: Identification, held: Sequence[HeldOut], shown: int, ways: Ways) -> Figure:
+    horizons = [_horizon_figure(found.horizons, ways)] if found.horizons else []
+    if not held:
+        return horizons
     one = held[shown]
     worst = (
         f"Of {count(len(held), 'recording')} the one with the largest errors, {found.logs[shown].name}. "
@@ -95,7 +91,8 @@ def _held_figure(found: Identification, held: Sequence[HeldOut], shown: int, way
         "{}\u202fs it is {} off on average (rms), in one piece {}.</b> Where the curves lie on one another the model "
         "does what the axis did."
     ).format(worst, f"{one.restart:.3g}", ways.error(one.rms_restarted), ways.error(one.rms_free))
-    return Figure(title="On the part that the fit did not see", caption=caption, charts=held_charts(one, ways))
+    title = "On the part that the fit did not see"
+    return [Figure(title=title, caption=caption, charts=held_charts(one, ways)), *horizons]
 
 
 def held_charts(held: HeldOut, ways: Ways) -> list[Chart]:
@@ -107,19 +104,16 @@ def held_charts(held: HeldOut, ways: Ways) -> list[Chart]:
         scaled("recorded", "left", held.measured, place, dash=(5, 4)),
     ]
     label = label_of("position", place.name)
+    # A simulation that runs away must not squeeze the rest.
+    room = SPREAD * float(np.ptp(held.measured))
+    low, high = float(held.measured.min()) - room, float(held.measured.max()) + room
+    leaves = bool(np.any((held.free < low) | (held.free > high)))
+    span = (low * place.factor, high * place.factor) if leaves else None
     return time_charts(Timeline(name="held", t=held.t, label=SINCE, unit="s"), [
-        Panel(name="held-position", label=label, curves=curves, span=_span_of(held, place)),
+        Panel(name="held-position", label=label, curves=curves, span=span),
         _off_panel("held-restarted", again, "speed", held.measured - held.restarted, ways),
         _off_panel("held-free", "simulated in one piece", "drive", held.measured - held.free, ways),
     ])  # fmt: skip
-
-
-def _span_of(held: HeldOut, place: Scale) -> tuple[float, float] | None:
-    """A simulation that runs away must not squeeze the rest."""
-    low, high = float(held.measured.min()), float(held.measured.max())
-    room = SPREAD * (high - low)
-    leaves = bool(np.any((held.free < low - room) | (held.free > high + room)))
-    return ((low - room) * place.factor, (high + room) * place.factor) if leaves else None
 
 
 def _off_panel(name: str, label: str, colour: str, off: Numbers, ways: Ways) -> Panel:

@@ -7,6 +7,7 @@ import pytest
 from tests.log_rig import make_log
 from tests.places import DATA
 
+from detent.cli.terminal import print_json
 from detent.errors import DetentError
 from detent.identify.analyse.analyses import ANALYSES, analyse
 from detent.logs.log import Log
@@ -54,9 +55,9 @@ def test_what_a_log_does_not_hold_is_a_reason_and_no_error(steady: Log, name: st
 
 
 @pytest.mark.parametrize("name", ANALYSES)
-def test_every_answer_is_plain_data(steady: Log, name: str):
-    told = json.dumps(analyse(steady, name).to_dict(), allow_nan=False)
-    assert json.loads(told)["analysis"] == name
+def test_every_answer_is_plain_data(steady: Log, name: str, capsys: pytest.CaptureFixture[str]):
+    print_json(analyse(steady, name).to_dict())
+    assert json.loads(capsys.readouterr().out)["analysis"] == name
 
 
 def test_an_unknown_name_lists_the_known_ones(steady: Log):
