@@ -31,22 +31,11 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """How the loop answered a command.
+    """How the loop answered a command: columns of shape (n,) over the time `t` since the first sample instant [s].
 
-    Attributes
-    ----------
-    t : ndarray
-        Time since the first sample instant [s], shape (n,).
-    command, position : ndarray
-        X and x [count].
-    velocity : ndarray
-        x' [count/s].
-    speed_word : ndarray
-        y [count]; at a sample instant the new word, which acts from there.
-    following_error : ndarray
-        P = X - x [count].
-    drive_word : ndarray
-        E = K1·P - y [count].
+    `command` is X and `position` is x [count], `velocity` is x' [count/s], `following_error` is P = X - x [count].
+    `speed_word` is y [count], at a sample instant the new word, which acts from there; `drive_word` is E = K1·P - y
+    [count].
     """
 
     t: Numbers
@@ -62,6 +51,8 @@ class Response:
 class SampledLoop:
     """Position servo whose speed is counted over windows, filtered, and held.
 
+    A constant that is out of range is a `DetentError`.
+
     Attributes
     ----------
     gain : float
@@ -76,11 +67,6 @@ class SampledLoop:
         Mechanical time constant of the axis [s]; infinite for an ideal current drive without viscous friction.
     position_gain : float
         K1.
-
-    Raises
-    ------
-    DetentError
-        A constant is out of range.
 
     Examples
     --------
@@ -218,24 +204,9 @@ class SampledLoop:
     def respond(self, rates: ArrayLike, *, step: float = 0.0, points: int = 1) -> Response:
         """Answer of the loop, at rest until then, to a command of constant rate in each window.
 
-        Parameters
-        ----------
-        rates : array_like
-            Speed of the command in each window [count/s], shape (n,), n >= 1.
-        step : float
-            Jump of the command at the beginning [count].
-        points : int
-            Instants computed in each window, evenly spaced; 1 gives the sample instants alone.
-
-        Returns
-        -------
-        Response
-            Columns of shape (n·points + 1,), from the beginning to the end of the last window.
-
-        Raises
-        ------
-        DetentError
-            There is no window, a rate is not a finite number, or `points` is below 1.
+        `rates` are the speeds of the command [count/s], finite, shape (n,), n >= 1; `step` is its jump at the beginning
+        [count]; `points` says how many instants of each window are computed, evenly spaced, 1 for the sample instants
+        alone. Columns have the shape (n·points + 1,), from the beginning to the end of the last window.
 
         Examples
         --------

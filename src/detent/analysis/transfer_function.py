@@ -25,6 +25,8 @@ from detent.analysis.arguments import require_between, require_not_negative, req
 class ServoTransfer:
     """Position servo with a first-order lag in its speed feedback.
 
+    A constant that is not above 0 (`filter_time`: below 0), or not finite, is a `DetentError`.
+
     Attributes
     ----------
     gain : float
@@ -35,11 +37,6 @@ class ServoTransfer:
         Tf [s]; 0 without filter.
     position_gain : float
         K1.
-
-    Raises
-    ------
-    DetentError
-        A constant is not above 0 (`filter_time`: below 0), or not finite.
 
     Examples
     --------

@@ -16,27 +16,19 @@ UNKNOWN = 10.0  # half of an interval over the value from which on nothing is kn
 UNKNOWN_DELAY = 0.1  # the same of a delay [s], which may be 0
 LONGEST = 220  # longest bar of a table [px]
 
-_KINDS = {
-    "coulomb": "Coulomb friction",
-    "viscous": "viscous friction",
-    "static": "static friction",
-    "stribeck": "Stribeck velocity",
-    "spring": "spring",
-    "loss": "share lost in the transmission",
-    "delay": "delay of the effort",
+_CONSTANTS = {
+    "mass": ("inertia", "effort per acceleration"),
+    "coulomb": ("Coulomb friction", "at any speed; constant forces are part of it"),
+    "viscous": ("viscous friction", "grows with speed"),
+    "static": ("static friction", "just before standstill"),
+    "stribeck": ("Stribeck velocity", "below it friction rises to the static one"),
+    "pendulum": ("weight", "times the sine of the angle"),
+    "pendulum.across": ("weight, across", "times the cosine of the angle"),
+    "spring": ("spring", "effort per way from position 0"),
+    "loss": ("share lost in the transmission", ""),
+    "delay": ("delay of the effort", "how much later it acts than it was recorded"),
 }
-
-_MEANINGS = {
-    "mass": "effort per acceleration",
-    "coulomb": "at any speed; constant forces are part of it",
-    "viscous": "grows with speed",
-    "static": "just before standstill",
-    "stribeck": "below it friction rises to the static one",
-    "pendulum": "times the sine of the angle",
-    "pendulum.across": "times the cosine of the angle",
-    "spring": "effort per way from position 0",
-    "delay": "how much later it acts than it was recorded",
-}
+"""Names of constants, and what they say."""
 
 _WAYS = {"positive": "in positive direction", "negative": "in negative direction"}
 SINCE = "time since the recording began"
@@ -50,18 +42,17 @@ def constant_name(name: str, unit: str = "") -> str:
     >>> constant_name("viscous.positive"), constant_name("mass", "kg*m^2")
     ('viscous friction in positive direction', 'moment of inertia')
     """
+    if name == "mass" and unit in {"kg", "kg*m^2"}:
+        return "mass" if unit == "kg" else "moment of inertia"
+    if name in _CONSTANTS:
+        return _CONSTANTS[name][0]
     kind, _, way = name.partition(".")
-    if kind == "mass":
-        return {"kg": "mass", "kg*m^2": "moment of inertia"}.get(unit, "inertia")
-    if kind == "pendulum":
-        return "weight, across" if way else "weight"
-    words = _KINDS.get(kind, kind)
-    return f"{words} {_WAYS.get(way, way)}" if way else words
+    return f"{_CONSTANTS[kind][0] if kind in _CONSTANTS else kind} {_WAYS.get(way, way)}".strip()
 
 
 def meaning_of(name: str) -> str:
     """What a constant says, in a few words; empty where its name does."""
-    return _MEANINGS.get(name) or _MEANINGS.get(name.partition(".")[0], "")
+    return (_CONSTANTS.get(name) or _CONSTANTS.get(name.partition(".")[0], ("", "")))[1]
 
 
 def sentence(text: str) -> str:

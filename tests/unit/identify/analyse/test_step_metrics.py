@@ -1,11 +1,14 @@
 """Step response: closed forms come back with intervals that hold, and recordings of a real axis as published."""
 
+import json
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 from tests.log_rig import assert_covers, coloured, make_log, quantised
 from tests.places import DATA
 
+from detent.cli.terminal import print_json
 from detent.errors import DetentError
 from detent.identify.analyse.analyses import analyse
 from detent.identify.analyse.ringing import find_turns, fit_ringing
@@ -120,7 +123,7 @@ def test_an_answer_without_overshoot_has_none():
     assert step.settling_5 == pytest.approx(0.05 * np.log(20), abs=2 * DT)
 
 
-def test_an_axis_that_does_not_settle_is_said():
+def test_an_axis_that_does_not_settle_is_said(capsys: pytest.CaptureFixture[str]):
     t = np.arange(0.0, 1.0, DT)
     x = np.where(t > 0.1, 1 - np.cos(60 * (t - 0.1)), 0.0)
     log = make_log(t, reference=np.where(t > 0.1, 1.0, 0.0), position=x)
@@ -128,7 +131,8 @@ def test_an_axis_that_does_not_settle_is_said():
     assert np.isinf(step.settling_2)
     assert "not settled" in step.notes[0]
     assert step.ringing is None
-    assert analyse(log, "steps").to_dict()["steps"][0]["settling_2"] is None
+    print_json(analyse(log, "steps").to_dict())
+    assert json.loads(capsys.readouterr().out)["steps"][0]["settling_2"] is None
     rest = measure_steps(make_log(t, reference=np.where(t > 0.1, 1.0, 0.0), position=0 * t)).steps[0]
     assert (rest.rise_time, rest.overshoot) == (None, None)
     assert rest.rest_error.value == 1.0
