@@ -48,10 +48,10 @@ def _parts(figure: Figure) -> list[Part]:
     """What a figure is made of, from top to bottom."""
     caption = textwrap.wrap(plain(figure.caption), LETTERS)
     parts: list[Part] = [((len(caption) + 1.2) * LINE, lambda canvas, at: _write(canvas, at, figure.title, caption))]
-    if figure.beside and figure.charts:
-        parts.append((max(map(_height, figure.charts)), partial(_draw_beside, figure.charts)))
-    else:
-        parts += [(_height(chart), partial(_draw_beside, [chart])) for chart in figure.charts]
+    groups = [figure.charts] if figure.beside and figure.charts else [[chart] for chart in figure.charts]
+    for group in groups:
+        heights = [chart["height"] / DOTS + (0.0 if chart.get("foot") is False else 0.2) for chart in group]
+        parts.append((max(heights), partial(_draw_beside, group)))
     tables = [table for table in (figure.table, figure.event_table) if table]
     return parts + [((len(table.rows) + 2.5) * 1.4 * LINE, partial(_draw_table, table)) for table in tables]
 
@@ -95,10 +95,6 @@ def _draw_table(table: Table, canvas: Any, at: Any) -> None:
 
 
 # ---- charts
-
-
-def _height(chart: Chart) -> float:
-    return chart["height"] / DOTS + (0.0 if chart.get("foot") is False else 0.2)
 
 
 def _draw_beside(charts: Sequence[Chart], canvas: Any, at: Any) -> None:

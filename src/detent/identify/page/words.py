@@ -120,25 +120,14 @@ def long_bar(share: float, text: str, *, chosen: bool) -> Markup:
     ).format(width, colour, text)
 
 
-@dataclass(frozen=True, slots=True)
 class Ways:
-    """How positions of a log are written."""
+    """How positions of a log are written: in the units of an axis, or in a unit of the log that is not m or rad."""
 
-    unit: str  # of the log's positions: "m", "rad", or anything else as it is
-
-    @property
-    def _units(self) -> Units | None:
-        return Units(rotary=self.unit == "rad") if self.unit in {"m", "rad"} else None
-
-    @property
-    def place(self) -> Scale:
-        """Of positions."""
-        return self._units.place if self._units else Scale(1.0, unit_text(self.unit))
-
-    @property
-    def speed(self) -> Scale:
-        """Of velocities."""
-        return self._units.speed if self._units else Scale(1.0, f"{unit_text(self.unit)}/s")
+    def __init__(self, unit: str) -> None:
+        self._units = Units(rotary=unit == "rad") if unit in {"m", "rad"} else None
+        own = unit_text(unit)
+        self.place = self._units.place if self._units else Scale(1.0, own)
+        self.speed = self._units.speed if self._units else Scale(1.0, f"{own}/s")
 
     def small(self, peak: float) -> Scale:
         """Of errors, by the largest of them."""
