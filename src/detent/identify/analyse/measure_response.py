@@ -174,11 +174,6 @@ class FrequencyResponse:
     def __len__(self) -> int:
         return len(self.frequency)
 
-    @property
-    def magnitude(self) -> Values:
-        """Magnitude, in units of the output per unit of the input, shape (n,)."""
-        return np.abs(self.response)
-
 
 def response_deviation(coherence: Values, averages: float) -> Values:
     """Standard deviation of a response by its coherence: of the magnitude, as a part of it, and of the phase [rad].

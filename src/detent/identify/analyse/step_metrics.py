@@ -119,11 +119,6 @@ class StepMetrics:
     notes: tuple[str, ...] = ()  # what to know about it
 
     @property
-    def size(self) -> float:
-        """Size of the step, signed."""
-        return self.target - self.start
-
-    @property
     def estimates(self) -> tuple[Estimate, ...]:
         """All numbers with an interval."""
         ringing = (self.ringing.period, self.ringing.damping_ratio) if self.ringing else ()

@@ -95,42 +95,25 @@ def _fit_direction(
     if max(speeds) - min(speeds) < APART * max(speeds):
         only = f"only one steady speed in {name} direction ({max(speeds):.4g} {speed_unit}); {advice}"
         return SpeedLine(name, measured, reason=only)
-    line = _weighted_line(measured)
+    line, errors, degrees, between = _weighted_line(measured)
     for _ in range(ROUNDS):
-        measured = tuple(measure_stretch(*series, part, float(line.values[0])) for part in parts)
-        line = _weighted_line(measured)
+        measured = tuple(measure_stretch(*series, part, line[0]) for part in parts)
+        line, errors, degrees, between = _weighted_line(measured)
     notes = [f"holds from {min(speeds):.4g} to {max(speeds):.4g} {speed_unit}; friction at rest is not measured"]
-    if line.between > 0:
+    if between > 0:
         text = "position-dependent friction, or friction that is no line over the speed"
-        notes.append(f"stretches scatter about the line by {line.between:.3g} {unit} beside their errors: {text}")
+        notes.append(f"stretches scatter about the line by {between:.3g} {unit} beside their errors: {text}")
     method = f"two-speed method, {len(measured)} stretches"
-    slope, height = line.values.tolist()
-    errors: list[float] = np.sqrt(np.diag(line.covariance)).tolist()
-    return SpeedLine(
-        name,
-        measured,
-        estimate(f"slope.{name}", slope, unit_of_slope, errors[0], method, line.degrees[0]),
-        estimate(f"coulomb.{name}", DIRECTIONS[name] * height, unit, errors[1], method, line.degrees[1]),
-        line.between,
-        notes=tuple(notes),
-    )
+    slope = estimate(f"slope.{name}", line[0], unit_of_slope, errors[0], method, degrees[0])
+    coulomb = estimate(f"coulomb.{name}", DIRECTIONS[name] * line[1], unit, errors[1], method, degrees[1])
+    return SpeedLine(name, measured, slope, coulomb, between, notes=tuple(notes))
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """A weighted line: slope and height at zero, their covariance, degrees of freedom of each, scatter between."""
-
-    values: Values
-    covariance: Values
-    degrees: tuple[float, float]
-    between: float
-
-
-def _weighted_line(measured: tuple[SteadyStretch, ...]) -> _Line:
+def _weighted_line(measured: tuple[SteadyStretch, ...]) -> tuple[list[float], list[float], list[float], float]:
     """Line through the means of the stretches, weighted by their length.
 
-    Weights from the errors of the stretches would make the interval too short: each error is known with few degrees
-    of freedom.
+    Slope and height at zero, their standard errors, degrees of freedom of each, scatter between the stretches. Weights
+    from the errors of the stretches would make the interval too short: each error is known with few degrees of freedom.
     """
     v = np.array([stretch.speed for stretch in measured])
     f = np.array([stretch.effort for stretch in measured])
@@ -148,7 +131,7 @@ def _weighted_line(measured: tuple[SteadyStretch, ...]) -> _Line:
     if between > 0:
         inner = np.minimum(inner, len(v) - 2)
     covariance = pull * (own + between**2) @ pull.T
-    return _Line(pull @ f, covariance, (float(inner[0]), float(inner[1])), between)
+    return (pull @ f).tolist(), np.sqrt(np.diag(covariance)).tolist(), inner.tolist(), between
 
 
 def _pull(columns: Values, size: Values) -> NDArray[np.float64]:

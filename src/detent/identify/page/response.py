@@ -165,7 +165,7 @@ def _tells(response: FrequencyResponse) -> bool:
     that coherence does not show it.
     """
     told = response.coherence >= COHERENT
-    f, size = response.frequency[told], response.magnitude[told]
+    f, size = response.frequency[told], np.abs(response.response[told])
     if len(f) < FEWEST_LINES or f[-1] < BROADEST * f[0]:
         return False
     apart = np.abs(np.diff(np.log(size * f**2)))

@@ -39,11 +39,6 @@ class HeldOut:
         """Root mean square of what the restarted simulation is off."""
         return rms(self.restarted - self.measured)
 
-    @property
-    def rms_free(self) -> float:
-        """Root mean square of what the simulation in one piece is off."""
-        return rms(self.free - self.measured)
-
 
 def hold_out(found: Identification) -> tuple[HeldOut, ...]:
     """Simulate the last part of each log with constants from the first parts, as the table of horizons does."""
@@ -90,7 +85,7 @@ def simulated_figures(found: Identification, held: Sequence[HeldOut], shown: int
         "gets the recorded effort and nothing else; no controller holds it, so every error adds up. <b>Restarted every "
         "{}\u202fs it is {} off on average (rms), in one piece {}.</b> Where the curves lie on one another the model "
         "does what the axis did."
-    ).format(worst, f"{one.restart:.3g}", ways.error(one.rms_restarted), ways.error(one.rms_free))
+    ).format(worst, f"{one.restart:.3g}", ways.error(one.rms_restarted), ways.error(rms(one.free - one.measured)))
     title = "On the part that the fit did not see"
     return [Figure(title=title, caption=caption, charts=held_charts(one, ways)), *horizons]
 

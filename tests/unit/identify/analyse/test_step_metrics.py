@@ -55,7 +55,7 @@ def test_closed_forms_come_back():
     (step,) = found.steps
     assert (found.unit, found.reason, found.notes, step.notes) == ("m", "", (), ())
     assert {one.name: one.value for one in step.estimates} == pytest.approx(true_values(), rel=0.01)
-    assert (step.begin, step.duration, step.size) == pytest.approx((0.1, DT, 0.01))
+    assert (step.begin, step.duration, step.target - step.start) == pytest.approx((0.1, DT, 0.01))
     rest = 0.01 - OFF
     for settling, band in ((step.settling_2, 0.02), (step.settling_5, 0.05)):
         t = np.arange(0.0, 0.4, DT)
@@ -192,7 +192,7 @@ def test_a_closed_loop_stepper():
     """Published with the recording: overshoot 1.65 steps, ring period about 30 ms, rests 0.47 step off."""
     found = measure_steps(read_log(DUET))
     (step,) = found.steps
-    assert (found.unit, round(step.size, 2)) == ("count", -16.0)
+    assert (found.unit, round(step.target - step.start, 2)) == ("count", -16.0)
     assert step.overshoot.holds(1.65)
     assert step.overshoot.value == pytest.approx(1.65, abs=0.06)
     assert step.rest_error.value == pytest.approx(-0.47, abs=0.01)
