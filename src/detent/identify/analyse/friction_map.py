@@ -151,28 +151,19 @@ class _Bin(NamedTuple):
 
 def _averages(moving: _Moving, bins: int) -> list[_Bin]:
     """Mean friction of each bin of speed and direction."""
-    member = _members(moving, bins)
-    window = moving.place // _window_rows(moving, member)
-    insides = [member == number for number in sorted(set(member[member != 0].tolist()))]
-    return [_average(moving.v[inside], moving.friction[inside], window[inside]) for inside in insides]
-
-
-def _members(moving: _Moving, bins: int) -> NDArray[np.int64]:
-    """Number of the bin of each sample, from 1, negative in negative direction; 0 below the lowest speed."""
     size = np.abs(moving.v)
-    lowest = max(moving.lowest, float(size.max()) / RANGE)
-    edges = np.geomspace(min(lowest, 0.9 * float(size.max())), float(size.max()) * (1.0 + 1e-9), bins + 1)
-    number = np.searchsorted(edges, size, side="right")
-    return (number * np.sign(moving.v)).astype(np.int64)
-
-
-def _window_rows(moving: _Moving, member: NDArray[np.int64]) -> int:
-    """Rows of a window: many times what the residual about the means of the bins remembers."""
+    top = float(size.max())
+    edges = np.geomspace(min(max(moving.lowest, top / RANGE), 0.9 * top), top * (1.0 + 1e-9), bins + 1)
+    # Number of the bin of each sample, from 1, negative in negative direction; 0 below the lowest speed.
+    member = (np.searchsorted(edges, size, side="right") * np.sign(moving.v)).astype(np.int64)
     used = member != 0
-    _, which = np.unique(member[used], return_inverse=True)
+    numbers, which = np.unique(member[used], return_inverse=True)
     value = moving.friction[used]
     residual = value - (np.bincount(which, value) / np.bincount(which))[which]
-    return max(1, round(MEMORIES * memory_rows(residual, moving.place[used])))
+    # A window is many times what the residual about the means of the bins remembers.
+    window = moving.place // max(1, round(MEMORIES * memory_rows(residual, moving.place[used])))
+    insides = [member == number for number in numbers.tolist()]
+    return [_average(moving.v[inside], moving.friction[inside], window[inside]) for inside in insides]
 
 
 def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
