@@ -93,7 +93,7 @@ def test_a_rest_on_one_count_is_as_uncertain_as_the_count():
 
 def test_a_step_to_smaller_positions_overshoots_to_its_own_side():
     (down,) = measure_steps(record(np.random.default_rng(2), size=-0.01)).steps
-    assert down.size == pytest.approx(-0.01)
+    assert down.target - down.start == pytest.approx(-0.01)
     assert down.overshoot.value == pytest.approx(true_values()["overshoot"], rel=0.02)
     assert down.rest_error.value == pytest.approx(-OFF, rel=0.1)
 
