@@ -5,7 +5,6 @@ and a second encoder must go where it goes.
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -55,6 +54,7 @@ _NOT_OF_POSITIONS = frozenset({4.0, 60.0, 60e3, 100.0, 60 / math.tau})
 _AS_GOOD = 0.05
 _SAID = {"velocity": "d(position)/dt", "acceleration": "d(velocity)/dt", "reference": "the position",
          "position_load": "the position"}  # fmt: skip
+"""What each signal must agree with, in the order of the checks."""
 
 
 def find_disagreements(draft: Draft) -> None:
@@ -67,45 +67,36 @@ def find_disagreements(draft: Draft) -> None:
     if position is None or np.ptp(position) <= 5 * grain(position):
         return
     base = draft.unit("position")
-    checks: tuple[tuple[str, Callable[[Draft, str], Likeness]], ...] = (
-        ("velocity", _against_position), ("acceleration", _against_velocity), ("reference", _before_position),
-        ("position_load", _beside_position),
-    )  # fmt: skip
-    for role, compare in checks:
+    for role in _SAID:
         if role in draft.values and draft.unit(role).partition("/")[0] == base:
-            _check_sign(draft, role, compare(draft, role))
-            _check_factor(draft, role, compare(draft, role))
+            _check_sign(draft, role, _compare(draft, role))
+            _check_factor(draft, role, _compare(draft, role))
 
 
-def _against_position(draft: Draft, role: str) -> Likeness:
-    """A velocity against the change of the position."""
-    return likeness(*paired_changes(draft.values["position"], draft.values[role], draft.t))
-
-
-def _against_velocity(draft: Draft, role: str) -> Likeness:
-    """An acceleration against the change of the velocity; about its mean, as gravity may give it one."""
+def _compare(draft: Draft, role: str) -> Likeness:
+    """A signal against what it must agree with."""
+    values, position = draft.values[role], draft.values["position"]
+    if role == "velocity":
+        return likeness(*paired_changes(position, values, draft.t))
+    if role == "reference":
+        return _before_position(draft)
+    if role == "position_load":
+        return likeness(values, position, is_centred=True)
+    # An acceleration, about its mean, as gravity may give it one.
     is_doubtful = any(finding.signal == "velocity" and finding.action == Action.LEFT for finding in draft.findings)
     has_velocity = "velocity" in draft.values and draft.unit(role) == f"{draft.unit('velocity')}^2"
-    if has_velocity and not is_doubtful:
-        velocity = draft.values["velocity"]
-    else:
-        velocity = np.gradient(draft.values["position"], draft.t)
-    return likeness(*paired_changes(velocity, draft.values[role], draft.t), is_centred=True)
+    velocity = draft.values["velocity"] if has_velocity and not is_doubtful else np.gradient(position, draft.t)
+    return likeness(*paired_changes(velocity, values, draft.t), is_centred=True)
 
 
-def _beside_position(draft: Draft, role: str) -> Likeness:
-    """A position beside the position."""
-    return likeness(draft.values[role], draft.values["position"], is_centred=True)
-
-
-def _before_position(draft: Draft, role: str) -> Likeness:
+def _before_position(draft: Draft) -> Likeness:
     """A reference beside the position that follows it: where they are most alike, at the shortest delay of those.
 
     Without the delay of the loop a fast motion would lie crosswise to its reference, or even against it. Of a sine,
     half a period of delay and a wrong sign look the same: then the sign is believed.
     """
     part = _longest_enabled(draft)
-    reference, position = draft.values[role][part], draft.values["position"][part]
+    reference, position = draft.values["reference"][part], draft.values["position"][part]
     curve = correlation_curve(position, reference, min(FARTHEST, len(position) // 4))
     size, middle = np.abs(curve), len(curve) // 2
     peaks = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])) + 1
@@ -147,7 +138,9 @@ def _check_factor(draft: Draft, role: str, found: Likeness) -> None:
     factor = found.factor
     known = _known(factor, role, draft.unit("position"))
     said = f"is {factor:.4g} times {_SAID[role]}"
-    if known is not None and not _is_of_time(draft, role, known[0]):
+    # A power of a thousand is what a wrong guess of the unit of the time would make as well.
+    is_rate = role in {"velocity", "acceleration"} and "time" in draft.guessed_units
+    if known is not None and not (is_rate and any(np.isclose(known[0], (1e3, 1e6, 1e-3, 1e-6)))):
         factor, meaning = known
         draft.rescale(role, 1.0 / factor)
         advice = f"state the units; the other of the two may be the wrong one ({_other(role)})"
@@ -163,12 +156,6 @@ def _check_factor(draft: Draft, role: str, found: Likeness) -> None:
 
 def _other(role: str) -> str:
     return "velocity" if role == "acceleration" else "position"
-
-
-def _is_of_time(draft: Draft, role: str, factor: float) -> bool:
-    """True for a power of a thousand that a wrong guess of the unit of the time would make as well."""
-    is_rate = role in {"velocity", "acceleration"}
-    return is_rate and "time" in draft.guessed_units and any(np.isclose(factor, (1e3, 1e6, 1e-3, 1e-6)))
 
 
 def _known(factor: float, role: str, base: str) -> tuple[float, str] | None:

@@ -1,8 +1,6 @@
 """Which column is which signal, and in which unit: as the user says, otherwise guessed by name, unit and numbers."""
 
 import difflib
-from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,38 +23,32 @@ _TIME_UNITS = (("s", 1e-7, 0.2), ("ms", 0.2, 200.0), ("us", 200.0, 2e5), ("ns", 
 servos are made with 5 to 5000 rows a second, seldom more."""
 
 
-@dataclass
-class Chosen:
-    """Columns of a table by their roles."""
-
-    columns: dict[str, str] = field(default_factory=dict[str, str])  # from a role to the name of its column
-    # from a role to what the user says; only roles that the user names
-    choices: dict[str, Choice] = field(default_factory=dict[str, Choice])
-    guesses: list[str] = field(default_factory=list[str])  # what was guessed
+Chosen = dict[str, str]  # from a role to the name of its column
 
 
 def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
-    """Find the column of each signal."""
-    chosen = Chosen(choices={role: choice for role, choice in mapping.columns.items() if choice.column})
+    """Find the column of each signal; what was guessed is among the notes of the table."""
+    chosen: Chosen = {}
     problems: list[FileProblem] = []
-    for role, choice in chosen.choices.items():
-        name = find_column(table, choice.column)
-        if name is None:
+    silent = {role for role, choice in mapping.columns.items() if not choice.column}
+    for role, choice in mapping.columns.items():
+        name = None if role in silent else find_column(table, choice.column)
+        if name is not None:
+            chosen[role] = name
+        elif role not in silent:
             problems.append(_no_column(table, role, choice.column))
-        else:
-            chosen.columns[role] = name
     if problems:
         raise InputError(problems)
-    silent = {role for role, choice in mapping.columns.items() if not choice.column}
-    if mapping.file.period is not None and "time" not in chosen.columns:
+    if mapping.file.period is not None and "time" not in chosen:
         silent.add("time")
     _guess(table, chosen, silent)
-    if "time" not in chosen.columns and mapping.file.period is None:
+    came = f"columns {table.told_columns()}"
+    if "time" not in chosen and mapping.file.period is None:
         remedy = "state it as time=COLUMN [UNIT], or the time between rows as period=1 ms"
-        raise InputError.of_file(table.file, f"columns {table.told_columns()}", "a column for the time", remedy)
-    if not set(chosen.columns) - {"time"}:
+        raise InputError.of_file(table.file, came, "a column for the time", remedy)
+    if not set(chosen) - {"time"}:
         remedy = "state what the columns are, as in position=COLUMN [mm]"
-        raise InputError.of_file(table.file, f"columns {table.told_columns()}", f"signals: {', '.join(ROLES)}", remedy)
+        raise InputError.of_file(table.file, came, f"signals: {', '.join(ROLES)}", remedy)
     return chosen
 
 
@@ -88,28 +80,27 @@ def _no_column(table: RawTable, role: str, wanted: str) -> FileProblem:
 def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
     """Guess the signals that the user does not name: by the names of columns, then by their units."""
     for role in ROLES:
-        if role in chosen.columns or role in silent:
+        if role in chosen or role in silent:
             continue
         ranks = {name: place for name in _free(table, chosen) if (place := _rank(table, name, role)) is not None}
         if ranks:
             best = min(ranks, key=lambda name: ranks[name])
-            chosen.columns[role] = best
-            others = [name for name in ranks if name != best and ranks[name] == ranks[best]]
-            alike = f"; {tell([short(name) for name in others])} would fit as well" if others else ""
-            chosen.guesses.append(f'{role}: column "{short(best)}", by its name{alike}')
+            chosen[role] = best
+            others = [short(name) for name in ranks if name != best and ranks[name] == ranks[best]]
+            alike = f"; {tell(others)} would fit as well" if others else ""
+            table.notes.append(f'{role}: column "{short(best)}", by its name{alike}')
     for role in _BY_UNIT:
         fitting = [name for name in _free(table, chosen) if _fits_unit(table.units[name], role)]
-        if len(fitting) == 1 and role not in chosen.columns and role not in silent:
-            chosen.columns[role] = fitting[0]
-            chosen.guesses.append(f'{role}: column "{short(fitting[0])}", by its unit {table.units[fitting[0]]}')
+        if len(fitting) == 1 and role not in chosen and role not in silent:
+            chosen[role] = fitting[0]
+            table.notes.append(f'{role}: column "{short(fitting[0])}", by its unit {table.units[fitting[0]]}')
     rest = [short(name) for name in _free(table, chosen)]
     if rest:
-        chosen.guesses.append(f"columns not read: {tell(rest)}")
+        table.notes.append(f"columns not read: {tell(rest)}")
 
 
-def _free(table: RawTable, chosen: Chosen) -> Iterable[str]:
-    taken = set(chosen.columns.values())
-    return [name for name in table.columns if name not in taken]
+def _free(table: RawTable, chosen: Chosen) -> list[str]:
+    return [name for name in table.columns if name not in chosen.values()]
 
 
 def _rank(table: RawTable, name: str, role: str) -> int | None:
@@ -127,18 +118,18 @@ def _fits_unit(unit: str, role: str) -> bool:
 def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft:
     """Put the chosen columns into a draft, with what their numbers mean."""
     draft = Draft(table.file, table.rows, np.empty(0), {}, {}, {}, findings=table.findings)
-    draft.guesses = [*table.notes, *chosen.guesses]
+    draft.guesses = [*table.notes]
     constants = {**table.constants, **mapping.constants}
-    if "time" not in chosen.columns and mapping.file.period is not None:
+    if "time" not in chosen and mapping.file.period is not None:
         period = mapping.file.period
         draft.t, draft.has_clock = (table.rows - 1).astype(np.float64), False
         draft.conversions["time"] = Conversion("s", period)
         draft.sources["time"] = Source("", "rows", period)
-    bases = _Bases(table, chosen)
-    for role in sorted(chosen.columns, key=list(ROLES).index):
-        name = chosen.columns[role]
+    bases = _Bases(table, chosen, mapping)
+    for role in sorted(chosen, key=list(ROLES).index):
+        name = chosen[role]
         unit, conversion = bases.find(role, draft)
-        choice = chosen.choices.get(role, Choice(name))
+        choice = mapping.columns.get(role, Choice(name))
         factor = choice.sign * _number_of(table.file, role, choice.factor, constants)
         # Behind the border: unit factor * (sign * factor * number + offset) + unit offset.
         total = conversion.factor * choice.offset + conversion.offset
@@ -150,7 +141,10 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
             draft.values[role] = table.columns[name].copy()
         draft.bits |= {role: choice.bits} if choice.bits else {}
         draft.delays |= {role: choice.delay} if choice.delay else {}
-    _check_widths(draft, table, chosen)
+    for role in [role for role in draft.values if role not in mapping.columns]:  # what the user states is believed
+        bits = bits_of(table.units[chosen[role]])
+        if bits is not None:
+            _check_width(draft, role, chosen[role], bits)
     return draft
 
 
@@ -170,18 +164,18 @@ def _number_of(file: str, role: str, factor: float | str, constants: dict[str, f
 class _Bases:
     """Finds the units of signals; those of a motion without a unit follow those with one."""
 
-    def __init__(self, table: RawTable, chosen: Chosen) -> None:
-        self._table, self._chosen = table, chosen
+    def __init__(self, table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> None:
+        self._table, self._chosen, self._mapping = table, chosen, mapping
         stated = (find for role in _MOTION if (find := self._stated(role)) is not None)
         first = next(stated, None)
         self._base = first[1].unit.partition("/")[0] if first else ""
 
     def _stated(self, role: str) -> tuple[str, Conversion] | None:
         """Unit of a signal that the user or the heading states."""
-        if role not in self._chosen.columns:
+        if role not in self._chosen:
             return None
-        choice = self._chosen.choices.get(role)
-        for unit in (choice.unit if choice else "", self._table.units[self._chosen.columns[role]]):
+        choice = self._mapping.columns.get(role)
+        for unit in (choice.unit if choice else "", self._table.units[self._chosen[role]]):
             for target in ROLES[role].units if unit else ():
                 conversion = find_conversion(unit, target)
                 if conversion is not None:
@@ -193,7 +187,7 @@ class _Bases:
         stated = self._stated(role)
         if stated is not None:
             return stated
-        name = self._chosen.columns[role]
+        name = self._chosen[role]
         unit, reason = self._guess(role, name)
         draft.guessed_units.add(role)
         odd = self._table.units[name]
@@ -207,7 +201,11 @@ class _Bases:
         """Unit of a signal that has none, and the reason."""
         values = self._table.columns[name]
         if role == "time":
-            return _guess_time_unit(values)
+            # The one in which its rows are as far apart as recordings are made.
+            steps = np.diff(values[np.isfinite(values)])
+            step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+            unit = next((unit for unit, low, high in _TIME_UNITS if low <= step < high), "s")
+            return unit, f": its rows are {step:.4g} apart"
         if role == "temperature":
             return "degC", ""
         if role not in _MOTION:
@@ -219,20 +217,11 @@ class _Bases:
         if _are_counts(values) and role not in {"velocity", "acceleration"}:
             self._base = "count"
             return "count", f": whole numbers; say how long one is, as in {role}={short(name)} [0.5 um]"
-        is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in self._chosen.columns
+        is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in self._chosen
         self._base = "rad" if is_angle else "m"
         other = "moves straight" if is_angle else "turns"
         said = f"; for an axis that {other} state it, as in {role}={short(name)} [{'mm' if is_angle else 'rad'}]"
         return units[turns.get(self._base, 0)], said
-
-
-def _guess_time_unit(values: Values) -> tuple[str, str]:
-    """Unit of a time without one: the one in which its rows are as far apart as recordings are made."""
-    steps = np.diff(values[np.isfinite(values)])
-    steps = steps[steps > 0]
-    step = float(np.median(steps)) if len(steps) else 0.0
-    unit = next((unit for unit, low, high in _TIME_UNITS if low <= step < high), "s")
-    return unit, f": its rows are {step:.4g} apart"
 
 
 def _are_counts(values: Values) -> bool:
@@ -241,23 +230,15 @@ def _are_counts(values: Values) -> bool:
     return bool(len(known)) and bool(np.all(known == np.rint(known))) and float(np.ptp(known)) > 20
 
 
-def _check_widths(draft: Draft, table: RawTable, chosen: Chosen) -> None:
+def _check_width(draft: Draft, role: str, name: str, bits: int) -> None:
     """Leave out words whose heading states a width in bits that they do not fit: they are something else."""
-    for role in list(draft.values):
-        # What the user states is believed.
-        bits = None if role in chosen.choices else bits_of(table.units[chosen.columns[role]])
-        values = draft.values[role]
-        if bits is None or not np.nanmax(np.abs(values), initial=0) >= 2**bits:
-            continue
+    values = draft.values[role]
+    beyond = np.flatnonzero(np.abs(values) >= 2**bits)
+    if len(beyond):
         low, high = np.nanmin(values), np.nanmax(values)
         text = f"the heading says {bits} bits, but the numbers go from {low:g} to {high:g}: they are something else"
-        advice = f"state what the column is, as in reference={short(chosen.columns[role])} [{_example(draft)}]"
-        beyond = np.flatnonzero(np.abs(values) >= 2**bits)
+        unit = draft.conversions["position"].unit if "position" in draft.conversions else "m"
+        example = {"count": "steps", "m": "mm"}.get(unit, unit)
+        advice = f"state what the column is, as in reference={short(name)} [{example}]"
         draft.note(Kind.WRONG_UNIT, role, beyond, text, Action.LEFT_OUT, advice, Severity.WARNING)
         del draft.values[role]
-
-
-def _example(draft: Draft) -> str:
-    """Unit in which an example names a position."""
-    unit = draft.conversions["position"].unit if "position" in draft.conversions else "m"
-    return {"count": "steps", "m": "mm"}.get(unit, unit)

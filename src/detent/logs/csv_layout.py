@@ -4,6 +4,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -69,10 +70,8 @@ def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64]
         values = np.array([np.nan if value is None else value for value in found])
         return values, wrong
     if len(values) and np.all(np.abs(values) > LARGEST_EXACT):
-        try:
+        with suppress(ValueError, OverflowError):
             return np.array([int(cell) for cell in cells], dtype=np.int64), set()
-        except (ValueError, OverflowError):
-            return values, set()
     return values, set()
 
 
@@ -81,15 +80,10 @@ def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]
 
     The difference to universal time is left out: it is the same for all.
     """
-    texts: list[str] = []
-    wrong: set[int] = set()
-    for index, cell in enumerate(cells):
-        match = _MOMENT.fullmatch(cell)
-        texts.append(f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT")
-        if match is None:
-            wrong.add(index)
+    found = [_MOMENT.fullmatch(cell) for cell in cells]
+    texts = [f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT" for match in found]
     try:
-        return np.array(texts, dtype="datetime64[ns]"), wrong
+        return np.array(texts, dtype="datetime64[ns]"), {index for index, match in enumerate(found) if match is None}
     except ValueError:  # a month 13, or a year beyond what nanoseconds can count
         return np.full(len(cells), np.datetime64("NaT"), dtype="datetime64[ns]"), set(range(len(cells)))
 
@@ -171,20 +165,15 @@ def guess_layout(file: str, lines: Sequence[str], options: FileOptions) -> CsvLa
 
 def _guess_separator(lines: Sequence[str]) -> str:
     """Separator that leaves the most cells of one width that are numbers."""
-
-    def score(separator: str) -> tuple[float, int]:
-        """Rows whose cells are numbers, and how many cells they have."""
+    scores: dict[str, tuple[float, int]] = {}  # rows whose cells are numbers or nothing, and how many cells they have
+    for separator in _TRIED:
         rows = list(split_lines(lines, separator))
         width = _width(rows)
-        fractions = [_share(cells) for cells in rows if len(cells) == width]
-        return (sum(fractions) if width > 1 else 0.0), width
-
-    return max(_TRIED, key=score) if any(score(separator)[0] for separator in _TRIED) else ","
-
-
-def _share(cells: Sequence[str]) -> float:
-    """Share of the cells that hold numbers, or nothing."""
-    return sum(is_number(cell) or is_moment(cell) or cell.lower() in MISSING for cell in cells) / max(len(cells), 1)
+        whole = (cells for cells in rows if len(cells) == width > 1)
+        known = (_numbers(cells) + sum(cell.lower() in MISSING for cell in cells) for cells in whole)
+        scores[separator] = sum(count / width for count in known), width
+    best = max(_TRIED, key=lambda separator: scores[separator])
+    return best if scores[best][0] else ","
 
 
 def _width(rows: Sequence[Sequence[str]]) -> int:
@@ -218,9 +207,9 @@ def _read_header(file: str, lines: Sequence[str], layout: CsvLayout, stated: int
     """Names and units of the columns."""
     width = layout.width
     above = [index for index in range(layout.first) if lines[index].strip()]
-    if stated is not None and stated > len(lines):
-        raise InputError.of_file(file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
     if stated is not None:
+        if stated > len(lines):
+            raise InputError.of_file(file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
         above = [stated - 1] if stated else []
     rows = [_cells(lines[index], layout.separator) for index in above]
     units: list[str] = []

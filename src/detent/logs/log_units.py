@@ -97,45 +97,29 @@ def find_conversion(text: str, unit: str) -> Conversion | None:
     if len(text) > MAX_TEXT:
         return None
     name = _WRITTEN_AS.get(name, name).replace("µ", "u").replace("μ", "u").replace("°", "deg")
-    if unit in _SPECIAL:
-        return _SPECIAL[unit](float(number), name)
-    if unit.startswith("count"):
-        return _counts(float(number), name, unit)
-    return _by_parser(number, name, unit)
+    if unit == "K":  # steps of several degrees do not exist
+        return Conversion("K", *_TEMPERATURES[name]) if name in _TEMPERATURES and float(number) == 1 else None
+    if unit == "":
+        as_it_stands = float(number) if name.lower() in _NO_UNIT else None
+        factor = {"%": float(number) / 100, "bits": 1.0}.get(name, as_it_stands)
+    elif unit.startswith("count"):
+        head, slash, rest = name.partition("/")
+        factor = float(number) if head.lower() in COUNT_WORDS and f"count{slash}{rest}" == unit else None
+    else:
+        factor = _by_parser(number, name, unit)
+    return None if factor is None else Conversion(unit, factor)
 
 
-def _by_parser(number: str, name: str, unit: str) -> Conversion | None:
-    """How a number in any unit of a physical quantity is read."""
+def _by_parser(number: str, name: str, unit: str) -> float | None:
+    """Factor of a number in any unit of a physical quantity."""
     if unit == "m/s^2" and name in _GRAVITIES:
-        return Conversion(unit, float(number) * 9.80665)
+        return float(number) * 9.80665
     if ("rad" in unit) != bool(_OF_TURNS.search(name)):
         return None  # the parser takes angles and counts for pure numbers
     try:
-        return Conversion(unit, parse_quantity(f"{number} {name}", unit))
+        return parse_quantity(f"{number} {name}", unit)
     except QuantityError:
         return None
 
 
-def _counts(number: float, name: str, unit: str) -> Conversion | None:
-    """How counts are read, whatever they are called."""
-    head, slash, rest = name.partition("/")
-    return Conversion(unit, number) if head.lower() in COUNT_WORDS and f"count{slash}{rest}" == unit else None
-
-
-def _temperature(number: float, name: str) -> Conversion | None:
-    """How a temperature is read; steps of several degrees do not exist."""
-    scale = _TEMPERATURES.get(name)
-    return Conversion("K", *scale) if scale and number == 1 else None
-
-
-def _pure(number: float, name: str) -> Conversion | None:
-    """How a number without a dimension is read: as it stands, percent as its fraction."""
-    if name == "%":
-        return Conversion("", number / 100)
-    if name == "bits":
-        return Conversion("", 1.0)
-    return Conversion("", number) if name.lower() in _NO_UNIT else None
-
-
-_SPECIAL = {"K": _temperature, "": _pure}
 _COMMON_TARGETS = ("s", "m", "count", "V", "A", "N", "rad", "m/s", "rad/s", "m/s^2", "N*m", "K", "")

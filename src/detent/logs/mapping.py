@@ -24,7 +24,7 @@ A signal is ``(sign * factor * number + offset)`` in the unit. The unit may carr
 import difflib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -73,12 +73,10 @@ class ColumnMapping:
 
     def overridden(self, other: "ColumnMapping") -> "ColumnMapping":
         """Give the mapping with what another says in place of what it says."""
-        default = FileOptions()
-        names = [entry.name for entry in fields(FileOptions)]
-        stated = {name: getattr(other.file, name) for name in names}
-        changed = {name: value for name, value in stated.items() if value != getattr(default, name)}
+        default = asdict(FileOptions())
+        stated = {key: value for key, value in asdict(other.file).items() if value != default[key]}
         return ColumnMapping(
-            {**self.columns, **other.columns}, replace(self.file, **changed), {**self.constants, **other.constants}
+            self.columns | other.columns, replace(self.file, **stated), self.constants | other.constants
         )
 
 

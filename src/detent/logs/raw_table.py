@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from detent.errors import InputError
 from detent.files.text import short
 from detent.logs.log import Finding, Rows, Values
+from detent.logs.roles import is_time
 
 MAX_CELLS = 50_000_000  # most numbers read from one file: 400 MB of them
 MAX_COLUMNS = 2000  # most columns read from one file
@@ -57,9 +58,7 @@ class RawTable:
 
     def told_columns(self) -> str:
         """Names of the columns for a message."""
-        names = [short(name) for name in self.columns]
-        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-        return ", ".join(names[:MOST_NAMED]) + more
+        return tell([short(name) for name in self.columns])
 
 
 def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
@@ -77,7 +76,11 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
             vectors += found
         elif not keep_constant(table, item):
             passed.append(short(item.name))
-    length = _choose_length(vectors)
+    # Rows of the table: those of the time if there is one, otherwise those that most vectors have.
+    lengths = [len(item.value) for item in vectors]
+    timed = [len(item.value) for item in vectors if is_time(item.name)]
+    common = Counter(timed or lengths).most_common()
+    length = max((length for length, count in common if count == common[0][1]), default=0)
     check_size(file, length, len(vectors))
     for item in vectors:
         if len(item.value) == length:
@@ -181,16 +184,6 @@ def keep_constant(table: RawTable, item: Item) -> bool:
     return True
 
 
-def _choose_length(vectors: list[Item]) -> int:
-    """Rows of the table: those of the time if there is one, otherwise those that most vectors have."""
-    from detent.logs.roles import is_time
-
-    lengths = [len(item.value) for item in vectors]
-    timed = [len(item.value) for item in vectors if is_time(item.name)]
-    common = Counter(timed or lengths).most_common()
-    return max((length for length, count in common if count == common[0][1]), default=0)
-
-
 def _as_floats(table: RawTable, name: str, values: NDArray[Any]) -> tuple[Values, str]:
     """Numbers of a column as floats, and their unit if their type says it.
 
@@ -202,11 +195,8 @@ def _as_floats(table: RawTable, name: str, values: NDArray[Any]) -> tuple[Values
         moments = values.astype(f"{values.dtype.kind}8[ns]")
         moments[absent] = moments[~absent][0] if not absent.all() else 0
         values, unit = moments.astype(np.int64), "ns"
-    if (
-        values.dtype.kind in "iu"
-        and len(values)
-        and max(abs(int(values.max())), abs(int(values.min()))) > LARGEST_EXACT
-    ):
+    is_whole = values.dtype.kind in "iu" and len(values)
+    if is_whole and max(abs(int(values.max())), abs(int(values.min()))) > LARGEST_EXACT:
         origin = int(values[0])
         table.notes.append(f"{short(name)}: counted from its first value, {origin}")
         # Subtracting without a sign wraps round to the right difference, as long as that fits.

@@ -1,5 +1,6 @@
-"""Recordings as files of arrays: MATLAB up to version 7, and NumPy's NPZ."""
+"""Recordings as files of arrays: MATLAB up to version 7, NumPy's NPZ, and Parquet, where pyarrow is installed."""
 
+import importlib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,13 +12,15 @@ from detent.errors import InputError
 from detent.files.text import check_file
 from detent.logs.csv_layout import FileOptions
 from detent.logs.log_units import split_heading
-from detent.logs.raw_table import MAX_CELLS, Item, RawTable, no_table, table_of, whole
+from detent.logs.raw_table import MAX_CELLS, Item, RawTable, check_size, no_table, table_of, whole
+from detent.logs.read_hdf5 import MAX_BYTES as MAX_COLUMNAR
 from detent.logs.read_hdf5 import read_hdf5
 from detent.logs.windows import scipy
 
-MAX_BYTES = 500_000_000  # largest file of arrays read
+MAX_BYTES = 500_000_000  # largest file of arrays read, Parquet aside
 ALLOWED_MAT = "a MATLAB file with vectors of equal length"
 ALLOWED_NPZ = "an NPZ or NPY file with vectors of equal length"
+ALLOWED_PARQUET = "a Parquet file with columns of numbers"
 
 _DEEPEST = 4
 
@@ -30,7 +33,9 @@ def read_mat(path: Path, options: FileOptions) -> RawTable:
     check_file(path, MAX_BYTES, ALLOWED_MAT)
     with whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
         try:
-            _check_shapes(path, [shape for _, shape, _ in scipy("io").whosmat(path)], ALLOWED_MAT)
+            cells = sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy("io").whosmat(path))
+            if cells > MAX_CELLS:
+                raise _too_much(path, f"{cells} numbers", f"{ALLOWED_MAT}, up to {MAX_CELLS} numbers")
             found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
             return read_hdf5(path, options)
@@ -44,7 +49,11 @@ def read_npz(path: Path, options: FileOptions) -> RawTable:
     items: list[Item] = []
     with whole(path, "NPZ", ALLOWED_NPZ, "save it again with numpy.savez, or as CSV"), path.open("rb") as stream:
         if zipfile.is_zipfile(stream):
-            _check_unpacked(path)
+            with zipfile.ZipFile(path) as archive:
+                size = sum(entry.file_size for entry in archive.infolist())
+            if size > 8 * MAX_CELLS:
+                most = f"up to {8 * MAX_CELLS // 1_000_000} MB unpacked"
+                raise _too_much(path, f"{size // 1_000_000} MB unpacked", most)
             with np.load(path, allow_pickle=False) as arrays:
                 for name in arrays.files:
                     items += _fields(name, _load_member(arrays, name), 0)
@@ -53,6 +62,35 @@ def read_npz(path: Path, options: FileOptions) -> RawTable:
             array = np.load(stream, allow_pickle=False)
             items = list(_fields("" if array.dtype.names else "column", array, 0))
     return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
+
+
+def read_parquet(path: Path, options: FileOptions) -> RawTable:
+    """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit."""
+    del options
+    check_file(path, MAX_COLUMNAR, ALLOWED_PARQUET)
+    try:
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+    except ImportError:
+        remedy = 'pip install "detent[parquet]", or save the recording as CSV or HDF5'
+        came = "a file that needs pyarrow, which is not installed"
+        raise InputError.of_file(str(path), came, ALLOWED_PARQUET, remedy) from None
+    with whole(path, "Parquet", ALLOWED_PARQUET), parquet.ParquetFile(path) as file:
+        check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
+        items = [_column(field, values) for field, values in zip(file.schema_arrow, file.read().columns, strict=True)]
+    return table_of(str(path), items, ALLOWED_PARQUET)
+
+
+def _column(field: Any, column: Any) -> Item:
+    """A column of a Parquet file with its unit; one of anything but numbers and moments has no value."""
+    metadata: dict[bytes, bytes] = field.metadata or {}
+    unit = metadata.get(b"unit", b"").decode("utf-8", "replace") or split_heading(field.name)[1]
+    values: Any = column.to_numpy()
+    if values.dtype.kind == "O":
+        try:  # truth values and decimals with gaps come as objects
+            values = values.astype(np.float64)
+        except (ValueError, TypeError):
+            values = None
+    return Item(field.name, values, unit)
 
 
 def _load_member(arrays: Any, name: str) -> Any:
@@ -65,22 +103,9 @@ def _load_member(arrays: Any, name: str) -> Any:
         raise
 
 
-def _check_unpacked(path: Path) -> None:
-    """Refuse an archive that unpacks to more than memory should take."""
-    with zipfile.ZipFile(path) as archive:
-        size = sum(entry.file_size for entry in archive.infolist())
-    if size > 8 * MAX_CELLS:
-        allowed = f"up to {8 * MAX_CELLS // 1_000_000} MB unpacked"
-        remedy = "cut the recording into pieces"
-        raise InputError.of_file(str(path), f"{size // 1_000_000} MB unpacked", allowed, remedy)
-
-
-def _check_shapes(path: Path, shapes: list[tuple[int, ...]], allowed: str) -> None:
-    """Refuse arrays that would fill the memory, before they are read."""
-    cells = sum(int(np.prod(shape, dtype=object)) for shape in shapes)
-    if cells > MAX_CELLS:
-        remedy = "cut the recording into pieces"
-        raise InputError.of_file(str(path), f"{cells} numbers", f"{allowed}, up to {MAX_CELLS} numbers", remedy)
+def _too_much(path: Path, came: str, allowed: str) -> InputError:
+    """What would fill the memory, before it is read."""
+    return InputError.of_file(str(path), came, allowed, "cut the recording into pieces")
 
 
 def _fields(name: str, value: Any, depth: int) -> Iterator[Item]:

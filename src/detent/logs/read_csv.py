@@ -44,12 +44,6 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     except csv.Error as error:
         came = f"cells that cannot be told apart ({error})"
         raise InputError.of_file(table.file, came, ALLOWED, "remove the quotation marks, or state separator=") from None
-    _check_broken(table, layout, lines, numbers)
-    return table
-
-
-def _check_broken(table: RawTable, layout: CsvLayout, lines: list[str], numbers: list[int]) -> None:
-    """Refuse a table of which too little fits its header."""
     if len(table.broken) > _MOST_BROKEN * len(numbers) and len(table.broken) > 2:
         worst = table.broken[0]
         line = numbers[worst.row - 1]
@@ -57,6 +51,7 @@ def _check_broken(table: RawTable, layout: CsvLayout, lines: list[str], numbers:
         allowed = f"rows of {len(layout.names)} cells as the header has"
         remedy = "state separator=, decimal= or header= (its line)"
         raise InputError([FileProblem(table.file, line + 1, 1, "", came, allowed, remedy)])
+    return table
 
 
 def decode(path: Path, data: bytes, table: RawTable) -> str:
@@ -82,13 +77,19 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
     first = 1
     while block := list(islice(cells, BLOCK_ROWS)):
         fitting = _sort_out(table, layout, block, first)
-        found, wrong = _read_block(layout, [block[index] for index in fitting], columns)
-        for place in wrong:
-            row = fitting[place]
-            _break(table, layout, block[row], first + row, f'"{short(wrong[place])}" is no number')
-        keep = np.array([place not in wrong for place in range(len(fitting))], dtype=np.bool_)
+        found: list[NDArray[np.generic]] = []
+        wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
         for index in columns:
-            pieces[index].append(found[index][keep])
+            column = [block[row][index] for row in fitting]
+            is_moment = index in layout.moment_columns
+            values, bad = read_moments(column) if is_moment else read_column(column, layout.decimal)
+            found.append(values)
+            wrong = {fitting[place]: column[place] for place in bad} | wrong
+        for row, cell in wrong.items():
+            _break(table, layout, block[row], first + row, f'"{short(cell)}" is no number')
+        keep = np.array([row not in wrong for row in fitting], dtype=np.bool_)
+        for index, values in zip(columns, found, strict=True):
+            pieces[index].append(values[keep])
         rows.append(np.array(fitting, dtype=np.int64)[keep] + first)
         first += len(block)
     table.rows = np.concatenate(rows) if rows else table.rows
@@ -113,21 +114,6 @@ def _sort_out(table: RawTable, layout: CsvLayout, block: list[list[str]], first:
         else:
             _break(table, layout, cells, first + index, f"{len(cells)} cells in place of {width}")
     return fitting
-
-
-def _read_block(
-    layout: CsvLayout, block: list[list[str]], columns: list[int]
-) -> tuple[dict[int, NDArray[np.generic]], dict[int, str]]:
-    """Numbers of the columns of a block, and per row that holds no number where it should its first such cell."""
-    found: dict[int, NDArray[np.generic]] = {}
-    bad: dict[int, str] = {}
-    for index in columns:
-        cells = [row[index] for row in block]
-        is_moment = index in layout.moment_columns
-        found[index], wrong = read_moments(cells) if is_moment else read_column(cells, layout.decimal)
-        for place in sorted(wrong):
-            bad.setdefault(place, cells[place])
-    return found, bad
 
 
 def _break(table: RawTable, layout: CsvLayout, cells: list[str], row: int, reason: str) -> None:

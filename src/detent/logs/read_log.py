@@ -15,11 +15,10 @@ from detent.logs.draft import Draft, tell_count
 from detent.logs.log import Action, Finding, Kind, Log, Severity, row_ranges
 from detent.logs.mapping import ColumnMapping, load_mapping, parse_options
 from detent.logs.raw_table import RawTable
-from detent.logs.read_arrays import read_mat, read_npz
+from detent.logs.read_arrays import read_mat, read_npz, read_parquet
 from detent.logs.read_csv import read_csv
 from detent.logs.read_hdf5 import read_hdf5
 from detent.logs.read_json import read_json
-from detent.logs.read_parquet import read_parquet
 from detent.logs.rotation import mend_rotation
 
 EPOCH = 1e8  # a time from which on it counts from some year, and is counted from the first sample instead [s]
@@ -42,8 +41,8 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     stated = stated.overridden(parse_options(options))
     table = read_table(path, stated.file)
     chosen = choose_columns(table, stated)
-    if "time" in chosen.columns:
-        mend_rotation(table, chosen.columns["time"])
+    if "time" in chosen:
+        mend_rotation(table, chosen["time"])
     _tell_broken(table)
     draft = make_draft(table, chosen, stated)
     if not draft.values:

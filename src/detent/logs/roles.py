@@ -3,7 +3,7 @@
 import difflib
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 from detent.logs.log_units import split_heading
 
@@ -65,11 +65,16 @@ DERIVED = frozenset(
 )
 """Words in the name of a column that say that it is computed from others, or is none of these."""
 
-_OF_MOTION = {"velocity": ("velocity", "speed", "vel"), "acceleration": ("acceleration", "accel", "acc")}
+_MARKS = {
+    "velocity": {"velocity", "speed", "vel"},
+    "acceleration": {"acceleration", "accel", "acc"},
+    "enabled": {"enable", "enabled"},
+}
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 _LEAST_FUZZY = 6
 
 
+@lru_cache(4096)
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a column's name, in small letters.
 
@@ -98,36 +103,25 @@ def is_time(name: str) -> bool:
     return rank(split_heading(name)[0], "time") is not None
 
 
-@cache
-def _known_words(known: str) -> tuple[str, ...]:
-    return words_of(known)
-
-
 def _contains(words: tuple[str, ...], known: str) -> bool:
     """True where the known words stand whole and in their order in a name; a single letter must be all of it."""
-    sought = _known_words(known)
+    sought = words_of(known)
     if sum(map(len, sought)) <= 1:
         return words == sought
     rest = iter(words)
-    if all(any(_is_same(word, wanted) for word in rest) for wanted in sought):
-        return True
-    return "".join(words) == "".join(sought)
+    return all(any(_is_same(word, wanted) for word in rest) for wanted in sought) or "".join(words) == "".join(sought)
 
 
 def _is_same(word: str, wanted: str) -> bool:
     """True for a word, or a long one that is misspelled."""
-    if word == wanted:
-        return True
-    return len(wanted) >= _LEAST_FUZZY and difflib.SequenceMatcher(None, word, wanted).ratio() > 0.88
+    is_long = len(wanted) >= _LEAST_FUZZY
+    return word == wanted or (is_long and difflib.SequenceMatcher(None, word, wanted).ratio() > 0.88)
 
 
 def _means_other(words: tuple[str, ...], known: str, role: str) -> bool:
     """True where other words of a name say that it is something else, as in target velocity."""
-    others = set(words) - set(_known_words(known))
-    for motion, marks in _OF_MOTION.items():
-        if role != motion and others & set(marks):
-            return True
-    if role != "enabled" and others & {"enable", "enabled"}:
+    others = set(words) - set(words_of(known))
+    if any(others & marks for meant, marks in _MARKS.items() if role != meant):
         return True
     asked = {"target", "goal", "reference", "ref", "desired", "setpoint", "demand", "demanded", "commanded"}
     return role in {"position", "velocity", "acceleration", "current", "force", "torque"} and bool(others & asked)

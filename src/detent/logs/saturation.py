@@ -1,11 +1,10 @@
 """Drives at their limit, and sensors at the end of their range."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.logs.differences import runs_of
 from detent.logs.draft import Draft, tell_count
-from detent.logs.log import Action, Kind, Severity, Values
+from detent.logs.log import Action, Kind, Severity
 
 LIMITED = ("command", "voltage", "current", "force", "torque")
 """Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus."""
@@ -34,18 +33,20 @@ def find_saturation(draft: Draft) -> None:
     (255, 1023, 100) or both ends lie at the same distance from zero; otherwise it is noted only.
     """
     for role in LIMITED:
-        if role in draft.values:
-            _find(draft, role)
+        if role in draft.values and len(np.unique(draft.values[role])) >= FEWEST_LEVELS:
+            _find(draft, role, 1.0)
+            _find(draft, role, -1.0)
 
 
-def _find(draft: Draft, role: str) -> None:
+def _find(draft: Draft, role: str, side: float) -> None:
+    """Find a plateau at the largest value, or at the smallest for side -1."""
     values = draft.values[role]
-    if len(np.unique(values)) < FEWEST_LEVELS:
-        return
-    ends = {float(end): _plateaus(values, side) for end, side in ((values.max(), 1.0), (values.min(), -1.0))}
-    piled = {end: where for end, where in ends.items() if len(where)}
-    factor = abs(draft.sources[role].factor)
-    for end, where in piled.items():
+    levels, counts = np.unique(side * values, return_counts=True)
+    is_end = side * values == levels[-1]
+    runs = runs_of(is_end)
+    is_piled = counts[-1] >= max(FEWEST, PILED * float(counts[-1 - NEIGHBOURS : -1].max(initial=0)))
+    if is_piled and (runs[:, 1] - runs[:, 0]).max() >= SHORTEST:
+        end, where, factor = side * float(levels[-1]), np.flatnonzero(is_end), abs(draft.sources[role].factor)
         is_symmetric = bool(np.isclose(values.max(), -values.min(), rtol=1e-3))
         is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)
         severity = Severity.WARNING if is_symmetric or is_full else Severity.NOTE
@@ -54,12 +55,3 @@ def _find(draft: Draft, role: str) -> None:
         text = f"stays at {shown} ({why}) in {tell_count(len(where), 'row')}"
         advice = "leave these rows out of a fit of the loop; a fit of the axis may keep them"
         draft.note(Kind.SATURATED, role, where, text, Action.LEFT, advice, severity)
-
-
-def _plateaus(values: Values, side: float) -> NDArray[np.intp]:
-    """Samples at the largest number, or at the smallest for side -1; none unless values are piled up there."""
-    levels, counts = np.unique(side * values, return_counts=True)
-    where = np.flatnonzero(side * values == levels[-1])
-    runs = runs_of(side * values == levels[-1])
-    is_piled = counts[-1] >= max(FEWEST, PILED * float(counts[-1 - NEIGHBOURS : -1].max(initial=0)))
-    return where if is_piled and (runs[:, 1] - runs[:, 0]).max() >= SHORTEST else where[:0]

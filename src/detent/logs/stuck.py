@@ -17,7 +17,7 @@ from detent.logs.differences import (
     runs_of,
     window_rows,
 )
-from detent.logs.draft import Draft
+from detent.logs.draft import Draft, tell_count
 from detent.logs.log import Action, Kind, Severity, Values
 from detent.logs.windows import spread
 
@@ -47,14 +47,11 @@ class Twin(NamedTuple):
     grain: float  # resolution of the positions
     drift: float  # resolution of the velocity, by which its integral can drift per second; 0 between positions
 
-    def way_in(self, first: int, last: int) -> float:
-        """Way in some samples, by whichever of the two says more."""
+    def floor(self, t: Values, first: int, last: int) -> float:
+        """Disagreement that calibration and rounding can make in some samples: the way is what either of them says."""
         way, rest = self.way[first:last], self.disagreement[first:last]
-        return max(float(np.ptp(way)), float(np.ptp(way + rest)))
-
-    def rounding(self, t: Values, first: int, last: int) -> float:
-        """Disagreement that rounding can make in some samples."""
-        return 3 * self.grain + self.drift * float(t[last - 1] - t[first])
+        most = max(float(np.ptp(way)), float(np.ptp(way + rest)))
+        return CALIBRATION * most + (3 * self.grain + self.drift * float(t[last - 1] - t[first]))
 
 
 def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
@@ -126,12 +123,9 @@ def find_stuck(draft: Draft) -> None:
     """
     for role in [role for role in draft.values if role in _MEASURED or role == "command"]:
         _find_constant(draft, role)
-    for role in ("position", "position_load", "velocity"):
+    for role in _MEASURED:
         if role in draft.values:
-            _find_against_twins(draft, role)
-    for role in _NOISY:
-        if role in draft.values:
-            _find_by_chance(draft, role)
+            (_find_by_chance if role in _NOISY else _find_against_twins)(draft, role)
 
 
 def _find_constant(draft: Draft, role: str) -> None:
@@ -154,27 +148,27 @@ def _find_against_twins(draft: Draft, role: str) -> None:
     values = draft.values[role]
     runs = equal_runs(values, FEWEST)
     runs = runs[np.argsort(runs[:, 0] - runs[:, 1])][:MOST_RUNS]
-    stuck: dict[int, tuple[int, str]] = {}
+    stuck: dict[tuple[int, int], str] = {}
     for twin in find_twins(draft, role) if len(runs) else ():
         for first, last in runs.tolist():
-            floor = CALIBRATION * twin.way_in(first, last) + twin.rounding(draft.t, first, last)
-            if first not in stuck and _grows(twin.disagreement, first, last, runs, floor):
-                stuck[first] = (last, twin.name)
-    if not stuck:
-        return
-    rows = np.concatenate([np.arange(first, last) for first, (last, _) in sorted(stuck.items())])
-    names = " and ".join(sorted({name for _, name in stuck.values()}))
-    most = max(last - first for first, (last, _) in stuck.items())
-    text = f"stays the same for up to {most} rows while {names} goes on"
-    draft.note(Kind.STUCK, role, rows, text, Action.LEFT, "leave these rows out of a fit")
+            floor = twin.floor(draft.t, first, last)
+            if (first, last) not in stuck and _grows(twin.disagreement, first, last, runs, floor):
+                stuck[first, last] = twin.name
+    if stuck:
+        names = " and ".join(sorted(set(stuck.values())))
+        most = max(last - first for first, last in stuck)
+        _tell(draft, role, sorted(stuck), f"stays the same for up to {most} rows while {names} goes on")
 
 
 def _grows(rest: Values, first: int, last: int, runs: NDArray[np.int64], floor: float) -> bool:
     """True where the disagreement grows in a run by far more than in as many rows elsewhere."""
     size = last - first
     growth = float(np.ptp(rest[first:last]))
-    if growth <= floor or size > len(rest) // 2:
-        return growth > floor and _grows_overall(rest, first, last)
+    if growth <= floor:
+        return False
+    if size > len(rest) // 2:  # a run over most of a recording: against the rows outside it
+        others = np.r_[rest[:first], rest[last:]]
+        return len(others) >= FEWEST and growth > STRONGER * float(np.ptp(others))
     usual = spread(rest, size)
     outside = np.ones(len(rest), dtype=np.bool_)
     half = size // 2
@@ -184,18 +178,13 @@ def _grows(rest: Values, first: int, last: int, runs: NDArray[np.int64], floor: 
     return growth > STRONGER * float(np.percentile(usual, 95))
 
 
-def _grows_overall(rest: Values, first: int, last: int) -> bool:
-    """The same for a run over most of a recording: against the rows outside it."""
-    outside = np.r_[rest[:first], rest[last:]]
-    return len(outside) >= FEWEST and float(np.ptp(rest[first:last])) > STRONGER * float(np.ptp(outside))
-
-
 def _find_by_chance(draft: Draft, role: str) -> None:
     """Find runs of equal numbers of a noisy signal that are longer than chance allows while the axis moves."""
     values = draft.values[role]
-    moves = _moving(draft)
-    if moves is None:
+    position = draft.values.get("position")
+    if position is None or np.ptp(position) == 0:
         return
+    moves = spread(position, 2 * FEWEST + 1) > 3 * grain(position)
     extremes = (values.min(), values.max())
     runs: list[tuple[int, int]] = [
         (first, last)
@@ -203,10 +192,15 @@ def _find_by_chance(draft: Draft, role: str) -> None:
         if values[first] not in extremes and _is_unlikely(values, first, last, int(moves[first:last].sum()))
     ]
     if runs:
-        rows = np.concatenate([np.arange(first, last, dtype=np.intp) for first, last in runs])
         most = max(last - first for first, last in runs)
-        text = f"the same number for up to {most} rows while the axis moves, at {len(runs)} place{'s'[: len(runs) > 1]}"
-        draft.note(Kind.STUCK, role, rows, text, Action.LEFT, "leave these rows out of a fit")
+        places = tell_count(len(runs), "place")
+        _tell(draft, role, runs, f"the same number for up to {most} rows while the axis moves, at {places}")
+
+
+def _tell(draft: Draft, role: str, runs: list[tuple[int, int]], text: str) -> None:
+    """Note runs of equal numbers."""
+    rows = np.concatenate([np.arange(first, last, dtype=np.intp) for first, last in runs])
+    draft.note(Kind.STUCK, role, rows, text, Action.LEFT, "leave these rows out of a fit")
 
 
 def _is_unlikely(values: Values, first: int, last: int, moving: int) -> bool:
@@ -223,13 +217,3 @@ def _is_unlikely(values: Values, first: int, last: int, moving: int) -> bool:
     before, behind = values[max(0, first - 1)] - values[first], values[min(last, len(values) - 1)] - values[first]
     needed = max(FEWEST, STRONGER * longest) * (2 if before * behind > 0 else 1)
     return moving >= needed and bool(chance < np.log(CHANCE))
-
-
-def _moving(draft: Draft) -> NDArray[np.bool_] | None:
-    """Samples around which the position changes; None where there is none."""
-    position = draft.values.get("position")
-    if position is None or np.ptp(position) == 0:
-        return None
-    around = 2 * FEWEST + 1
-    change = spread(position, around)
-    return change > 3 * grain(position)

@@ -22,7 +22,8 @@ def table_of(*headings, count=30, **values):
 
 
 def chosen(table, *options):
-    return choose_columns(table, parse_options(options))
+    """Columns by their roles, and what was guessed."""
+    return choose_columns(table, parse_options(options)), table.notes
 
 
 def draft_of(table, *options):
@@ -39,9 +40,9 @@ def problem_of(call, *arguments):
 
 
 def test_guesses_are_told():
-    found = chosen(table_of("time(ms)", "enconder(steps)", "inputSignal(8bits)", "remark"))
-    assert found.columns == {"time": "time(ms)", "position": "enconder(steps)", "command": "inputSignal(8bits)"}
-    assert found.guesses == [
+    found, guesses = chosen(table_of("time(ms)", "enconder(steps)", "inputSignal(8bits)", "remark"))
+    assert found == {"time": "time(ms)", "position": "enconder(steps)", "command": "inputSignal(8bits)"}
+    assert guesses == [
         'time: column "time(ms)", by its name',
         'position: column "enconder(steps)", by its name',
         'command: column "inputSignal(8bits)", by its name',
@@ -50,21 +51,21 @@ def test_guesses_are_told():
 
 
 def test_a_column_whose_unit_does_not_fit_is_something_else():
-    found = chosen(table_of("t [s]", "load [N]", "v [V]", "x [mm]"))
-    assert found.columns == {"time": "t [s]", "position": "x [mm]", "force": "load [N]", "voltage": "v [V]"}
-    assert 'force: column "load [N]", by its unit N' in found.guesses
+    found, guesses = chosen(table_of("t [s]", "load [N]", "v [V]", "x [mm]"))
+    assert found == {"time": "t [s]", "position": "x [mm]", "force": "load [N]", "voltage": "v [V]"}
+    assert 'force: column "load [N]", by its unit N' in guesses
 
 
 def test_two_columns_alike():
-    found = chosen(table_of("t", "a.position", "b.position"))
-    assert found.columns["position"] == "a.position"
-    assert 'position: column "a.position", by its name; b.position would fit as well' in found.guesses
+    found, guesses = chosen(table_of("t", "a.position", "b.position"))
+    assert found["position"] == "a.position"
+    assert 'position: column "a.position", by its name; b.position would fit as well' in guesses
 
 
 def test_stated_columns_are_not_guessed_again():
-    found = chosen(table_of("t", "x", "y", "force"), "position=y [mm]", "force=", "reference=x")
-    assert found.columns == {"position": "y", "reference": "x", "time": "t"}
-    assert found.guesses == ['time: column "t", by its name', "columns not read: force"]
+    found, guesses = chosen(table_of("t", "x", "y", "force"), "position=y [mm]", "force=", "reference=x")
+    assert found == {"position": "y", "reference": "x", "time": "t"}
+    assert guesses == ['time: column "t", by its name', "columns not read: force"]
 
 
 @pytest.mark.parametrize("wanted", ["x [mm]", "x", "X", "2", "X [um]"])
@@ -90,7 +91,7 @@ def test_missing_columns_are_refused():
     )  # fmt: skip
     assert problem_of(chosen, table_of("a", "x")).allowed == "a column for the time"
     assert "state what the columns are" in problem_of(chosen, table_of("t", "a")).remedy
-    assert chosen(table_of("a", "x"), "period=1 ms").columns == {"position": "x"}
+    assert chosen(table_of("a", "x"), "period=1 ms")[0] == {"position": "x"}
 
 
 @pytest.mark.parametrize(

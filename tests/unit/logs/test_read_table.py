@@ -365,6 +365,6 @@ def test_parquet_without_pyarrow(tmp_path, monkeypatch):
     def missing(name):
         raise ImportError(name)
 
-    monkeypatch.setattr("detent.logs.read_parquet.importlib.import_module", missing)
+    monkeypatch.setattr("detent.logs.read_arrays.importlib.import_module", missing)
     assert "detent[parquet]" in refusal(tmp_path / "run.parquet").remedy
     assert issubclass(InputError, DetentError)
