@@ -8,7 +8,16 @@ import math
 
 import numpy as np
 
-from detent.logs.differences import FARTHEST, Likeness, correlation_curve, grain, likeness, paired_changes, runs_of
+from detent.logs.differences import (
+    FARTHEST,
+    Likeness,
+    correlation_curve,
+    grain,
+    likeness,
+    paired_changes,
+    peaks_of,
+    runs_of,
+)
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity
 
@@ -99,7 +108,7 @@ def _before_position(draft: Draft) -> Likeness:
     reference, position = draft.values["reference"][part], draft.values["position"][part]
     curve = correlation_curve(position, reference, min(FARTHEST, len(position) // 4))
     size, middle = np.abs(curve), len(curve) // 2
-    peaks = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    peaks = peaks_of(size)
     peaks = peaks[size[peaks] >= size.max() - _AS_GOOD]
     if not len(peaks) or np.min(np.abs(peaks - middle)) > max(10, len(position) // 20):
         return Likeness(0.0, 0.0)

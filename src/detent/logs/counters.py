@@ -30,12 +30,10 @@ def unwrap_clock(draft: Draft) -> None:
     """
     steps = np.diff(draft.t)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    for bits in WIDTHS:
-        modulus = 2.0**bits
-        true = steps + modulus
-        where = np.flatnonzero((steps < 0) & (true > 0) & (true < 10 * usual))
-        fits = _are_whole(draft.t) and draft.t.min() >= 0 and draft.t.max() < modulus
-        if len(where) and fits:
+    is_count = _are_whole(draft.t) and draft.t.min() >= 0
+    for modulus, bits in [(2.0**bits, bits) for bits in WIDTHS if is_count and draft.t.max() < 2.0**bits]:
+        where = np.flatnonzero((steps < 0) & (steps + modulus > 0) & (steps + modulus < 10 * usual))
+        if len(where):
             draft.t = draft.t + modulus * np.cumsum(np.bincount(where + 1, minlength=len(draft)))
             text = f"the clock wraps at {bits} bits, {tell_count(len(where), 'time')}"
             draft.note(Kind.WRAPPED_COUNTER, "time", where + 1, text, Action.UNWRAPPED)

@@ -107,6 +107,12 @@ def correlation_curve(ours: Values, theirs: Values, most: int) -> Values:
     return products / (sizes * (float(np.sqrt(middle @ middle)) or 1.0))
 
 
+def peaks_of(curve: Values) -> NDArray[np.intp]:
+    """Indices at which a curve is no lower than at its neighbours, its ends aside."""
+    inner = curve[1:-1]
+    return np.flatnonzero((inner >= curve[:-2]) & (inner >= curve[2:])) + 1
+
+
 def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """First index and index behind the last of each run of True, shape (k, 2)."""
     edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(np.int8), 0]))

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from detent.files.text import short
 from detent.logs.differences import runs_of
-from detent.logs.log import Action, Finding, Kind, Severity, Values, row_ranges
+from detent.logs.draft import tell_count
+from detent.logs.log import Action, Finding, Kind, Values, row_ranges
 from detent.logs.raw_table import BrokenRow, RawTable
 from detent.logs.roles import words_of
 from detent.logs.windows import fill_holes
@@ -48,13 +49,16 @@ def mend_rotation(table: RawTable, time: str) -> None:
         return
     whole = found.where.mean() > _WHOLE
     head = _head(table, matrix, names.index(time), found.shift) if whole else None
+    column, unit = names[(names.index(time) + found.shift) % len(names)], tell_count(found.shift, "column")
+    text = f'the clock runs in "{short(column)}", not in "{short(time)}": cells stand {unit} too far right'
     if head is None:
         matrix[found.where] = np.roll(matrix[found.where], -found.shift, axis=1)
-        _tell(table, names, time, found, table.rows[found.where])
+        rows = table.rows[found.where]
     else:
         matrix = _reflow(table, matrix, found.shift, head)
-        _tell(table, names, time, found, table.rows, "; lines are broken in the wrong places")
+        rows, text = table.rows, f"{text}; lines are broken in the wrong places"
     table.columns = {name: matrix[:, index] for index, name in enumerate(names)}
+    table.findings.append(Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text, Action.REORDERED))
 
 
 def _find(matrix: Values, names: list[str], clock: int) -> Rotation | None:
@@ -146,29 +150,15 @@ def _head(table: RawTable, matrix: Values, clock: int, shift: int) -> BrokenRow 
 def _reflow(table: RawTable, matrix: Values, shift: int, head: BrokenRow) -> Values:
     """Rows whose first cells go to the row before: one row more than before, unless the last lacks its last cells."""
     rows = np.r_[head.row, table.rows]
-    count = matrix.shape[1]
-    whole = np.full((len(rows), count), np.nan)
-    whole[0, : count - shift] = np.array(head.cells, dtype=np.float64)
-    whole[1:, : count - shift] = matrix[:, shift:]
+    whole = np.full((len(rows), matrix.shape[1]), np.nan)
+    whole[0, :-shift] = np.array(head.cells, dtype=np.float64)
+    whole[1:, :-shift] = matrix[:, shift:]
     follows = np.flatnonzero(np.diff(rows) == 1)
-    whole[follows, count - shift :] = matrix[follows, :shift]
+    whole[follows, -shift:] = matrix[follows, :shift]
     table.broken.remove(head)
     tail = next((row for row in table.broken if row.row == rows[-1] + 1), None)
     if tail is not None and len(tail.cells) == shift and None not in tail.cells:
-        whole[-1, count - shift :] = np.array(tail.cells, dtype=np.float64)
+        whole[-1, -shift:] = np.array(tail.cells, dtype=np.float64)
         table.broken.remove(tail)
     table.rows = rows
     return whole
-
-
-def _tell(  # noqa: PLR0913 - the parts of a sentence
-    table: RawTable, names: list[str], time: str, found: Rotation, rows: NDArray[np.int64], more: str = ""
-) -> None:
-    """Note what was found."""
-    column = names[(names.index(time) + found.shift) % len(names)]
-    unit = "column" if found.shift == 1 else "columns"
-    text = (
-        f'the clock runs in "{short(column)}", not in "{short(time)}": cells stand {found.shift} {unit} too far right'
-    )
-    finding = Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text + more, Action.REORDERED, "", Severity.WARNING)
-    table.findings.append(finding)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from detent.logs.differences import FARTHEST, correlation_curve
+from detent.logs.differences import FARTHEST, correlation_curve, peaks_of
 from detent.logs.draft import Draft
 from detent.logs.effort import Motion, find_motion, smoothed, terms
 from detent.logs.log import Action, Kind, Values
@@ -13,6 +13,7 @@ BETTER = 0.5  # disagreement left without the shift, as a share, at most: that o
 ALIKE = 0.9
 _AS_GOOD = 0.02
 _FEWEST = 200
+_BESIDE = {"reference": "comes after the position that follows it", "position_load": "is beside the position"}
 
 
 def find_shifts(draft: Draft) -> None:
@@ -30,50 +31,39 @@ def find_shifts(draft: Draft) -> None:
         _move_velocity(draft, motion)
         motion = find_motion(draft) or motion
     position = smoothed(draft.values["position"], draft, motion)
-    for role, text in (
-        ("reference", "comes after the position that follows it"),
-        ("position_load", "is beside the position"),
-    ):
-        if role in draft.values:
-            other = smoothed(draft.values[role], draft, motion)
-            lag = find_lag(other, position, prefers_earlier=role == "reference")
-            if abs(lag) >= SMALLEST and (role != "reference" or lag > 0):
-                _tell(draft, role, f"{text} by {abs(lag):.1f} rows", lag)
-    for role in ("force", "torque", "current"):
-        if role in draft.values:
-            lag = _late_effort(smoothed(draft.values[role], draft, motion), motion)
-            if lag >= SMALLEST:
-                _tell(draft, role, f"comes {lag} rows after the acceleration that it makes", float(lag))
-
-
-def _tell(draft: Draft, role: str, text: str, lag: float) -> None:
-    period = float(np.median(np.diff(draft.t)))
-    advice = f'if {role} was recorded late, state delay = "{lag * period * 1e3:.3g} ms" in [columns.{role}]'
-    draft.note(Kind.SHIFTED, role, [], text, Action.LEFT, advice)
+    for role in ("reference", "position_load", "force", "torque", "current"):
+        if role not in draft.values:
+            continue
+        signal = smoothed(draft.values[role], draft, motion)
+        if role in {"force", "torque", "current"}:
+            lag = float(_late_effort(signal, motion))
+            text = f"comes {lag:.0f} rows after the acceleration that it makes"
+        else:
+            lag = find_lag(signal, position, prefers_earlier=role == "reference")
+            text = f"{_BESIDE[role]} by {abs(lag):.1f} rows"
+        if (abs(lag) if role == "position_load" else lag) >= SMALLEST:
+            period = float(np.median(np.diff(draft.t)))
+            advice = f'if {role} was recorded late, state delay = "{lag * period * 1e3:.3g} ms" in [columns.{role}]'
+            draft.note(Kind.SHIFTED, role, [], text, Action.LEFT, advice)
 
 
 def find_lag(ours: Values, theirs: Values, *, prefers_earlier: bool = False) -> float:
     """By how many rows one series comes after another, by the peak of their correlation."""
     most = min(FARTHEST, len(ours) // 4)
     curve = correlation_curve(ours, theirs, most)
-    peak = _nearest_peak(curve, most, prefers_earlier=prefers_earlier)
-    if peak is None or curve[peak] < ALIKE or 1 - curve[peak] > BETTER * (1 - curve[most]):
+    peaks = peaks_of(curve)
+    if not len(peaks):
+        return 0.0
+    # A periodic motion has many: the nearest to no shift among those that are as good as the highest.
+    good = peaks[1 - curve[peaks] <= 2 * (1 - curve[peaks].max()) + _AS_GOOD]
+    if prefers_earlier and np.any(good <= most):
+        good = good[good <= most]
+    peak = int(good[np.argmin(np.abs(good - most))])
+    if curve[peak] < ALIKE or 1 - curve[peak] > BETTER * (1 - curve[most]):
         return 0.0
     left, top, right = curve[peak - 1 : peak + 2]
     bend = left - 2 * top + right
     return peak - most + (0.5 * float(left - right) / float(bend) if bend else 0.0)
-
-
-def _nearest_peak(curve: Values, middle: int, *, prefers_earlier: bool) -> int | None:
-    """Index of the peak nearest to no shift among those that are as good as the highest: a periodic motion has many."""
-    inner = curve[1:-1]
-    peaks = np.flatnonzero((inner >= curve[:-2]) & (inner >= curve[2:])) + 1
-    if not len(peaks):
-        return None
-    good = peaks[1 - curve[peaks] <= 2 * (1 - curve[peaks].max()) + _AS_GOOD]
-    if prefers_earlier and np.any(good <= middle):
-        good = good[good <= middle]
-    return int(good[np.argmin(np.abs(good - middle))])
 
 
 def _move_velocity(draft: Draft, motion: Motion) -> None:

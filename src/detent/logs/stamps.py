@@ -159,17 +159,13 @@ def _spread_stamps(draft: Draft) -> None:
         draft.keep(~again)
         return
     widths = np.r_[widths, np.median(widths)]
-    within = np.arange(len(draft)) - np.repeat(firsts, sizes)
-    even = draft.t + within * np.repeat(widths / sizes, sizes)
-    draft.t = _straight(even, float(np.median(widths)))
-
-
-def _straight(t: Values, resolution: float) -> Values:
-    """The straight line through stamps that lie within their resolution of one; otherwise the stamps."""
-    k = np.arange(len(t), dtype=np.float64)
-    slope, start = np.polyfit(k, t, 1)
+    k = np.arange(len(draft), dtype=np.float64)
+    draft.t = draft.t + (k - np.repeat(firsts, sizes)) * np.repeat(widths / sizes, sizes)
+    # Stamps that lie within their resolution of a straight line are those of the line.
+    slope, start = np.polyfit(k, draft.t, 1)
     line = start + slope * k
-    return line if float(np.max(np.abs(line - t))) <= resolution else t
+    if float(np.max(np.abs(line - draft.t))) <= float(np.median(widths)):
+        draft.t = line
 
 
 def look_at_clock(draft: Draft) -> None:

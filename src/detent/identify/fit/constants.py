@@ -100,7 +100,12 @@ def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
 
 def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
     """Names, values, covariance and degrees of freedom of the constants that a model has; a sum has the fewest."""
-    wanted = [name for name, sums in _SUMS.items() if _has(fit, name, sums)]
+    # Static friction is more than Coulomb friction only where its own term is part of the model.
+    wanted = [
+        name
+        for name, sums in _SUMS.items()
+        if (all if name.startswith("static") else any)(term in fit.names for term in sums)
+    ]
     weights = np.zeros((len(wanted), len(fit.values)))
     for row, name in enumerate(wanted):
         for term, sign in _SUMS[name].items():
@@ -111,12 +116,6 @@ def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
     # Two that cancel leave rounding, of either sign.
     values = [significant(v) if abs(v) > CANCELLED * p else 0.0 for v, p in zip(values, parts, strict=True)]
     return tuple(wanted), np.array(values), weights @ fit.covariance @ weights.T, degrees
-
-
-def _has(fit: Fit, name: str, sums: dict[str, float]) -> bool:
-    if name.startswith("static"):
-        return all(term in fit.names for term in sums)
-    return any(term in fit.names for term in sums)
 
 
 def _spread(names: Sequence[str], values: Values, rivals: Sequence[Fit]) -> Values:

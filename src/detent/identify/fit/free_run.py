@@ -125,9 +125,9 @@ def simulate_horizons(constants: Constants, runs: Sequence[Run], report: Report 
         if samples < 1 or (samples == 1 and name != "one step"):
             continue
         made = [_stretches(constants, run, samples) for run in runs if len(run.position) > samples + 2]
-        rows = np.concatenate(made) if made else np.empty((0, 3))
+        rows = np.concatenate([np.empty((0, 3)), *made])
         if len(rows):
-            found.append(_horizon(name, samples * step, rows))
+            found.append(_horizon(name, samples * step, len(rows), rows))
         report((k + 1) / (len(named) + 1))
     found.append(_free_run(constants, runs))
     return tuple(found)
@@ -148,29 +148,20 @@ def _stretches(constants: Constants, run: Run, samples: int) -> Values:
     return np.array(rows).reshape(-1, 3)
 
 
-def _horizon(name: str, duration: float, rows: Values) -> Horizon:
+def _horizon(name: str, duration: float, starts: int, rows: Values) -> Horizon:
     error, way, naive = rows.T
-    return Horizon(duration, name, len(rows), rms(error), float(np.abs(error).max()), rms(way), rms(naive))
+    return Horizon(duration, name, starts, rms(error), float(np.abs(error).max()), rms(way), rms(naive))
 
 
 def _free_run(constants: Constants, runs: Sequence[Run]) -> Horizon:
     """The whole of each run in one piece."""
-    errors: list[Values] = []
-    ways: list[Values] = []
-    naive: list[Values] = []
+    rows: list[Values] = []
     for run in runs:
         velocity = float(start_velocities(run)[well_known_from(run)])
         cut = run.part(well_known_from(run), len(run.position))
         q = cut.position
-        errors.append(free_run(constants, run) - q)
-        ways.append(q - q[0])
-        naive.append(q[0] + velocity * cut.t - q)
-    error = np.concatenate(errors)
-    duration = max(run.t[-1] for run in runs)
-    largest = float(np.abs(error).max())
-    return Horizon(
-        duration, "free run", len(runs), rms(error), largest, rms(np.concatenate(ways)), rms(np.concatenate(naive))
-    )
+        rows.append(np.column_stack([free_run(constants, run) - q, q - q[0], q[0] + velocity * cut.t - q]))
+    return _horizon("free run", max(run.t[-1] for run in runs), len(runs), np.concatenate(rows))
 
 
 def well_known_from(run: Run) -> int:

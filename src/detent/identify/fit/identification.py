@@ -19,7 +19,7 @@ from detent.identify.fit.prepare import Run, make_run
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
 from detent.identify.fit.weights import make_kernel
-from detent.logs.log import Log, Values
+from detent.logs.log import Log
 
 Report = Callable[[str, float], None]
 Method = Literal["regression", "output error"]
@@ -144,30 +144,29 @@ def identify(
     refusals = [r for log, run in zip(logs, runs, strict=True) for r in look_at_log(log, run)]
     parts = choose_windows(runs)
     refusals += look_at_motion(runs, parts)
-    if sum(len(p.motion.rows) for p in parts) < 5 * len(RUNGS[-1].terms):
+    windows = sum(len(p.motion.rows) for p in parts)
+    if windows < 5 * len(RUNGS[-1].terms):
         if not refusals:
             refusals.append(Refusal("too short", "hardly any window without standstill", "record longer moves"))
         return Identification(tuple(logs), runs, None, (), (), None, (), tuple(refusals))
-    found = _fit_all(parts, runs, report)
-    constants = constants_of(found.fit, found.rivals)
+    climbs, fit, rivals = _fit_all(parts, runs, report)
+    constants = constants_of(fit, rivals)
     if method == "output error" and constants.value("mass") > 0.0:
         constants = _refine(runs, constants, "output error", report)
     refusals += look_at_constants(runs[0], constants, parts)
-    seen, horizons, closed = _test_simulation(runs, found, constants, method, report)
-    refusals += [*look_at_prediction(found.climbs, horizons, refusals)]
-    told = constants.estimates(runs[0])
-    results = (constants, told, found.climbs, found.fit, horizons, tuple(refusals), seen, closed)
-    return Identification(tuple(logs), runs, *results, _notes_of(runs, parts))
-
-
-def _notes_of(runs: Sequence[Run], parts: Sequence[Prepared]) -> tuple[str, ...]:
-    """What was chosen on the way."""
-    kernel, windows = parts[0].motion.kernel, sum(len(p.motion.rows) for p in parts)
-    return (
+    seen, horizons, closed = None, (), None
+    if constants.value("mass") > 0.0:
+        seen, horizons, closed = _test_simulation(runs, fit, chosen_rung(climbs), method, report)
+    refusals += [*look_at_prediction(climbs, horizons, refusals)]
+    kernel = parts[0].motion.kernel
+    notes = (
         f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
         f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {windows} of them",
         _WAYS[parts[0].instruments],
     )
+    told = constants.estimates(runs[0])
+    results = (constants, told, climbs, fit, horizons, tuple(refusals), seen, closed, notes)
+    return Identification(tuple(logs), runs, *results)
 
 
 def _check_alike(runs: Sequence[Run]) -> None:
@@ -186,16 +185,7 @@ def _check_alike(runs: Sequence[Run]) -> None:
 def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report) -> Constants:
     """Constants by simulation, from those of the regression on."""
     longest = min(float(run.t[-1]) for run in runs)
-    return fit_output_error(runs, constants, min(STRETCH, longest / 4), partial(report, what)).constants
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """The ladder, the chosen model and its rivals."""
-
-    climbs: tuple[Climb, ...]
-    fit: Fit
-    rivals: tuple[Fit, ...]
+    return fit_output_error(runs, constants, min(STRETCH, longest / 4), partial(report, what))
 
 
 def choose_windows(runs: Sequence[Run]) -> list[Prepared]:
@@ -217,13 +207,9 @@ def _follows(part: Prepared) -> bool:
         return False
     motion, ideal = part.motion, part.ideal
     pairs = ((motion.velocity, ideal.velocity), (motion.acceleration, ideal.acceleration))
-    return all(_cosine(*pair) > LIKENESS[part.instruments] for pair in pairs)
-
-
-def _cosine(a: Values, b: Values) -> float:
-    """Cosine of the angle between two signals; 0 where one is absent."""
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return float(a @ b) / size if size > 0.0 else 0.0
+    sizes = [float(np.linalg.norm(a) * np.linalg.norm(b)) for a, b in pairs]
+    cosines = [float(a @ b) / size if size > 0.0 else 0.0 for (a, b), size in zip(pairs, sizes, strict=True)]
+    return all(cosine > LIKENESS[part.instruments] for cosine in cosines)
 
 
 def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
@@ -232,18 +218,12 @@ def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]
     while True:
         kernels = [make_kernel(max(5, round(half / run.step)), run.step) for run in runs]
         parts = [prepare(run, kernel, instruments) for run, kernel in zip(runs, kernels, strict=True)]
-        if half >= WIDEST or _noise_share(parts) < NOISE_SHARE[instruments]:
+        seconds = [float(kernel.second @ kernel.second) for kernel in kernels]
+        noise = sum(len(p.motion.rows) * p.run.noise**2 * s for p, s in zip(parts, seconds, strict=True))
+        power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
+        if half >= WIDEST or (noise / power if power > 0.0 else 0.0) < NOISE_SHARE[instruments]:
             return parts
         half *= 1.4
-
-
-def _noise_share(parts: Sequence[Prepared]) -> float:
-    """Share of the noise of the position in the square of the acceleration."""
-    noise = sum(
-        len(p.motion.rows) * p.run.noise**2 * float(p.motion.kernel.second @ p.motion.kernel.second) for p in parts
-    )
-    power = sum(float(np.sum(p.motion.acceleration**2)) for p in parts)
-    return noise / power if power > 0.0 else 0.0
 
 
 def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ...]:
@@ -264,8 +244,10 @@ def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ..
     return (*ladder, lossy)
 
 
-def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report) -> _Found:
-    """Climb the ladder, then fit the chosen model and those as good."""
+def _fit_all(
+    parts: Sequence[Prepared], runs: Sequence[Run], report: Report
+) -> tuple[tuple[Climb, ...], Fit, list[Fit]]:
+    """Climb the ladder; the fit of the chosen model, and those of models as good."""
     climbs = climb(parts, _rungs_for(parts, runs), partial(report, "ladder"))
     chosen = next(c for c in reversed(climbs) if c.taken)
     fits = {c.rung.name: c.fit for c in climbs if _is_rival(c, chosen)}
@@ -273,8 +255,7 @@ def _fit_all(parts: Sequence[Prepared], runs: Sequence[Run], report: Report) -> 
         climbs = tuple(replace(c, taken=c.taken and not c.rung.is_bent) for c in climbs)
         chosen = next(c for c in reversed(climbs) if c.taken)
         fits.setdefault(chosen.rung.name, chosen.fit)
-    fit = fits.pop(chosen.rung.name)
-    return _Found(climbs, fit, tuple(fits.values()))
+    return climbs, fits.pop(chosen.rung.name), list(fits.values())
 
 
 def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
@@ -300,18 +281,16 @@ def _is_rival(c: Climb, chosen: Climb) -> bool:
 
 
 def _test_simulation(
-    runs: Sequence[Run], found: _Found, whole: Constants, method: Method, report: Report
+    runs: Sequence[Run], fit: Fit, rung: Rung, method: Method, report: Report
 ) -> tuple[Constants | None, tuple[Horizon, ...], ClosedLoop | None]:
-    """Constants from the first part of each log, simulated along the last; none where those of the whole cannot be."""
-    if whole.value("mass") <= 0.0:
-        return None, (), None
+    """Constants from the first part of each log, simulated along the last."""
     cuts = [round((1.0 - HELD_OUT) * len(run.position)) for run in runs]
     seen = [run.part(0, cut) for run, cut in zip(runs, cuts, strict=True)]
     unseen = [run.part(cut, len(run.position)) for run, cut in zip(runs, cuts, strict=True)]
-    parts = prepare_all(seen, found.fit.instruments)
-    if sum(len(p.motion.rows) for p in parts) < 3 * len(found.fit.names):
+    parts = prepare_all(seen, fit.instruments)
+    if sum(len(p.motion.rows) for p in parts) < 3 * len(fit.names):
         return None, (), None
-    constants = constants_of(fit_rung(parts, chosen_rung(found.climbs)))
+    constants = constants_of(fit_rung(parts, rung))
     if constants.value("mass") <= 0.0:
         return None, (), None
     if method == "output error":

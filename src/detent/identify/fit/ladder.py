@@ -120,7 +120,7 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, f
     """
     tried = bends_tried(parts, names)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
-    effort = make_effort(parts, fit_equations(parts, plain).delay)
+    effort = make_effort(parts, fit_equations(parts, plain).value("delay"))
 
     def miss(bend: float) -> float:
         """Sum of the squared residuals."""

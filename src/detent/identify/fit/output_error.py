@@ -12,7 +12,7 @@ Bock: Recent advances in parameter identification for ordinary differential equa
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +21,6 @@ import numpy as np
 from detent.errors import DetentError
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.estimate import rms
 from detent.identify.fit.free_run import Plant, start_velocities
 from detent.identify.fit.prepare import Run
 from detent.logs.log import Values
@@ -48,16 +47,6 @@ class Stretch:
     velocity: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OutputErrorFit:
-    """Outcome of a fit by simulation."""
-
-    constants: Constants  # with intervals
-    error: float  # root mean square of simulated less measured position over all stretches [m] or [rad]
-    before: float  # the same with the constants that it began with
-    stretches: int  # stretches simulated
-
-
 def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretch]:
     """Stretches of a duration, without samples that mean nothing."""
     found: list[Stretch] = []
@@ -65,13 +54,13 @@ def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretc
         velocity = start_velocities(run)
         border = max(4, round(0.006 / run.step))
         n = len(run.position) - 2 * border
+        if n < 8:
+            continue
         samples = min(max(round(duration / run.step), 8), n)
-        begins: list[int] = []
-        if n >= 8:
-            begins = (np.linspace(0, n - samples, max(round(n / samples), 1)).astype(np.int64) + border).tolist()
+        begins = np.linspace(0, n - samples, max(round(n / samples), 1)).astype(np.int64) + border
         found += [
             Stretch(run, begin, samples, float(velocity[begin]))
-            for begin in begins
+            for begin in begins.tolist()
             if float(run.usable[begin : begin + samples].mean()) > MEANT
         ]
     return found
@@ -79,7 +68,7 @@ def cut_stretches(runs: Sequence[Run], duration: float = STRETCH) -> list[Stretc
 
 def fit_output_error(
     runs: Sequence[Run], start: Constants, duration: float = STRETCH, report: Report = untold
-) -> OutputErrorFit:
+) -> Constants:
     """Fit constants by simulation."""
     names = tuple(name for name in start.names if name != "delay")
     stretches = cut_stretches(runs, duration)
@@ -89,13 +78,11 @@ def fit_output_error(
             "record longer, or shorten the stretches"
         )
     search = _Search(names, start, stretches)
-    before = search.residual(search.begin)
     rough = search.minimise(search.begin, lambda share: report(0.5 * share))
     # What an error of a start does depends on the constants: once more with those found.
     search.look_at_starts(rough.x)
     found = search.minimise(rough.x, lambda share: report(0.5 + 0.5 * share))
-    constants = search.constants_at(found.x, found.jac, found.fun)
-    return OutputErrorFit(constants, rms(found.fun), rms(before), len(stretches))
+    return search.constants_at(found.x, found.jac, found.fun)
 
 
 class _Search:
@@ -161,16 +148,8 @@ class _Search:
 
         low, high = self._bounds()
         start = np.clip(x, low + 1e-6, high - 1e-6)
-        found = scipy("optimize").least_squares(
-            self.residual,
-            start,
-            jac=jacobian,
-            bounds=(low, high),
-            x_scale=1.0,
-            max_nfev=MOST_ROUNDS,
-            xtol=1e-6,
-            ftol=1e-8,
-        )
+        accuracy = {"max_nfev": MOST_ROUNDS, "xtol": 1e-6, "ftol": 1e-8}
+        found = scipy("optimize").least_squares(self.residual, start, jac=jacobian, bounds=(low, high), **accuracy)
         report(1.0)
         return found
 
@@ -197,14 +176,9 @@ class _Search:
         covariance = self._back @ (covariance * np.outer(self._scale, self._scale)) @ self._back.T
         covariance = np.pad(covariance, ((0, 1), (0, 1)))
         covariance[-1, -1] = self._start.errors[self._start.names.index("delay")] ** 2
-        return Constants(
-            (*self.names, "delay"),
-            self._constants(x).values,
-            covariance,
-            np.full(len(covariance), float(degrees)),
-            "output error",
-            self._start.delay_is_told,
-        )
+        freedom = np.full(len(covariance), float(degrees))
+        told = self._start.delay_is_told
+        return replace(self._constants(x), covariance=covariance, degrees=freedom, delay_is_told=told)
 
 
 def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Values]:
@@ -222,11 +196,9 @@ def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Values]:
 
 def _scales(names: Sequence[str], values: Values) -> Values:
     """Scale of each searched constant: its size, or a tenth of the largest of its unit where it is nearly nothing."""
-    forces = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.partition(".")[0] in _FORCES]
-    drags = [abs(v) for n, v in zip(names, values.tolist(), strict=True) if n.startswith("viscous")]
-    floors: list[float] = []
-    for name in names:
-        kind = name.partition(".")[0]
-        alike = forces if kind in _FORCES else drags if kind == "viscous" else [0.1]
-        floors.append(0.1 * max(alike))
+    kinds = ["force" if (kind := name.partition(".")[0]) in _FORCES else kind for name in names]
+    sizes = {"force": 0.0, "viscous": 0.0}
+    for kind in sizes:
+        sizes[kind] = max((abs(v) for k, v in zip(kinds, values.tolist(), strict=True) if k == kind), default=0.0)
+    floors = [0.1 * sizes.get(kind, 0.1) for kind in kinds]
     return np.maximum(np.maximum(np.abs(values), floors), 1e-12)

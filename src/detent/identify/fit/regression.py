@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows
 from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
@@ -68,19 +67,9 @@ class Fit:
     instruments: Instruments  # what they are made of: "reference", "position", or "none" for least squares
 
     @property
-    def delay(self) -> float:
-        """By how much later the effort acts than it was recorded [s]."""
-        return self.value("delay")
-
-    @property
     def bend(self) -> float:
         """Stribeck velocity, or share lost; 1 for a model with neither."""
         return float(self.values[-1]) if is_bent(self.model) else 1.0
-
-    @property
-    def linear(self) -> Values:
-        """Constants of the columns."""
-        return self.values[: len(terms_of(self.model))]
 
     def value(self, name: str) -> float:
         """Constant of a term; 0 where the model does not have it."""
@@ -121,23 +110,19 @@ def prepare(run: Run, kernel: Kernel, instruments: Instruments) -> Prepared:
         return Prepared(run, make_motion(run.position, run.effort, kernel, rows), ideal, instruments)
     motion = ideal = make_motion(run.position, run.effort, kernel, rows)
     if instruments == "reference" and run.reference is not None:
-        ideal = make_motion(_delayed(run.reference, lag_of(run)), run.effort, kernel, rows)
+        lag = lag_of(run.reference, run)
+        delayed = np.concatenate([np.full(lag, run.reference[0]), run.reference[: n - lag]])
+        ideal = make_motion(delayed, run.effort, kernel, rows)
     return Prepared(run, motion, ideal, instruments)
 
 
-def lag_of(run: Run) -> int:
+def lag_of(reference: Values, run: Run) -> int:
     """Samples by which the position follows the reference: where their changes agree best."""
-    if run.reference is None:
-        return 0
-    asked, done = run.reference - run.reference[0], run.position - run.position[0]
+    asked, done = reference - reference[0], run.position - run.position[0]
     most = max(min(round(0.25 / run.step), len(asked) // 4), 1)
     lags = range(0, most, max(1, most // 100))
     miss = [float(np.abs(done[lag:] - asked[: len(asked) - lag]).mean()) for lag in lags]
     return lags[int(np.argmin(miss))]
-
-
-def _delayed(values: Values, lag: int) -> Values:
-    return np.concatenate([np.full(lag, values[0]), values[: len(values) - lag]]) if lag else values
 
 
 def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *, ideal: bool = False) -> Values:
@@ -162,9 +147,9 @@ def fit_equations(
     columns = make_columns(parts, names, bend)
     ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
     late, step = delay or 0.0, parts[0].run.step
-    theta = solve(ideal, columns, make_effort(parts, late))
     y = make_effort(parts, late)
-    x, z = _with_delay(parts, _known(names, theta), late, columns, ideal)
+    theta = solve(ideal, columns, y)
+    x, z = _with_delay(parts, names, theta, late, columns, ideal)
     for _ in range(ROUNDS if delay is None else 0):
         found = solve(z, x, y)
         theta = found[:-1]
@@ -173,11 +158,13 @@ def fit_equations(
             break
         late += moved
         y = make_effort(parts, late)
-        x, z = _with_delay(parts, _known(names, theta), late, columns, ideal)
+        x, z = _with_delay(parts, names, theta, late, columns, ideal)
     residual = y - combine(columns, theta)
     x, z = _with_bend(parts, names, theta, bend, x, z)
     covariance, cosines = coloured_covariance(x, residual, z)
-    unknown = _unknown(x, z)
+    # Constants that the columns cannot tell: absent, or one with others.
+    _, singular, ways = np.linalg.svd(products(z / column_sizes(z), x / column_sizes(x)))
+    unknown = np.flatnonzero((np.abs(ways[singular <= RANK * singular[0]]) > SHARED).any(axis=0))
     covariance[unknown, unknown] = (UNKNOWN * float(np.abs(y).max())) ** 2
     singular = np.linalg.svd(columns / column_sizes(columns), compute_uv=False)
     bends = ("loss" if LOSS in names else "stribeck",) if is_bent(names) else ()
@@ -195,30 +182,20 @@ def fit_equations(
     )
 
 
-def _known(names: Sequence[str], theta: Values) -> dict[str, float]:
-    """Constants of the columns by their names."""
-    return dict(zip(terms_of(names), theta.tolist(), strict=True))
-
-
-def _with_delay(
-    parts: Sequence[Prepared], known: dict[str, float], late: float, columns: Values, ideal: Values
+def _with_delay(  # noqa: PLR0913 - all that a model consists of
+    parts: Sequence[Prepared], names: Sequence[str], theta: Values, late: float, columns: Values, ideal: Values
 ) -> tuple[Values, Values]:
     """Columns and instruments with that of the delay."""
     slope = np.concatenate([p.motion.kernel.held_slope(p.run.effort, p.motion.rows, late / p.run.step) for p in parts])
     x = np.column_stack([columns, slope])
     if ideal is columns:
         return x, x
-    return x, np.column_stack([ideal, _ideal_slope(parts, known)])
-
-
-def _ideal_slope(parts: Sequence[Prepared], known: dict[str, float]) -> Values:
-    """What the instruments say of the effort's derivative, once mass and viscous friction are roughly known."""
-    viscous = max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
-    made: list[Values] = []
-    for p in parts:
-        m = p.ideal
-        made.append((known["mass"] or 1.0) * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration)
-    return np.concatenate(made)
+    # What the instruments say of the effort's derivative, once mass and viscous friction are roughly known.
+    known = dict(zip(terms_of(names), theta.tolist(), strict=True))
+    mass, viscous = known["mass"] or 1.0, max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
+    motions = [p.ideal for p in parts]
+    tool = np.concatenate([mass * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration for m in motions])
+    return x, np.column_stack([ideal, tool])
 
 
 def _with_bend(  # noqa: PLR0913 - all that a model consists of
@@ -227,19 +204,16 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
     if not is_bent(names):
         return x, z
-    slope, tool = (_bend_slope(parts, names, theta, bend, ideal=ideal) for ideal in (False, z is not x))
-    return np.column_stack([x, slope]), np.column_stack([z, tool])
-
-
-def _bend_slope(parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, *, ideal: bool) -> Values:
-    """Change of the effort with the bend, shape (m,)."""
-    more, less = (combine(make_columns(parts, names, bend * f, ideal=ideal), theta) for f in (1.05, 0.95))
-    return (more - less) / (0.1 * bend)
+    slopes: list[Values] = []  # change of the effort with the bend, by the motion and by the instruments
+    for ideal in (False, z is not x):
+        more, less = (combine(make_columns(parts, names, bend * f, ideal=ideal), theta) for f in (1.05, 0.95))
+        slopes.append((more - less) / (0.1 * bend))
+    return np.column_stack([x, slopes[0]]), np.column_stack([z, slopes[1]])
 
 
 def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
     """By how much the bend misses what the instruments say of it, to first order."""
-    names, theta, bend = fit.model, fit.linear, fit.bend
+    names, theta, bend = fit.model, fit.values[: len(terms_of(fit.model))], fit.bend
     columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
     x, z = _with_bend(parts, names, theta, bend, columns, tools)
     return float(solve(z, x, fit.residual)[-1])
@@ -263,10 +237,3 @@ def products(a: Values, b: Values) -> Values:
 def combine(columns: Values, constants: Values) -> Values:
     """``X theta``, likewise."""
     return np.asarray((columns * constants).sum(axis=1), np.float64)
-
-
-def _unknown(columns: Values, instruments: Values) -> NDArray[np.intp]:
-    """Constants that the columns cannot tell: absent, or one with others."""
-    matrix = products(instruments / column_sizes(instruments), columns / column_sizes(columns))
-    _, singular, ways = np.linalg.svd(matrix)
-    return np.flatnonzero((np.abs(ways[singular <= RANK * singular[0]]) > SHARED).any(axis=0))

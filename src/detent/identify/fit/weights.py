@@ -83,22 +83,18 @@ def make_kernel(half: int, step: float) -> Kernel:
     first = -_SHAPE.deriv(1)(s) / (area * slope)
     second = _SHAPE.deriv(2)(s) / (area * slope**2)
     third = -_SHAPE.deriv(3)(s) / (area * slope**3)
-    # Sums are no integrals: these make straight lines, parabolas and cubics come out exactly.
+    # Sums are no integrals: these make straight lines, parabolas and cubics come out exactly; of the third derivative a
+    # straight line gives 0 and a cubic 6.
     t = np.asarray(np.arange(-half, half + 1) * step, np.float64)
+    third -= t * float(np.sum(third * t)) / float(np.sum(t * t))
     return Kernel(
         half,
         step,
         value,
         first / float(np.sum(first * t)),
         (second - second.mean()) * (2.0 / float(np.sum((second - second.mean()) * (t * t)))),
-        _exact_third(third, t),
+        third * (6.0 / float(np.sum(third * t**3))),
     )
-
-
-def _exact_third(weights: Values, t: Values) -> Values:
-    """Weights that give 0 for a straight line and 6 for a cubic."""
-    straight = weights - t * float(np.sum(weights * t)) / float(np.sum(t * t))
-    return straight * (6.0 / float(np.sum(straight * t**3)))
 
 
 @cache
