@@ -168,42 +168,29 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     DetentError
         The axis file is of another method.
     """
+    from detent.methods.load import read_axis
+
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
     tell = progress or untold
-    text = "" if axis is None else read_axis_text(axis)
+    text = ""
     if axis is not None:
+        read_axis(axis)  # tells everything that is wrong with it
+        with Path(axis).open(encoding="utf-8-sig", newline="") as file:
+            text = file.read()
         cascade_spec(text, str(axis))
-    read = _read_logs(paths, mapping, columns, tell)
+    if not paths:
+        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
+    read: list[Log] = []
+    for number, path in enumerate(paths):
+        tell(0.1 * number / len(paths), f"reading {Path(path).name}")  # the first tenth of the work
+        read.append(read_log(path, mapping, columns))
 
     def report(stage: str, share: float) -> None:
         begin, end, text = _STAGES.get(stage, (0.4, 0.8, stage))
         tell(begin + share * (end - begin), text)
 
-    return Identified(
-        identify(read, effort, method=method, report=report), text, "" if axis is None else str(axis), reading
-    )
-
-
-def _read_logs(
-    paths: Sequence[str | Path], mapping: str | Path | None, columns: Sequence[str], tell: "Progress"
-) -> list[Log]:
-    """Recordings one after the other, and how far it is: the first tenth of the work."""
-    if not paths:
-        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
-    read: list[Log] = []
-    for number, path in enumerate(paths):
-        tell(0.1 * number / len(paths), f"reading {Path(path).name}")
-        read.append(read_log(path, mapping, columns))
-    return read
-
-
-def read_axis_text(path: str | Path) -> str:
-    """Text of an axis file."""
-    from detent.methods.load import read_axis
-
-    read_axis(path)  # tells everything that is wrong with it
-    with Path(path).open(encoding="utf-8-sig", newline="") as file:
-        return file.read()
+    found = identify(read, effort, method=method, report=report)
+    return Identified(found, text, "" if axis is None else str(axis), reading)
 
 
 def write_text(path: str | Path, text: str) -> Path:

@@ -7,7 +7,7 @@ file says which.
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from detent.axisfile.motion import unit_in
@@ -16,7 +16,6 @@ from detent.files.locate import Path, Place, locate_keys
 from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
-from detent.identify.fit.prepare import Run
 from detent.identify.write.file_numbers import NATIVE, FileNumbers, Number, plain
 from detent.identify.write.seen import Seen, outwards, see
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec
@@ -90,39 +89,48 @@ def choose_gains(mass: float, seen: Seen, delay: int) -> Gains:
 
 
 def _whole_file(found: Identification, reading: str) -> str:
-    """A new axis file."""
+    """A new axis file, as ``template/axis.toml.j2`` shows it."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     numbers = {n.key: n for n in FileNumbers(found).numbers()}
-    if not numbers["mechanics.motor_mass"].trusted:
+    mass, delay = numbers["mechanics.motor_mass"], numbers.get("drive.delay")
+    if not mass.trusted:
         raise AxisError("no axis file: the mass is not trusted; record what the refusals name")
-    seen = see(found.runs)
-    parts = (
-        _head(found, reading),
-        _axis(found),
-        _limits(found, seen, numbers),
-        _drive(numbers, seen),
-        _mechanics(numbers, seen),
-        _loops(found.runs[0], numbers, seen),
+    seen, run = see(found.runs), found.runs[0]
+    loops, motion = fit_loops(run), "rotary" if run.is_rotary else "linear"
+    gains = choose_gains(mass.value, seen, round(delay.value) if delay else 0)
+    file_name = plain(run.name)
+
+    def shown(value: float, linear: str, digits: int = 4) -> str:
+        return format_quantity(value, unit_in(motion, linear), digits)
+
+    templates = Environment(  # noqa: S701 - no page
+        loader=PackageLoader("detent.identify.write", "template"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
     )
-    return "\n".join(line for part in parts for line in part) + "\n"
-
-
-def _head(found: Identification, reading: str) -> Iterator[str]:
-    """What the file is, and what to do with it."""
-    run = found.runs[0]
-    logs = ", ".join(f"{plain(r.name)} ({format_quantity(r.t[-1], 's', 3)})" for r in found.runs)
-    yield f"# Cascade axis, identified from {logs}."
-    yield "#"
-    yield f"#   detent run THIS_FILE --replay {plain(run.name)}{_replay_options(found, reading)}"
-    yield "#"
-    yield f"# Verdict: {found.verdict}. Each identified number has its 95 % interval behind it; a number that is not"
-    yield "# trusted stands in a comment, and counts as not stated."
-    yield from (f"# {plain(str(refusal))}" for refusal in found.refusals)
-    native = NATIVE["rotary" if run.is_rotary else "linear"]
-    if run.effort_unit != native:
-        yield "#"
-        yield f"# The log holds a {run.effort_name}, in {run.effort_unit}, and no force. Where this file says {native},"
-        yield f"# read {run.effort_unit}: forces, masses and frictions are what they are to that {run.effort_name}."
-    yield ""
+    return templates.get_template("axis.toml.j2").render(
+        found=found,
+        run=run,
+        seen=seen,
+        logs=", ".join(f"{plain(r.name)} ({format_quantity(r.t[-1], 's', 3)})" for r in found.runs),
+        name=json.dumps((file_name.rpartition(".")[0] or file_name)[:80] or "axis", ensure_ascii=False),
+        replay=_replay_options(found, reading),
+        native=NATIVE[motion],
+        limits=_limits(seen, numbers),
+        force_share=FORCE_SHARE,
+        loops=loops,
+        gains=gains,
+        hertz=gains.bandwidth / (2 * math.pi),
+        shares=_shares(loops, numbers),
+        numbers=numbers,
+        line=_line,
+        plain=plain,
+        said=_said,
+        shown=shown,
+    )
 
 
 def _replay_options(found: Identification, reading: str) -> str:
@@ -136,141 +144,55 @@ def _replay_options(found: Identification, reading: str) -> str:
     return f"{options} --column '{role}={sign}{plain(source.column)} [{abs(source.factor):.9g} {native}]'"
 
 
-def _axis(found: Identification) -> Iterator[str]:
-    name = plain(found.runs[0].name).rpartition(".")[0] or plain(found.runs[0].name)
-    yield "[axis]"
-    yield f"name = {json.dumps(name[:80] or 'axis', ensure_ascii=False)}"
-    yield 'method = "cascade"'
-    if found.runs[0].is_rotary:
-        yield 'motion = "rotary"'
-    yield ""
-
-
-def _limits(found: Identification, seen: Seen, numbers: dict[str, Number]) -> Iterator[str]:
-    """What the logs show, which the axis may exceed."""
-    way, rise = _unit(seen, "m"), _unit(seen, "m/s^2")
-    angle = math.radians(1.0) if seen.is_rotary else 1.0
-    speed = angle * outwards(seen.speed / angle, up=True, size=seen.speed / angle)
-    low, high = (angle * edge for edge in _edges(seen, angle))
-    mass = numbers["mechanics.motor_mass"].value
-    steady = max(_resistance(numbers, way, speed) for way in ("positive", "negative"))
-    left = max(FORCE_SHARE * seen.effort - steady, 0.1 * seen.effort) / mass
-    took = f"{format_quantity(seen.acceleration, rise)} in the log"
-    if left < seen.acceleration:
-        took += f"; at full speed {FORCE_SHARE:.0%} of the effort leave this"
-    shown = (format_quantity(place, way) for place in (seen.lowest, seen.highest))
-    yield _said("[limits]", "what the log shows; the axis may be able to do more")
-    yield _said(f"travel = {_quoted(high - low, way)}", f"{' to '.join(shown)} in the log")
-    yield f"lowest = {_quoted(low, way)}"
-    yield _said(f"speed = {_quoted(speed, _unit(seen, 'm/s'))}", "top speed in the log, rounded up")
-    yield _said(f"acceleration = {_quoted(min(seen.acceleration, left), rise, 3)}", took)
-    most = outwards(seen.effort, up=True, size=seen.effort)
-    name = found.runs[0].effort_name
-    yield _said(f"effort = {_quoted(most, _unit(seen, 'N'))}", f"largest {name} in the log, rounded up")
-    yield ""
-
-
-def _edges(seen: Seen, unit: float) -> tuple[float, float]:
-    """Ends of the way, a little beyond what was seen, as round numbers of a unit."""
+def _limits(seen: Seen, numbers: dict[str, Number]) -> dict[str, float]:
+    """What the logs show, a little beyond it and in round numbers; the axis may be able to do more."""
+    unit = math.radians(1.0) if seen.is_rotary else 1.0
+    speed = unit * outwards(seen.speed / unit, up=True, size=seen.speed / unit)
     margin, size = MARGIN * seen.way, seen.way / unit
-    low = outwards((seen.lowest - margin) / unit, up=False, size=size)
-    return low, outwards((seen.highest + margin) / unit, up=True, size=size)
+    low = unit * outwards((seen.lowest - margin) / unit, up=False, size=size)
+    high = unit * outwards((seen.highest + margin) / unit, up=True, size=size)
+    offset, weight = _value(numbers, "friction.offset"), _value(numbers, "pendulum")
+    steady = max(
+        _value(numbers, f"friction.{way}.coulomb")
+        + _value(numbers, f"friction.{way}.viscous") * speed
+        + sign * offset
+        + weight
+        for way, sign in (("positive", 1.0), ("negative", -1.0))
+    )
+    left = max(FORCE_SHARE * seen.effort - steady, 0.1 * seen.effort) / _value(numbers, "motor_mass")
+    return {
+        "travel": high - low,
+        "lowest": low,
+        "speed": speed,
+        "acceleration": min(seen.acceleration, left),
+        "effort": outwards(seen.effort, up=True, size=seen.effort),
+    }
 
 
-def _resistance(numbers: dict[str, Number], way: str, speed: float) -> float:
-    """Friction at a speed in one direction, and what holds weights."""
-    sign = 1.0 if way == "positive" else -1.0
-    table = f"mechanics.friction.{way}"
-    found = {name: numbers[name].value for name in (f"{table}.coulomb", f"{table}.viscous") if name in numbers}
-    offset = numbers["mechanics.friction.offset"].value if "mechanics.friction.offset" in numbers else 0.0
-    weight = numbers["mechanics.pendulum"].value if "mechanics.pendulum" in numbers else 0.0
-    return found.get(f"{table}.coulomb", 0.0) + found.get(f"{table}.viscous", 0.0) * speed + sign * offset + weight
-
-
-def _drive(numbers: dict[str, Number], seen: Seen) -> Iterator[str]:
-    """An amplifier that imposes the effort."""
-    yield "[drive]"
-    yield _said('input = "force"', f"1 V of command is 1 {_unit(seen, 'N')}")
-    yield f'effort_per_volt = "1 {_unit(seen, "N/V")}"'
-    yield f"command_limit = {_quoted(outwards(seen.effort, up=True, size=seen.effort), 'V')}"
-    if "drive.delay" in numbers:
-        yield _line(numbers["drive.delay"])
-    yield ""
-
-
-def _mechanics(numbers: dict[str, Number], seen: Seen) -> Iterator[str]:
-    """Masses, weights, friction and the encoder."""
-    way = _unit(seen, "m")
-    yield "[mechanics]"
-    yield _line(numbers["mechanics.motor_mass"])
-    for key in ("mechanics.pendulum", "mechanics.transmission_loss"):
-        if key in numbers:
-            yield _line(numbers[key])
-    yield _said(f"start_position = {_quoted(seen.start, way)}", "of the log")
-    for table in ("mechanics.friction", "mechanics.friction.positive", "mechanics.friction.negative"):
-        yield from ("", f"[{table}]")
-        yield from (_line(n) for key, n in numbers.items() if key.rpartition(".")[0] == table)
-    yield ""
-    yield "[encoder]"
-    found = "smallest step in the log" if seen.resolution > 0 else "no counts show in the log"
-    yield _said(f"resolution = {_quoted(seen.resolution, way)}", found)
-
-
-def _loops(run: Run, numbers: dict[str, Number], seen: Seen) -> Iterator[str]:
-    """Loops of the log, or by the rules of `choose_gains`."""
-    found = fit_loops(run)
-    number = numbers.get("drive.delay")
-    mass = numbers["mechanics.motor_mass"].value
-    g = choose_gains(mass, seen, round(number.value) if number else 0)
-    yield _said(f"velocity_span = {g.span if found is None else found.span}", "samples")
-    yield ""
-    yield from _chosen_loops(g, seen) if found is None else _found_loops(found, seen)
-    yield ""
-    yield _said("[method.feed_forward]", "shares of what a move takes by this file")
-    if found is None:
-        yield from ("velocity = 1", "acceleration = 1", "viscous = 1", "coulomb = 0.8")
-    else:
-        yield from _shares(found, numbers)
-    if "mechanics.pendulum" in numbers and found is None:
-        yield "weight = 1"
-
-
-def _chosen_loops(g: Gains, seen: Seen) -> Iterator[str]:
-    dead, hz = format_quantity(g.dead_time, "s", 3), f"{g.bandwidth / (2 * math.pi):.3g} Hz"
-    yield _said("[method]", "no log tells these loops: they follow from mass, delay and encoder")
-    yield _said(f"sample_period = {_quoted(seen.period, 's')}", "of the log")
-    gain = _quoted(g.velocity, _unit(seen, "V*s/m"), 4)
-    yield _said(f"velocity_gain = {gain}", f"mass x bandwidth, {hz}; the dead time is {dead}")
-    yield _said(f"velocity_integral = {_quoted(g.integral, _unit(seen, 'V/m'), 4)}", "velocity_gain x bandwidth / 8")
-    yield _said(f"position_gain = {g.position:.4g}", "bandwidth / 4")
-
-
-def _found_loops(found: Loops, seen: Seen) -> Iterator[str]:
-    yield _said("[method]", f"loops of the log: what they leave of its effort in a part not fitted: {found.error:.1%}")
-    yield _said(f"sample_period = {_quoted(seen.period, 's')}", "of the log")
-    yield f"velocity_gain = {_quoted(found.velocity, _unit(seen, 'V*s/m'), 5)}"
-    if found.integral > 0.0:
-        yield f"velocity_integral = {_quoted(found.integral, _unit(seen, 'V/m'), 5)}"
-    yield f"position_gain = {found.position:.5g}"
-    most = 1.5 * seen.speed + seen.effort / found.velocity
-    yield _said(f"velocity_limit = {_quoted(most, _unit(seen, 'm/s'), 3)}", "never in the way")
-
-
-def _shares(found: Loops, numbers: dict[str, Number]) -> Iterator[str]:
-    """Feed-forward of the log's loops, as shares of what the file says."""
-
-    def mean(name: str) -> float:
-        keys = (f"mechanics.friction.{way}.{name}" for way in ("positive", "negative"))
-        return sum(numbers[key].value for key in keys if key in numbers) / 2.0
-
-    yield f"velocity = {min(found.feed_velocity, 2.0):.4g}"
+def _shares(loops: Loops | None, numbers: dict[str, Number]) -> dict[str, str]:
+    """Feed-forward of the log's loops, as shares of what the file says; where none are known, by rule."""
+    if loops is None:
+        shares = {"velocity": "1", "acceleration": "1", "viscous": "1", "coulomb": "0.8"}
+        return shares | ({"weight": "1"} if "mechanics.pendulum" in numbers else {})
+    shares = {"velocity": f"{min(loops.feed_velocity, 2.0):.4g}"}
+    viscous, coulomb = (
+        sum(_value(numbers, f"friction.{way}.{name}") for way in ("positive", "negative")) / 2.0
+        for name in ("viscous", "coulomb")
+    )
     for name, fed, whole in (
-        ("acceleration", found.feed_acceleration, numbers["mechanics.motor_mass"].value),
-        ("viscous", found.feed_viscous, mean("viscous")),
-        ("coulomb", found.feed_coulomb, mean("coulomb")),
+        ("acceleration", loops.feed_acceleration, _value(numbers, "motor_mass")),
+        ("viscous", loops.feed_viscous, viscous),
+        ("coulomb", loops.feed_coulomb, coulomb),
     ):
         if fed > 0.0 and whole > 0.0:
-            yield f"{name} = {min(fed / whole, 2.0):.3g}"
+            shares[name] = f"{min(fed / whole, 2.0):.3g}"
+    return shares
+
+
+def _value(numbers: dict[str, Number], name: str) -> float:
+    """A number of the mechanics; 0 where the file has none."""
+    key = f"mechanics.{name}"
+    return numbers[key].value if key in numbers else 0.0
 
 
 def _line(number: Number) -> str:
@@ -284,12 +206,7 @@ def _said(line: str, comment: str) -> str:
     return f"{line:<35} # {comment}"
 
 
-def _unit(seen: Seen, linear: str) -> str:
-    return unit_in("rotary" if seen.is_rotary else "linear", linear)
-
-
-def _quoted(value: float, unit: str, digits: int = 6) -> str:
-    return f'"{format_quantity(value, unit, digits)}"'
+# ---- numbers put into a file
 
 
 def patch(text: str, numbers: Iterable[Number], file: str) -> str:

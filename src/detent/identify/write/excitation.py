@@ -24,15 +24,12 @@ LEAST = 20.0  # length of a recording that is aimed at [s]
 RAMP = 0.15  # time of a ramp where neither the axis nor the log tells one [s]
 
 
-def bounds_of_axis(spec: CascadeSpec) -> Bounds:
-    """Limits of an axis, and a little less of its travel."""
-    limits, margin = spec.limits, INSIDE * spec.limits.travel
-    start, is_rotary = spec.mechanics.start_position, spec.axis.motion == "rotary"
-    return Bounds(limits.lowest + margin, spec.highest - margin, limits.speed, limits.acceleration, start, is_rotary)
-
-
-def bounds_of_logs(found: Identification) -> Bounds:
-    """What the axis did in its logs."""
+def bounds_of(found: Identification, spec: CascadeSpec | None) -> Bounds:
+    """Limits of an axis, and a little less of its travel; without one what the axis did in its logs."""
+    if spec is not None:
+        limits, margin = spec.limits, INSIDE * spec.limits.travel
+        low, high, start = limits.lowest + margin, spec.highest - margin, spec.mechanics.start_position
+        return Bounds(low, high, limits.speed, limits.acceleration, start, spec.axis.motion == "rotary")
     seen = see(found.runs)
     if not (seen.way > 20.0 * seen.resolution and seen.speed > 0.0):
         raise DetentError(
@@ -88,7 +85,7 @@ def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
 
 def excitation_job(found: Identification, axis: CascadeSpec | None = None) -> str:
     """Write a list of moves that a recording needs for what is missing."""
-    bounds = bounds_of_logs(found) if axis is None else bounds_of_axis(axis)
+    bounds = bounds_of(found, axis)
     told = f"travel and speed of {found.runs[0].name}" if axis is None else f"limits of {axis.axis.name}"
     saturated = any(refusal.subject == "saturated" for refusal in found.refusals)
     moves = _Moves(bounds, SLOWER * bounds.speed if saturated else bounds.speed)

@@ -50,20 +50,14 @@ class Scale:
     factor: float = 1.0  # force per effort
     drag: float = 0.0  # force per velocity that back-EMF takes, and that the log shows as viscous friction [N s/m]
 
-    def force(self, found: Estimate) -> Estimate:
-        """An estimate in the units of the axis file, times aside."""
+    def in_file(self, found: Estimate, motion: str) -> Estimate:
+        """An estimate as the file of an axis has it, and its unit there."""
         kind = found.name.partition(".")[0]
-        if kind in {"stribeck", "delay", "loss"}:
-            return found
+        f = 1.0 if kind in {"stribeck", "delay", "loss"} else self.factor
         less = self.drag if kind == "viscous" else 0.0
-        f = self.factor
-        return replace(
-            found,
-            value=f * found.value - less,
-            low=f * found.low - less,
-            high=f * found.high - less,
-            error=f * found.error,
-        )
+        value, low, high = (f * v - less for v in (found.value, found.low, found.high))
+        unit = unit_in(motion, LINEAR_UNITS.get(kind, "N"))
+        return replace(found, value=value, unit=unit, error=f * found.error, low=low, high=high)
 
 
 def scale_of(spec: CascadeSpec, run: Run) -> Scale:
@@ -150,14 +144,8 @@ class Contrast:
 def contrasts(found: Identification, spec: CascadeSpec) -> list[Contrast]:
     """Constants that a file states outside of what was identified and is trusted."""
     scale, stated = scale_of(spec, found.runs[0]), stated_constants(spec)
-    known = [in_file_units(scale.force(e), spec.axis.motion) for e in found.trusted if e.name in stated]
+    known = [scale.in_file(e, spec.axis.motion) for e in found.trusted if e.name in stated]
     return [Contrast(e.name, stated[e.name], e) for e in known if not e.holds(stated[e.name])]
-
-
-def in_file_units(found: Estimate, motion: str) -> Estimate:
-    """An estimate with the unit that the file of an axis has for it."""
-    kind = found.name.partition(".")[0]
-    return replace(found, unit=unit_in(motion, LINEAR_UNITS.get(kind, "N")))
 
 
 class FileNumbers:
@@ -168,7 +156,7 @@ class FileNumbers:
         scale = Scale() if base is None else scale_of(base, run)
         self.motion = "rotary" if run.is_rotary else "linear"
         self._found, self._base = found, base
-        self._known = {e.name: in_file_units(scale.force(e), self.motion) for e in found.estimates}
+        self._known = {e.name: scale.in_file(e, self.motion) for e in found.estimates}
         self._trusted = {e.name for e in found.trusted}
         names = [one.name for one in found.logs]
         self._where = plain(names[0]) if len(names) == 1 else f"{len(names)} logs"
@@ -179,7 +167,10 @@ class FileNumbers:
             yield self._delay()
         yield self._mass()
         if "pendulum" in self._known:
-            yield self._pendulum()
+            weight = math.hypot(self._value("pendulum"), self._value("pendulum.across"))
+            place = 0.0 if self._found.constants is None else hanging_position(self._found.constants)
+            text = "" if abs(place) < math.radians(1) else f"hangs at {format_quantity(place, 'rad', 3)} of the log; "
+            yield self._make("mechanics.pendulum", weight, "N*m", "pendulum", text)
         if "loss" in self._known:
             share = min(max(self._value("loss"), 0.0), MOST_LOSS)
             yield self._make("mechanics.transmission_loss", share, "", "loss")
@@ -226,12 +217,6 @@ class FileNumbers:
         text = f"with the other {format_quantity(rest, self._unit('kg'))} of this file; " if rest else ""
         return self._make(key, total - rest, "kg", "mass", text)
 
-    def _pendulum(self) -> Number:
-        weight = math.hypot(self._value("pendulum"), self._value("pendulum.across"))
-        place = 0.0 if self._found.constants is None else hanging_position(self._found.constants)
-        text = "" if abs(place) < math.radians(1) else f"hangs at {format_quantity(place, 'rad', 3)} of the log; "
-        return self._make("mechanics.pendulum", weight, "N*m", "pendulum", text)
-
     def _friction(self) -> Iterator[Number]:
         """Friction of the motor's side: the whole without the load's and the weight."""
         base = self._base
@@ -241,20 +226,17 @@ class FileNumbers:
         for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
             beside = _direction(load, way).coulomb + sign * (load.offset + weight)
             needs[way] = self._value(f"coulomb.{way}") - beside
-        offset = self._offset(needs)
+        # Force that does not turn round: as stated where that leaves a friction in both directions, else the half.
+        offset = 0.5 * (needs["positive"] - needs["negative"])
+        stated = offset if base is None else base.mechanics.friction.offset
+        if needs["positive"] >= stated and needs["negative"] >= -stated:
+            offset = stated
         if base is None or offset != base.mechanics.friction.offset:
             trusted = {"coulomb.positive", "coulomb.negative"} <= self._trusted
             text = "half of what the directions differ by: in motion nothing tells it from an uneven friction"
             yield Number("mechanics.friction.offset", offset, self._unit("N"), text, trusted)
         for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
             yield from self._one_way(way, sign * offset, max(needs[way] - sign * offset, 0.0), _direction(load, way))
-
-    def _offset(self, needs: dict[str, float]) -> float:
-        """Force that does not turn round: as stated where that leaves a friction in both directions, else the half."""
-        stated = None if self._base is None else self._base.mechanics.friction.offset
-        if stated is not None and needs["positive"] >= stated and needs["negative"] >= -stated:
-            return stated
-        return 0.5 * (needs["positive"] - needs["negative"])
 
     def _one_way(self, way: str, offset: float, coulomb: float, load: DirectionTable) -> Iterator[Number]:
         """Friction in one direction."""
@@ -272,27 +254,21 @@ class FileNumbers:
 
     def _low_speed(self, way: str, offset: float, coulomb: float, load: DirectionTable) -> Iterator[Number]:
         """Static friction of one direction, and where it ends."""
-        table, name = f"mechanics.friction.{way}", f"static.{way}"
+        table, name, base = f"mechanics.friction.{way}", f"static.{way}", self._base
         if name not in self._known:
-            yield from self._no_low_speed(way, coulomb)
+            # The log shows none of its own: never below Coulomb friction.
+            if base is None or _direction(base.mechanics.friction, way).static < coulomb:
+                note, trusted = "none above Coulomb friction shows in the log", f"coulomb.{way}" in self._trusted
+                yield Number(f"{table}.static", coulomb, self._unit("N"), note, trusted)
             return
-        excess = (
-            self._value(name) - self._value(f"coulomb.{way}") - (load.static - load.coulomb if load.stribeck else 0.0)
-        )
-        yield self._make(
-            f"{table}.static", coulomb + max(excess, 0.0), "N", name, "with the offset; " if offset else ""
-        )
+        on_load = load.static - load.coulomb if load.stribeck else 0.0
+        excess = self._value(name) - self._value(f"coulomb.{way}") - on_load
+        text = "with the offset; " if offset else ""
+        yield self._make(f"{table}.static", coulomb + max(excess, 0.0), "N", name, text)
         if "stribeck" in self._known:
             trusted = {name, "stribeck"} <= self._trusted and self._known["stribeck"].low > 0.0
             note = self.interval("stribeck")
             yield Number(f"{table}.stribeck", max(self._value("stribeck"), 0.0), self._unit("m/s"), note, trusted)
-
-    def _no_low_speed(self, way: str, coulomb: float) -> Iterator[Number]:
-        """Static friction of a direction where the log shows none of its own: never below Coulomb friction."""
-        note, base = "none above Coulomb friction shows in the log", self._base
-        if base is None or _direction(base.mechanics.friction, way).static < coulomb:
-            trusted = f"coulomb.{way}" in self._trusted
-            yield Number(f"mechanics.friction.{way}.static", coulomb, self._unit("N"), note, trusted)
 
 
 def plain(name: str) -> str:

@@ -267,7 +267,7 @@ def test_an_effort_becomes_a_force_by_the_motor_of_the_file(
 
 def test_back_emf_is_taken_off_viscous_friction(found: Identification) -> None:
     viscous = next(one for one in found.estimates if one.name == "viscous.positive")
-    made = Scale(2.0, 5.0).force(viscous)
+    made = Scale(2.0, 5.0).in_file(viscous, "linear")
     assert made.value == pytest.approx(2.0 * viscous.value - 5.0)
     assert made.high - made.low == pytest.approx(2.0 * (viscous.high - viscous.low))
 
