@@ -75,9 +75,9 @@ def find_disagreements(draft: Draft) -> None:
     position = draft.values.get("position")
     if position is None or np.ptp(position) <= 5 * grain(position):
         return
-    base = draft.unit("position")
+    base = draft.units["position"]
     for role in _SAID:
-        if role in draft.values and draft.unit(role).partition("/")[0] == base:
+        if role in draft.values and draft.units[role].partition("/")[0] == base:
             _check_sign(draft, role, _compare(draft, role))
             _check_factor(draft, role, _compare(draft, role))
 
@@ -93,7 +93,7 @@ def _compare(draft: Draft, role: str) -> Likeness:
         return likeness(values, position, is_centred=True)
     # An acceleration, about its mean, as gravity may give it one.
     is_doubtful = any(finding.signal == "velocity" and finding.action == Action.LEFT for finding in draft.findings)
-    has_velocity = "velocity" in draft.values and draft.unit(role) == f"{draft.unit('velocity')}^2"
+    has_velocity = "velocity" in draft.values and draft.units[role] == f"{draft.units['velocity']}^2"
     velocity = draft.values["velocity"] if has_velocity and not is_doubtful else np.gradient(position, draft.t)
     return likeness(*paired_changes(velocity, values, draft.t), is_centred=True)
 
@@ -145,7 +145,7 @@ def _check_factor(draft: Draft, role: str, found: Likeness) -> None:
     if found.correlation < (FOLLOWS if tracks else ALIKE):
         return
     factor = found.factor
-    known = _known(factor, role, draft.unit("position"))
+    known = _known(factor, role, draft.units["position"])
     said = f"is {factor:.4g} times {_SAID[role]}"
     # A power of a thousand is what a wrong guess of the unit of the time would make as well.
     is_rate = role in {"velocity", "acceleration"} and "time" in draft.guessed_units

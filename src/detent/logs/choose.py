@@ -122,8 +122,8 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
     constants = {**table.constants, **mapping.constants}
     if "time" not in chosen and mapping.file.period is not None:
         period = mapping.file.period
-        draft.t, draft.has_clock = (table.rows - 1).astype(np.float64), False
-        draft.conversions["time"] = Conversion("s", period)
+        draft.t = (table.rows - 1).astype(np.float64)
+        draft.units["time"] = "s"
         draft.sources["time"] = Source("", "rows", period)
     bases = _Bases(table, chosen, mapping)
     for role in sorted(chosen, key=list(ROLES).index):
@@ -133,7 +133,7 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
         factor = choice.sign * _number_of(table.file, role, choice.factor, constants)
         # Behind the border: unit factor * (sign * factor * number + offset) + unit offset.
         total = conversion.factor * choice.offset + conversion.offset
-        draft.conversions[role] = Conversion(conversion.unit, conversion.factor * factor, total)
+        draft.units[role] = conversion.unit
         draft.sources[role] = Source(name, unit, conversion.factor * factor, total)
         if role == "time":
             draft.t = table.columns[name]
@@ -237,7 +237,7 @@ def _check_width(draft: Draft, role: str, name: str, bits: int) -> None:
     if len(beyond):
         low, high = np.nanmin(values), np.nanmax(values)
         text = f"the heading says {bits} bits, but the numbers go from {low:g} to {high:g}: they are something else"
-        unit = draft.conversions["position"].unit if "position" in draft.conversions else "m"
+        unit = draft.units.get("position", "m")
         example = {"count": "steps", "m": "mm"}.get(unit, unit)
         advice = f"state what the column is, as in reference={short(name)} [{example}]"
         draft.note(Kind.WRONG_UNIT, role, beyond, text, Action.LEFT_OUT, advice, Severity.WARNING)

@@ -64,9 +64,8 @@ def _ranges(draft: Draft, role: str) -> list[tuple[float, str]]:
         return [(2.0 ** draft.bits[role], f"the counter wraps at {draft.bits[role]} bits")]
     if _are_whole(values):
         found = [(2.0**bits, f"the counter wraps at {bits} bits") for bits in WIDTHS]
-    conversion = draft.conversions[role]
-    if conversion.unit == "rad":
-        found.append((2 * math.pi / abs(conversion.factor), "the angle wraps at a whole turn"))
+    if draft.units[role] == "rad":
+        found.append((2 * math.pi / abs(draft.sources[role].factor), "the angle wraps at a whole turn"))
     return [(modulus, text) for modulus, text in found if float(np.ptp(values)) <= modulus * (1 + 1e-6)]
 
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.files.text import short
+from detent.logs.draft import tell_count
 from detent.logs.log_units import is_unit, split_heading
-from detent.logs.raw_table import LARGEST_EXACT
+from detent.logs.raw_table import LARGEST_EXACT, RawTable
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
 """Separators by the words that name them in options."""
@@ -113,7 +114,6 @@ class CsvLayout:
     # text_columns, moment_columns: columns that hold words, and those that hold dates with times of day
     text_columns: set[int] = field(default_factory=set[int])
     moment_columns: set[int] = field(default_factory=set[int])
-    notes: list[str] = field(default_factory=list[str])  # what was guessed
 
 
 def is_telling(line: str) -> bool:
@@ -130,8 +130,8 @@ def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
         yield from ([cell.strip() for cell in cells] for cells in reader)
 
 
-def guess_layout(file: str, lines: Sequence[str], options: FileOptions) -> CsvLayout:
-    """Find out how a text table is laid out.
+def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) -> CsvLayout:
+    """Find out how a text table is laid out; what was guessed is among the notes of the table.
 
     The separator is the one that gives the most cells that are numbers in rows of one width. The first such row is the
     first row of numbers; the header is the line above it, which may be a comment; a line of nothing but units may stand
@@ -147,19 +147,18 @@ def guess_layout(file: str, lines: Sequence[str], options: FileOptions) -> CsvLa
         came = short(lines[sample[0]].strip()) if sample else "no lines below the header"
         allowed = "a table: a header such as t [s],position [mm], then lines of numbers"
         remedy = "state separator=, decimal= or header= (its line), or name another file"
-        raise InputError.of_file(file, came, allowed, remedy)
+        raise InputError.of_file(table.file, came, allowed, remedy)
     # Lines may end in separators behind which nothing ever stands.
     while width > 1 and not any(cells[width - 1 : width] != [""] for cells in rows[place:] if len(cells) >= width):
         width -= 1
     decimal = options.decimal or _guess_decimal(rows[place:], separator)
     layout = CsvLayout(separator, decimal, sample[place], width)
-    _read_header(file, lines, layout, options.header)
+    _read_header(table, lines, layout, options.header)
     _find_texts(rows[place:], layout)
-    shown = {value: word for word, value in SEPARATORS.items()}.get(separator, separator)
     if not options.separator and separator != ",":
-        layout.notes.append(f"separator {shown}")
+        table.notes.append(f"separator {next(word for word, value in SEPARATORS.items() if value == separator)}")
     if not options.decimal and layout.decimal == ",":
-        layout.notes.append("decimal comma")
+        table.notes.append("decimal comma")
     return layout
 
 
@@ -203,13 +202,13 @@ def _guess_decimal(rows: Sequence[Sequence[str]], separator: str) -> str:
     return "," if commas and (separator != "," or commas > points) else "."
 
 
-def _read_header(file: str, lines: Sequence[str], layout: CsvLayout, stated: int | None) -> None:
+def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, stated: int | None) -> None:
     """Names and units of the columns."""
     width = layout.width
     above = [index for index in range(layout.first) if lines[index].strip()]
     if stated is not None:
         if stated > len(lines):
-            raise InputError.of_file(file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
+            raise InputError.of_file(table.file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
         above = [stated - 1] if stated else []
     rows = [_cells(lines[index], layout.separator) for index in above]
     units: list[str] = []
@@ -219,11 +218,11 @@ def _read_header(file: str, lines: Sequence[str], layout: CsvLayout, stated: int
     names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
     passed = len(rows) - bool(names)
     if passed:
-        layout.notes.append(f"{passed} line{'s' if passed > 1 else ''} above the header passed over")
+        table.notes.append(f"{tell_count(passed, 'line')} above the header passed over")
     if names and len(names) < width:
-        layout.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last have no name")
+        table.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last have no name")
     if not names:
-        layout.notes.append("no header: columns are called by their numbers")
+        table.notes.append("no header: columns are called by their numbers")
     for index in range(max(len(names), width)):
         name = names[index] if index < len(names) else ""
         layout.names.append(name or f"column {index + 1}")

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.logs.log import Action, Finding, Kind, Rows, Severity, Source, Values, row_ranges
-from detent.logs.log_units import Conversion
 
 
 @dataclass
@@ -18,13 +17,12 @@ class Draft:
     rows: Rows  # row of the file of each sample, shape (n,)
     t: Values  # time, shape (n,)
     values: dict[str, Values]  # from a role to its numbers, shape (n,)
-    conversions: dict[str, Conversion]  # from a role, ``time`` too, to how its numbers become SI units
-    sources: dict[str, Source]  # from a role, ``time`` too, to where it comes from
+    units: dict[str, str]  # from a role, ``time`` too, to its unit after `convert`
+    sources: dict[str, Source]  # from a role, ``time`` too, to where it comes from, and how its numbers become SI units
     # from a role to the width of its counter, where stated
     bits: dict[str, int] = field(default_factory=dict[str, int])
     delays: dict[str, float] = field(default_factory=dict[str, float])  # from a role to its stated delay [s]
     guessed_units: set[str] = field(default_factory=set[str])  # roles whose unit was guessed
-    has_clock: bool = True  # False where the time was made from a stated period
     findings: list[Finding] = field(default_factory=list[Finding])  # what was found so far
     guesses: list[str] = field(default_factory=list[str])  # what was guessed so far
 
@@ -53,21 +51,15 @@ class Draft:
 
     def convert(self) -> None:
         """Bring all numbers into SI units."""
-        conversion = self.conversions["time"]
-        self.t = self.t * conversion.factor + conversion.offset
+        self.t = self.t * self.sources["time"].factor + self.sources["time"].offset
         for role, values in self.values.items():
-            conversion = self.conversions[role]
-            self.values[role] = values * conversion.factor + conversion.offset
+            self.values[role] = values * self.sources[role].factor + self.sources[role].offset
 
     def rescale(self, role: str, factor: float) -> None:
         """Multiply a converted signal, and remember it."""
         self.values[role] = self.values[role] * factor
         source = self.sources[role]
         self.sources[role] = replace(source, factor=source.factor * factor, offset=source.offset * factor)
-
-    def unit(self, role: str) -> str:
-        """Unit of a signal after `convert`."""
-        return self.conversions[role].unit
 
 
 def tell_count(count: int, what: str) -> str:

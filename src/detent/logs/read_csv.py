@@ -37,7 +37,7 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
     table = RawTable(str(path))
     lines = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table).splitlines()
     try:
-        layout = guess_layout(table.file, lines, options)
+        layout = guess_layout(table, lines, options)
         numbers = [index for index in range(layout.first, len(lines)) if is_telling(lines[index])]
         check_size(table.file, len(numbers), len(layout.names))
         _read_rows(table, layout, lines, numbers)
@@ -70,7 +70,6 @@ def decode(path: Path, data: bytes, table: RawTable) -> str:
 def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: list[int]) -> None:
     """Read all rows, a block at a time, into the columns and the broken rows."""
     cells = split_lines((lines[index] for index in numbers), layout.separator)
-    table.notes += layout.notes
     columns = [index for index in range(len(layout.names)) if index not in layout.text_columns]
     pieces: dict[int, list[NDArray[np.generic]]] = {index: [] for index in columns}
     rows: list[NDArray[np.int64]] = []

@@ -51,7 +51,7 @@ def _find(draft: Draft, role: str, side: float) -> None:
         is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)
         severity = Severity.WARNING if is_symmetric or is_full else Severity.NOTE
         why = "as far as the other end" if is_symmetric else "a full scale" if is_full else "cut off, or commanded so"
-        shown = f"{end:.4g} {draft.unit(role)}".rstrip()
+        shown = f"{end:.4g} {draft.units[role]}".rstrip()
         text = f"stays at {shown} ({why}) in {tell_count(len(where), 'row')}"
         advice = "leave these rows out of a fit of the loop; a fit of the axis may keep them"
         draft.note(Kind.SATURATED, role, where, text, Action.LEFT, advice, severity)

@@ -27,7 +27,7 @@ def find_shifts(draft: Draft) -> None:
     motion = find_motion(draft)
     if motion is None or len(draft) < _FEWEST:
         return
-    if "velocity" in draft.values and draft.unit("velocity").partition("/")[0] == draft.unit("position"):
+    if "velocity" in draft.values and draft.units["velocity"].partition("/")[0] == draft.units["position"]:
         _move_velocity(draft, motion)
         motion = find_motion(draft) or motion
     position = smoothed(draft.values["position"], draft, motion)

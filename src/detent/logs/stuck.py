@@ -57,14 +57,14 @@ class Twin(NamedTuple):
 def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
     """Find the signals that a position or a velocity can be held against."""
     values, t = draft.values[role], draft.t
-    base = draft.unit(role).partition("/")[0]
+    base = draft.units[role].partition("/")[0]
     found: list[tuple[str, Values, Values, float]] = []
     if role == "velocity":
-        if "position" in draft.values and draft.unit("position") == base:
+        if "position" in draft.values and draft.units["position"] == base:
             found = [("the position", integral(values, t), draft.values["position"], resolution(values))]
     else:
         velocity = draft.values.get("velocity")
-        if velocity is not None and draft.unit("velocity").partition("/")[0] == base:
+        if velocity is not None and draft.units["velocity"].partition("/")[0] == base:
             found = [("the integral of the velocity", values, integral(velocity, t), resolution(velocity))]
         for other in ("position_load", "position", "reference"):
             if other in draft.values and other != role:
@@ -133,7 +133,7 @@ def _find_constant(draft: Draft, role: str) -> None:
     values = draft.values[role]
     if np.ptp(values) > 0 or (role == "command" and values[0] != 0):
         return
-    unit = draft.unit(role)
+    unit = draft.units[role]
     text = f"{values[0]:g} {unit}".rstrip() + f" in each of {len(draft)} rows"
     if role == "position":
         advice = "record a run in which the axis moves"

@@ -107,7 +107,7 @@ def test_units_of_time(step, unit):
 
 def test_units_of_a_motion_follow_those_that_are_stated():
     draft = draft_of(table_of("t [s]", "ref", "x [deg]", "speed", "acc"))
-    assert {role: draft.unit(role) for role in draft.values} == {
+    assert {role: draft.units[role] for role in draft.values} == {
         "reference": "rad", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2",
     }  # fmt: skip
     assert "reference: no unit stated, taken as rad, as the other signals in rad" in draft.guesses
@@ -118,20 +118,20 @@ def test_units_of_a_motion_follow_those_that_are_stated():
 )
 def test_units_of_a_motion_without_any(headings, unit):
     draft = draft_of(table_of(*headings))
-    assert draft.unit("position") == unit
+    assert draft.units["position"] == unit
     assert any("position: no unit stated" in guess and "state it, as in position=" in guess for guess in draft.guesses)
 
 
 def test_whole_numbers_are_counts():
     draft = draft_of(table_of("t [s]", "x", "v", x=np.arange(30)))
-    assert (draft.unit("position"), draft.unit("velocity")) == ("count", "count/s")
+    assert (draft.units["position"], draft.units["velocity"]) == ("count", "count/s")
     draft = draft_of(table_of("t [s]", "x", x=np.arange(30) % 4))
-    assert draft.unit("position") == "m"
+    assert draft.units["position"] == "m"
 
 
 def test_other_units_without_any():
     draft = draft_of(table_of("t [s]", "force", "current", "vbus", "temp", "pwm"))
-    assert {role: draft.unit(role) for role in draft.values} == {
+    assert {role: draft.units[role] for role in draft.values} == {
         "force": "N", "current": "A", "supply": "V", "temperature": "K", "command": "",
     }  # fmt: skip
     assert "temperature: no unit stated, taken as degC" in draft.guesses
@@ -140,7 +140,7 @@ def test_other_units_without_any():
 
 def test_a_unit_that_is_none_is_told():
     draft = draft_of(table_of("t [s]", "position [apples]"))
-    assert draft.unit("position") == "m"
+    assert draft.units["position"] == "m"
     assert any('"apples" is no unit of position as measured' in guess for guess in draft.guesses)
 
 
@@ -196,4 +196,3 @@ def test_time_by_the_period():
     draft = draft_of(table_of("x [mm]"), "period=2 ms")
     draft.convert()
     assert draft.t.tolist() == pytest.approx(np.arange(30) * 0.002)
-    assert not draft.has_clock

@@ -7,8 +7,7 @@ import pytest
 
 from detent.logs.counters import find_wraps, mend_counters, unwrap
 from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, row_ranges
-from detent.logs.log_units import Conversion
+from detent.logs.log import Action, Kind, Source, row_ranges
 
 T = np.arange(400.0)
 SWING = np.round(30_000 * np.sin(T / 40))
@@ -17,8 +16,9 @@ SWING = np.round(30_000 * np.sin(T / 40))
 def mended(unit="count", factor=1.0, bits=None, **values):
     values = {role: np.asarray(found, dtype=np.float64) for role, found in values.items()}
     n = len(next(iter(values.values())))
-    conversions = {role: Conversion(unit if role == "position" else "", factor) for role in values}
-    draft = Draft("log.csv", np.arange(1, n + 1), np.arange(float(n)), values, conversions, {}, bits or {})
+    units = {role: unit if role == "position" else "" for role in values}
+    sources = {role: Source(role, units[role], factor) for role in values}
+    draft = Draft("log.csv", np.arange(1, n + 1), np.arange(float(n)), values, units, sources, bits or {})
     mend_counters(draft)
     return draft
 

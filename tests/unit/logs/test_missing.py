@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from detent.logs.dirt import mend_missing
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Severity
-from detent.logs.log_units import Conversion
+from detent.logs.read_log import mend_missing
 
 NAN = np.nan
 
@@ -13,8 +12,7 @@ NAN = np.nan
 def mended(**values):
     arrays = {role: np.asarray(found, dtype=np.float64) for role, found in values.items()}
     n = len(next(iter(arrays.values())))
-    conversions = dict.fromkeys(arrays, Conversion("", 1.0))
-    draft = Draft("log.csv", np.arange(1, n + 1), np.arange(float(n)), arrays, conversions, {})
+    draft = Draft("log.csv", np.arange(1, n + 1), np.arange(float(n)), arrays, dict.fromkeys(arrays, ""), {})
     mend_missing(draft)
     return draft
 

@@ -5,7 +5,6 @@ import pytest
 
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Source
-from detent.logs.log_units import Conversion
 from detent.logs.saturation import find_saturation
 
 T = np.arange(2000) * 0.001
@@ -16,7 +15,7 @@ WAVE = 300 * np.sin(9 * T) + 80 * np.sin(31 * T) + RNG.normal(0, 3, len(T))
 def findings(values, role="command", factor=1.0):
     draft = Draft(
         "log.csv", np.arange(1, len(values) + 1), T, {role: np.asarray(values, dtype=float)},
-        {role: Conversion("", factor)}, {role: Source(role, "", factor)},
+        {role: ""}, {role: Source(role, "", factor)},
     )  # fmt: skip
     find_saturation(draft)
     return draft.findings

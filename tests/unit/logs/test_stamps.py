@@ -6,7 +6,6 @@ import pytest
 from detent.errors import InputError
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity
-from detent.logs.log_units import Conversion
 from detent.logs.stamps import look_at_clock, mend_clock, stretches
 
 
@@ -16,7 +15,7 @@ def draft_of(t, **values):
     values = {
         role: np.asarray(v, dtype=np.float64) for role, v in (values or {"position": np.arange(n) ** 1.5}).items()
     }
-    return Draft("log.csv", np.arange(1, n + 1), t, values, {"time": Conversion("s", 1.0)}, {})
+    return Draft("log.csv", np.arange(1, n + 1), t, values, {"time": "s"}, {})
 
 
 def mended(t, **values):

@@ -25,12 +25,7 @@ _SUMS: dict[str, dict[str, float]] = {
     "viscous.negative": {"viscous": 1.0, "viscous.negative": 1.0},
     "static.positive": {"coulomb.positive": 1.0, "excess.positive": 1.0},
     "static.negative": {"coulomb.negative": 1.0, "excess.negative": 1.0},
-    "pendulum": {"pendulum": 1.0},
-    "pendulum.across": {"pendulum.across": 1.0},
-    "spring": {"spring": 1.0},
-    "stribeck": {"stribeck": 1.0},
-    "loss": {"loss": 1.0},
-    "delay": {"delay": 1.0},
+    **{name: {name: 1.0} for name in ("pendulum", "pendulum.across", "spring", "stribeck", "loss", "delay")},
 }
 """Constants as sums of those of the terms; a force that does not turn round is part of both Coulomb constants."""
 
@@ -71,10 +66,10 @@ class Constants:
         error = np.maximum(self.errors, 1e-300)
         return np.clip(self.covariance / np.outer(error, error), -1.0, 1.0)
 
-    def inseparable(self, limit: float = 0.95) -> tuple[tuple[str, str, float], ...]:
+    def inseparable(self) -> tuple[tuple[str, str, float], ...]:
         """Pairs of constants whose errors go together, with their correlation: the data cannot tell them well apart."""
         c, n = self.correlation, len(self.names)
-        pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if abs(float(c[i, j])) > limit]
+        pairs = [(i, j) for i in range(n) for j in range(i + 1, n) if abs(float(c[i, j])) > 0.95]
         return tuple((self.names[i], self.names[j], float(c[i, j])) for i, j in pairs)
 
     def estimates(self, run: Run) -> tuple[Estimate, ...]:

@@ -62,7 +62,13 @@ class DeadTime:
 
 def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float | None = None) -> DeadTime:
     """Find the dead time by the shift at which the motion explains the effort best."""
-    step = _checked_step(t, effort, position)
+    least = BLOCKS * _FEWEST_ROWS * LONGEST
+    if not len(t) == len(effort) == len(position) or len(t) < least:
+        raise DetentError(
+            f"identify: came {len(t)} times, {len(effort)} efforts, {len(position)} positions; allowed: as many of "
+            f"each, {least} or more for a dead time of up to {LONGEST} samples; record longer"
+        )
+    step = float(t[-1] - t[0]) / (len(t) - 1)
     even: Values = t[0] + step * np.arange(len(t), dtype=np.float64)
     effort, position = np.interp(even, t, effort), np.interp(even, t, position)
     rows = 2 * window_rows(position) + 1
@@ -74,17 +80,6 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     value = step * shift - 0.5 * (step if hold is None else hold)
     found = estimate("delay", value, "s", error, "shift of the effort that the motion explains best", BLOCKS - 1)
     return DeadTime(found, step, _doubt(shift, explained))
-
-
-def _checked_step(t: Values, effort: Values, position: Values) -> float:
-    """Mean time between samples [s] of a recording that is long enough."""
-    least = BLOCKS * _FEWEST_ROWS * LONGEST
-    if not len(t) == len(effort) == len(position) or len(t) < least:
-        raise DetentError(
-            f"identify: came {len(t)} times, {len(effort)} efforts, {len(position)} positions; allowed: as many of "
-            f"each, {least} or more for a dead time of up to {LONGEST} samples; record longer"
-        )
-    return float(t[-1] - t[0]) / (len(t) - 1)
 
 
 def _columns(position: Values, step: float, rows: int) -> Values:

@@ -10,7 +10,7 @@ Burman, Chow, Nolan: A cross-validatory method for dependent data. Biometrika 81
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -203,22 +203,18 @@ def fit_rung(parts: Sequence[Prepared], rung: Rung) -> Fit:
 Mask = NDArray[np.bool_]
 
 
-def hold_out(parts: Sequence[Prepared], count: int = STRETCHES) -> list[tuple[Mask, Mask]]:
+def hold_out(parts: Sequence[Prepared]) -> Iterator[tuple[Mask, Mask]]:
     """Windows of each stretch, and those that share no sample with it."""
-    masks: list[tuple[Mask, Mask]] = []
-    for stretch in range(count):
+    for stretch in range(STRETCHES):
         inside: list[Mask] = []
         apart: list[Mask] = []
         for p in parts:
             rows, reach = p.motion.rows, 2 * p.motion.kernel.half
-            here = np.arange(len(rows)) * count // max(len(rows), 1) == stretch
+            here = np.arange(len(rows)) * STRETCHES // max(len(rows), 1) == stretch
+            first, last = rows[here][[0, -1]].tolist() if here.any() else (len(p.run.position) + reach, -reach - 1)
             inside.append(here)
-            if here.any():
-                apart.append((rows < rows[here][0] - reach) | (rows > rows[here][-1] + reach))
-            else:
-                apart.append(~here)
-        masks.append((np.concatenate(inside), np.concatenate(apart)))
-    return masks
+            apart.append((rows < first - reach) | (rows > last + reach))
+        yield np.concatenate(inside), np.concatenate(apart)
 
 
 def _held_out(parts: Sequence[Prepared], fit: Fit) -> Values:

@@ -114,7 +114,8 @@ class _Trial:
         parts = self.parts(feeds)
         gain = self._search(parts[:cut], effort[:cut])
         columns = parts @ self.mix(gain, parts.shape[1])
-        theta = np.array([significant(value) for value in _solve(columns[:cut], effort[:cut]).tolist()])
+        seen = columns[:cut]
+        theta = np.array([significant(value) for value in _solve(seen.T @ seen, seen.T @ effort[:cut]).tolist()])
         rest = effort[cut:]
         first = 2 if self.integrates else 1
         least = SLIGHT * rms(effort)
@@ -140,7 +141,7 @@ class _Trial:
             """Square of the error, less that of the effort."""
             mix = self.mix(math.exp(logarithm), len(products))
             own, told = mix.T @ products @ mix, mix.T @ moments
-            return -float(told @ _solve_normal(own, told))
+            return -float(told @ _solve(own, told))
 
         grid: list[float] = np.linspace(math.log(GAINS[0]), math.log(GAINS[1]), 9).tolist()
         best = int(np.argmin([miss(g) for g in grid]))
@@ -154,13 +155,8 @@ class _Trial:
         return significant(math.exp(found), 6)
 
 
-def _solve(columns: Values, effort: Values) -> Values:
-    """Least squares, worked out with columns of unit length by their normal equations, which are few."""
-    return _solve_normal(columns.T @ columns, columns.T @ effort)
-
-
-def _solve_normal(products: Values, moments: Values) -> Values:
-    """The same from the normal equations."""
+def _solve(products: Values, moments: Values) -> Values:
+    """Least squares by the normal equations, which are few, worked out with columns of unit length."""
     size = np.maximum(np.sqrt(np.diag(products)), 1e-150)
     linalg: Any = np.linalg
     theta: Values = linalg.lstsq(products / np.outer(size, size), moments / size, rcond=1e-12)[0]

@@ -1,7 +1,6 @@
 """A log made ready for a fit: what moved and what moved it, on an even grid."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,8 +26,7 @@ class Run:
     effort_name: str = "force"  # and effort_unit: what it is
     effort_unit: str = "N"
     position_unit: str = "m"
-    reference: Values | None = None  # and load_position: position asked for; position of a second encoder
-    load_position: Values | None = None
+    reference: Values | None = None  # position asked for
     resolution: float = 0.0  # way of a count of the encoder; 0 where none shows
     noise: float = 0.0  # standard deviation of the measured position, counts included
 
@@ -51,28 +49,22 @@ class Run:
             effort=self.effort[cut],
             usable=self.usable[cut],
             reference=None if self.reference is None else self.reference[cut],
-            load_position=None if self.load_position is None else self.load_position[cut],
         )
 
     def unit(self, name: str) -> str:
         """Unit of a constant by its name, such as ``viscous.positive``."""
-        return _unit(name, self.effort_unit or "1", self.position_unit)
-
-
-def _unit(name: str, effort: str, way: str) -> str:
-    kind = name.partition(".")[0]
-    per_way = f"{effort}*s/{way}" if effort != "1" else f"s/{way}"
-    per_rise = f"{effort}*s^2/{way}" if effort != "1" else f"s^2/{way}"
-    units: Mapping[str, str] = {
-        "mass": _MASS.get(effort, per_rise),
-        "viscous": per_way,
-        "stribeck": f"{way}/s",
-        "delay": "s",
-        "spring": f"{effort}/{way}",
-        "loss": "1",
-        "hanging": "rad",
-    }
-    return units.get(kind, effort)
+        effort, way = self.effort_unit or "1", self.position_unit
+        times = f"{effort}*" if effort != "1" else ""
+        units = {
+            "mass": _MASS.get(effort, f"{times}s^2/{way}"),
+            "viscous": f"{times}s/{way}",
+            "stribeck": f"{way}/s",
+            "delay": "s",
+            "spring": f"{effort}/{way}",
+            "loss": "1",
+            "hanging": "rad",
+        }
+        return units.get(name.partition(".")[0], effort)
 
 
 def make_run(log: Log, effort: str | None = None) -> Run:
@@ -85,11 +77,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
     samples = math.floor((log.t[-1] - log.t[0]) / step + 0.5) + 1
     grid: Values = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
     position = np.interp(grid, log.t, log.signals["position"])
-    others = {
-        role: np.interp(grid, log.t, log.signals[role])
-        for role in ("reference", "position_load")
-        if role in log.signals
-    }
+    reference = np.interp(grid, log.t, log.signals["reference"]) if "reference" in log.signals else None
     resolution = find_count(log.signals["position"])
     return Run(
         name=log.name,
@@ -100,8 +88,7 @@ def make_run(log: Log, effort: str | None = None) -> Run:
         effort_name=name,
         effort_unit=log.units[name] or "1",
         position_unit=log.units["position"],
-        reference=others.get("reference"),
-        load_position=others.get("position_load"),
+        reference=reference,
         resolution=resolution,
         noise=max(noise_of(position), 0.29 * resolution),
     )

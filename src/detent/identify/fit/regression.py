@@ -62,7 +62,6 @@ class Fit:
     residual: Values  # and effort: measured less fitted effort, and the effort, window by window
     effort: Values
     model: tuple[str, ...]  # what the model was asked for
-    half: int  # samples of the window to each side
     condition: float  # condition number of the columns at unit length
     instruments: Instruments  # what they are made of: "reference", "position", or "none" for least squares
 
@@ -136,21 +135,15 @@ def make_effort(parts: Sequence[Prepared], delay: float) -> Values:
     return np.concatenate([p.motion.kernel.held(p.run.effort, p.motion.rows, delay / p.run.step) for p in parts])
 
 
-def fit_equations(
-    parts: Sequence[Prepared],
-    names: Sequence[str],
-    bend: float = 1.0,  # Stribeck velocity [m/s] or share lost, where the model has one
-    *,
-    delay: float | None = None,  # known delay of the effort [s]; found by default
-) -> Fit:
-    """Fit a model to runs."""
+def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float = 1.0) -> Fit:
+    """Fit a model to runs; `bend` is the Stribeck velocity [m/s] or the share lost, where the model has one."""
     columns = make_columns(parts, names, bend)
     ideal = make_columns(parts, names, bend, ideal=True) if parts[0].instruments != "none" else columns
-    late, step = delay or 0.0, parts[0].run.step
+    late, step = 0.0, parts[0].run.step
     y = make_effort(parts, late)
     theta = solve(ideal, columns, y)
     x, z = _with_delay(parts, names, theta, late, columns, ideal)
-    for _ in range(ROUNDS if delay is None else 0):
+    for _ in range(ROUNDS):
         found = solve(z, x, y)
         theta = found[:-1]
         moved = float(np.clip(found[-1], -5 * step, 5 * step))
@@ -176,7 +169,6 @@ def fit_equations(
         residual,
         y,
         tuple(names),
-        parts[0].motion.kernel.half,
         float(singular[0] / max(singular[-1], 1e-300)),
         parts[0].instruments,
     )

@@ -77,7 +77,8 @@ def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
         if finding.kind in _DIRT and finding.severity is not Severity.NOTE:
             subject, record = _DIRT[finding.kind]
             yield Refusal(subject, f"{log.name}: {finding.signal} {finding.text}", finding.advice or record)
-    stuck = _share(log, Kind.STUCK, {"position", run.effort_name})
+    told = {"position", run.effort_name}
+    stuck = float(log.mask(Kind.STUCK, signals=told).mean())
     if stuck > MOST_STUCK:
         text = f"{log.name}: stands still in {stuck:.0%} of the rows"
         yield Refusal("stuck signal", text, "look at the sensor and its cable, and record again")
@@ -85,15 +86,12 @@ def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     if behind > MOST_LEFT_BEHIND:
         text = f"{log.name}: the reference makes {behind:.0%} of its way while the position stands still"
         yield Refusal("stuck signal", text, "look at the encoder, its cable and the drive's enable, and record again")
-    saturated = max(_share(log, Kind.SATURATED, {"position", run.effort_name}), _share_at_ends(run.effort))
+    top, bottom = run.effort.max(), run.effort.min()
+    at_ends = np.count_nonzero((run.effort == top) | (run.effort == bottom)) / len(run.effort)
+    saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), at_ends)
     if saturated > MOST_SATURATED:
         text = f"{log.name}: {run.effort_name} or position is at its limit in {saturated:.0%} of the rows"
         yield Refusal("saturated", text, "record slower or smaller moves that stay within the limit")
-
-
-def _share(log: Log, kind: Kind, signals: set[str]) -> float:
-    """Share of rows in findings of a kind about some signals."""
-    return float(log.mask(kind, signals=signals).mean())
 
 
 def _share_left_behind(run: Run) -> float:
@@ -109,13 +107,6 @@ def _share_left_behind(run: Run) -> float:
     way = np.abs(np.diff(run.reference[: stretches * count].reshape(cut), axis=1)).sum(axis=1)
     total = float(way.sum())
     return float(way[still].sum()) / total if total > 0.0 else 0.0
-
-
-def _share_at_ends(values: Values) -> float:
-    """Share of samples exactly at the largest or the smallest value."""
-    top, bottom = float(values.max()), float(values.min())
-    at_ends = np.count_nonzero(values == top) + np.count_nonzero(values == bottom)
-    return at_ends / len(values) if top > bottom else 1.0
 
 
 def look_at_motion(runs: Sequence[Run], parts: Sequence[Prepared]) -> Iterator[Refusal]:
@@ -160,7 +151,8 @@ def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float)
         is_viscous = e.name.startswith("viscous")
         scale = top if is_viscous else 1.0
         if not e.half * scale < WIDEST_FORCE * effort:
-            text = f"{e.name} {_tell(e, effort / max(scale, 1e-300))}"
+            is_known = e.half < 100.0 * (effort / max(scale, 1e-300))
+            text = f"{e.name} {f'{e.value:.4g} +- {e.half:.2g} {e.unit}' if is_known else 'not known at all'}"
             record = "steady moves at several speeds" if is_viscous else "slow moves in both directions"
             yield Refusal("not told by the data", text, f"record {record}", (e.name,))
     if delay is not None and delay.half > WIDEST_DELAY * run.step:
@@ -179,11 +171,6 @@ def _one_speed(run: Run, velocity: Values, names: Collection[str]) -> Iterator[R
             speeds = f"{low:.3g} to {high:.3g} {run.position_unit}/s nearly all the time"
             text = f"in {way} direction it moves at {speeds}: Coulomb and viscous friction cannot be told apart"
             yield Refusal("one speed", text, "record moves at two speeds or more in each direction", concerned)
-
-
-def _tell(e: Estimate, scale: float) -> str:
-    """A constant with its limits, or that nothing is known of it."""
-    return f"{e.value:.4g} +- {e.half:.2g} {e.unit}" if e.half < 100.0 * scale else "not known at all"
 
 
 def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iterator[Refusal]:

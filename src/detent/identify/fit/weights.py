@@ -43,11 +43,11 @@ class Kernel:
 
     def held(self, signal: Values, rows: Rows, late: float = 0.0) -> Values:
         """Mean of a signal held from each sample to the next, seen `late` samples later, around samples `rows`."""
-        return _sums(signal, _held_weights(self.half, late), rows)
+        return _sums(signal, _held(self.half, late)[0], rows)
 
     def held_slope(self, signal: Values, rows: Rows, late: float = 0.0) -> Values:
         """Mean of the first derivative of such a signal [1/s], around samples `rows`."""
-        return _sums(signal, _held_slopes(self.half, late), rows) / self.step
+        return _sums(signal, _held(self.half, late)[1], rows) / self.step
 
     def mean(self, signal: Values, rows: Rows) -> Values:
         """Mean of a signal between whose samples straight lines run, around samples `rows`."""
@@ -98,22 +98,13 @@ def make_kernel(half: int, step: float) -> Kernel:
 
 
 @cache
-def _held_weights(half: int, late: float) -> Values:
-    """Integral of the window over each sample's stretch, `late` samples after it began."""
-    reach = half + 1 + int(np.ceil(abs(late)))
-    edges = (np.arange(-reach, reach + 2) + late) / half
-    rise = _SHAPE.integ()
-    weights = np.diff(rise(np.clip(edges, -1.0, 1.0)))
-    return weights / weights.sum()
-
-
-@cache
-def _held_slopes(half: int, late: float) -> Values:
-    """The same of the derivative: the window's change over each stretch, per sample."""
+def _held(half: int, late: float) -> tuple[Values, Values]:
+    """Integral of the window over each sample's stretch, `late` samples after it began; and its change, per sample."""
     reach = half + 1 + int(np.ceil(abs(late)))
     edges = np.clip((np.arange(-reach, reach + 2) + late) / half, -1.0, 1.0)
-    area = float(_SHAPE.integ()(1.0) - _SHAPE.integ()(-1.0)) * half
-    return -np.diff(_SHAPE(edges)) / area
+    rise = _SHAPE.integ()
+    weights, area = np.diff(rise(edges)), float(rise(1.0) - rise(-1.0)) * half
+    return weights / weights.sum(), -np.diff(_SHAPE(edges)) / area
 
 
 def _sums(signal: Values, weights: Values, rows: Rows) -> Values:

@@ -25,7 +25,7 @@ def fit_of(model, values, covariance=None, *, instruments="position"):
     covariance = covariance_of(len(values)) if covariance is None else covariance
     degrees = np.full(len(values), 12.0)
     return Fit(
-        *(tuple(names), np.array(values), covariance, degrees, np.zeros(5), np.ones(5), tuple(model), 10, 2.0),
+        *(tuple(names), np.array(values), covariance, degrees, np.zeros(5), np.ones(5), tuple(model), 2.0),
         instruments=instruments,
     )
 

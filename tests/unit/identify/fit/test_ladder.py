@@ -80,7 +80,7 @@ def test_stretches_are_held_out_with_all_that_shares_samples_with_them():
     parts = parts_of(Recorder(seconds=6), Recorder(seconds=4, seed=2))
     rows = np.concatenate([p.motion.rows for p in parts])
     which = np.repeat([0, 1], [len(p.motion.rows) for p in parts])
-    masks = hold_out(parts)
+    masks = list(hold_out(parts))
     assert np.sum([inside for inside, _ in masks], axis=0) == pytest.approx(1)
     for inside, apart in masks:
         assert not (inside & apart).any()

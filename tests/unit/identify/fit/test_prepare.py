@@ -24,7 +24,6 @@ def test_an_even_log_is_taken_as_it_is():
     assert run.position == pytest.approx(POSITION)
     assert run.effort == pytest.approx(FORCE)
     assert run.reference == pytest.approx(2 * POSITION)
-    assert run.load_position is None
     assert run.usable.all()
     assert run.t == pytest.approx(T)
     assert (run.name, run.effort_name, run.effort_unit, run.position_unit) == ("made.csv", "force", "N", "m")
@@ -119,12 +118,11 @@ def test_units_of_constants_follow_effort_and_position():
 
 
 def test_a_part_holds_all_signals():
-    run = make_run(make_log(T, {"position": POSITION, "force": FORCE, "reference": FORCE, "position_load": POSITION}))
+    run = make_run(make_log(T, {"position": POSITION, "force": FORCE, "reference": FORCE}))
     part = run.part(100, 300)
     assert part.position == pytest.approx(POSITION[100:300])
     assert part.effort == pytest.approx(FORCE[100:300])
     assert part.reference == pytest.approx(FORCE[100:300])
-    assert part.load_position == pytest.approx(POSITION[100:300])
     assert len(part.usable) == 200
     assert part.t[0] == 0.0
 

@@ -40,16 +40,6 @@ def test_constants_and_delay_come_back(way, delay):
     assert fit.instruments == way
 
 
-def test_a_known_delay_is_kept():
-    run = Recorder(delay=0.004, force_noise=0.0).run()
-    fit = fit_equations(parts_of(run), NAMES, delay=0.004)
-    assert fit.value("delay") == 0.004
-    assert fit.value("mass") == pytest.approx(2.0, rel=1e-4)
-    wrong = fit_equations(parts_of(run), NAMES, delay=0.0)
-    assert wrong.value("delay") == 0.0
-    assert np.std(wrong.residual) > 10 * np.std(fit.residual)
-
-
 def test_several_runs_are_one_fit():
     runs = [Recorder(seconds=5, seed=seed, force_noise=0.2).run() for seed in (1, 2, 3)]
     alone = fit_equations(parts_of(runs[0]), NAMES)

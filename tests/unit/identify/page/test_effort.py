@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.identify.page.samples import identified, windows
 
+from detent.identify.fit.identification import prepare_all
 from detent.identify.page.effort import (
     Windows,
     autocorrelation,
@@ -33,7 +34,8 @@ def test_windows_are_the_rows_of_the_regression() -> None:
     assert len(one.t) == len(one.velocity) == len(fit.effort)
     assert one.place[0] == 0
     assert one.t == pytest.approx(one.t[0] + one.place * one.hop)
-    assert one.width == pytest.approx((2 * fit.half + 1) * identified().runs[0].step)
+    half = prepare_all(identified().runs, fit.instruments)[0].motion.kernel.half
+    assert one.width == pytest.approx((2 * half + 1) * identified().runs[0].step)
 
 
 def test_two_logs_share_the_rows_in_their_order() -> None:
