@@ -191,14 +191,12 @@ class ClosedLoop:
 
 def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequence[Run]) -> ClosedLoop | None:
     """Follow the references of the parts that were not seen; None where a log shows no such loops."""
-    found = [fit_loops(run) for run in seen]
-    if any(loops is None for loops in found):
+    found = [loops for run in seen if (loops := fit_loops(run)) is not None]
+    if len(found) < len(seen):
         return None
-    pairs: list[tuple[Values, Values, Run]] = []
-    for loops, run in zip(found, unseen, strict=True):
-        if loops is not None and len(run.position) > MEMORY:
-            pairs.append((*_follow(constants, loops, run), run))
-    if not pairs or found[0] is None:
+    parts = [(loops, run) for loops, run in zip(found, unseen, strict=True) if len(run.position) > MEMORY]
+    pairs = [(*_follow(constants, loops, run), run) for loops, run in parts]
+    if not pairs:
         return None
     position = np.concatenate([q - run.position for q, _, run in pairs])
     effort = np.concatenate([u - run.effort for _, u, run in pairs])

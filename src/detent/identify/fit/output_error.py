@@ -103,23 +103,21 @@ class _Search:
         self.look_at_starts(self.begin)
 
     def look_at_starts(self, x: Values) -> None:
-        """Work out what an error of each start does."""
-        self._removers = [self._remover(x, s) for s in self._stretches]
+        """Work out what an error of each start does to its stretch: position and velocity, orthonormal columns."""
+        self._removers = []
+        for s in self._stretches:
+            plant = Plant(self._constants(x), s.run.step)
+            q = float(s.run.position[s.begin])
+            nudge = 1e-3 * max(abs(s.velocity), float(np.abs(np.diff(s.run.position)).max()) / s.run.step)
+            a, b = (plant.run(s.run.effort, s.begin, s.samples, q, s.velocity + d) for d in (0.0, nudge))
+            ways = np.column_stack([np.ones(s.samples), b - a])
+            ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
+            self._removers.append(np.linalg.qr(ways)[0])
 
     def _constants(self, x: Values) -> Constants:
         values = np.append(self._back @ (x * self._scale), self._start.value("delay"))
         k = len(values)
         return Constants((*self.names, "delay"), values, np.zeros((k, k)), np.ones(k), "output error")
-
-    def _remover(self, x: Values, s: Stretch) -> Values:
-        """What an error of the start does to a stretch: position and velocity, orthonormal columns."""
-        plant = Plant(self._constants(x), s.run.step)
-        q = float(s.run.position[s.begin])
-        nudge = 1e-3 * max(abs(s.velocity), float(np.abs(np.diff(s.run.position)).max()) / s.run.step)
-        a, b = (plant.run(s.run.effort, s.begin, s.samples, q, s.velocity + d) for d in (0.0, nudge))
-        ways = np.column_stack([np.ones(s.samples), b - a])
-        ways = ways / np.maximum(np.linalg.norm(ways, axis=0), 1e-300)
-        return np.linalg.qr(ways)[0]
 
     def residual(self, x: Values) -> Values:
         """Simulated less measured position of all stretches, without what the starts explain."""

@@ -117,15 +117,10 @@ def _block_means(velocity: Values, part: slice, block: int) -> Values:
 
 def _reach(speeds: Values, first: int) -> int:
     """First block behind `first` that is not of the same speed as those before it."""
-    low = high = total = float(speeds[first])
-    stop = first + 1
-    while stop < len(speeds):
-        new = float(speeds[stop])
-        low, high, total = min(low, new), max(high, new), total + new
-        if high - low > TOLERANCE * abs(total) / (stop + 1 - first):
-            break
-        stop += 1
-    return stop
+    rest = speeds[first:]
+    spread = np.maximum.accumulate(rest) - np.minimum.accumulate(rest)
+    is_other = spread > TOLERANCE * np.abs(np.cumsum(rest)) / np.arange(1, len(rest) + 1)
+    return first + (int(np.argmax(is_other)) if is_other.any() else len(rest))
 
 
 def _trimmed(speeds: Values, first: int, stop: int) -> tuple[int, int] | None:
@@ -175,10 +170,6 @@ def _stands_out(speed: float, others: Values) -> bool:
 
 def _without(free: slice, taken: list[slice]) -> list[slice]:
     """What is left of a part when others are taken out of it."""
-    left: list[slice] = []
-    start = free.start
-    for part in taken:
-        if free.start <= part.start < free.stop:
-            left.append(slice(start, part.start))
-            start = part.stop
-    return [*left, slice(start, free.stop)]
+    inside = [edge for part in taken if free.start <= part.start < free.stop for edge in (part.start, part.stop)]
+    edges = [free.start, *inside, free.stop]
+    return [slice(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True)]

@@ -16,6 +16,7 @@ from detent.files.locate import Path, Place, locate_keys
 from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
+from detent.identify.write import render
 from detent.identify.write.file_numbers import NATIVE, FileNumbers, Number, plain
 from detent.identify.write.seen import Seen, outwards, see
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec
@@ -90,8 +91,6 @@ def choose_gains(mass: float, seen: Seen, delay: int) -> Gains:
 
 def _whole_file(found: Identification, reading: str) -> str:
     """A new axis file, as ``template/axis.toml.j2`` shows it."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     numbers = {n.key: n for n in FileNumbers(found).numbers()}
     mass, delay = numbers["mechanics.motor_mass"], numbers.get("drive.delay")
     if not mass.trusted:
@@ -104,14 +103,8 @@ def _whole_file(found: Identification, reading: str) -> str:
     def shown(value: float, linear: str, digits: int = 4) -> str:
         return format_quantity(value, unit_in(motion, linear), digits)
 
-    templates = Environment(  # noqa: S701 - no page
-        loader=PackageLoader("detent.identify.write", "template"),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    return templates.get_template("axis.toml.j2").render(
+    return render(
+        "axis.toml.j2",
         found=found,
         run=run,
         seen=seen,

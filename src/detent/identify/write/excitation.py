@@ -6,12 +6,13 @@ the top speed.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from detent.errors import DetentError
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.verdict import Refusal
+from detent.identify.write import render
 from detent.identify.write.file_numbers import plain
 from detent.identify.write.seen import Bounds, see
 from detent.methods.cascade.schema import CascadeSpec
@@ -84,72 +85,57 @@ def missing_parts(refusals: Sequence[Refusal]) -> list[Part]:
 
 
 def excitation_job(found: Identification, axis: CascadeSpec | None = None) -> str:
-    """Write a list of moves that a recording needs for what is missing."""
+    """Write a list of moves that a recording needs for what is missing, as ``template/moves.toml.j2`` shows it."""
     bounds = bounds_of(found, axis)
     told = f"travel and speed of {found.runs[0].name}" if axis is None else f"limits of {axis.axis.name}"
-    saturated = any(refusal.subject == "saturated" for refusal in found.refusals)
-    moves = _Moves(bounds, SLOWER * bounds.speed if saturated else bounds.speed)
-    lines = ["", "# To the middle of the way.", *moves.to(moves.middle, 0.5 * moves.top)]
-    for part in missing_parts(found.refusals):
-        lines += ["", f"# {part.text[0].upper()}{part.text[1:]}.", *moves.of(part)]
-    lines += ["", "# Back to the begin.", *moves.to(bounds.start, 0.5 * moves.top)]
-    repeat = max(1, math.ceil(LEAST / moves.seconds))
-    return "\n".join([*_head(found, plain(told), moves, repeat, saturated=saturated), *lines]) + "\n"
+    subjects = {refusal.subject for refusal in found.refusals}
+    moves = _Moves(bounds, SLOWER * bounds.speed if "saturated" in subjects else bounds.speed)
+    middle = 0.5 * (bounds.lowest + bounds.highest)
+    parts = [("to the middle of the way", [moves.to(middle, 0.5 * moves.top)])]
+    parts += [(part.text, moves.of(part, middle)) for part in missing_parts(found.refusals)]
+    parts += [("back to the begin", [moves.to(bounds.start, 0.5 * moves.top)])]
+    way = "rad" if bounds.is_rotary else "m"
+    return render(
+        "moves.toml.j2",
+        found=found,
+        told=plain(told),
+        logs=", ".join(plain(log.name) for log in found.logs),
+        subjects=subjects,
+        slower=SLOWER,
+        bounds=bounds,
+        top=moves.top,
+        seconds=moves.seconds,
+        repeat=max(1, math.ceil(LEAST / moves.seconds)),
+        parts=parts,
+        plain=plain,
+        quantity=format_quantity,
+        way=way,
+    )
 
 
-def _head(found: Identification, told: str, moves: "_Moves", repeat: int, *, saturated: bool) -> Iterator[str]:
-    """What the job is for."""
-    logs = ", ".join(plain(log.name) for log in found.logs)
-    yield f"# Moves to be recorded, about {repeat * moves.seconds:.0f} s, after {logs} was looked at."
-    yield f"# They keep to the {told}: {moves.shown(moves.bounds.lowest)} to {moves.shown(moves.bounds.highest)}, up to"
-    yield f"# {format_quantity(moves.top, moves.speed_unit, 3)}."
-    yield "#"
-    yield "# Record position, reference and what drives the axis, 500 samples a second or more, without a gap."
-    if found.verdict == "partly trusted":
-        yield f"# Then look at both: detent identify {plain(found.logs[0].name)} NEW_LOG"
-    if not found.refusals:
-        yield "# Nothing was refused: these moves show every constant once more."
-    for refusal in found.refusals:
-        yield f"# {plain(str(refusal))}"
-    if saturated:
-        yield f"# The effort was at its limit: the moves reach {SLOWER:.0%} of the speed only."
-    if any(refusal.subject in {"wrong sign", "wrong unit", "lost sign"} for refusal in found.refusals):
-        yield "# No move mends a sign or a unit: state them first (--column, --map), and look at the log again."
-    if repeat > 1:
-        yield ""
-        yield f"repeat = {repeat}"
+Move = tuple[float, float, float]  # target, speed, and rest after it [s]
 
 
 class _Moves:
-    """Writes moves to and fro, and counts their time."""
+    """Makes moves to and fro, and counts their time."""
 
     def __init__(self, bounds: Bounds, top: float) -> None:
         self.top, self.seconds = top, 0.0
-        self.bounds, self._place, self.middle = bounds, bounds.start, 0.5 * (bounds.lowest + bounds.highest)
-        self.way_unit, self.speed_unit = ("rad", "rad/s") if bounds.is_rotary else ("m", "m/s")
+        self._free, self._place = bounds.highest - bounds.lowest, bounds.start
         self._rise = bounds.acceleration if bounds.acceleration > 0.0 else top / RAMP
 
-    def shown(self, place: float) -> str:
-        """A position as people read it."""
-        return format_quantity(place, self.way_unit)
-
-    def of(self, part: Part) -> Iterator[str]:
+    def of(self, part: Part, middle: float) -> list[Move]:
         """Moves of a part, each speed there and back around the middle of the travel."""
-        for share in part.shares:
-            speed = share * self.top
-            free = self.bounds.highest - self.bounds.lowest
-            way = min(speed * part.steady + speed**2 / self._rise, free)
-            for sign in (1.0, -1.0):
-                yield from self.to(self.middle + sign * 0.5 * way, speed, part.dwell)
+        found: list[Move] = []
+        for speed in (share * self.top for share in part.shares):
+            way = min(speed * part.steady + speed**2 / self._rise, self._free)
+            found += [self.to(middle + sign * 0.5 * way, speed, part.dwell) for sign in (1.0, -1.0)]
+        return found
 
-    def to(self, target: float, speed: float, dwell: float = 0.0) -> Iterator[str]:
+    def to(self, target: float, speed: float, dwell: float = 0.0) -> Move:
         """One move."""
         way = abs(target - self._place)
         self._place = target
         ramp = speed / self._rise
         self.seconds += dwell + (way / speed + ramp if way > speed * ramp else 2.0 * math.sqrt(way / self._rise))
-        yield "[[move]]"
-        yield f'target = "{format_quantity(target, self.way_unit)}"'
-        yield f'speed = "{format_quantity(speed, self.speed_unit, 4)}"'
-        if dwell:
-            yield f'dwell = "{format_quantity(dwell, "s")}"'
+        return target, speed, dwell
