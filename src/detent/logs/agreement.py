@@ -8,16 +8,7 @@ import math
 
 import numpy as np
 
-from detent.logs.differences import (
-    FARTHEST,
-    Likeness,
-    correlation_curve,
-    grain,
-    likeness,
-    paired_changes,
-    peaks_of,
-    runs_of,
-)
+from detent.logs.differences import Likeness, correlate, grain, likeness, paired_changes, peaks_of, runs_of
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity
 
@@ -104,9 +95,12 @@ def _before_position(draft: Draft) -> Likeness:
     Without the delay of the loop a fast motion would lie crosswise to its reference, or even against it. Of a sine,
     half a period of delay and a wrong sign look the same: then the sign is believed.
     """
-    part = _longest_enabled(draft)
-    reference, position = draft.values["reference"][part], draft.values["position"][part]
-    curve = correlation_curve(position, reference, min(FARTHEST, len(position) // 4))
+    reference, position, enabled = draft.values["reference"], draft.values["position"], draft.values.get("enabled")
+    if enabled is not None and np.any(enabled):  # the longest stretch in which the drive is on
+        runs = runs_of(enabled > 0.5)
+        first, last = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))].tolist()
+        reference, position = reference[first:last], position[first:last]
+    curve = correlate(position, reference)
     size, middle = np.abs(curve), len(curve) // 2
     peaks = peaks_of(size)
     peaks = peaks[size[peaks] >= size.max() - _AS_GOOD]
@@ -117,16 +111,6 @@ def _before_position(draft: Draft) -> Likeness:
         correlation = abs(correlation)
     factor = float(reference.std() / position.std()) if position.std() > 0 else 0.0
     return Likeness(correlation, float(np.copysign(factor, correlation)))
-
-
-def _longest_enabled(draft: Draft) -> slice:
-    """Longest stretch in which the drive is on; all of a recording that does not say."""
-    enabled = draft.values.get("enabled")
-    if enabled is None or not np.any(enabled):
-        return slice(None)
-    runs = runs_of(enabled > 0.5)
-    first, last = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))].tolist()
-    return slice(first, last)
 
 
 def _check_sign(draft: Draft, role: str, found: Likeness) -> None:

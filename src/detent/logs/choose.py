@@ -30,25 +30,29 @@ def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
     """Find the column of each signal; what was guessed is among the notes of the table."""
     chosen: Chosen = {}
     problems: list[FileProblem] = []
+    held = f"columns {table.told_columns()}"
     silent = {role for role, choice in mapping.columns.items() if not choice.column}
     for role, choice in mapping.columns.items():
         name = None if role in silent else find_column(table, choice.column)
         if name is not None:
             chosen[role] = name
         elif role not in silent:
-            problems.append(_no_column(table, role, choice.column))
+            plain = [_plain(name) for name in table.columns]
+            near = difflib.get_close_matches(choice.column.casefold(), plain, n=1, cutoff=0.6)
+            remedy = f'did you mean "{near[0]}"?' if near else "name one of these, or its number from 1"
+            came = f'the column "{short(choice.column)}"'
+            problems.append(FileProblem(table.file, 0, 0, role, came, held, remedy))
     if problems:
         raise InputError(problems)
     if mapping.file.period is not None and "time" not in chosen:
         silent.add("time")
     _guess(table, chosen, silent)
-    came = f"columns {table.told_columns()}"
     if "time" not in chosen and mapping.file.period is None:
         remedy = "state it as time=COLUMN [UNIT], or the time between rows as period=1 ms"
-        raise InputError.of_file(table.file, came, "a column for the time", remedy)
+        raise InputError.of_file(table.file, held, "a column for the time", remedy)
     if not set(chosen) - {"time"}:
         remedy = "state what the columns are, as in position=COLUMN [mm]"
-        raise InputError.of_file(table.file, came, f"signals: {', '.join(ROLES)}", remedy)
+        raise InputError.of_file(table.file, held, f"signals: {', '.join(ROLES)}", remedy)
     return chosen
 
 
@@ -67,14 +71,6 @@ def find_column(table: RawTable, wanted: str) -> str | None:
 
 def _plain(name: str) -> str:
     return split_heading(name)[0].casefold()
-
-
-def _no_column(table: RawTable, role: str, wanted: str) -> FileProblem:
-    """The problem of a column that is not there."""
-    near = difflib.get_close_matches(wanted.casefold(), [_plain(name) for name in table.columns], n=1, cutoff=0.6)
-    remedy = f'did you mean "{near[0]}"?' if near else "name one of these, or its number from 1"
-    came = f'the column "{short(wanted)}"'
-    return FileProblem(table.file, 0, 0, role, came, f"columns {table.told_columns()}", remedy)
 
 
 def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:

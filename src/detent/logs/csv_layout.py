@@ -115,6 +115,10 @@ class CsvLayout:
     text_columns: set[int] = field(default_factory=set[int])
     moment_columns: set[int] = field(default_factory=set[int])
 
+    def read(self, index: int, cells: Sequence[str]) -> tuple[NDArray[np.generic], set[int]]:
+        """Numbers or moments of a piece of a column, and the indices of the cells that are none."""
+        return read_moments(cells) if index in self.moment_columns else read_column(cells, self.decimal)
+
 
 def is_telling(line: str) -> bool:
     """True for a line that is neither empty nor a comment."""
@@ -151,7 +155,10 @@ def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) ->
     # Lines may end in separators behind which nothing ever stands.
     while width > 1 and not any(cells[width - 1 : width] != [""] for cells in rows[place:] if len(cells) >= width):
         width -= 1
-    decimal = options.decimal or _guess_decimal(rows[place:], separator)
+    # The decimal sign is a comma where numbers have one and it does not separate cells, or stands in quotes.
+    signed = [cell for cells in rows[place:] for cell in cells if is_number(cell)]
+    commas, points = sum("," in cell for cell in signed), sum("." in cell for cell in signed)
+    decimal = options.decimal or ("," if commas and (separator != "," or commas > points) else ".")
     layout = CsvLayout(separator, decimal, sample[place], width)
     _read_header(table, lines, layout, options.header)
     _find_texts(rows[place:], layout)
@@ -193,13 +200,6 @@ def _first_data(rows: Sequence[Sequence[str]], width: int) -> int | None:
 def _numbers(cells: Sequence[str]) -> int:
     """How many cells are numbers."""
     return sum(is_number(cell) or is_moment(cell) for cell in cells)
-
-
-def _guess_decimal(rows: Sequence[Sequence[str]], separator: str) -> str:
-    """Decimal sign: a comma where numbers have one and it does not separate cells, or stands in quotes."""
-    commas = sum("," in cell and is_number(cell) for cells in rows for cell in cells)
-    points = sum("." in cell and is_number(cell) for cells in rows for cell in cells)
-    return "," if commas and (separator != "," or commas > points) else "."
 
 
 def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, stated: int | None) -> None:

@@ -93,11 +93,12 @@ def likeness(ours: Values, theirs: Values, *, is_centred: bool = False) -> Liken
     return Likeness(correlation, float(np.copysign(np.sqrt(own / other), correlation)))
 
 
-def correlation_curve(ours: Values, theirs: Values, most: int) -> Values:
-    """Correlation of two series, about their means, for each shift of the first.
+def correlate(ours: Values, theirs: Values) -> Values:
+    """Correlation of two series, about their means, for each shift of the first by up to a quarter of its rows.
 
     Shape (2 most + 1,); the value at ``most + k`` is that of the first taken from k rows later.
     """
+    most = min(FARTHEST, len(ours) // 4)
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.
     middle = theirs[most : len(theirs) - most]

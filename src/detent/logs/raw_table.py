@@ -60,6 +60,52 @@ class RawTable:
         """Names of the columns for a message."""
         return tell([short(name) for name in self.columns])
 
+    def add(self, item: Item) -> None:
+        """Add a column of numbers under a name of its own."""
+        name = item.name
+        while name in self.columns:
+            name += "'"
+        values, unit = self._as_floats(name, np.asarray(item.value))
+        self.columns[name] = values
+        self.units[name] = unit or item.unit
+
+    def keep(self, item: Item) -> bool:
+        """Keep a single number or text; False for anything else, or when there are too many."""
+        value: Any = item.value
+        if isinstance(value, np.ndarray | np.generic):
+            array = np.asarray(cast("NDArray[Any]", value))
+            value = array.reshape(-1)[0].item() if array.size == 1 and array.dtype.kind in "biufUS" else None
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", "replace")
+        if len(self.constants) >= MAX_CONSTANTS or not isinstance(value, str | int | float):
+            return False
+        try:
+            self.constants[item.name] = short(value) if isinstance(value, str) else float(value)
+        except OverflowError:
+            return False
+        return True
+
+    def _as_floats(self, name: str, values: NDArray[Any]) -> tuple[Values, str]:
+        """Numbers of a column as floats, and their unit if their type says it.
+
+        Whole numbers beyond what a float holds exactly, such as nanoseconds since 1970, are counted from the first.
+        """
+        unit, absent = "", np.zeros(len(values), dtype=np.bool_)
+        if values.dtype.kind in "mM":
+            absent = np.isnat(values)
+            moments = values.astype(f"{values.dtype.kind}8[ns]")
+            moments[absent] = moments[~absent][0] if not absent.all() else 0
+            values, unit = moments.astype(np.int64), "ns"
+        is_whole = values.dtype.kind in "iu" and len(values)
+        if is_whole and max(abs(int(values.max())), abs(int(values.min()))) > LARGEST_EXACT:
+            origin = int(values[0])
+            self.notes.append(f"{short(name)}: counted from its first value, {origin}")
+            # Subtracting without a sign wraps round to the right difference, as long as that fits.
+            values = (values.astype(np.uint64) - np.uint64(origin % 2**64)).astype(np.int64)
+        floats = values.astype(np.float64)
+        floats[absent | ~np.isfinite(floats)] = np.nan
+        return floats, unit
+
 
 def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
     """Make a table of named arrays, such as a file of arrays holds.
@@ -74,7 +120,7 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
         found = _vectors(item)
         if found:
             vectors += found
-        elif not keep_constant(table, item):
+        elif not table.keep(item):
             passed.append(short(item.name))
     # Rows of the table: those of the time if there is one, otherwise those that most vectors have.
     lengths = [len(item.value) for item in vectors]
@@ -84,7 +130,7 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
     check_size(file, length, len(vectors))
     for item in vectors:
         if len(item.value) == length:
-            add_column(table, item)
+            table.add(item)
         else:
             passed.append(f"{short(item.name)} ({len(item.value)} rows)")
     if not table.columns:
@@ -112,16 +158,6 @@ def no_table(file: str, name: str, held: Iterable[str], nothing: str = "") -> In
     """The error for a table that a file does not hold."""
     allowed = f"one of {', '.join(map(short, [*held][:MOST_NAMED])) or nothing}"
     return InputError.of_file(file, f'the table "{short(name)}"', allowed, "state one of these as table=")
-
-
-def add_column(table: RawTable, item: Item) -> None:
-    """Add a column of numbers to a table, under a name of its own."""
-    name = item.name
-    while name in table.columns:
-        name += "'"
-    values, unit = _as_floats(table, name, np.asarray(item.value))
-    table.columns[name] = values
-    table.units[name] = unit or item.unit
 
 
 def check_size(file: str, rows: int, columns: int) -> None:
@@ -165,42 +201,3 @@ def _vectors(item: Item) -> list[Item]:
     # A matrix holds its signals along the longer side.
     matrix = array if array.shape[0] > array.shape[1] else array.T
     return [Item(f"{item.name}.{index + 1}", matrix[:, index], item.unit) for index in range(matrix.shape[1])]
-
-
-def keep_constant(table: RawTable, item: Item) -> bool:
-    """Keep a single number or text; False for anything else, or when there are too many."""
-    value: Any = item.value
-    if isinstance(value, np.ndarray | np.generic):
-        array = np.asarray(cast("NDArray[Any]", value))
-        value = array.reshape(-1)[0].item() if array.size == 1 and array.dtype.kind in "biufUS" else None
-    if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
-    if len(table.constants) >= MAX_CONSTANTS or not isinstance(value, str | int | float):
-        return False
-    try:
-        table.constants[item.name] = short(value) if isinstance(value, str) else float(value)
-    except OverflowError:
-        return False
-    return True
-
-
-def _as_floats(table: RawTable, name: str, values: NDArray[Any]) -> tuple[Values, str]:
-    """Numbers of a column as floats, and their unit if their type says it.
-
-    Whole numbers beyond what a float holds exactly, such as nanoseconds since 1970, are counted from the first.
-    """
-    unit, absent = "", np.zeros(len(values), dtype=np.bool_)
-    if values.dtype.kind in "mM":
-        absent = np.isnat(values)
-        moments = values.astype(f"{values.dtype.kind}8[ns]")
-        moments[absent] = moments[~absent][0] if not absent.all() else 0
-        values, unit = moments.astype(np.int64), "ns"
-    is_whole = values.dtype.kind in "iu" and len(values)
-    if is_whole and max(abs(int(values.max())), abs(int(values.min()))) > LARGEST_EXACT:
-        origin = int(values[0])
-        table.notes.append(f"{short(name)}: counted from its first value, {origin}")
-        # Subtracting without a sign wraps round to the right difference, as long as that fits.
-        values = (values.astype(np.uint64) - np.uint64(origin % 2**64)).astype(np.int64)
-    floats = values.astype(np.float64)
-    floats[absent | ~np.isfinite(floats)] = np.nan
-    return floats, unit

@@ -9,17 +9,8 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import read_bytes, short
-from detent.logs.csv_layout import (
-    CsvLayout,
-    FileOptions,
-    guess_layout,
-    is_telling,
-    read_cell,
-    read_column,
-    read_moments,
-    split_lines,
-)
-from detent.logs.raw_table import BrokenRow, Item, RawTable, add_column, check_size
+from detent.logs.csv_layout import CsvLayout, FileOptions, guess_layout, is_telling, read_cell, split_lines
+from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size
 
 MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB
 ALLOWED = "a table as text: CSV, packed with gzip or not"
@@ -80,8 +71,7 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
         for index in columns:
             column = [block[row][index] for row in fitting]
-            is_moment = index in layout.moment_columns
-            values, bad = read_moments(column) if is_moment else read_column(column, layout.decimal)
+            values, bad = layout.read(index, column)
             found.append(values)
             wrong = {fitting[place]: column[place] for place in bad} | wrong
         for row, cell in wrong.items():
@@ -93,7 +83,7 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         first += len(block)
     table.rows = np.concatenate(rows) if rows else table.rows
     for index in columns:
-        add_column(table, Item(layout.names[index], np.concatenate(pieces[index]), layout.units[index]))
+        table.add(Item(layout.names[index], np.concatenate(pieces[index]), layout.units[index]))
     table.broken.sort()
     words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
     table.notes += [f"columns of words passed over: {', '.join(words)}"] if words else []

@@ -11,18 +11,7 @@ from detent.errors import FileProblem, InputError
 from detent.files.text import decode_utf8, kind_of, read_bytes, short
 from detent.logs.csv_layout import FileOptions, is_moment, read_cell, read_moments
 from detent.logs.log_units import split_heading
-from detent.logs.raw_table import (
-    BrokenRow,
-    Item,
-    RawTable,
-    add_column,
-    check_size,
-    flatten,
-    keep_constant,
-    no_table,
-    table_of,
-    tell,
-)
+from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size, flatten, no_table, table_of, tell
 
 MAX_BYTES = 100_000_000  # longest file of JSON read, unpacked; its values take ten times the memory
 ALLOWED = "JSON: a list of records, lists by their names, or one record per line"
@@ -109,7 +98,7 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
     """Make a table of records."""
     table = RawTable(file)
     for key, value in constants.items():
-        keep_constant(table, Item(key, value))
+        table.keep(Item(key, value))
     flat = _flatten(table, records)
     names = list(dict.fromkeys(name for record in flat.values() for name in record))
     check_size(file, len(flat), len(names))
@@ -133,7 +122,7 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
         raise InputError.of_file(file, came, ALLOWED, "name another file, or another list of it with table=NAME")
     table.rows = rows[keep]
     for name, values in columns.items():
-        add_column(table, Item(name, values[keep], split_heading(name)[1]))
+        table.add(Item(name, values[keep], split_heading(name)[1]))
     table.notes += [f"passed over: {tell(passed)}"] if passed else []
     return table
 

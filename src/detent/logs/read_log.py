@@ -22,10 +22,9 @@ from detent.logs.read_csv import read_csv
 from detent.logs.read_hdf5 import read_hdf5
 from detent.logs.read_json import read_json
 from detent.logs.rotation import mend_rotation
-from detent.logs.saturation import find_saturation
 from detent.logs.shifts import find_shifts
 from detent.logs.stamps import look_at_clock, mend_clock
-from detent.logs.stuck import find_stuck
+from detent.logs.stuck import find_saturation, find_stuck
 
 EPOCH = 1e8  # a time from which on it counts from some year, and is counted from the first sample instead [s]
 READERS: dict[str, Callable[[Path, FileOptions], RawTable]] = {

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from detent.logs.differences import FARTHEST, correlation_curve, peaks_of
+from detent.logs.differences import correlate, peaks_of
 from detent.logs.draft import Draft
 from detent.logs.effort import Motion, find_motion, smoothed, terms
 from detent.logs.log import Action, Kind, Values
@@ -49,9 +49,8 @@ def find_shifts(draft: Draft) -> None:
 
 def find_lag(ours: Values, theirs: Values, *, prefers_earlier: bool = False) -> float:
     """By how many rows one series comes after another, by the peak of their correlation."""
-    most = min(FARTHEST, len(ours) // 4)
-    curve = correlation_curve(ours, theirs, most)
-    peaks = peaks_of(curve)
+    curve = correlate(ours, theirs)
+    peaks, most = peaks_of(curve), len(curve) // 2
     if not len(peaks):
         return 0.0
     # A periodic motion has many: the nearest to no shift among those that are as good as the highest.

@@ -5,7 +5,7 @@ import pytest
 
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Source
-from detent.logs.saturation import find_saturation
+from detent.logs.stuck import find_saturation
 
 T = np.arange(2000) * 0.001
 RNG = np.random.default_rng(4)

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import rms, significant
 from detent.identify.fit.prepare import Run
@@ -72,33 +71,25 @@ def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
         moved = np.zeros(count)
         moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)
         # Without an integral a share of the velocity and a viscous feed-forward are one and the same.
-        for share, integrates in ((0.0, False), (0.0, True), (1.0, True)):
-            yield _Trial(run, reference - run.position, share * velocity - moved, feeds, rows, span, share, integrates)
+        for share, loops in ((0.0, 1), (0.0, 2), (1.0, 2)):
+            pair = [reference - run.position, share * velocity - moved]
+            integrals = [np.cumsum(signal) * step for signal in pair] if loops == 2 else []
+            yield _Trial(np.column_stack([*pair, *integrals, feeds])[rows], run.effort[rows], span, share, loops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
     """One structure."""
 
-    run: Run
-    error: Values
-    demand: Values
-    feeds: Values
-    rows: NDArray[np.intp]
-    span: int
+    signals: Values  # error and demand, with an integral theirs too, then what is fed forward
+    effort: Values
+    span: int  # and share: as of `Loops`
     share: float
-    integrates: bool
-
-    def parts(self, feeds: tuple[int, ...]) -> Values:
-        """What the columns of every position gain are made of, and some of the feed-forwards."""
-        loops = [self.error, self.demand]
-        if self.integrates:
-            loops += [np.cumsum(signal) * self.run.step for signal in loops]
-        return np.column_stack([*loops, self.feeds[:, [*feeds, -1]]])[self.rows]
+    loops: int  # 2 with an integral, else 1
 
     def mix(self, gain: float, count: int) -> Values:
         """How a position gain mixes so many parts: their product are its columns."""
-        loops = 2 if self.integrates else 1
+        loops = self.loops
         mixed = np.zeros((count, count - loops))
         for k in range(loops):
             mixed[2 * k, k], mixed[2 * k + 1, k] = gain, 1.0
@@ -110,27 +101,25 @@ class _Trial:
 
         A feed-forward that is slight, or against the motion, is left out.
         """
-        cut, effort = round(SEEN * len(self.rows)), self.run.effort[self.rows]
-        parts = self.parts(feeds)
+        effort, first = self.effort, self.loops
+        cut = round(SEEN * len(effort))
+        parts = np.ascontiguousarray(self.signals[:, [*range(2 * first), *(2 * first + f for f in feeds), -1]])
         gain = self._search(parts[:cut], effort[:cut])
         columns = parts @ self.mix(gain, parts.shape[1])
         seen = columns[:cut]
         theta = np.array([significant(value) for value in _solve(seen.T @ seen, seen.T @ effort[:cut]).tolist()])
-        rest = effort[cut:]
-        first = 2 if self.integrates else 1
-        least = SLIGHT * rms(effort)
-        if not (theta[:first] > 0.0).all() or (self.integrates and rms(columns[:, 1] * theta[1]) < least):
+        rest, least = effort[cut:], SLIGHT * rms(effort)
+        if not (theta[:first] > 0.0).all() or (first == 2 and rms(columns[:, 1] * theta[1]) < least):
             return None
         kept = tuple(f for k, f in enumerate(feeds, first) if theta[k] > 0.0 and rms(columns[:, k] * theta[k]) > least)
         if kept != feeds:
             return self.solve(kept)
         error = rms(rest - columns[cut:] @ theta) / max(rms(rest), 1e-300)
         known = dict(zip(feeds, theta[first:-1].tolist(), strict=True))
-        integral = float(theta[1]) if self.integrates else 0.0
         acceleration, viscous, coulomb = (known.get(f, 0.0) for f in range(3))
-        share = self.share
-        if not self.integrates:
-            share, viscous = viscous / float(theta[0]), 0.0
+        share, integral = self.share, float(theta[1])
+        if first == 1:
+            share, integral, viscous = viscous / float(theta[0]), 0.0, 0.0
         return Loops(gain, float(theta[0]), integral, self.span, share, acceleration, viscous, coulomb, error)
 
     def _search(self, parts: Values, effort: Values) -> float:

@@ -99,12 +99,9 @@ def _share_left_behind(run: Run) -> float:
     if run.reference is None:
         return 0.0
     count = max(round(0.25 / run.step), 2)
-    stretches = len(run.position) // count
-    if stretches == 0:
-        return 0.0
-    cut = (stretches, count)
-    still = np.ptp(run.position[: stretches * count].reshape(cut), axis=1) == 0.0
-    way = np.abs(np.diff(run.reference[: stretches * count].reshape(cut), axis=1)).sum(axis=1)
+    whole = len(run.position) // count * count
+    still = np.ptp(run.position[:whole].reshape(-1, count), axis=1) == 0.0
+    way = np.abs(np.diff(run.reference[:whole].reshape(-1, count), axis=1)).sum(axis=1)
     total = float(way.sum())
     return float(way[still].sum()) / total if total > 0.0 else 0.0
 
