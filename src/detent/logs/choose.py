@@ -1,6 +1,7 @@
 """Which column is which signal, and in which unit: as the user says, otherwise guessed by name, unit and numbers."""
 
 import difflib
+from itertools import product
 
 import numpy as np
 
@@ -121,10 +122,9 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
         draft.t = (table.rows - 1).astype(np.float64)
         draft.units["time"] = "s"
         draft.sources["time"] = Source("", "rows", period)
-    bases = _Bases(table, chosen, mapping)
+    units = _find_units(table, chosen, mapping, draft)
     for role in sorted(chosen, key=list(ROLES).index):
-        name = chosen[role]
-        unit, conversion = bases.find(role, draft)
+        name, (unit, conversion) = chosen[role], units[role]
         choice = mapping.columns.get(role, Choice(name))
         factor = choice.sign * _number_of(table.file, role, choice.factor, constants)
         # Behind the border: unit factor * (sign * factor * number + offset) + unit offset.
@@ -157,67 +157,54 @@ def _number_of(file: str, role: str, factor: float | str, constants: dict[str, f
     raise InputError([problem])
 
 
-class _Bases:
-    """Finds the units of signals; those of a motion without a unit follow those with one."""
+def _find_units(
+    table: RawTable, chosen: Chosen, mapping: ColumnMapping, draft: Draft
+) -> dict[str, tuple[str, Conversion]]:
+    """Unit of each signal, guessed where neither user nor heading states it, with how it becomes SI.
 
-    def __init__(self, table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> None:
-        self._table, self._chosen, self._mapping = table, chosen, mapping
-        stated = (find for role in _MOTION if (find := self._stated(role)) is not None)
-        first = next(stated, None)
-        self._base = first[1].unit.partition("/")[0] if first else ""
-
-    def _stated(self, role: str) -> tuple[str, Conversion] | None:
-        """Unit of a signal that the user or the heading states."""
-        if role not in self._chosen:
-            return None
-        choice = self._mapping.columns.get(role)
-        for unit in (choice.unit if choice else "", self._table.units[self._chosen[role]]):
-            for target in ROLES[role].units if unit else ():
-                conversion = find_conversion(unit, target)
-                if conversion is not None:
-                    return unit, conversion
-        return None
-
-    def find(self, role: str, draft: Draft) -> tuple[str, Conversion]:
-        """Unit of a signal, guessed where it is not stated, with how it becomes SI."""
-        stated = self._stated(role)
-        if stated is not None:
-            return stated
-        name = self._chosen[role]
-        unit, reason = self._guess(role, name)
-        draft.guessed_units.add(role)
-        odd = self._table.units[name]
+    Signals of a motion without a unit follow those with one.
+    """
+    found: dict[str, tuple[str, Conversion]] = {}
+    for role, name in chosen.items():
+        stated = (mapping.columns[role].unit if role in mapping.columns else "", table.units[name])
+        for unit, target in product(filter(None, stated), ROLES[role].units):
+            conversion = find_conversion(unit, target)
+            if conversion is not None and role not in found:
+                found[role] = unit, conversion
+    base = next((found[role][1].unit.partition("/")[0] for role in _MOTION if role in found), "")
+    for role in sorted(chosen.keys() - found.keys(), key=list(ROLES).index):
+        odd = table.units[chosen[role]]
+        unit, reason = _guess_unit(table, chosen, role, base)
+        base = base or (unit.partition("/")[0] if role in _MOTION else "")
         why = f'"{short(odd)}" is no unit of {ROLES[role].meaning}' if odd else "no unit stated"
         if unit:
             draft.guesses.append(f"{role}: {why}, taken as {unit}{reason}")
+        draft.guessed_units.add(role)
         target = next(target for target in ROLES[role].units if not unit or find_conversion(unit, target))
-        return unit, find_conversion(unit, target) or Conversion(target, 1.0)
+        found[role] = unit, find_conversion(unit, target) or Conversion(target, 1.0)
+    return found
 
-    def _guess(self, role: str, name: str) -> tuple[str, str]:
-        """Unit of a signal that has none, and the reason."""
-        values = self._table.columns[name]
-        if role == "time":
-            # The one in which its rows are as far apart as recordings are made.
-            steps = np.diff(values[np.isfinite(values)])
-            step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-            unit = next((unit for unit, low, high in _TIME_UNITS if low <= step < high), "s")
-            return unit, f": its rows are {step:.4g} apart"
-        if role == "temperature":
-            return "degC", ""
-        if role not in _MOTION:
-            return ROLES[role].units[0], ""
-        turns = {"rad": 1, "count": 2}
-        units = ROLES[role].units
-        if self._base:
-            return units[turns.get(self._base, 0)], f", as the other signals in {self._base}"
-        if _are_counts(values) and role not in {"velocity", "acceleration"}:
-            self._base = "count"
-            return "count", f": whole numbers; say how long one is, as in {role}={short(name)} [0.5 um]"
-        is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in self._chosen
-        self._base = "rad" if is_angle else "m"
-        other = "moves straight" if is_angle else "turns"
-        said = f"; for an axis that {other} state it, as in {role}={short(name)} [{'mm' if is_angle else 'rad'}]"
-        return units[turns.get(self._base, 0)], said
+
+def _guess_unit(table: RawTable, chosen: Chosen, role: str, base: str) -> tuple[str, str]:
+    """Unit of a signal that has none, and the reason; the base is the unit of other positions."""
+    name, units = chosen[role], ROLES[role].units
+    values, turns = table.columns[name], {"rad": 1, "count": 2}
+    if role == "time":
+        # The one in which its rows are as far apart as recordings are made.
+        steps = np.diff(values[np.isfinite(values)])
+        step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+        unit = next((unit for unit, low, high in _TIME_UNITS if low <= step < high), "s")
+        return unit, f": its rows are {step:.4g} apart"
+    if role not in _MOTION:
+        return "degC" if role == "temperature" else units[0], ""
+    if base:
+        return units[turns.get(base, 0)], f", as the other signals in {base}"
+    if _are_counts(values) and role not in {"velocity", "acceleration"}:
+        return "count", f": whole numbers; say how long one is, as in {role}={short(name)} [0.5 um]"
+    is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in chosen
+    other = "moves straight" if is_angle else "turns"
+    said = f"; for an axis that {other} state it, as in {role}={short(name)} [{'mm' if is_angle else 'rad'}]"
+    return units[1 if is_angle else 0], said
 
 
 def _are_counts(values: Values) -> bool:
