@@ -19,8 +19,7 @@ from detent.errors import DetentError
 
 Numbers = NDArray[np.float64]
 
-MOST_SAMPLES = 10_000_000
-"""Samples of a profile at most: nearly three hours at 1 kHz, 240 MB."""
+MOST_SAMPLES = 10_000_000  # samples of a profile at most: nearly three hours at 1 kHz, 240 MB
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ from itertools import pairwise
 from math import hypot, isfinite, pi, sqrt
 from typing import Protocol
 
-FIRST_HARMONIC = 4 / pi
-"""Fundamental of a square wave of amplitude 1: full steps switch each coil so."""
+FIRST_HARMONIC = 4 / pi  # fundamental of a square wave of amplitude 1: full steps switch each coil so
 
 
 class PullOut(Protocol):

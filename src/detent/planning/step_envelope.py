@@ -24,8 +24,7 @@ INDEX_BITS = 11
 INDEX_MASK = (1 << INDEX_BITS) - 1
 MAX_RAMP = 1 << INDEX_BITS
 MAX_LIMITS = 16
-SENTINEL = -1
-"""Entry of a step that is not allowed."""
+SENTINEL = -1  # entry of a step that is not allowed
 
 ENTRY_BYTES = 2
 

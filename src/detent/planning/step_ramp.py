@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 
 from detent.planning.pull_out import PullOut, above_zero
 
-LEAST_GAIN_HZ = 0.5
-"""A ramp ends where a step gains less than this: the torque left over is used up."""
-
-MAX_HZ = 65535
-"""Largest frequency in a 16-bit word."""
+LEAST_GAIN_HZ = 0.5  # a ramp ends where a step gains less than this: the torque left over is used up
+MAX_HZ = 65535  # largest frequency in a 16-bit word
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 ROTOR_STEP = 2e-6
 """Time step of the rotor's equation of motion (7.2) [s], rounded down to whole ticks of the timer; at least one."""
 
-DAMPING = 0.4
-"""Damping of the rotor against its field, over sqrt(teeth T_hold J): a fifth of the critical one (7.2)."""
+DAMPING = 0.4  # damping of the rotor against its field, over sqrt(teeth T_hold J): a fifth of the critical one (7.2)
 
 UNLOADED_STARTS = 3.0
 """Start frequency of a bare rotor over its natural one where no data sheet states it; 3.1 with the defaults of 7.1."""

@@ -35,32 +35,18 @@ from detent.planning.step_ramp import MAX_HZ, natural_frequency
 from detent.units import format_quantity as text
 from detent.units import parse_quantity
 
-LEAST_TICKS = 10
-"""Ticks of the step timer in the shortest period: fewer, and neighbours on the ramp are all alike."""
-
-FASTEST_SWING = 0.1
-"""Largest swing of the rotor about its step in a time step of its equation of motion [rad]."""
-
-START_RESERVE = 1.4604
-"""Start frequency over the natural one up to which no step was lost; that of 7.1."""
+LEAST_TICKS = 10  # ticks of the step timer in the shortest period: fewer, and neighbours on the ramp are all alike
+FASTEST_SWING = 0.1  # largest swing of the rotor about its step in a time step of its equation of motion [rad]
+START_RESERVE = 1.4604  # start frequency over the natural one up to which no step was lost; that of 7.1
 
 LEAST_NEAR_START = 0.9
 """Torque up to that frequency, as a part of that at standstill, down to which no step was lost; 0.95 with 7.1."""
 
-MOST_USED = 0.45
-"""Share of its torque that a ramp takes, up to which no step was lost; 0.44 with 7.1."""
-
-MOST_FRICTION = 0.1
-"""Friction over the holding torque up to which no step was lost; that of 7.1."""
-
-LEAST_SAFETY = 2.0
-"""Divisors of pull-out torque and start frequency that age, temperature and resonance call for (7.1)."""
-
-RESONANCE = (0.8, 1.25)
-"""Step frequencies over the natural one at which the steps come in time with the rotor's swing."""
-
-MOST_ROUNDING = 2e-3
-"""Largest relative error of a frequency (test 31)."""
+MOST_USED = 0.45  # share of its torque that a ramp takes, up to which no step was lost; 0.44 with 7.1
+MOST_FRICTION = 0.1  # friction over the holding torque up to which no step was lost; that of 7.1
+LEAST_SAFETY = 2.0  # divisors of pull-out torque and start frequency that age, temperature and resonance call for (7.1)
+RESONANCE = (0.8, 1.25)  # step frequencies over the natural one at which the steps come in time with the rotor's swing
+MOST_ROUNDING = 2e-3  # largest relative error of a frequency (test 31)
 
 FEWEST_ZONE_STEPS = 5
 

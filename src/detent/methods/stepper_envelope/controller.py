@@ -25,11 +25,8 @@ from detent.kernel.step import hot_step, step
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK
 from detent.planning.step_ramp import StepRamp
 
-Entries = HostArray
-"""Table of int16, see `control.step_rule.next_entry`."""
-
-NOWHERE = -(1 << 62)
-"""Position that is never reached."""
+Entries = HostArray  # table of int16, see `control.step_rule.next_entry`
+NOWHERE = -(1 << 62)  # position that is never reached
 
 
 class StepperControllerParams(Registers):

@@ -24,11 +24,8 @@ from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK, StepEnvelope, 
 from detent.planning.step_ramp import natural_frequency, total_inertia
 from detent.units import format_quantity
 
-HIGHEST_HZ = 1e6
-"""Frequency up to which the end of the torque is looked for [Hz]."""
-
-PLACES = 1000
-"""Places of that range at which a curve is looked at first, evenly on a logarithmic scale."""
+HIGHEST_HZ = 1e6  # frequency up to which the end of the torque is looked for [Hz]
+PLACES = 1000  # places of that range at which a curve is looked at first, evenly on a logarithmic scale
 
 Row = tuple[str, float | None, str, str, str]
 """Name, value, unit, text and formula of a figure; no value where there is none, no text where it is the quantity."""

@@ -29,11 +29,8 @@ from detent.page.run_page import Stretch, stretch
 from detent.page.words import GAP, count, number
 from detent.record.trace import Trace
 
-ARC_POINTS = 600
-"""Points of one run in the figure of frequency against position."""
-
-POINTS = 1500
-"""Rows that are chosen for one curve's sake: a page has many of them."""
+ARC_POINTS = 600  # points of one run in the figure of frequency against position
+POINTS = 1500  # rows that are chosen for one curve's sake: a page has many of them
 
 NEEDED_ROTOR = ("controller.timer.period", "controller.rule.direction", "plant.rotor.velocity", "plant.rotor.lag")
 """Registers that the rotor is drawn from."""

@@ -27,8 +27,7 @@ HEADROOM = 1.32
 UPRIGHT, NONE = 0.07, 0.015
 """A zone narrower than the first part of the travel has its limit written upright, below the second not at all."""
 
-BESIDE = 0.17
-"""Part of the travel that the name of an extreme may take, beside its point."""
+BESIDE = 0.17  # part of the travel that the name of an extreme may take, beside its point
 
 LABEL: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
 

@@ -34,22 +34,14 @@ from detent.units import format_quantity
 
 Words = NDArray[np.int64]
 
-CSV_ROWS = 8192
-"""Rows of text made at once: bounds the memory of a CSV file of any length."""
-
-LINE = 110
-"""Longest line of a comment in the header."""
-
-PER_LINE = 16
-"""Numbers of up to five digits in a line of the header; of longer ones, half as many."""
-
-MAX_CLOCK_HZ = 2**31 - 1
-"""Fastest timer whose periods fit the control unit's 32-bit words."""
+CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
+LINE = 110  # longest line of a comment in the header
+PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
+MAX_CLOCK_HZ = 2**31 - 1  # fastest timer whose periods fit the control unit's 32-bit words
 
 MAX_PAUSE = 255
 
-METRE_DIGITS = 12
-"""Decimals of a position in metres: a picometre, far below any step."""
+METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
 
 STATES = ("REST", "ACCEL", "CRUISE", "DECEL", "TURN", "FAULT")
 OUTCOMES = ("IDLE", "STEP", "PAUSE")

@@ -28,8 +28,7 @@ from detent.record.machine import LONGEST_STRETCH
 from detent.record.recorder import choose_leaves
 from detent.units import format_quantity
 
-POINTS = 900
-"""Points of one curve."""
+POINTS = 900  # points of one curve
 
 MM = 1e3
 

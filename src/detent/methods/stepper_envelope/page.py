@@ -37,20 +37,11 @@ from detent.page.table import Cell, left_out, long_table
 from detent.page.words import GAP, count, duration, further, number
 from detent.record.trace import Trace
 
-MOST_MOTORS = 6
-"""Motors that are drawn."""
-
-POINTS = 1500
-"""Rows that are chosen for one curve's sake: a page has many of them."""
-
-ARC_POINTS = 4000
-"""Points of all runs of one motor in the figure of frequency against position."""
-
-MOST_MOVES = 400
-"""Moves of one motor in that figure: more lie on one another."""
-
-MOST_ZONES = 4
-"""Zones that are named below a figure."""
+MOST_MOTORS = 6  # motors that are drawn
+POINTS = 1500  # rows that are chosen for one curve's sake: a page has many of them
+ARC_POINTS = 4000  # points of all runs of one motor in the figure of frequency against position
+MOST_MOVES = 400  # moves of one motor in that figure: more lie on one another
+MOST_ZONES = 4  # zones that are named below a figure
 
 ENVELOPE_CAPTION = (
     "Step frequency over position: motion up above zero, motion down below it. The grey ground is what the table "

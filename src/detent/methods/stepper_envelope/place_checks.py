@@ -10,11 +10,8 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperT
 from detent.methods.stepper_envelope.torque_checks import START_KEYS, Rule, is_drivable, keys_of, per_motor, remedy
 from detent.units import format_quantity as text
 
-MOST_STEPS = 10_000_000
-"""Longest travel in steps: both tables of a motor then take 40 MB."""
-
-PLACE_DIGITS = 7
-"""Digits of a place that a remedy names: a step of a micrometre in a travel of metres."""
+MOST_STEPS = 10_000_000  # longest travel in steps: both tables of a motor then take 40 MB
+PLACE_DIGITS = 7  # digits of a place that a remedy names: a step of a micrometre in a travel of metres
 
 
 def _is_inside(table: StepperTable, place: float) -> bool:

@@ -12,14 +12,9 @@ from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.words import GAP, count
 
-HEADROOM = 1.25
-"""Height of a half of the figure over the motor's limit."""
-
-LONG_NUMBERS = 1e4
-"""Limit from which on frequencies are written in kHz [Hz]."""
-
-CROPPED = 0.35
-"""Runs that lie within less than this part of the travel are drawn alone, not with all of it."""
+HEADROOM = 1.25  # height of a half of the figure over the motor's limit
+LONG_NUMBERS = 1e4  # limit from which on frequencies are written in kHz [Hz]
+CROPPED = 0.35  # runs that lie within less than this part of the travel are drawn alone, not with all of it
 
 MM = 1e3
 

@@ -14,38 +14,22 @@ from detent.methods.stepper_envelope.summary import StageFigures, stated
 from detent.page.figure import Figure
 from detent.page.words import GAP, count, further, number
 
-WIDTH, HEIGHT = 1000.0, 560.0
-"""Most room that the drawing takes, in its own units."""
-
-MARGIN = 46.0
-"""Room around the tiles, for their halves and the scales."""
-
-MOST_TILES = 2000
-"""Tiles that are drawn: more are smaller than a dot."""
-
-LABELLED = 22.0
-"""Side of a tile from which on its name is written inside."""
+WIDTH, HEIGHT = 1000.0, 560.0  # most room that the drawing takes, in its own units
+MARGIN = 46.0  # room around the tiles, for their halves and the scales
+MOST_TILES = 2000  # tiles that are drawn: more are smaller than a dot
+LABELLED = 22.0  # side of a tile from which on its name is written inside
 
 LOOK = "display:block;width:100%;min-width:560px;height:auto;max-height:600px;font:12px system-ui,sans-serif"
 """Style of the whole drawing."""
 
-LONG = 2.0
-"""A tile has its full colour when its way took so many times the median."""
-
-PALEST = 0.12
-"""Share of the colour that a tile of the median has at least."""
+LONG = 2.0  # a tile has its full colour when its way took so many times the median
+PALEST = 0.12  # share of the colour that a tile of the median has at least
 
 NICE = (1.0, 2.0, 5.0)
 
-SAME = 1e-7
-"""Places that are nearer than this to one another are in one row or column [m]."""
-
-LONE = 1e-3
-"""Side of a tile that stands alone [m]."""
-
-
-Place = tuple[float, float]
-"""To the right, and up in the picture [m]."""
+SAME = 1e-7  # places that are nearer than this to one another are in one row or column [m]
+LONE = 1e-3  # side of a tile that stands alone [m]
+Place = tuple[float, float]  # to the right, and up in the picture [m]
 
 
 @dataclass(frozen=True, slots=True)

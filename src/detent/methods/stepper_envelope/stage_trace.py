@@ -20,8 +20,7 @@ from detent.record.trace import Trace
 NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
 """Registers of a motor that its steps are read from."""
 
-FLAT = 20
-"""Steps of one frequency that make a stretch of their own in a curve."""
+FLAT = 20  # steps of one frequency that make a stretch of their own in a curve
 
 
 def of(motor: str, names: Sequence[str]) -> list[str]:

@@ -49,11 +49,8 @@ RAMP_KEYS = (
 )  # fmt: skip
 """What the ramp depends on."""
 
-SURE_REST = 0.5
-"""Distance from its step, in steps, from which a resting rotor counts as a step off."""
-
-STEEPEST = 1e4
-"""Acceleration with which the torque alone limits the ramp [m/s^2]."""
+SURE_REST = 0.5  # distance from its step, in steps, from which a resting rotor counts as a step off
+STEEPEST = 1e4  # acceleration with which the torque alone limits the ramp [m/s^2]
 
 remedy = Remedies(StepperEnvelopeSpec)
 
