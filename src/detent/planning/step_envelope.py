@@ -12,6 +12,7 @@ step over the interval i, from boundary i to i + 1, departs from i upwards and f
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,23 +187,22 @@ class StepEnvelope:
         written = sum(self._write(place - reach + 1, place + 1) for place in {former, self._stop})
         return StopEdit(self.stop, wanted < nearest, written)
 
-    def _by_step(self) -> NDArray[np.int16]:
-        """Entries by interval i, shape (N,)."""
-        return self.entries[:-1] if self.direction > 0 else self.entries[1:]
-
     def indices(self) -> NDArray[np.int64]:
         """Ramp index of every step i, -1 at a sentinel, shape (N,)."""
-        entries = self._by_step().astype(np.int64)
+        entries = (self.entries[:-1] if self.direction > 0 else self.entries[1:]).astype(np.int64)
         return np.where(entries < 0, -1, entries & INDEX_MASK)
+
+    def of_steps(self, ramp: NDArray[Any], limits: NDArray[Any], slower: np.ufunc = np.minimum) -> NDArray[Any]:
+        """What a step i has of values by ramp index and by zone limit: the slower one, 0 at a sentinel, shape (N,)."""
+        entries = self.entries[:-1] if self.direction > 0 else self.entries[1:]
+        found = np.zeros(self.steps, ramp.dtype)
+        kept = entries[entries >= 0]
+        found[entries >= 0] = slower(ramp[kept & INDEX_MASK], limits[kept >> INDEX_BITS])
+        return found
 
     def permissible_hz(self) -> NDArray[np.float64]:
         """f_zul of every step i, 0 at a sentinel, shape (N,) [Hz]."""
-        entries = self._by_step()
-        allowed = entries >= 0
-        kept = entries[allowed]
-        hz = np.zeros(self.steps)
-        hz[allowed] = np.minimum(self.ramp.hz[kept & INDEX_MASK], np.array(self.zones.limits)[kept >> INDEX_BITS])
-        return hz
+        return self.of_steps(self.ramp.hz, np.array(self.zones.limits))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,9 @@ from the same declarations, so firmware and simulation cannot drift apart. Its t
 import csv
 import ctypes
 import re
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
-from math import isfinite
 from pathlib import Path
 from string import Template
 from textwrap import wrap
@@ -24,8 +22,8 @@ from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
-from detent.errors import DetentError
-from detent.kernel.registers import Field, Registers
+from detent.kernel.registers import Registers
+from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
@@ -37,22 +35,19 @@ Words = NDArray[np.int64]
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
-MAX_CLOCK_HZ = 2**31 - 1  # fastest timer whose periods fit the control unit's 32-bit words
-
-MAX_PAUSE = 255
-
 METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
 
-STATES = ("REST", "ACCEL", "CRUISE", "DECEL", "TURN", "FAULT")
-OUTCOMES = ("IDLE", "STEP", "PAUSE")
-CAUSES = ("INFEASIBLE", "OUT_OF_RANGE")
+CODES = (
+    "REST", "ACCEL", "CRUISE", "DECEL", "TURN", "FAULT", "INFEASIBLE", "OUT_OF_RANGE", "IDLE", "STEP", "PAUSE",
+)  # fmt: skip
+"""Names of `control.step_rule` that the header has too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnvelopeTables:
     """Both tables of one motor, and what firmware must know to use them."""
 
-    motor: str  # name of the motor; `motor_identifier` makes the prefix of all names in C from it
+    motor: str  # name of the motor, the prefix of all names in C
     axis: str  # name of the axis, for people
     # up, down: tables towards growing and towards falling positions: one ramp, one travel, one numbering of the zone
     # limits
@@ -63,29 +58,6 @@ class EnvelopeTables:
     travel_per_step: float  # travel of the moved mass per step [m]
     first_position: float = 0.0  # place of step boundary 0 [m]
     pause: int = 1  # waiting time of a reversal, in periods of the start frequency, 0..255
-
-    def __post_init__(self) -> None:
-        up, down = self.up, self.down
-        if (up.direction, down.direction) != (1, -1):
-            self._refuse("directions of up and down", (up.direction, down.direction), "1 and -1")
-        if up.steps != down.steps:
-            self._refuse("steps of up and down", (up.steps, down.steps), "one travel")
-        if up.zones.limits != down.zones.limits:
-            self._refuse("zone limits of up and down", (up.zones.limits, down.zones.limits), "one numbering")
-        if not np.array_equal(up.ramp.hz, down.ramp.hz):
-            self._refuse("ramps of up and down", (len(up.ramp), len(down.ramp)), "the same ramp list")
-        if not up.ramp.hz[-1] <= self.clock_hz <= MAX_CLOCK_HZ:
-            allowed = f"{up.ramp.hz[-1]:g}..{MAX_CLOCK_HZ} Hz, the largest step frequency and what 32 bits hold"
-            self._refuse("clock_hz", self.clock_hz, allowed)
-        if not 0 <= self.pause <= MAX_PAUSE:
-            self._refuse("pause", self.pause, f"0..{MAX_PAUSE} periods")
-        if not (isfinite(self.travel_per_step) and self.travel_per_step > 0):
-            self._refuse("travel_per_step", self.travel_per_step, "above 0 m and finite")
-        if not isfinite(self.first_position):
-            self._refuse("first_position", self.first_position, "a finite number of m")
-
-    def _refuse(self, what: str, came: object, allowed: str) -> None:
-        raise DetentError(f"envelope of motor {self.motor!r}: {what}: came {came}; allowed: {allowed}")
 
     @property
     def steps(self) -> int:
@@ -107,37 +79,15 @@ class EnvelopeTables:
 
     def periods(self, table: StepEnvelope) -> Words:
         """Period that the timer loads for every step i of one of the tables, 0 at a sentinel, shape (N,) [tick]."""
-        entries = (table.entries[:-1] if table.direction > 0 else table.entries[1:]).astype(np.int64)
-        kept = entries[entries >= 0]
-        ramp, limit = self.ramp_words()[kept & INDEX_MASK], self.limit_words()[kept >> INDEX_BITS]
-        found = np.zeros(self.steps, np.int64)
-        if self.reload:
-            found[entries >= 0] = np.maximum(ramp, limit)
-        else:
-            words = np.minimum(ramp, limit)
-            found[entries >= 0] = (self.clock_hz + words // 2) // words
-        return found
+        slower = np.maximum if self.reload else np.minimum
+        words = table.of_steps(self.ramp_words(), self.limit_words(), slower)
+        return words if self.reload else np.where(words, (self.clock_hz + words // 2) // np.maximum(words, 1), 0)
 
     def _loaded(self) -> StepperControllerParams:
         """Parameters of the motor's control unit, as a simulation has them."""
         p = StepperControllerParams()
         load_rule(p, self.up.ramp, self.up.zones.limits, self.clock_hz, reload=self.reload)
         return p
-
-
-def motor_identifier(name: str) -> str:
-    """Make a C identifier of a motor's name: the prefix of every name in its header.
-
-    Two motors of one firmware need different ones; "Zoom A" and "zoom-a" have the same.
-
-    >>> [motor_identifier(name) for name in ("Zoom A", "2nd stage", "Schärfe", "")]
-    ['zoom_a', 'motor_2nd_stage', 'scharfe', 'motor']
-    """
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    words = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
-    if not words:
-        return "motor"
-    return words if words[0].isalpha() else f"motor_{words}"
 
 
 # ---- CSV
@@ -151,30 +101,23 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
     sentinel) has index -1, and 0 for permissible and period.
     """
     path = Path(path)
-    columns = _csv_columns(tables)
-    part = part_of(path)
-    with writing(path):
-        with part.open("w", encoding="utf-8", newline="") as stream:
-            csv.writer(stream, lineterminator="\n").writerow(columns)
-            for first in range(0, tables.steps, CSV_ROWS):
-                texts = [list(map(repr, values[first : first + CSV_ROWS].tolist())) for values in columns.values()]
-                stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
-        part.replace(path)
-
-
-def _csv_columns(tables: EnvelopeTables) -> dict[str, NDArray[Any]]:
-    """Column per heading, each of shape (N,)."""
-    steps = np.arange(tables.steps)
+    steps, part = np.arange(tables.steps), part_of(path)
     position = tables.first_position + steps * tables.travel_per_step
     columns: dict[str, NDArray[Any]] = {"step": steps, "position [m]": np.round(position, METRE_DIGITS)}
     for name, table in (("up", tables.up), ("down", tables.down)):
         zones = table.zones
-        limits = np.array(zones.limits, float)
         columns[f"{name}.index"] = table.indices()
-        columns[f"{name}.zone_limit [Hz]"] = limits[zones.spread(zones.numbers, 0, tables.steps)]
+        columns[f"{name}.zone_limit [Hz]"] = np.repeat(np.array(zones.limits)[zones.numbers], np.diff(zones.edges))
         columns[f"{name}.permissible [Hz]"] = table.permissible_hz()
         columns[f"{name}.period [tick]"] = tables.periods(table)
-    return columns
+    with writing(path):
+        with part.open("w", encoding="utf-8", newline="") as stream:
+            out = csv.writer(stream, lineterminator="\n")
+            out.writerow(columns)
+            for first in range(0, tables.steps, CSV_ROWS):
+                rows = (values[first : first + CSV_ROWS].tolist() for values in columns.values())
+                out.writerows(zip(*rows, strict=True))
+        part.replace(path)
 
 
 # ---- C header
@@ -183,8 +126,8 @@ def _csv_columns(tables: EnvelopeTables) -> dict[str, NDArray[Any]]:
 def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
     """Write tables, ramp list, registers and step rule of one motor as a C99 header that needs only <stdint.h>.
 
-    Every name in it begins with `motor_identifier` of the motor, so that one firmware can include several. The rule is
-    the ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
+    Every name in it begins with that of the motor, so that one firmware can include several. The rule is the
+    ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
     arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
     """
     path = Path(path)
@@ -196,15 +139,13 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
 
 
 def _header(tables: EnvelopeTables) -> str:
-    prefix = motor_identifier(tables.motor)
     ramp, limit = tables.ramp_words(), tables.limit_words()
+    title = f'Stepper envelope of motor "{tables.motor}", axis "{tables.axis}": tables and step rule in C99.'
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
     return Template(template).substitute(
-        motor=prefix,
-        MOTOR=prefix.upper(),
-        title=_comment(
-            f'Stepper envelope of motor "{tables.motor}", axis "{tables.axis}": tables and step rule in C99.'
-        ),
+        motor=tables.motor,
+        MOTOR=tables.motor.upper(),
+        title=_comment(title),
         version=__version__,
         facts="\n".join(_facts(tables)),
         steps=tables.steps,
@@ -221,13 +162,13 @@ def _header(tables: EnvelopeTables) -> str:
         word_type="uint16_t" if tables.word_bytes == 2 else "int32_t",
         index_mask=f"0x{INDEX_MASK:04X}",
         index_bits=INDEX_BITS,
-        codes="\n".join(_codes(prefix.upper())),
-        rule_registers=_struct(StepRule, f"{prefix}_rule"),
-        timer_registers=_struct(StepTimer, f"{prefix}_timer"),
+        rule_registers=_members(StepRule),
+        timer_registers=_members(StepTimer),
         ramp=_numbers(ramp),
         limit=_numbers(limit),
         up=_numbers(tables.up.entries),
         down=_numbers(tables.down.entries),
+        **{name: getattr(step_rule, name) for name in CODES},
     )
 
 
@@ -263,26 +204,14 @@ def _comment(text: str, heading: str = "") -> str:
     return "\n".join(f" * {heading if row == 0 else ' ' * len(heading)}{line}" for row, line in enumerate(lines))
 
 
-def _codes(prefix: str) -> Iterator[str]:
-    """Names for the codes in the registers and for what the step function returns."""
-    for meaning, names in (
-        ("Register rule.state", STATES),
-        ("Register rule.cause, of the last fault", CAUSES),
-        (f"What begins, returned by {prefix.lower()}_next", OUTCOMES),
-    ):
-        yield f"\n/* {meaning}. */"
-        yield from (f"#define {prefix}_{name} {getattr(step_rule, name)}" for name in names)
-
-
-def _struct(registers: type[Registers], name: str) -> str:
-    """C declaration of a register file, with the meaning of each register."""
-    return "\n".join(["typedef struct {", *map(_member, registers.__fields__.values()), f"}} {name};"])
-
-
-def _member(field: Field) -> str:
-    width: Any = field.width
-    unit = f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
-    return f"    {width.c_name} {field.name}; /* {field.doc}{unit} */"
+def _members(registers: type[Registers]) -> str:
+    """Members of the C structure of a register file, each with its meaning."""
+    lines: list[str] = []
+    for field in registers.__fields__.values():
+        width: Any = field.width
+        unit = f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
+        lines.append(f"    {width.c_name} {field.name}; /* {field.doc}{unit} */")
+    return "\n".join(lines)
 
 
 def _numbers(values: NDArray[Any]) -> str:
@@ -295,8 +224,6 @@ def _numbers(values: NDArray[Any]) -> str:
 
 def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:
     """Tables of one motor as its file describes it."""
-    from detent.methods.stepper_envelope.build import make_tables
-
     table, tables = spec.stepper[name], make_tables(spec.stepper[name])
     return EnvelopeTables(
         motor=name,

@@ -39,7 +39,7 @@ from detent.methods.stepper_envelope.controller import (
     load_rule,
     step_once,
 )
-from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, motor_identifier, write_envelope_header
+from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, write_envelope_header
 from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import StepRamp
 
@@ -75,7 +75,7 @@ class FirmwareRegisters(Registers):
 def compile_headers(folder: Path, *motors: EnvelopeTables) -> ctypes.CDLL:
     """One source file that includes the headers of all motors."""
     source = folder / "firmware.c"
-    names = [motor_identifier(tables.motor) for tables in motors]
+    names = [tables.motor for tables in motors]
     for name, tables in zip(names, motors, strict=True):
         write_envelope_header(tables, folder / f"{name}.h")
     lines = [f'#include "{name}.h"' for name in names] + [CALLS.replace("@", name) for name in names]
@@ -87,7 +87,7 @@ class Twins:
     """One motor twice, in Python and in C, given the same orders; every call compares all their registers."""
 
     def __init__(self, tables: EnvelopeTables, library: ctypes.CDLL, at: int = 0) -> None:
-        self.tables, self.library, self.name = tables, library, motor_identifier(tables.motor)
+        self.tables, self.library, self.name = tables, library, tables.motor
         self.p, self.c = StepperControllerParams(pause=tables.pause), FirmwareRegisters()
         self.r = StepperController(stop_at=NOWHERE)
         load_rule(self.p, tables.up.ramp, tables.up.zones.limits, tables.clock_hz, reload=tables.reload)
@@ -168,7 +168,7 @@ class Twins:
         return self.c.rule.position, self.c.rule.state
 
 
-def default_tables(zones=(), *, motor="Zoom A", reload=True, turn=N, stop=0, pause=1, clock_hz=CLOCK_HZ):
+def default_tables(zones=(), *, motor="zoom_a", reload=True, turn=N, stop=0, pause=1, clock_hz=CLOCK_HZ):
     up, down = turn_envelopes(RAMP, ZoneMap(N, MAX_HZ, zones), 0, turn, stop)
     return EnvelopeTables(
         motor=motor, axis="microscope", up=up, down=down, clock_hz=clock_hz, reload=reload, travel_per_step=5e-6,
@@ -308,7 +308,7 @@ def test_a_start_under_the_operators_hand_is_forgotten(motor):
 
 
 def test_several_motors_in_one_firmware_do_not_know_of_each_other(tmp_path):
-    tables = [default_tables(COARSE_FINE, motor="Zoom A"), default_tables(motor="Zoom B", reload=False, pause=0)]
+    tables = [default_tables(COARSE_FINE, motor="zoom_a"), default_tables(motor="zoom_b", reload=False, pause=0)]
     library = compile_headers(tmp_path, *tables)
     pair = [Twins(each, library) for each in tables]
     for motor in pair:
