@@ -1,5 +1,6 @@
 """The reference of a whole job in one piece: what a recording of it would show."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from detent.errors import DetentError
 from detent.methods.moves.job import MoveJob
-from detent.planning.profile import MotionLimits, Numbers, Profile, _check_length, _rest, _whole_samples, plan_move
+from detent.planning.profile import MotionLimits, Numbers, Profile, check_length, plan_move
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +76,21 @@ def plan_job(
         target = place + (move.by or 0.0) if move.target is None else move.target
         own = limits if move.speed is None else MotionLimits(move.speed, limits.acceleration, limits.jerk)
         part = plan_move(place, target, own, period)
-        wait = _whole_samples(move.dwell, period)
+        check_length(move.dwell / period)
+        wait = math.ceil(move.dwell / period - 1e-9)
         end = begin + part.count - 1
         # The sample at which a move ends is the one at which the next begins.
         until = end + wait
-        _check_length(until)
+        check_length(until)
         parts += [_without_end(part), _rest(target, wait, period)]
         planned.append(PlannedMove(move.number, place, target, begin, end, until))
         place, begin = target, until
     parts.append(_rest(place, 1, period))
     return _join(parts, period), tuple(planned)
+
+
+def _rest(position: float, samples: int, period: float) -> Profile:
+    return Profile(period, np.full(samples, position), np.zeros(samples), np.zeros(samples))
 
 
 def _without_end(part: Profile) -> Profile:

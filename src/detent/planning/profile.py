@@ -60,6 +60,21 @@ class Profile:
         return np.arange(self.count, dtype=np.float64) * self.period
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sections:
+    """A time-optimal move as stretches of constant jerk: their begins, and the end."""
+
+    t: Numbers  # [s], shape (8,)
+    states: tuple[Numbers, Numbers, Numbers, Numbers]  # position, velocity, acceleration and jerk there
+
+    def at(self, t: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+        """Position, velocity and acceleration at some moments of the move [s]."""
+        k = np.searchsorted(self.t, t, side="right") - 1
+        s = t - self.t[k]
+        p, v, a, j = (state[k] for state in self.states)
+        return p + s * (v + s * (a / 2.0 + s * j / 6.0)), v + s * (a + s * j / 2.0), a + s * j
+
+
 def plan_move(start: float, target: float, limits: MotionLimits, period: float) -> Profile:
     """Time-optimal move from rest to rest.
 
@@ -69,23 +84,14 @@ def plan_move(start: float, target: float, limits: MotionLimits, period: float) 
     """
     _check_place(start, target, period)
     if start == target:
-        return _rest(target, 1, period)
-    sections = _sections(start, target, limits)
-    # ruckig takes no time for a way of a rounding error; the move still begins at its start.
-    samples = max(_whole_samples(float(sections.t[-1]), period), 1) + 1
-    t = np.arange(samples - 1) * period
-    k = np.searchsorted(sections.t, t, side="right") - 1
-    s = t - sections.t[k]
-    p, v, a, j = sections.p[k], sections.v[k], sections.a[k], sections.j[k]
-    position = p + s * (v + s * (a / 2.0 + s * j / 6.0))
-    velocity = v + s * (a + s * j / 2.0)
-    end = _rest(target, 1, period)
-    return Profile(
-        period,
-        np.append(position, end.position),
-        np.append(velocity, end.velocity),
-        np.append(a + s * j, end.acceleration),
-    )
+        return Profile(period, np.array([target]), np.zeros(1), np.zeros(1))
+    sections = move_sections(start, target, limits)
+    length = float(sections.t[-1]) / period
+    check_length(length)
+    # None is added for a rounding error; ruckig takes no time for a way of one, but the move begins at its start.
+    samples = max(math.ceil(length - 1e-9), 1)
+    position, velocity, acceleration = sections.at(np.arange(samples) * period)
+    return Profile(period, np.append(position, target), np.append(velocity, 0.0), np.append(acceleration, 0.0))
 
 
 def profile_of_recording(
@@ -101,7 +107,7 @@ def profile_of_recording(
     _check_place(0.0, 0.0, period)
     # A rounded time of the last sample must not lose it.
     samples = math.floor((t[-1] - t[0]) / period + 1e-6) + 1
-    _check_length(samples)
+    check_length(samples)
     at = np.minimum(t[0] + np.arange(samples, dtype=np.float64) * period, t[-1])
     q, dq, ddq = _spline(t, position, at)
     if velocity is not None:
@@ -118,18 +124,8 @@ def _spline(t: Numbers, values: Numbers, at: Numbers) -> tuple[Numbers, Numbers,
     return value, first, second
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sections:
-    """Stretches of constant jerk: their begins, and the end."""
-
-    t: Numbers
-    p: Numbers
-    v: Numbers
-    a: Numbers
-    j: Numbers
-
-
-def _sections(start: float, target: float, limits: MotionLimits) -> _Sections:
+def move_sections(start: float, target: float, limits: MotionLimits) -> Sections:
+    """Time-optimal move between two places, by ruckig."""
     ruckig: Any = import_module("ruckig")  # it states no types
     asked, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
     asked.current_position, asked.target_position = [start], [target]
@@ -145,24 +141,15 @@ def _sections(start: float, target: float, limits: MotionLimits) -> _Sections:
     one = found.profiles[0][0]
     begins = np.concatenate([[0.0], np.cumsum(one.t)])
     # ruckig states the acceleration of a trapezoid as that at its begin, with no jerk.
-    return _Sections(begins, *(np.append(x, x[-1])[:8] for x in (one.p, one.v, one.a, one.j)))
+    p, v, a, j = (np.append(x, x[-1])[:8] for x in (one.p, one.v, one.a, one.j))
+    return Sections(begins, (p, v, a, j))
 
 
-def _whole_samples(duration: float, period: float) -> int:
-    """Samples until a duration is over; one is not added for a rounding error."""
-    samples = duration / period
+def check_length(samples: float) -> None:
+    """Refuse a profile of more than `MOST_SAMPLES`."""
     if samples > MOST_SAMPLES:
-        raise _too_long(samples)
-    return math.ceil(samples - 1e-9)
-
-
-def _check_length(samples: int) -> None:
-    if samples > MOST_SAMPLES:
-        raise _too_long(samples)
-
-
-def _too_long(samples: float) -> DetentError:
-    return DetentError(f"a profile of {samples:.4g} samples, must be {MOST_SAMPLES} or fewer; cut it, or sample slower")
+        too_long = f"a profile of {samples:.4g} samples, must be {MOST_SAMPLES} or fewer; cut it, or sample slower"
+        raise DetentError(too_long)
 
 
 def _check_place(start: float, target: float, period: float) -> None:
@@ -181,7 +168,3 @@ def _check_recording(t: Numbers, *signals: Numbers | None) -> None:
         raise DetentError("a recording with values that are not finite; import it with detent.identify first")
     if not (np.diff(t) > 0.0).all():
         raise DetentError("a recording whose time does not increase strictly; import it with detent.identify first")
-
-
-def _rest(position: float, samples: int, period: float) -> Profile:
-    return Profile(period, np.full(samples, position), np.zeros(samples), np.zeros(samples))

@@ -5,27 +5,23 @@ standstill only; it is worked out by ruckig (MIT licence).
 """
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.control.step_rule import start_move
-from detent.errors import DetentError
-from detent.kernel.loop import advance
 from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
-from detent.methods.stepper_envelope.comparison import motor_at_start, time_text
-from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
+from detent.methods.stepper_envelope.comparison import time_text
+from detent.methods.stepper_envelope.envelope_files import envelope_tables
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import stated
-from detent.methods.stepper_envelope.system import Stepper, alone
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
 from detent.page.words import GAP, number
+from detent.planning.profile import MotionLimits, move_sections
+from detent.planning.step_envelope import StepEnvelope
 from detent.planning.step_ramp import natural_frequency, total_inertia
-from detent.record.machine import LONGEST_STRETCH
-from detent.record.recorder import choose_leaves
 from detent.units import format_quantity
 
 POINTS = 900  # points of one curve
@@ -37,11 +33,10 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Position and speed over time; speeds of `steps` hold until the next moment."""
+    """Speed over time; that of `steps` holds until the next moment."""
 
-    t: Numbers  # and position, speed: [s], [m] from the start, [m/s]
-    position: Numbers
-    speed: Numbers
+    t: Numbers  # [s] from the start
+    speed: Numbers  # [m/s]
     steps: bool = False
 
     @property
@@ -169,44 +164,22 @@ def _chart(found: JerkComparison, name: str, span: tuple[float, float], title: s
     return chart
 
 
-def compare_jerk(spec: StepperEnvelopeSpec, name: str | None = None) -> JerkComparison:
-    """Hold the envelope of one motor, over its whole travel upwards, against a profile of limited jerk."""
-    name = next(iter(spec.stepper)) if name is None else name
-    if name not in spec.stepper:
-        raise DetentError(f"motor: came {name!r}; allowed: one of {', '.join(spec.stepper)}; name one of these")
+def compare_jerk(spec: StepperEnvelopeSpec, name: str = "") -> JerkComparison:
+    """Hold the envelope of a motor, the first one, over its whole travel upwards against a profile of limited jerk."""
+    name = name or next(iter(spec.stepper))
     table = spec.stepper[name]
-    motor, load = stepper_motor(table), stepper_load(table)
-    swing = natural_frequency(motor.steps_per_turn, motor.holding_torque, total_inertia(motor, load))
-    limits = (table.limits.speed, table.limits.acceleration, table.limits.acceleration * swing)
-    envelope = _envelope_profile(spec, name)
-    return JerkComparison(name, table.steps * table.step, *limits, envelope, _smooth_profile(table, limits))
+    motor, way = stepper_motor(table), table.steps * table.step
+    swing = natural_frequency(motor.steps_per_turn, motor.holding_torque, total_inertia(motor, stepper_load(table)))
+    limits = MotionLimits(table.limits.speed, table.limits.acceleration, table.limits.acceleration * swing)
+    sections = move_sections(0.0, way, limits)
+    t = np.linspace(0.0, float(sections.t[-1]), 2001)
+    smooth, envelope = Profile(t, sections.at(t)[1]), _envelope_profile(spec, name)
+    return JerkComparison(name, way, limits.speed, limits.acceleration, limits.jerk, envelope, smooth)
 
 
 def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:
     """Every step of a run over the whole travel, without the zones, of which the other profile knows nothing."""
-    open_table = spec.stepper[name].model_copy(update={"zone": {}})
-    spec = spec.model_copy(update={"stepper": spec.stepper | {name: open_table}})
-    motor = motor_at_start(spec, name, open_table.steps)
-    start_move(motor.controller.rule, 1)
-    (period,) = choose_leaves(Stepper, ["controller.timer.period"])
-    picks = np.arange(period.offset, period.offset + period.width.size)
-    rows = np.zeros((motor.table.steps + 1, len(picks)), np.uint8)
-    made = advance(alone(motor.p), motor.r, min(motor.table.steps, LONGEST_STRETCH), rows, picks, 1, *motor.feed)
-    seconds = np.asarray(rows[1 : made + 1].view("<i8")[:, 0] / motor.p.controller.timer.clock_hz, float)
-    t: Numbers = np.concatenate([[0.0], np.cumsum(seconds)])
-    position = np.linspace(0.0, made * motor.table.step, made + 1)
-    return Profile(t, position, np.append(motor.table.step / seconds, 0.0), steps=True)
-
-
-def _smooth_profile(table: StepperTable, limits: tuple[float, float, float]) -> Profile:
-    """Ruckig's profile from rest to rest over the whole travel."""
-    ruckig: Any = import_module("ruckig")  # it states no types
-    way = table.steps * table.step
-    asked, found = ruckig.InputParameter(1), ruckig.Trajectory(1)
-    asked.current_position, asked.target_position = [0.0], [way]
-    asked.max_velocity, asked.max_acceleration, asked.max_jerk = ([limit] for limit in limits)
-    if ruckig.Ruckig(1).calculate(asked, found) != ruckig.Result.Working:
-        raise DetentError(f"no profile of limited jerk over {way:g} m; look at the limits of the axis")
-    t: Numbers = np.linspace(0.0, float(found.duration), 2001)
-    states = np.array([[part[0] for part in found.at_time(float(moment))] for moment in t], float)
-    return Profile(t, states[:, 0], states[:, 1])
+    table = spec.stepper[name].model_copy(update={"zone": {}})
+    tables = envelope_tables(spec.model_copy(update={"stepper": {name: table}}), name)
+    seconds = tables.periods(StepEnvelope(tables.up.ramp, tables.up.zones)) / tables.clock_hz
+    return Profile(np.append(0.0, np.cumsum(seconds)), np.append(table.step / seconds, 0.0), steps=True)
