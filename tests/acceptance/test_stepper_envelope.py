@@ -38,8 +38,7 @@ from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, fo
 from detent.control.step_timer import reload_values
 from detent.kernel.loop import advance
 from detent.methods.load import load_spec
-from detent.methods.stepper_envelope.build import stepper_motor
-from detent.methods.stepper_envelope.torque_checks import changed
+from detent.methods.stepper_envelope.build import changed, stepper_motor
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory
 from detent.planning.step_ramp import start_frequency, total_inertia
 

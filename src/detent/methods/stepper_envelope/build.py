@@ -1,14 +1,16 @@
 """From a checked specification to ramp, zones and parameters of each motor: SI values to steps and timer words."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable, ZoneTable
 from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
-from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
+from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import (
+    MAX_HZ,
     StepperLoad,
     StepperMotor,
     StepRamp,
@@ -29,6 +31,14 @@ DAMPING = 0.4  # damping of the rotor against its field, over sqrt(teeth T_hold 
 
 UNLOADED_STARTS = 3.0
 """Start frequency of a bare rotor over its natural one where no data sheet states it; 3.1 with the defaults of 7.1."""
+
+
+NEEDED = {
+    "winding": ("resistance", "inductance", "rated_current"),
+    "first order": ("pull_out_torque", "corner_frequency"),
+    "points": (),
+}
+"""Constants that each way of stating the pull-out torque needs, with those that every motor has."""
 
 
 def instant_ticks(spec: StepperEnvelopeSpec) -> int:
@@ -84,16 +94,76 @@ def stepper_load(table: StepperTable) -> StepperLoad:
     )
 
 
+def bare_start_hz(table: StepperTable) -> float:
+    """Start frequency with load and reserve, whatever the largest one [Hz]."""
+    return start_frequency(stepper_motor(table), stepper_load(table), table.drive.start_safety)
+
+
 def start_hz(table: StepperTable) -> float:
     """Frequency at which the loaded motor starts and stops, reserve included [Hz]; never above the largest one."""
-    return min(start_frequency(stepper_motor(table), stepper_load(table), table.drive.start_safety), table.max_hz)
+    return min(bare_start_hz(table), table.max_hz)
 
 
 def make_step_ramp(table: StepperTable) -> StepRamp:
     """Ramp list of a motor with its load."""
-    motor, load = stepper_motor(table), stepper_load(table)
-    limit = acceleration_limit(motor, load, table.limits.acceleration / table.step, table.drive.torque_safety)
-    return make_ramp(start_hz(table), table.max_hz, limit)
+    return make_ramp(start_hz(table), table.max_hz, _acceleration(table))
+
+
+def _acceleration(table: StepperTable) -> Callable[[float], float]:
+    """Acceleration that torque and limit allow [step/s^2], of a frequency [Hz]."""
+    limit = table.limits.acceleration / table.step
+    return acceleration_limit(stepper_motor(table), stepper_load(table), limit, table.drive.torque_safety)
+
+
+# ---- what can be worked out at all
+
+
+def missing_constants(table: StepperTable) -> list[str]:
+    """Constants that the chosen way of stating the torque needs and nobody states."""
+    return [name for name in NEEDED[table.motor.pull_out] if getattr(table.motor, name) is None]
+
+
+def has_pull_out(table: StepperTable) -> bool:
+    """True where the pull-out torque is known."""
+    if table.motor.pull_out != "points":
+        return not missing_constants(table)
+    hz, torque = table.motor.curve_frequency, table.motor.curve_torque
+    return len(hz) == len(torque) >= 2 and rises(hz) and torque[0] > 0
+
+
+def rises(values: list[float]) -> bool:
+    """True where each value is above the one before."""
+    return all(one < following for one, following in pairwise(values))
+
+
+def is_drivable(table: StepperTable) -> bool:
+    """True where a ramp can be worked out at all."""
+    return has_pull_out(table) and 1 <= table.max_hz <= MAX_HZ and bare_start_hz(table) >= 1
+
+
+def changed(table: StepperTable, name: str, value: float) -> StepperTable:
+    """Copy of a motor's table with another value of one key, such as ``limits.speed``."""
+    around, _, own = name.partition(".")
+    return table.model_copy(update={around: getattr(table, around).model_copy(update={own: value})})
+
+
+def ramp_fits(table: StepperTable) -> bool:
+    """True where the ramp reaches the largest speed and has room in the control unit."""
+    start, top = start_hz(table), table.max_hz
+    # Not even the linear acceleration comes to the largest speed within the longest ramp.
+    is_long = (top**2 - start**2) / (2 * table.limits.acceleration / table.step) > MAX_RAMP
+    if is_long or not starts(table):
+        return False
+    found = make_step_ramp(table)
+    return bool(found.hz[-1] >= top) and len(found) <= MAX_RAMP
+
+
+def starts(table: StepperTable) -> bool:
+    """True where torque is left to accelerate with at the start frequency."""
+    return _acceleration(table)(start_hz(table)) > 0
+
+
+# ---- zones and tables
 
 
 def zone_maps(table: StepperTable) -> tuple[ZoneMap, ZoneMap]:

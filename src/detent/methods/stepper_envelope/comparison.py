@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from detent.control.step_comparison import BRAKING_DISTANCE, CONSTANT_FREQUENCY, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import start_move
+from detent.methods.stepper_envelope.build import changed
 from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import stated
-from detent.methods.stepper_envelope.torque_checks import changed
 from detent.page.figure import Figure
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, duration, milliseconds, number

@@ -19,6 +19,7 @@ from detent.methods.stepper_envelope.build import (
     stepper_motor,
     zone_maps,
 )
+from detent.methods.stepper_envelope.rules import Motor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
 from detent.planning.step_ramp import natural_frequency, total_inertia
@@ -37,11 +38,11 @@ PULL_OUT_FORMULA = {
 }
 
 
-class MotorFigures:
+class MotorFigures(Motor):
     """Figures of one motor."""
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
-        self.spec, self.name, self.table = spec, name, spec.stepper[name]
+        super().__init__(spec, name)
         self.motor, self.load = stepper_motor(self.table), stepper_load(self.table)
         self.inertia = total_inertia(self.motor, self.load)
         self.start_hz, self.max_hz = start_hz(self.table), self.table.max_hz

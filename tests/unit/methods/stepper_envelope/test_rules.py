@@ -9,9 +9,8 @@ from tests.bad_files import given as given_in_full
 from tests.remedies import broken_rules, check_rule, named_value
 
 from detent.errors import InputError
-from detent.methods.stepper_envelope import checks
-from detent.methods.stepper_envelope.checks import RULES
-from detent.methods.stepper_envelope.torque_checks import TORQUE_RULES
+from detent.methods.stepper_envelope import rules
+from detent.methods.stepper_envelope.rules import RULES, TORQUE_RULES
 
 A, X = "stepper.group_a", "stepper.x"
 
@@ -148,4 +147,4 @@ def test_each_motor_has_its_own_problems(good_text, load_text):
 def test_both_tables_of_the_longest_travel_take_forty_megabytes():
     from detent.planning.step_envelope import ENTRY_BYTES
 
-    assert 2 * ENTRY_BYTES * checks.MOST_STEPS == 40_000_000
+    assert 2 * ENTRY_BYTES * rules.MOST_STEPS == 40_000_000

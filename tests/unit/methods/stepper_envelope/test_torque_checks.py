@@ -11,8 +11,8 @@ from tests.bad_files import given as given_in_full
 from tests.remedies import broken_rules, check_rule
 
 from detent.errors import InputError
-from detent.methods.stepper_envelope import torque_checks
-from detent.methods.stepper_envelope.torque_checks import TORQUE_RULES
+from detent.methods.stepper_envelope import rules
+from detent.methods.stepper_envelope.rules import TORQUE_RULES
 
 A, X = "stepper.group_a", "stepper.x"
 POINTS = "motor.pull_out=points"
@@ -143,4 +143,4 @@ def test_the_longest_ramp_is_that_of_the_control_unit():
     from detent.control.step_rule import RAMP as ROOM
     from detent.planning.step_envelope import MAX_RAMP
 
-    assert torque_checks.MAX_RAMP == MAX_RAMP == ROOM
+    assert rules.MAX_RAMP == MAX_RAMP == ROOM
