@@ -90,7 +90,7 @@ def plan_move(start: float, target: float, limits: MotionLimits, period: float) 
     check_length(length)
     # None is added for a rounding error; ruckig takes no time for a way of one, but the move begins at its start.
     samples = max(math.ceil(length - 1e-9), 1)
-    position, velocity, acceleration = sections.at(np.arange(samples) * period)
+    position, velocity, acceleration = sections.at(np.arange(samples, dtype=np.float64) * period)
     return Profile(period, np.append(position, target), np.append(velocity, 0.0), np.append(acceleration, 0.0))
 
 

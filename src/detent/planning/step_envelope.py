@@ -77,6 +77,11 @@ class ZoneMap:
         turned = [Zone(n - zone.end, n - zone.begin, zone.max_hz) for zone in self.zones]
         return ZoneMap(n, self.max_hz, turned, self.limits)
 
+    @property
+    def hz(self) -> NDArray[np.float64]:
+        """Limit of every step, shape (N,) [Hz]."""
+        return np.repeat(np.array(self.limits)[self.numbers], np.diff(self.edges))
+
     def spread(self, values: NDArray[np.int32], begin: int, end: int) -> NDArray[np.int32]:
         """One value per stretch -> one per step of the window [begin, end)."""
         return np.repeat(values, np.diff(np.clip(self.edges, begin, end)))

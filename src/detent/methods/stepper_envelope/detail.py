@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from detent.methods.stepper_envelope.runs_chart import Runs, runs_chart
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJog, StageMove
 from detent.methods.stepper_envelope.stage_trace import (
+    MM,
     Leg,
     MadeSteps,
-    StepTorques,
+    Runs,
     arc_of,
+    envelope_of,
     legs_of,
-    move_envelope,
     of,
+    runs_chart,
     step_torques,
-    travel_envelope,
 )
 from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
 from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, thin_indices, time_charts
@@ -35,7 +35,7 @@ POINTS = 1500  # rows that are chosen for one curve's sake: a page has many of t
 NEEDED_ROTOR = ("controller.timer.period", "controller.rule.direction", "plant.rotor.velocity", "plant.rotor.lag")
 """Registers that the rotor is drawn from."""
 
-MM, MILLI = 1e3, 1e3
+MILLI = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,19 +73,19 @@ def telling(figures: StageFigures, trace: Trace, made: Mapping[str, MadeSteps]) 
     It is the one that lost steps or missed its place first, else the one that had to pass a stop, else the one with the
     least torque margin, of several such the longest.
     """
-    whole = [motion for motion in figures.motions if _recorded(trace, made, motion)]
+    row = float(trace.time[1] - trace.time[0])
+    whole = [
+        motion
+        for motion in figures.motions
+        if motion.name in made and motion.move.ready <= trace.time[-1] + row
+        and len(made[motion.name].between(motion.move.begin, motion.motor.arrived).t)
+    ]  # fmt: skip
     if not whole:
         return None
     motion, why = _choose(figures, whole)
     spec, asked = figures.spec, next(asked for asked in figures.run.job.moves if asked.number == motion.move.number)
     legs = legs_of(made[motion.name], spec.stepper[motion.name], motion.move, motion.motor)
     return ShownMotion(spec, motion, why, asked, legs)
-
-
-def _recorded(trace: Trace, made: Mapping[str, MadeSteps], motion: Motion) -> bool:
-    if motion.name not in made or motion.move.ready > trace.time[-1] + (trace.time[1] - trace.time[0]):
-        return False
-    return len(made[motion.name].between(motion.move.begin, motion.motor.arrived).t) > 0
 
 
 def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str]:
@@ -98,15 +98,11 @@ def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str
         found = next(filter(applies, whole), None)
         if found:
             return found, why
-    least = min(map(_margin, whole))
-    tied = [motion for motion in whole if _margin(motion) == least]
+    # In three digits: what is equal to a reader is equal.
+    margins = [float(f"{motion.motor.margin:.3g}") for motion in whole]
+    tied = [motion for motion, margin in zip(whole, margins, strict=True) if margin == min(margins)]
     why = "the motion with the least torque margin" + (", the longest of several" if len(tied) > 1 else "")
     return max(tied, key=lambda motion: motion.motor.steps), why
-
-
-def _margin(motion: Motion) -> float:
-    """In three digits: what is equal to a reader is equal."""
-    return float(f"{motion.motor.margin:.3g}")
 
 
 # ---- under the table of the move
@@ -122,13 +118,10 @@ def _table_figure(shown: ShownMotion) -> Figure:
         "for: the line on the edge of the grey."
     )
     # The extremes of a manual run are the ends of the travel.
-    envelope = travel_envelope(table) if isinstance(shown.asked, StageJog) else move_envelope(table, legs)
+    envelope = envelope_of(table, () if isinstance(shown.asked, StageJog) else legs)
     runs = Runs(motion.name, table, envelope, [arc_of(leg, table, ARC_POINTS) for leg in legs])
-    return Figure(
-        title="Frequency against position, under the table of the move",
-        caption=caption,
-        charts=[runs_chart(runs, "detail-runs", height=260)],
-    )
+    title = "Frequency against position, under the table of the move"
+    return Figure(title=title, caption=caption, charts=[runs_chart(runs, "detail-runs", height=260)])
 
 
 def _mm(length: float) -> str:
@@ -139,39 +132,40 @@ def _mm(length: float) -> str:
 
 
 def _torque_figure(shown: ShownMotion) -> Figure | None:
-    torques = step_torques(shown.table, shown.legs)
+    torques, safety = step_torques(shown.table, shown.legs), shown.table.drive.torque_safety
     if torques is None:
         return None
     caption = (
         "Above: the torque that the motor can give at the frequency of each step, and what the step asks for: friction "
         "and acceleration; friction helps to brake. Below: their ratio, cut off where it is far above the least. Under "
-        f"1 the rotor cannot follow; the ramp is planned with a reserve of {stated(torques.safety)}. Look for: the "
+        f"1 the rotor cannot follow; the ramp is planned with a reserve of {stated(safety)}. Look for: the "
         f"least margin, ×{GAP}{margin_text(shown.motion)}, and where it is."
     )
-    return Figure(title="Margin of torque at every step", caption=caption, charts=torque_charts(torques))
+    _, available, needed = torques
+    charts = torque_charts(available * MILLI, needed * MILLI, safety)
+    return Figure(title="Margin of torque at every step", caption=caption, charts=charts)
 
 
-def torque_charts(torques: StepTorques) -> list[Chart]:
-    """Torque of every step, and its margin."""
-    margin = np.where(np.isfinite(torques.margin), torques.margin, np.nan)
-    kept = np.unique(np.concatenate([thin_indices(y, POINTS) for y in (margin, torques.available, torques.needed)]))
-    available, needed = torques.available[kept] * MILLI, torques.needed[kept] * MILLI
+def torque_charts(available: Numbers, needed: Numbers, safety: float) -> list[Chart]:
+    """Torque of every step [mN m], and its margin."""
+    margin = np.divide(available, needed, out=np.full(len(needed), np.nan), where=needed > 0)
+    kept = np.unique(np.concatenate([thin_indices(y, POINTS) for y in (margin, available, needed)]))
     planned: list[list[Curve]] = [[], []]
-    if torques.safety > 1:
-        label = f"planned with a reserve of {stated(torques.safety)}"
-        lines = (available / torques.safety, np.full(len(kept), torques.safety))
+    if safety > 1:
+        label = f"planned with a reserve of {stated(safety)}"
+        lines = (available[kept] / safety, np.full(len(kept), safety))
         planned = [[Curve(label=label, colour="left", dash=(6, 4), y=y)] for y in lines]
     torque = Panel(
-        name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(torques.available * MILLI)),
+        name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(available)),
         curves=[
-            Curve(label="pull-out torque", colour="muted", width=2, fill=True, y=available),
+            Curve(label="pull-out torque", colour="muted", width=2, fill=True, y=available[kept]),
             *planned[0],
-            Curve(label="torque needed", colour="speed", width=2, step=True, y=needed),
+            Curve(label="torque needed", colour="speed", width=2, step=True, y=needed[kept]),
         ],
     )  # fmt: skip
     # A margin far from 1 says nothing more than that it is far.
-    finite = torques.margin[np.isfinite(torques.margin)]
-    top = _top(finite.clip(0, max(2.5 * float(finite.min(initial=np.inf)), 3 * torques.safety)))
+    finite = margin[np.isfinite(margin)]
+    top = _top(finite.clip(0, max(2.5 * float(finite.min(initial=np.inf)), 3 * safety)))
     ratio = Panel(
         name="detail-margin", label="margin", height=220, span=(0.0, top), levels=[(1.0, "1: falls behind below")],
         curves=[
@@ -264,15 +258,18 @@ def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
 def motion_events(shown: ShownMotion) -> list[Event]:
     """What happened in the move, in order of time since the start signal."""
     asked, motion, legs = shown.asked, shown.motion, shown.legs
-    begin, change = motion.move.begin, None if isinstance(asked, StageJog) else asked.change
-    events = [Event(0.0, _start_text(asked, motion.name)), Event(motion.seconds, "the last step is over")]
+    begin, events = motion.move.begin, [Event(motion.seconds, "the last step is over")]
     if isinstance(asked, StageJog):
+        events.append(Event(0.0, f"the joystick asks for {stated(asked.speed * MM)}{GAP}mm/s"))
         events.append(Event(asked.duration, "the joystick is let go"))
-    if change is not None:
-        made, way = legs[0].made, legs[0].direction
-        text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
-        passed = np.flatnonzero((made.position - shown.table.step_at(change.at)) * way >= 0)
-        events += [Event(float(made.t[first]) - begin, text) for first in passed[:1]]
+    else:
+        others = ", ".join(other for other in asked.motors if other != motion.name)
+        events.append(Event(0.0, "start signal" + (f", at the same time for {others}" if others else "")))
+        if change := asked.change:
+            made, way = legs[0].made, legs[0].direction
+            text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
+            passed = np.flatnonzero((made.position - shown.table.step_at(change.at)) * way >= 0)
+            events += [Event(float(made.t[first]) - begin, text) for first in passed[:1]]
     for leg in legs[1:]:
         text = f"turns, {'up' if leg.direction > 0 else 'down'} from here"
         events.append(Event(float(leg.made.t[0]) - begin, text))
@@ -281,10 +278,3 @@ def motion_events(shown: ShownMotion) -> list[Event]:
         events.append(Event(settled - begin, f"the rotor is within ±{stated(tolerance)} steps of its place for good"))
     done = "the time to settle is over: the host takes the move for done"
     return sorted([*events, Event(motion.move.ready - begin, done)], key=lambda event: event.t)
-
-
-def _start_text(asked: StageMove | StageJog, name: str) -> str:
-    if isinstance(asked, StageJog):
-        return f"the joystick asks for {stated(asked.speed * MM)}{GAP}mm/s"
-    others = [other for other in asked.motors if other != name]
-    return "start signal" + (f", at the same time for {', '.join(others)}" if others else "")

@@ -105,9 +105,8 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
     position = tables.first_position + steps * tables.travel_per_step
     columns: dict[str, NDArray[Any]] = {"step": steps, "position [m]": np.round(position, METRE_DIGITS)}
     for name, table in (("up", tables.up), ("down", tables.down)):
-        zones = table.zones
         columns[f"{name}.index"] = table.indices()
-        columns[f"{name}.zone_limit [Hz]"] = np.repeat(np.array(zones.limits)[zones.numbers], np.diff(zones.edges))
+        columns[f"{name}.zone_limit [Hz]"] = table.zones.hz
         columns[f"{name}.permissible [Hz]"] = table.permissible_hz()
         columns[f"{name}.period [tick]"] = tables.periods(table)
     with writing(path):

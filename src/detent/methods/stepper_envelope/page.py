@@ -9,11 +9,19 @@ from markupsafe import Markup
 
 from detent.methods.stepper_envelope.detail import detail_section
 from detent.methods.stepper_envelope.run import StageMoveRecord, StageRun
-from detent.methods.stepper_envelope.runs_chart import MM, Runs, runs_chart
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJog
 from detent.methods.stepper_envelope.stage_plan import plan_figure
-from detent.methods.stepper_envelope.stage_trace import MadeSteps, arc_of, legs_of, made_steps, travel_envelope
+from detent.methods.stepper_envelope.stage_trace import (
+    MM,
+    MadeSteps,
+    Runs,
+    arc_of,
+    envelope_of,
+    legs_of,
+    made_steps,
+    runs_chart,
+)
 from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, margin_text, stated
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
@@ -230,7 +238,7 @@ def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
     points = max(ARC_POINTS // max(len(whole), 1), 12)
     legs = [leg for motion in whole for leg in legs_of(made, table, motion.move, motion.motor)]
     arcs = [arc_of(leg, table, points) for leg in legs]
-    return Runs(name, table, travel_envelope(table), arcs, left_out=len(motions) - len(whole))
+    return Runs(name, table, envelope_of(table), arcs, left_out=len(motions) - len(whole))
 
 
 def _runs_figure(runs: Runs, k: int) -> Figure:

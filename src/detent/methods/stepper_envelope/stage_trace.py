@@ -1,4 +1,4 @@
-"""From the trace of a stage to the steps that its motors made, and to the tables they were made under."""
+"""From the trace of a stage to the steps that its motors made, the tables they were made under, and a chart of both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,18 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.step_rule import TURN
-from detent.methods.stepper_envelope.build import make_tables, stepper_load, stepper_motor, zone_maps
+from detent.methods.stepper_envelope.build import make_step_ramp, stepper_load, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
-from detent.methods.stepper_envelope.schema import StepperTable
+from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
+from detent.methods.stepper_envelope.summary import stated
+from detent.page.chart import Chart, Curve, Panel
+from detent.page.loops import Loop, loop_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import has
+from detent.page.words import GAP, count
 from detent.planning.step_envelope import StepEnvelope, ZoneMap
-from detent.planning.step_ramp import needed_torque, torque_margin
+from detent.planning.step_ramp import needed_torque
 from detent.record.trace import Trace
 
 NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
 """Registers of a motor that its steps are read from."""
 
+HEADROOM = 1.25  # height of a half of the figure over the motor's limit
+LONG_NUMBERS = 1e4  # limit from which on frequencies are written in kHz [Hz]
+CROPPED = 0.35  # runs that lie within less than this part of the travel are drawn alone, not with all of it
+MM = 1e3
 FLAT = 20  # steps of one frequency that make a stretch of their own in a curve
 
 
@@ -40,17 +48,13 @@ class MadeSteps:
 
     def between(self, begin: float, end: float) -> "MadeSteps":
         """Steps of a stretch of time [s]."""
-        return self._rows(slice(*np.searchsorted(self.t, (begin, end)).tolist()))
+        return self.part(*np.searchsorted(self.t, (begin, end)).tolist())
 
-    def legs(self) -> "list[MadeSteps]":
-        """Stretches of one direction, in order of time."""
-        turns = np.flatnonzero(np.diff(self.direction)) + 1
-        edges = [0, *turns.tolist(), len(self.t)]
-        return [self._rows(slice(first, last)) for first, last in pairwise(edges) if first < last]
-
-    def _rows(self, part: slice) -> "MadeSteps":
-        index = None if self.index is None else self.index[part]
-        return MadeSteps(self.t[part], self.position[part], self.direction[part], self.hz[part], index)
+    def part(self, first: int, last: int) -> "MadeSteps":
+        """Some of the steps that follow one another."""
+        rows = slice(first, last)
+        index = None if self.index is None else self.index[rows]
+        return MadeSteps(self.t[rows], self.position[rows], self.direction[rows], self.hz[rows], index)
 
 
 def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
@@ -103,24 +107,21 @@ class Leg:
 
 def legs_of(made: MadeSteps, table: StepperTable, move: StageMoveRecord, motor: MotorMove) -> list[Leg]:
     """Runs of a motor in a move, from rest or turn to turn or rest."""
-    parts = made.between(move.begin, motor.arrived).legs()
+    made = made.between(move.begin, motor.arrived)
+    turns = np.flatnonzero(np.diff(made.direction)) + 1
+    parts = [made.part(*edges) for edges in pairwise([0, *turns.tolist(), len(made.t)])] if len(made.t) else []
     # Between two rows there may be a step that nobody saw, but not at a turn: the last step there is slow.
     ends = [int(part.position[-1]) for part in parts[:-1]]
     places = [table.step_at(motor.start), *ends, table.step_at(motor.stop)]
-    return [Leg(part, *ends) for part, ends in zip(parts, pairwise(places), strict=True)] if parts else []
+    return [Leg(part, *ends) for part, ends in zip(parts, pairwise(places), strict=False)]
 
 
 def arc_of(leg: Leg, table: StepperTable, points: int) -> Arc:
     """A run as a curve of frequency against position."""
-    made = leg.made
-    kept = _corners(made.hz, points - 2)
-    middle = made.position[kept] - 0.5 * leg.direction
-    places = np.concatenate(([leg.start], middle, [leg.stop]))
-    return Arc(
-        direction=leg.direction,
-        position=table.mechanics.lower_end + places * table.step,
-        hz=np.concatenate(([0.0], made.hz[kept], [0.0])),
-    )
+    kept = _corners(leg.made.hz, points - 2)
+    places = np.concatenate(([leg.start], leg.made.position[kept] - 0.5 * leg.direction, [leg.stop]))
+    hz = np.concatenate(([0.0], leg.made.hz[kept], [0.0]))
+    return Arc(direction=leg.direction, position=table.mechanics.lower_end + places * table.step, hz=hz)
 
 
 def _corners(hz: Numbers, points: int) -> NDArray[np.intp]:
@@ -133,74 +134,44 @@ def _corners(hz: Numbers, points: int) -> NDArray[np.intp]:
     return np.unique(np.concatenate((ends, others[spread]))).astype(np.intp)
 
 
-def travel_envelope(table: StepperTable) -> Envelope:
-    """Permissible frequency between the ends of the travel, zones included."""
-    ramp, (up, down) = make_tables(table).ramp, zone_maps(table)
-    return _envelope(table, StepEnvelope(ramp, up, 1), StepEnvelope(ramp, down, -1))
-
-
-def move_envelope(table: StepperTable, legs: Sequence[Leg]) -> Envelope:
-    """Permissible frequency between the extremes of a move."""
-    ramp, maps = make_tables(table).ramp, zone_maps(table)
-    first = {leg.direction: (leg.start, leg.stop) for leg in reversed(legs)}
-    up, down = (
-        StepEnvelope(ramp, zones, sign, *first[sign]) if sign in first else None
-        for sign, zones in zip((1, -1), maps, strict=True)
-    )
-    return _envelope(table, up, down)
-
-
-def _envelope(table: StepperTable, up: StepEnvelope | None, down: StepEnvelope | None) -> Envelope:
-    """Both directions, each frequency where it begins to hold."""
-    hz = [_between_extremes(half, table.steps) for half in (up, down)]
-    # The frequency of the last step holds up to the end; there a 0 follows.
-    closed = [np.append(half, 0.0) for half in hz]
-    changes = [np.flatnonzero(np.diff(half)) + 1 for half in closed]
-    places = np.unique(np.concatenate(([0], *changes)))
-    return Envelope(
-        position=table.mechanics.lower_end + places * table.step, up=closed[0][places], down=closed[1][places]
-    )
-
-
-def _between_extremes(half: StepEnvelope | None, steps: int) -> Numbers:
-    hz = np.zeros(steps)
-    if half is not None:
-        run = slice(*sorted((half.start, half.stop)))
-        hz[run] = half.permissible_hz()[run]
-    return hz
+def envelope_of(table: StepperTable, legs: Sequence[Leg] = ()) -> Envelope:
+    """Permissible frequency, zones included: between the extremes of a move, or of runs to the ends of the travel."""
+    ramp, maps, halves = make_step_ramp(table), zone_maps(table), list[Numbers]()
+    extremes = {leg.direction: (leg.start, leg.stop) for leg in reversed(legs)}
+    for sign, zones in zip((1, -1), maps, strict=True):
+        # The frequency of the last step holds up to the end; there a 0 follows.
+        hz = np.zeros(table.steps + 1)
+        if not legs or sign in extremes:
+            half = StepEnvelope(ramp, zones, sign, *extremes.get(sign, ()))
+            run = slice(*sorted((half.start, half.stop)))
+            hz[run] = half.permissible_hz()[run]
+        halves.append(hz)
+    places = np.unique(np.concatenate(([0], *(np.flatnonzero(np.diff(hz)) + 1 for hz in halves))))
+    up, down = (hz[places] for hz in halves)
+    return Envelope(position=table.mechanics.lower_end + places * table.step, up=up, down=down)
 
 
 # ---- torque
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StepTorques:
-    """What every step of a move asks of its motor."""
+def step_torques(table: StepperTable, legs: Sequence[Leg]) -> NDArray[np.float64] | None:
+    """What every step of a move asks of the motor: its frequency [Hz], pull-out torque there, torque needed [N m].
 
-    hz: Numbers  # frequency of each step [Hz], shape (n,)
-    # available, needed: pull-out torque at that frequency, torque for friction and acceleration [N m], shape (n,)
-    available: Numbers
-    needed: Numbers  # [N m]
-    margin: Numbers  # the first over the second, shape (n,); infinite where no torque is needed
-    safety: float  # what the ramp divides the pull-out torque by
-
-
-def step_torques(table: StepperTable, legs: Sequence[Leg]) -> StepTorques | None:
-    """What every step of a move asks of the motor."""
-    motor, load, maps = stepper_motor(table), stepper_load(table), zone_maps(table)
-    ramp = make_tables(table).ramp.hz
+    Shape (3, n); None where the ramp indices were not recorded, or no step was made.
+    """
+    motor, load = stepper_motor(table), stepper_load(table)
+    ramp, maps = make_step_ramp(table).hz, zone_maps(table)
     rows: list[Numbers] = []
     for leg in legs:
         planned = _planned_hz(leg, ramp, maps[0] if leg.direction > 0 else maps[1])
         if planned is None:
             return None
-        hz = _every_step(leg, planned)
-        available = np.array([motor.pull_out(f) for f in hz.tolist()])
-        rows.append(np.array([hz, available, needed_torque(motor, load, hz), torque_margin(motor, load, hz)]))
-    hz, available, needed, margin = np.concatenate(rows, axis=1)
-    if not len(hz):
-        return None
-    return StepTorques(hz=hz, available=available, needed=needed, margin=margin, safety=table.drive.torque_safety)
+        # Between two rows of the trace the square rises evenly.
+        way = np.abs(leg.made.position - leg.start)
+        hz = np.sqrt(np.interp(np.arange(1, abs(leg.stop - leg.start) + 1), way, planned**2))
+        rows.append(np.array([hz, [motor.pull_out(f) for f in hz.tolist()], needed_torque(motor, load, hz)]))
+    found = np.concatenate(rows, axis=1)
+    return found if found.size else None
 
 
 def _planned_hz(leg: Leg, ramp: Numbers, zones: ZoneMap) -> Numbers | None:
@@ -211,15 +182,91 @@ def _planned_hz(leg: Leg, ramp: Numbers, zones: ZoneMap) -> Numbers | None:
     made = leg.made
     if made.index is None:
         return None
-    interval = made.position - (1 if leg.direction > 0 else 0)
-    limit = np.repeat(np.array(zones.limits)[zones.numbers], np.diff(zones.edges))[interval]
+    limit = zones.hz[made.position - (1 if leg.direction > 0 else 0)]
     planned = np.minimum(ramp[made.index], limit)
     # An operator who asks for less than the table allows goes by a frequency of his own.
     rounded = np.abs(made.hz / planned - 1) < 0.01
     return np.where(rounded, planned, made.hz)
 
 
-def _every_step(leg: Leg, hz: Numbers) -> Numbers:
-    """Frequencies of all steps of a run, those between two rows included: there the square rises evenly."""
-    way = np.abs(leg.made.position - leg.start)
-    return np.sqrt(np.interp(np.arange(1, abs(leg.stop - leg.start) + 1), way, hz**2))
+# ---- frequency against position
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Runs of one motor under its envelope."""
+
+    name: str  # of the motor
+    table: StepperTable
+    envelope: Envelope
+    arcs: Sequence[Arc]  # in order of time; at least one, if they are to be drawn
+    left_out: int = 0  # motions of this motor that are not among them
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Ends of the travel [m]."""
+        return self.table.mechanics.lower_end, self.table.upper_end
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """Part of the travel that is drawn: all of it, or the neighbourhood of the runs if these are short [m]."""
+        places = np.concatenate([arc.position for arc in self.arcs])
+        low, high = float(places.min()), float(places.max())
+        first, last = self.travel
+        if high - low > CROPPED * (last - first):
+            return self.travel
+        room = max(0.12 * (high - low), 10 * self.table.step)
+        return max(low - room, first), min(high + room, last)
+
+    @property
+    def zones(self) -> dict[str, ZoneTable]:
+        """Zones that reach into that part."""
+        low, high = self.window
+        return {name: zone for name, zone in self.table.zone.items() if zone.begin < high and zone.end > low}
+
+    def permitted(self) -> tuple[Numbers, Numbers, Numbers]:
+        """Places in that part, both its ends included, and frequencies up and down."""
+        (low, high), envelope = self.window, self.envelope
+        inside = envelope.position[(envelope.position > low) & (envelope.position < high)]
+        at = np.concatenate(([low], inside, [high]))
+        rows = np.searchsorted(envelope.position, at + 0.01 * self.table.step, side="right") - 1
+        rows = rows.clip(0, len(envelope.position) - 1)
+        return at, envelope.up[rows], envelope.down[rows]
+
+
+def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:
+    """Draw the steps of a motor under its envelope, up above zero and down below it."""
+    at, up, down = runs.permitted()
+    max_hz = runs.table.max_hz
+    unit, per_hz, digits = ("kHz", 1e-3, 4) if max_hz >= LONG_NUMBERS else ("Hz", 1.0, 1)
+    permitted = [
+        Curve(label=f"permissible, {word}", colour="muted", step=True, fill=True, y=sign * hz * per_hz, digits=digits)
+        for word, sign, hz in (("up", 1, up), ("down", -1, down))
+        if hz.any()
+    ]
+    most = max_hz * per_hz
+    limit = f"limit {count(round(max_hz))}{GAP}Hz, {stated(max_hz * runs.table.step * MM)}{GAP}mm/s"
+    # A half in which nothing is permitted has little room.
+    span = tuple(round(HEADROOM * most * (1.0 if half.any() else 0.1), 3) for half in (down, up))
+    panel = Panel(
+        name=name, label=f"← down   [{unit}]   up →", height=height, zero=True, span=(-span[0], span[1]),
+        levels=[(most, limit), (-most, "" if up.any() else limit)], curves=permitted,
+        about=f"Step frequency of {runs.name} over position, under the envelope",
+    )  # fmt: skip
+    loops = [
+        Loop(label=f"steps made, {word}", colour=colour, x=arc.position * MM, y=arc.hz * sign * per_hz, digits=digits)
+        for word, colour, sign in (("up", "right", 1), ("down", "left", -1))
+        for arc in runs.arcs
+        if arc.direction == sign
+    ]
+    chart = loop_chart(panel, at * MM, f"position of {runs.name} [mm]", loops)
+    chart["bands"] = [
+        {
+            "spans": [[round(zone.begin * MM, 4), round(zone.end * MM, 4)]],
+            "colour": "brake",
+            "label": f"{zone_name}: {stated(zone.speed * MM)} mm/s"
+            + ("" if zone.direction == "both" else f", {zone.direction} only"),
+        }
+        for zone_name, zone in runs.zones.items()
+    ]
+    return chart

@@ -11,7 +11,6 @@ from detent.methods.stepper_envelope.detail import NEEDED_ROTOR, ShownMotion, te
 from detent.methods.stepper_envelope.page import recorded_steps, stage_page
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
 from detent.methods.stepper_envelope.stage_job import Change, StageJog, StageMove
-from detent.methods.stepper_envelope.stage_trace import StepTorques
 from detent.methods.stepper_envelope.summary import StageFigures
 from detent.page.draw import plain
 from detent.page.figure import Figure
@@ -161,13 +160,8 @@ def test_long_moves_are_told_in_seconds() -> None:
 # ---- torque
 
 
-def torques(**changes: object) -> StepTorques:
-    """Three steps; the second has the least margin, the third needs nothing."""
-    found = StepTorques(
-        hz=np.array([400.0, 4000.0, 400.0]), available=np.array([40e-3, 15e-3, 40e-3]),
-        needed=np.array([10e-3, 6e-3, 0.0]), margin=np.array([4.0, 2.5, np.inf]), safety=2.0,
-    )  # fmt: skip
-    return replace(found, **changes)
+AVAILABLE, NEEDED = np.array([40.0, 15.0, 40.0]), np.array([10.0, 6.0, 0.0])
+"""Three steps [mN m]; the second has the least margin, the third needs nothing."""
 
 
 def curves_of(chart: dict) -> dict:
@@ -175,7 +169,7 @@ def curves_of(chart: dict) -> dict:
 
 
 def test_torque_is_drawn_over_the_steps_of_the_move() -> None:
-    torque, margin = torque_charts(torques())
+    torque, margin = torque_charts(AVAILABLE, NEEDED, 2.0)
     assert torque["x"] == margin["x"] == [1.0, 2.0, 3.0]
     assert curves_of(torque) == {
         "pull-out torque": [40.0, 15.0, 40.0],
@@ -193,12 +187,12 @@ def test_torque_is_drawn_over_the_steps_of_the_move() -> None:
 
 
 def test_what_is_far_above_the_least_margin_is_cut_off() -> None:
-    _, margin = torque_charts(torques(margin=np.array([300.0, 2.5, 60.0])))
+    _, margin = torque_charts(6.0 * np.array([300.0, 2.5, 60.0]), np.full(3, 6.0), 2.0)
     assert margin["yRange"][1] == pytest.approx(1.15 * 2.5 * 2.5, abs=1e-3)
 
 
 def test_steps_that_need_no_torque_at_all_can_be_drawn() -> None:
-    _, margin = torque_charts(torques(needed=np.zeros(3), margin=np.full(3, np.inf)))
+    _, margin = torque_charts(AVAILABLE, np.zeros(3), 2.0)
     assert curves_of(margin)["pull-out torque / torque needed"] == [None, None, None]
     assert margin["yRange"][1] > 0
 
@@ -206,6 +200,6 @@ def test_steps_that_need_no_torque_at_all_can_be_drawn() -> None:
 def test_many_steps_are_thinned_and_keep_the_least_margin() -> None:
     margin = np.full(22_000, 3.0)
     margin[12_345] = 1.1
-    _, chart = torque_charts(torques(hz=margin, available=3e-3 * margin, needed=np.full(22_000, 3e-3), margin=margin))
+    _, chart = torque_charts(3.0 * margin, np.full(22_000, 3.0), 2.0)
     assert len(chart["x"]) < 3 * detail.POINTS + 6
     assert curves_of(chart)["pull-out torque / torque needed"][chart["x"].index(12_346.0)] == 1.1

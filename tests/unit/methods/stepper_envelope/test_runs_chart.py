@@ -4,9 +4,8 @@ from tests.unit.methods.stepper_envelope.samples import MM, STEP
 
 import detent
 from detent.methods.load import load_spec
-from detent.methods.stepper_envelope.runs_chart import Runs, runs_chart
 from detent.methods.stepper_envelope.schema import StepperTable
-from detent.methods.stepper_envelope.stage_trace import Arc, Envelope
+from detent.methods.stepper_envelope.stage_trace import Arc, Envelope, Runs, runs_chart
 
 
 @pytest.fixture(scope="module")
