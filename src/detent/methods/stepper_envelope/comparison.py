@@ -24,8 +24,6 @@ from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import Progress
 from detent.units import format_quantity
 
-Numbers = NDArray[np.float64]
-
 WAYS = (100, 500, 2000, 8000)
 """Ways that are compared, as far as the travel has room for them [step]; those of acceptance test 16."""
 
@@ -76,7 +74,7 @@ class StepComparison:
     methods: tuple[str, ...]
     courses: tuple[tuple[Course, ...], ...]
 
-    def seconds(self, method: int) -> Numbers:
+    def seconds(self, method: int) -> NDArray[np.float64]:
         """Time of each way with a method, shape (ways,) [s]."""
         return np.array([course.seconds for course in self.courses[method]])
 
@@ -96,12 +94,28 @@ class StepComparison:
 
     def figures(self) -> tuple[Figure, ...]:
         """The same with bars, and who loses steps."""
+        constant = self.courses[self.methods.index("start frequency")][-1].seconds
+        times = number(constant / self.courses[0][-1].seconds, 2)
         caption = (
             "The same motor over several ways from its lower end, with its rotor simulated. A and B reckon from the "
             "distance to the extremes how fast every step may be; the envelope looks it up, and is as quick as they "
-            f"are where they lose no step. {_worth(self)}{_losers(self)}"
+            f"are where they lose no step. On the longest way it is {times} times as quick as the constant start "
+            f"frequency. {_losers(self)}"
         )
-        return (Figure(title=f"Motor {self.motor}: time of a way, and steps lost", caption=caption, table=_bars(self)),)
+        heads = [(f"{count(way, 'step')}, {stated(way * self.step * 1e3)}{GAP}mm", True) for way in self.ways]
+        longest = np.max([self.seconds(k) for k in range(len(self.methods))], axis=0).tolist()
+        rows: list[list[str | Cell]] = []
+        for method, courses in zip(self.methods, self.courses, strict=True):
+            _, name, cost = METHODS[method]
+            cells: list[str | Cell] = []
+            for course, most in zip(courses, longest, strict=True):
+                text = time_text(course.seconds)
+                if course.lost:
+                    text = Markup("{}, <br>{} lost").format(text, count(abs(course.lost)))
+                cells.append(Cell(text=text, bar=course.seconds / most, over=course.lost != 0))
+            rows.append([Markup("<b>{}</b>").format(name), *cells, cost])
+        table = Table(heads=[("", False), *heads, ("worked out before every step", False)], rows=rows)
+        return (Figure(title=f"Motor {self.motor}: time of a way, and steps lost", caption=caption, table=table),)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
@@ -112,35 +126,9 @@ class StepComparison:
         return {"motor": self.motor, "step": self.step, "ways": list(self.ways), "methods": runs}
 
 
-def _bars(found: StepComparison) -> Table:
-    heads = [(f"{count(way, 'step')}, {stated(way * found.step * 1e3)}{GAP}mm", True) for way in found.ways]
-    longest = np.max([found.seconds(k) for k in range(len(found.methods))], axis=0)
-    rows: list[list[str | Cell]] = []
-    for method, courses in zip(found.methods, found.courses, strict=True):
-        _, name, cost = METHODS[method]
-        cells = (_course_cell(course, float(most)) for course, most in zip(courses, longest, strict=True))
-        rows.append([Markup("<b>{}</b>").format(name), *cells, cost])
-    return Table(heads=[("", False), *heads, ("worked out before every step", False)], rows=rows)
-
-
-def _course_cell(course: Course, longest: float) -> Cell:
-    """Time with a bar that compares it with the other methods, and the steps lost."""
-    text = time_text(course.seconds)
-    if course.lost:
-        text = Markup("{}, <br>{} lost").format(text, count(abs(course.lost)))
-    return Cell(text=text, bar=course.seconds / longest, over=course.lost != 0)
-
-
 def time_text(seconds: float) -> str:
     """Write a time below 1 s in milliseconds."""
     return milliseconds(seconds) if seconds < 1 else duration(seconds)
-
-
-def _worth(found: StepComparison) -> str:
-    """What the envelope saves over the start frequency on the longest way."""
-    constant = found.courses[found.methods.index("start frequency")][-1].seconds
-    times = number(constant / found.courses[0][-1].seconds, 2)
-    return f"On the longest way it is {times} times as quick as the constant start frequency. "
 
 
 def _losers(found: StepComparison) -> str:
@@ -164,23 +152,25 @@ def _losers(found: StepComparison) -> str:
 
 def compare_steps(spec: StepperEnvelopeSpec, progress: Progress | None = None) -> tuple[StepComparison, ...]:
     """Run each motor of an axis over several ways with each method, on its rotor."""
-    return tuple(_compare_motor(spec, name, progress) for name in spec.stepper)
-
-
-def _compare_motor(spec: StepperEnvelopeSpec, name: str, progress: Progress | None) -> StepComparison:
-    table = spec.stepper[name]
-    ways = tuple(way for way in WAYS if way <= table.steps) or (table.steps,)
-    rows: list[tuple[Course, ...]] = []
-    for done, method in enumerate(METHODS):
-        if progress is not None:
-            progress(done / len(METHODS), f"motor {name}: {method}")
-        rows.append(tuple(_course(spec, name, method, way) for way in ways))
-    return StepComparison(name, table.step, ways, tuple(METHODS), tuple(rows))
+    found: list[StepComparison] = []
+    for name, table in spec.stepper.items():
+        ways = tuple(way for way in WAYS if way <= table.steps) or (table.steps,)
+        rows: list[tuple[Course, ...]] = []
+        for done, method in enumerate(METHODS):
+            if progress is not None:
+                progress(done / len(METHODS), f"motor {name}: {method}")
+            rows.append(tuple(_course(spec, name, method, way) for way in ways))
+        found.append(StepComparison(name, table.step, ways, tuple(METHODS), tuple(rows)))
+    return tuple(found)
 
 
 def _course(spec: StepperEnvelopeSpec, name: str, method: str, way: int) -> Course:
-    """One motor with one method over one way, on its rotor."""
-    motor, (code, *_) = motor_at_start(spec, name, way), METHODS[method]
+    """One motor with one method over one way from its lower end, on its rotor."""
+    table, (code, *_) = spec.stepper[name], METHODS[method]
+    table = changed(table, "mechanics.start_position", table.mechanics.lower_end)
+    motor = StageMotor(spec.model_copy(update={"stepper": spec.stepper | {name: table}}), name)
+    motor.tables.up.move_start(0)
+    motor.tables.up.move_stop(way)
     if code:
         start_hz = motor.table.max_hz if method == "largest frequency" else float(motor.tables.ramp.hz[0])
         motor.compare(code, range(way), start_hz)
@@ -189,13 +179,3 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, way: int) -> Cour
     motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
     rotor = motor.r.plant.rotor
     return Course(motor.rested, lost_steps(motor.p.plant.rotor, rotor), float(rotor.peak_lag))
-
-
-def motor_at_start(spec: StepperEnvelopeSpec, name: str, way: int) -> StageMotor:
-    """The motor at its lower end, with its tables set for a run of `way` steps."""
-    table = spec.stepper[name]
-    table = changed(table, "mechanics.start_position", table.mechanics.lower_end)
-    motor = StageMotor(spec.model_copy(update={"stepper": spec.stepper | {name: table}}), name)
-    motor.tables.up.move_start(0)
-    motor.tables.up.move_stop(way)
-    return motor

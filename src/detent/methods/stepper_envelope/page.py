@@ -8,7 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.methods.stepper_envelope.detail import detail_section
-from detent.methods.stepper_envelope.run import StageMoveRecord, StageRun
+from detent.methods.stepper_envelope.run import StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJog
 from detent.methods.stepper_envelope.stage_plan import plan_figure
@@ -158,12 +158,8 @@ def _notes(figures: StageFigures) -> list[Note]:
 
 def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
     names = [name for name in figures.moved if has(trace, [f"{name}.controller.rule.position"])]
-    rows = (
-        stretch(trace, [f"{name}.controller.rule.position" for name in names], figures.run.time_ready)
-        if names
-        else None
-    )
-    if rows is None:
+    rows = stretch(trace, [f"{name}.controller.rule.position" for name in names], figures.run.time_ready)
+    if not names or rows is None:
         return None
     part = slice(0, int(np.searchsorted(rows.t, LONGEST, side="right")))
     t = rows.t[part]
@@ -225,9 +221,19 @@ def target_of(figures: StageFigures, name: str, t: Numbers) -> Numbers:
 
 def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[Figure]:
     runs = [runs for runs in (motor_runs(figures, name, steps) for name, steps in made.items()) if runs.arcs]
-    more = len(runs) - MOST_MOTORS
-    drawn = [_runs_figure(one, k) for k, one in enumerate(runs[:MOST_MOTORS])]
-    return [*drawn[:-1], replace(drawn[-1], hint=f"{further(more, 'motor')} not drawn.")] if more > 0 else drawn
+    drawn: list[Figure] = []
+    for k, one in enumerate(runs[:MOST_MOTORS]):
+        caption = "" if k else ENVELOPE_CAPTION
+        caption += f"1{GAP}000{GAP}Hz is {stated(one.table.step * 1e6)}{GAP}mm/s.{_zones_text(one)}"
+        if one.window != one.travel:
+            low, high = (stated(place * MM) for place in one.travel)
+            caption += f" The travel goes from {low} to {high}{GAP}mm; drawn is what was used."
+        if one.left_out:
+            caption += f" {further(one.left_out, 'move')} not drawn."
+        drawn.append(Figure(title=f"Motor {one.name}", caption=caption, charts=[runs_chart(one, f"runs-{k}")]))
+    if len(runs) > MOST_MOTORS:
+        drawn[-1] = replace(drawn[-1], hint=f"{further(len(runs) - MOST_MOTORS, 'motor')} not drawn.")
+    return drawn
 
 
 def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
@@ -239,17 +245,6 @@ def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
     legs = [leg for motion in whole for leg in legs_of(made, table, motion.move, motion.motor)]
     arcs = [arc_of(leg, table, points) for leg in legs]
     return Runs(name, table, envelope_of(table), arcs, left_out=len(motions) - len(whole))
-
-
-def _runs_figure(runs: Runs, k: int) -> Figure:
-    caption = "" if k else ENVELOPE_CAPTION
-    caption += f"1{GAP}000{GAP}Hz is {stated(runs.table.step * 1e6)}{GAP}mm/s.{_zones_text(runs)}"
-    if runs.window != runs.travel:
-        low, high = (stated(place * MM) for place in runs.travel)
-        caption += f" The travel goes from {low} to {high}{GAP}mm; drawn is what was used."
-    if runs.left_out:
-        caption += f" {further(runs.left_out, 'move')} not drawn."
-    return Figure(title=f"Motor {runs.name}", caption=caption, charts=[runs_chart(runs, f"runs-{k}")])
 
 
 def _zones_text(runs: Runs) -> str:
@@ -276,7 +271,7 @@ def _every_move(figures: StageFigures) -> Figure:
     rows: list[list[str | Cell]] = []
     for move, motions in zip(run.moves, figures.by_move, strict=True):
         cells = [_cells(motion) for motion in motions] or [["none: stays", *[""] * 9]]
-        lead = _lead(run, move, labelled=labelled)
+        lead = [count(move.number), *([move.label] if labelled else []), f"{move.begin - run.time_ready:.3f}"]
         # Number and name stand in the first row only.
         heading = [lead, *([[""] * len(lead)] * (len(cells) - 1))]
         rows += [[*first, *rest[: len(heads) - len(lead)]] for first, rest in zip(heading, cells, strict=True)]
@@ -290,18 +285,16 @@ def _every_move(figures: StageFigures) -> Figure:
     return Figure(title=f"Every {figures.word}", caption=caption, table=long_table(heads, rows))
 
 
-def _lead(run: StageRun, move: StageMoveRecord, *, labelled: bool) -> list[str]:
-    return [count(move.number), *([move.label] if labelled else []), f"{move.begin - run.time_ready:.3f}"]
-
-
 def _cells(motion: Motion) -> list[str | Cell]:
     """Cells of a motion, the last of which is left out where every rotor stands in its place."""
-    motor = motion.motor
+    motor, way = motion.motor, motion.motor.stop - motion.motor.start
+    look, side = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
+    arrow = Markup('<span class="arrow {}">{}</span> {}').format(look, side, stated(abs(way) * MM))
     return [
         motion.name,
         _place(motor.start),
         _place(motor.target),
-        _way_cell(motor.stop - motor.start),
+        Cell(text=arrow, nowrap=True),
         number(motion.seconds * 1e3),
         count(round(motor.peak_hz)),
         Cell(text=number(motor.peak_lag), over=motor.peak_lag >= PULL_OUT_LAG),
@@ -309,12 +302,6 @@ def _cells(motion: Motion) -> list[str | Cell]:
         Cell(text=number(motor.lost), over=motor.lost != 0),
         Cell(text=number(motion.off), over=motion.off != 0),
     ]
-
-
-def _way_cell(way: float) -> Cell:
-    look, side = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
-    arrow = Markup('<span class="arrow {}">{}</span> {}').format(look, side, stated(abs(way) * MM))
-    return Cell(text=arrow, nowrap=True)
 
 
 def _place(position: float) -> str:

@@ -104,7 +104,13 @@ def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[s
     if run.moves:
         rows.append(("time", f"{duration(figures.seconds)}, {figures.rate}"))
     if figures.steps:
-        rows += [("moving", _moving(figures)), ("lost steps", lost_text(figures))]
+        constant = f"at the constant start frequency {duration(figures.naive)}, {number(figures.faster)} times as long"
+        rows.append(("moving", f"{duration(figures.moving)}; {constant}"))
+        lost = "0"
+        if figures.first_lost:
+            by_motor = ", ".join(f"{name} {number(n)}" for name, n in run.lost.items() if n) or "0 in the end"
+            lost = f"{by_motor} (from move {count(figures.first_lost.move.number)} on),"
+        rows.append(("lost steps", f"{lost} of {count(figures.steps)}"))
     if lag := figures.lag:
         most = f"up to {steps(lag.value)} ({figures.whose(lag.of)})"
         rows.append(("rotor lag", f"{most}; falls out of step at {number(PULL_OUT_LAG)}"))
@@ -146,19 +152,3 @@ def steps(value: float) -> str:
 def margin_text(motion: Motion) -> str:
     """Write a torque margin; without friction and acceleration no torque is needed."""
     return number(motion.motor.margin) if math.isfinite(motion.motor.margin) else "any"
-
-
-def lost_text(figures: StageFigures) -> str:
-    """Steps lost, by motor where there are some."""
-    made = count(figures.steps)
-    if not figures.first_lost:
-        return f"0 of {made}"
-    by_motor = ", ".join(f"{name} {number(n)}" for name, n in figures.run.lost.items() if n) or "0 in the end"
-    return f"{by_motor} (from move {count(figures.first_lost.move.number)} on), of {made}"
-
-
-def _moving(figures: StageFigures) -> str:
-    return (
-        f"{duration(figures.moving)}; at the constant start frequency {duration(figures.naive)}, "
-        f"{number(figures.faster)} times as long"
-    )
