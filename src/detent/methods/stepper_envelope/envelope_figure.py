@@ -46,7 +46,11 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
         for table, colour in ((tables.up, BLUE), (tables.down, ORANGE)):
             _shade_zones(area, table, top)
             outside = _draw_table(area, table, colour) or outside
-            _name_direction(area, table, colour)
+            way, place = ("up →", 0.968) if table.direction > 0 else ("← down", 0.032)
+            area.text(
+                0.008, place, way, transform=area.transAxes, color=colour, fontsize=11, fontweight="bold", va="center",
+                bbox=LABEL,
+            )  # fmt: skip
         if outside:
             area.plot([], [], "--", color=INK, linewidth=0.9, label="permissible outside of the run")
         area.axhline(0, color=INK, linewidth=0.9)
@@ -56,7 +60,11 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
         area.xaxis.get_major_locator().set_params(integer=True)
         area.set_xlabel("position [step]")
         area.set_ylabel("permissible step frequency [Hz]")
-        _add_scales(area, tables)
+        # The same in mm and mm/s.
+        step, first = tables.travel_per_step / MM, tables.first_position / MM
+        area.secondary_xaxis("top", functions=_line(first, step)).set_xlabel("position [mm]")
+        per_step = format_quantity(tables.travel_per_step, "m", 4).replace("um", "µm")
+        area.secondary_yaxis("right", functions=_line(0.0, step)).set_ylabel(f"speed [mm/s], {per_step} a step")
         area.set_title(f"How fast may every step be? Motor {tables.motor}, axis {tables.axis}", pad=12)
         figure.legend(loc="outside lower center", ncols=2, fontsize=9)
 
@@ -101,17 +109,11 @@ def _corners(hz: Numbers, first: int) -> tuple[Numbers, NDArray[np.int64]]:
     return hz[begins], np.append(begins, len(hz)) + first
 
 
-def _name_direction(area: Axes, table: StepEnvelope, colour: str) -> None:
-    """Name the half and show which way the motor moves there."""
-    name = "up →" if table.direction > 0 else "← down"
-    area.text(
-        0.008, 0.5 + 0.468 * table.direction, name, transform=area.transAxes, color=colour, fontsize=11,
-        fontweight="bold", va="center", bbox=LABEL,
-    )  # fmt: skip
-
-
 def _mark_extremes(area: Axes, tables: EnvelopeTables) -> None:
-    """Points on the axis where a run begins, turns and ends, each named in its own half, outside of the run."""
+    """Points on the axis where a run begins, turns and ends, each named in its own half, outside of the run.
+
+    Names stand above or below (1, -1), and right or left of the point.
+    """
     up, down = tables.up, tables.down
     marks = [("start", up.start, (1, -1)), ("stop", down.stop, (-1, -1))]
     if up.start == down.stop:
@@ -119,30 +121,16 @@ def _mark_extremes(area: Axes, tables: EnvelopeTables) -> None:
     marks += [("stop", up.stop, (1, 1)), ("start", down.start, (-1, 1))]
     if up.stop == down.start:
         marks[-2:] = [("turn", up.stop, (1, 1))]
-    for name, place, towards in marks:
-        _mark(area, place / tables.steps, f"{name} {place}", towards)
-
-
-def _mark(area: Axes, place: float, text: str, towards: tuple[int, int]) -> None:
-    """One point at a part of the travel; `towards` is 1 or -1 for a name above or below, and right or left."""
-    vertical, side = towards
-    if not BESIDE < place < 1 - BESIDE:
-        side = 1 if place < 0.5 else -1
-    area.plot(place, 0, "o", color=INK, markersize=7, clip_on=False, zorder=5, transform=area.get_yaxis_transform())
-    area.annotate(
-        text, (place, 0), (4 * side, 8 * vertical), xycoords=area.get_yaxis_transform(), textcoords="offset points",
-        ha="left" if side > 0 else "right", va="bottom" if vertical > 0 else "top", fontsize=9, fontweight="bold",
-        bbox=LABEL, zorder=6,
-    )  # fmt: skip
-
-
-def _add_scales(area: Axes, tables: EnvelopeTables) -> None:
-    """The same in mm and mm/s."""
-    step, first = tables.travel_per_step / MM, tables.first_position / MM
-    above = area.secondary_xaxis("top", functions=_line(first, step))
-    above.set_xlabel("position [mm]")
-    right = area.secondary_yaxis("right", functions=_line(0.0, step))
-    right.set_ylabel(f"speed [mm/s], {format_quantity(tables.travel_per_step, 'm', 4).replace('um', 'µm')} a step")
+    across = area.get_yaxis_transform()
+    for name, place, (vertical, outer) in marks:
+        part = place / tables.steps
+        side = outer if BESIDE < part < 1 - BESIDE else 1 if part < 0.5 else -1
+        area.plot(part, 0, "o", color=INK, markersize=7, clip_on=False, zorder=5, transform=across)
+        area.annotate(
+            f"{name} {place}", (part, 0), (4 * side, 8 * vertical), xycoords=across, textcoords="offset points",
+            ha="left" if side > 0 else "right", va="bottom" if vertical > 0 else "top", fontsize=9, fontweight="bold",
+            bbox=LABEL, zorder=6,
+        )  # fmt: skip
 
 
 def _line(begin: float, slope: float) -> tuple[Callable[[Numbers], Numbers], Callable[[Numbers], Numbers]]:

@@ -25,8 +25,6 @@ LOOK = "display:block;width:100%;min-width:560px;height:auto;max-height:600px;fo
 LONG = 2.0  # a tile has its full colour when its way took so many times the median
 PALEST = 0.12  # share of the colour that a tile of the median has at least
 
-NICE = (1.0, 2.0, 5.0)
-
 SAME = 1e-7  # places that are nearer than this to one another are in one row or column [m]
 LONE = 1e-3  # side of a tile that stands alone [m]
 Place = tuple[float, float]  # to the right, and up in the picture [m]
@@ -40,11 +38,6 @@ class Tile:
     target: Place  # where the stage had to go
     place: Place  # and where its rotors stood in the end
     off: bool  # a rotor stood steps beside its place
-
-    @property
-    def lag(self) -> float:
-        """Largest distance of a rotor from its field on the way there [step]."""
-        return max((motor.peak_lag for motor in self.move.motors.values()), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +93,7 @@ def plan_drawing(plan: TilePlan) -> Markup:
         '<div class="scroll" tabindex="0"><svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}" style="{}">'
         "{}{}{}</svg></div>"
     ).format(
-        view.width, view.height, f"Plan of {count(len(tiles), 'tile')} in their order", LOOK, _scales(plan, view),
+        WIDTH, view.height, f"Plan of {count(len(tiles), 'tile')} in their order", LOOK, _scales(plan, view),
         Markup().join(_square(tile, view, usual) for tile in tiles), _path(plan, tiles, view),
     )  # fmt: skip
 
@@ -108,19 +101,17 @@ def plan_drawing(plan: TilePlan) -> Markup:
 def plan_legend(plan: TilePlan) -> Markup:
     """Say what the colours of the drawing mean."""
     usual = _usual(plan.tiles[:MOST_TILES])
-    swatches = [
-        (_look(usual, usual), f"{time_text(usual)}, the median, or less"),
-        (_look(LONG * usual, usual), f"{time_text(LONG * usual)} or more"),
-    ]
+    swatches = {
+        f"{time_text(usual)}, the median, or less": _look(usual, usual),
+        f"{time_text(LONG * usual)} or more": _look(LONG * usual, usual),
+    }
     if any(tile.off for tile in plan.tiles):
-        swatches.append(("fill:var(--bad)", "a rotor stood beside its place"))
-    items = Markup().join(
-        Markup(
-            '<span class="nowrap"><svg width="14" height="14" style="vertical-align:-2px"><rect x="1" y="1" width="12" '
-            'height="12" style="{};stroke:var(--speed)"/></svg> {}</span>'
-        ).format(look, text)
-        for look, text in swatches
+        swatches["a rotor stood beside its place"] = "fill:var(--bad)"
+    swatch = Markup(
+        '<span class="nowrap"><svg width="14" height="14" style="vertical-align:-2px"><rect x="1" y="1" width="12" '
+        'height="12" style="{};stroke:var(--speed)"/></svg> {}</span>'
     )
+    items = Markup().join(swatch.format(look, text) for text, look in swatches.items())
     return Markup('<div class="controls">Time of the way to a tile: {}</div>').format(items)
 
 
@@ -139,13 +130,13 @@ class _View:
         pitch = (across or up or LONE, up or across or LONE)
         spans = [max(places) - min(places) + one for places, one in zip((xs, ys), pitch, strict=True)]
         self.scale = min((WIDTH - 2 * MARGIN) / spans[0], (HEIGHT - 2 * MARGIN) / spans[1])
-        self.width, self.height = WIDTH, spans[1] * self.scale + 2 * MARGIN
+        self.height = spans[1] * self.scale + 2 * MARGIN
         self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
         self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
 
     def at(self, place: Place) -> Place:
         """Place in the drawing; up is to larger positions."""
-        x = self.width / 2 + (place[0] - self.middle[0]) * self.scale
+        x = WIDTH / 2 + (place[0] - self.middle[0]) * self.scale
         return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
 
 
@@ -163,8 +154,8 @@ def _look(seconds: float, usual: float) -> str:
 
 def _square(tile: Tile, view: _View, usual: float) -> Markup:
     (x, y), (width, height), move = view.at(tile.target), view.sides, tile.move
-    left, top = x - width / 2, y - height / 2
-    text = Markup()
+    left, top, text = x - width / 2, y - height / 2, Markup()
+    lag = max((motor.peak_lag for motor in move.motors.values()), default=0.0)
     if min(view.sides) >= LABELLED and move.label:
         # Above the path, which goes through the middle.
         ink = "card" if tile.off or move.seconds > (1 + LONG) / 2 * usual else "ink"
@@ -175,7 +166,7 @@ def _square(tile: Tile, view: _View, usual: float) -> Markup:
         '<g><title>{}</title><rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" '
         'style="{};stroke:var(--speed);stroke-width:.7"/>{}</g>'
     ).format(
-        f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(tile.lag)} steps",
+        f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(lag)} steps",
         left, top, width, height,
         "fill:var(--bad);fill-opacity:.8" if tile.off else _look(move.seconds, usual), text,
     )  # fmt: skip
@@ -198,8 +189,10 @@ def _path(plan: TilePlan, tiles: Sequence[Tile], view: _View) -> Markup:
 
 def _scales(plan: TilePlan, view: _View) -> Markup:
     """A bar for the scale, and the names of the motors along the edges."""
-    length = _nice(0.2 * view.width / view.scale)
-    x, y, bar = view.width - 12.0, view.height - 12.0, length * view.scale
+    wanted = 0.2 * WIDTH / view.scale
+    power = 10.0 ** math.floor(math.log10(wanted))
+    length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
+    x, y, bar = WIDTH - 12.0, view.height - 12.0, length * view.scale
     return Markup(
         '<g style="stroke:var(--soft);stroke-width:2"><path d="M{:.1f} {:.1f}H{:.1f}"/></g>'
         '<g style="fill:var(--soft)"><text x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>'
@@ -208,9 +201,3 @@ def _scales(plan: TilePlan, view: _View) -> Markup:
         x - bar, y, x, x - bar / 2, y - 6, f"{stated(length * 1e3)} mm", y, f"{plan.motors[0]} \u2192",
         f"\u2191 {plan.motors[1]}",
     )  # fmt: skip
-
-
-def _nice(wanted: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is not larger than what is wanted."""
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return max((step * power for step in NICE if step * power <= wanted), default=power)
