@@ -8,7 +8,7 @@ stepper-envelope specification 3.1, the constants of the winding, or points read
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, isfinite, pi, sqrt
+from math import hypot, pi, sqrt
 from typing import Protocol
 
 FIRST_HARMONIC = 4 / pi  # fundamental of a square wave of amplitude 1: full steps switch each coil so
@@ -28,9 +28,6 @@ class FirstOrderPullOut:
 
     torque: float  # pull-out torque at standstill T_po0 [N m]
     corner_hz: float  # step frequency at which it has fallen to 1/sqrt 2 [Hz]
-
-    def __post_init__(self) -> None:
-        above_zero(self, "torque", "corner_hz")
 
     def __call__(self, hz: float) -> float:
         """Pull-out torque at `hz` [N m]."""
@@ -57,9 +54,6 @@ class WindingPullOut:
     inductance: float  # per phase [H]
     teeth: float  # rotor teeth, a quarter of the steps per turn
 
-    def __post_init__(self) -> None:
-        above_zero(self, "holding_torque", "rated_current", "current", "supply", "resistance", "inductance", "teeth")
-
     @property
     def per_current(self) -> float:
         """Torque per current of one phase at its best angle [N m/A]."""
@@ -82,28 +76,11 @@ class MeasuredPullOut:
     hz: Sequence[float]
     torque: Sequence[float]  # pull-out torque at each [N m]
 
-    def __post_init__(self) -> None:
-        if len(self.hz) != len(self.torque) or len(self.hz) < 2:
-            raise ValueError(f"{len(self.hz)} frequencies and {len(self.torque)} torques, must be as many, at least 2")
-        if not all(isfinite(value) and value >= 0 for value in (*self.hz, *self.torque)):
-            raise ValueError("a point of the pull-out curve is not a number of 0 or more")
-        if not all(one < following for one, following in pairwise(self.hz)):
-            raise ValueError(f"the frequencies {list(self.hz)} Hz must rise")
-
     def __call__(self, hz: float) -> float:
         """Pull-out torque at `hz` [N m]."""
         if hz <= self.hz[0]:
             return self.torque[0]
-        points = zip(self.hz, self.torque, strict=True)
-        for (f0, t0), (f1, t1) in pairwise(points):
+        for (f0, t0), (f1, t1) in pairwise(zip(self.hz, self.torque, strict=True)):
             if hz <= f1:
                 return t0 + (t1 - t0) * (hz - f0) / (f1 - f0)
         return 0.0
-
-
-def above_zero(record: object, *names: str) -> None:
-    """Refuse attributes that are not numbers above 0."""
-    for name in names:
-        value = getattr(record, name)
-        if not (isfinite(value) and value > 0):
-            raise ValueError(f"{type(record).__name__}.{name} is {value}, must be above 0 and finite")

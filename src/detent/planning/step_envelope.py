@@ -108,8 +108,6 @@ class StepEnvelope:
                 f"the ramp has {len(ramp)} entries, must be {MAX_RAMP} or fewer; raise the acceleration or the start "
                 "frequency, or lower the largest frequency"
             )
-        if direction not in {1, -1}:
-            raise ValueError(f"direction is {direction}, must be 1 or -1")
         self.ramp, self.zones, self.direction, self.steps = ramp, zones, direction, zones.steps
         self._map = zones if direction > 0 else zones.mirrored()
         caps = np.array([ramp.index_of(hz) for hz in self._map.limits], np.int32)

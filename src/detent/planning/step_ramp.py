@@ -12,7 +12,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.planning.pull_out import PullOut, above_zero
+from detent.planning.pull_out import PullOut
 
 LEAST_GAIN_HZ = 0.5  # a ramp ends where a step gains less than this: the torque left over is used up
 MAX_HZ = 65535  # largest frequency in a 16-bit word
@@ -27,9 +27,6 @@ class StepperMotor:
     holding_torque: float  # peak of the static torque curve [N m]
     pull_out: PullOut  # pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`
     unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
-
-    def __post_init__(self) -> None:
-        above_zero(self, "steps_per_turn", "rotor_inertia", "holding_torque", "unloaded_start_hz")
 
     @property
     def step_angle(self) -> float:
@@ -46,13 +43,6 @@ class StepperLoad:
     spindle_inertia: float  # and coupling_inertia: [kg m^2]
     coupling_inertia: float  # [kg m^2]
     friction_torque: float  # Coulomb friction at the shaft [N m]
-
-    def __post_init__(self) -> None:
-        above_zero(self, "pitch")
-        for name in ("mass", "spindle_inertia", "coupling_inertia", "friction_torque"):
-            value = getattr(self, name)
-            if not 0 <= value < float("inf"):
-                raise ValueError(f"StepperLoad.{name} is {value}, must be 0 or more and finite")
 
     @property
     def inertia(self) -> float:
@@ -72,8 +62,6 @@ def total_inertia(motor: StepperMotor, load: StepperLoad) -> float:
 
 def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1) -> float:
     """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
-    if not safety >= 1:
-        raise ValueError(f"safety is {safety}, must be 1 or more")
     return motor.unloaded_start_hz / sqrt(1 + load.inertia / motor.rotor_inertia) / safety
 
 
@@ -81,10 +69,6 @@ def acceleration_limit(
     motor: StepperMotor, load: StepperLoad, max_acceleration: float, safety_factor: float = 2.0
 ) -> Callable[[float], float]:
     """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""
-    if not 0 < max_acceleration < float("inf"):
-        raise ValueError(f"max_acceleration is {max_acceleration} step/s^2, must be above 0 and finite")
-    if not safety_factor >= 1:
-        raise ValueError(f"safety_factor is {safety_factor}, must be 1 or more")
     per_torque = 1 / (total_inertia(motor, load) * motor.step_angle)
 
     def acceleration(hz: float) -> float:

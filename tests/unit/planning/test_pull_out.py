@@ -54,16 +54,3 @@ def test_points_are_joined_by_straight_lines_and_end():
     assert [curve(hz) for hz in (0, 100, 550, 1000, 1500, 2000, 2001)] == pytest.approx(
         [0.4, 0.4, 0.35, 0.3, 0.2, 0.1, 0.0]
     )
-
-
-def test_bad_figures_are_refused():
-    with pytest.raises(ValueError, match=r"FirstOrderPullOut\.corner_hz is 0"):
-        FirstOrderPullOut(0.045, 0)
-    with pytest.raises(ValueError, match=r"WindingPullOut\.supply is nan"):
-        WindingPullOut(0.4, 1.7, 1.7, math.nan, 1.5, 2.8e-3, 50)
-    with pytest.raises(ValueError, match="1 frequencies and 1 torques"):
-        MeasuredPullOut((1.0,), (1.0,))
-    with pytest.raises(ValueError, match="must rise"):
-        MeasuredPullOut((1.0, 1.0), (1.0, 1.0))
-    with pytest.raises(ValueError, match="not a number of 0 or more"):
-        MeasuredPullOut((1.0, 2.0), (1.0, -1.0))

@@ -130,7 +130,5 @@ def test_bad_tables_are_refused():
         ZoneMap(0, 500.0)
     with pytest.raises(ValueError, match="ramp has 2049 entries"):
         StepEnvelope(StepRamp(np.arange(1.0, MAX_RAMP + 2)), ZoneMap(40, 500.0))
-    with pytest.raises(ValueError, match="direction is 0"):
-        StepEnvelope(RAMP, ZoneMap(40, 500.0), 0)
     with pytest.raises(ValueError, match=r"position is 41, must be 0\.\.40"):
         StepEnvelope(RAMP, ZoneMap(40, 500.0)).move_stop(41)

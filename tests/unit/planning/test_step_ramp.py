@@ -7,8 +7,6 @@ from tests.stepper_rig import LOAD, MOTOR, Rig, heavier
 
 from detent.planning.pull_out import MeasuredPullOut
 from detent.planning.step_ramp import (
-    StepperLoad,
-    StepperMotor,
     acceleration_limit,
     make_ramp,
     natural_frequency,
@@ -80,21 +78,6 @@ def test_index_of_a_frequency():
 def test_bad_frequencies_are_refused(start, top):
     with pytest.raises(ValueError, match="start_hz is"):
         make_ramp(start, top, lambda _: 1.0)
-
-
-def test_bad_figures_are_refused():
-    with pytest.raises(ValueError, match=r"StepperMotor\.holding_torque is 0"):
-        StepperMotor(200, 9e-7, 0, MOTOR.pull_out, 900)
-    with pytest.raises(ValueError, match=r"StepperLoad\.pitch is -1"):
-        StepperLoad(-1, 0, 0, 0, 0)
-    with pytest.raises(ValueError, match=r"StepperLoad\.mass is nan"):
-        StepperLoad(1e-3, math.nan, 0, 0, 0)
-    with pytest.raises(ValueError, match="safety is 0"):
-        start_frequency(MOTOR, LOAD, 0.5)
-    with pytest.raises(ValueError, match="max_acceleration is 0"):
-        acceleration_limit(MOTOR, LOAD, 0)
-    with pytest.raises(ValueError, match=r"safety_factor is 0\.9"):
-        acceleration_limit(MOTOR, LOAD, 1, 0.9)
 
 
 @pytest.mark.compiled

@@ -21,7 +21,7 @@ from detent.methods.stepper_envelope.build import (
 )
 from detent.methods.stepper_envelope.rules import Motor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.planning.step_envelope import INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
+from detent.planning.step_envelope import StepEnvelope, envelope_memory
 from detent.planning.step_ramp import natural_frequency, total_inertia
 from detent.units import format_quantity
 
@@ -101,12 +101,7 @@ class MotorFigures(Motor):
     @cached_property
     def travel_time(self) -> float:
         """Time from end to end, upwards, zones included [s]."""
-        zones = zone_maps(self.table)[0]
-        # A travel has millions of steps and few different entries; the last one is the sentinel.
-        many = np.bincount(StepEnvelope(self.ramp, zones).entries[:-1])
-        entries = np.flatnonzero(many)
-        hz = np.minimum(self.ramp.hz[entries & INDEX_MASK], np.array(zones.limits)[entries >> INDEX_BITS])
-        return float(np.sum(many[entries] / hz))
+        return float(np.sum(1 / StepEnvelope(self.ramp, zone_maps(self.table)[0]).permissible_hz()))
 
     def rounding(self, clock: float, words: str) -> float:
         """Largest relative error of the ramp's frequencies, stored as `words` and made by a timer's clock [Hz]."""

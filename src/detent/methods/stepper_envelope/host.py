@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from detent.control.step_rule import FAULT, acknowledge, deflect, release, start_move
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
 from detent.methods.stepper_envelope.controller import NOWHERE, call_at
-from detent.methods.stepper_envelope.machine import Stage, StageMotor
+from detent.methods.stepper_envelope.machine import Stage
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
-from detent.planning.step_envelope import StepEnvelope
 from detent.record.machine import AnyRecorder
 from detent.units import format_quantity
 
@@ -59,7 +58,7 @@ class StageHost:
             motor = self.stage.motors[name]
             via = leg.target if leg.turn is None else leg.turn
             heading = 1 if via > leg.start else -1
-            first, second = _tables(motor, heading)
+            first, second = motor.along(heading)
             first.move_start(leg.start)
             first.move_stop(via)
             if leg.turn is not None:
@@ -76,9 +75,9 @@ class StageHost:
             if rule.state == FAULT:
                 raise AxisError(f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}")
             if name in late:
+                late_after = format_quantity(limit, "s")
                 raise AxisError(
-                    f"motor {name}: did not come to rest within {format_quantity(limit, 's')}; look at its table in "
-                    "the report"
+                    f"motor {name}: did not come to rest within {late_after}; look at its table in the report"
                 )
 
     def _slowest(self, name: str) -> float:
@@ -86,23 +85,21 @@ class StageHost:
         motor = self.stage.motors[name]
         return min(float(motor.tables.ramp.hz[0]), *motor.tables.up.zones.limits)
 
-    def run(self, move: StageMove) -> tuple[dict[str, Leg], set[str]]:
-        """Make one move up to rest: what each motor did, and which of them could not stop where they were told to."""
-        legs = self.legs(move)
+    def run(self, move: StageMove) -> tuple[dict[str, Leg], bool]:
+        """Make one move up to rest: what each motor did, and whether it could not stop where it was told to."""
+        legs, over = self.legs(move), False
         self.start(legs)
-        over: set[str] = set()
-        if move.change is not None and legs:
-            (name,) = legs
-            if self._change(name, move.change.at, move.change.to):
-                over.add(name)
+        if move.change is not None:
+            for name in legs:  # it is the only one
+                over = self._change(name, move.change.at, move.change.to)
         self.wait(legs)
         if over:  # the stop it was given lay behind the nearest possible one: come back to it
-            (name,) = over
-            motor = self.stage.motors[name]
-            back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
-            if back[name].steps:
-                self.start(back)
-                self.wait(back)
+            for name in legs:
+                motor = self.stage.motors[name]
+                back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
+                if back[name].steps:
+                    self.start(back)
+                    self.wait(back)
         return legs, over
 
     def _change(self, name: str, at: float, to: float) -> bool:
@@ -115,7 +112,7 @@ class StageHost:
         if late or motor.resting:
             return False
         acknowledge(rule)
-        ahead, behind = _tables(motor, rule.direction)
+        ahead, behind = motor.along(rule.direction)
         edit = ahead.move_stop(motor.table.step_inside(to), rule.position, rule.index)
         behind.move_start(edit.stop)
         self.goal[name] = to
@@ -129,9 +126,11 @@ class StageHost:
             lower, upper = (0, motor.table.steps) if table.direction > 0 else (motor.table.steps, 0)
             table.move_start(lower)
             table.move_stop(upper)
-        last = len(motor.tables.ramp) - 1
-        rule, word = motor.controller.rule, self._word(abs(jog.speed), motor.table)
-        deflect(motor.p.controller.rule, rule, word, last, heading)
+        # A timer word on the slower side.
+        hz, rule = motor.table.hz(abs(jog.speed)), motor.controller.rule
+        reload = self.spec.controller.words == "reload"
+        word = math.ceil(self.spec.controller.timer / hz - 1e-9) if reload else math.floor(hz + 1e-9)
+        deflect(motor.p.controller.rule, rule, word, len(motor.tables.ramp) - 1, heading)
         self.stage.pass_time(jog.duration)
         release(rule)
         if not motor.resting:
@@ -139,68 +138,51 @@ class StageHost:
         self.goal[jog.motor] = motor.place
         return Leg(start, motor.position)
 
-    def _word(self, speed: float, table: StepperTable) -> int:
-        """Timer word of a speed, rounded to the slower side."""
-        hz = table.hz(speed)
-        if self.spec.controller.words == "reload":
-            return math.ceil(self.spec.controller.timer / hz - 1e-9)
-        return math.floor(hz + 1e-9)
-
-
-def _tables(motor: StageMotor, heading: int) -> tuple[StepEnvelope, StepEnvelope]:
-    """Table of the direction of motion, and of the other one."""
-    up, down = motor.tables.up, motor.tables.down
-    return (up, down) if heading > 0 else (down, up)
-
 
 def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
     """Refuse what the axis cannot be told to do, before anything moves."""
-    problems = list(_job_problems(spec, job))
-    if problems:
-        raise InputError(problems)
-
-
-def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[FileProblem]:
+    problems: list[FileProblem] = []
     goal = {name: table.mechanics.start_position for name, table in spec.stepper.items()}
     for move in job.moves:
-        for name in move.motors:
-            if name not in spec.stepper:
-                came = f"the motor {name}"
-                yield FileProblem(job.name, move.row, 1, name, came, f"one of {', '.join(spec.stepper)}", "rename it")
-                return
+        unknown = next((name for name in move.motors if name not in spec.stepper), None)
+        if unknown is not None:
+            came, allowed = f"the motor {unknown}", f"one of {', '.join(spec.stepper)}"
+            problems.append(FileProblem(job.name, move.row, 1, unknown, came, allowed, "rename it"))
+            break
         if isinstance(move, StageJog):
-            yield from _jog_problems(spec, job, move)
+            problems += _jog_problems(spec.stepper[move.motor], job, move)
             # Where a manual run ends is not known before it is made.
             goal[move.motor] = math.nan
             continue
         for name in move.motors:
             goal[name] = move.targets[name] if name in move.targets else goal[name] + move.by[name]
-            places = [goal[name]] + [place for place in (move.turn,) if place is not None]
+            places = [goal[name], move.turn]
             if move.change is not None:
                 places += [move.change.at, move.change.to]
                 goal[name] = move.change.to
             for place in places:
-                yield from _place_problems(spec.stepper[name], (job.name, move.row, name), place)
+                if place is not None:
+                    problems += _place_problems(spec.stepper[name], (job.name, move.row, name), place)
+    if problems:
+        raise InputError(problems)
 
 
 def _place_problems(table: StepperTable, where: tuple[str, int, str], place: float) -> Iterator[FileProblem]:
+    """What is wrong with a place, of the file, line and motor `where`."""
     # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.
     end = max(table.steps * table.step, table.limits.travel) + table.step / 2
-    if math.isnan(place) or -table.step / 2 <= place - table.mechanics.lower_end <= end:
-        return
-    lower, upper = format_quantity(table.mechanics.lower_end, "m"), format_quantity(table.upper_end, "m")
-    nearest = lower if place < table.mechanics.lower_end else upper
-    file, row, name = where
-    remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
-    came = f"the position {format_quantity(place, 'm', 6)}"
-    yield FileProblem(file, row, 1, name, came, f"from {lower} to {upper}", remedy)
+    if not math.isnan(place) and not -table.step / 2 <= place - table.mechanics.lower_end <= end:
+        lower, upper = format_quantity(table.mechanics.lower_end, "m"), format_quantity(table.upper_end, "m")
+        nearest = lower if place < table.mechanics.lower_end else upper
+        file, row, name = where
+        remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
+        came = f"the position {format_quantity(place, 'm', 6)}"
+        yield FileProblem(file, row, 1, name, came, f"from {lower} to {upper}", remedy)
 
 
-def _jog_problems(spec: StepperEnvelopeSpec, job: StageJob, jog: StageJog) -> Iterator[FileProblem]:
-    table = spec.stepper[jog.motor]
-    least, most = table.hz(table.step), table.max_hz
-    if not 1.0 <= table.hz(abs(jog.speed)) <= most * (1 + 1e-9):
+def _jog_problems(table: StepperTable, job: StageJob, jog: StageJog) -> Iterator[FileProblem]:
+    if not 1.0 <= table.hz(abs(jog.speed)) <= table.max_hz * (1 + 1e-9):
         came, top = format_quantity(jog.speed, "m/s"), format_quantity(table.limits.speed, "m/s")
-        slowest = format_quantity(least * table.step, "m/s")
+        slowest = format_quantity(table.step, "m/s")
         remedy = f"write {top}, or correct limits.speed"
         yield FileProblem(job.name, jog.row, 1, "speed", came, f"{slowest} to {top}, either way", remedy)

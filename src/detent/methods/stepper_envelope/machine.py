@@ -18,9 +18,8 @@ from detent.methods.stepper_envelope.build import MotorTables, build_stepper, in
 from detent.methods.stepper_envelope.compared import take_over
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.system import Stepper, switch_on, tables
+from detent.planning.step_envelope import StepEnvelope
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder
-
-_NO_ROWS = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
 
 
 def stage_registers(spec: StepperEnvelopeSpec) -> type[Registers]:
@@ -31,11 +30,11 @@ def stage_registers(spec: StepperEnvelopeSpec) -> type[Registers]:
 @cache
 def _registers_of(names: tuple[str, ...]) -> type[Registers]:
     """One class per set of names; it has the layout of a record, the motors themselves live apart."""
-    fields: dict[str, Any] = {"tick": register("time steps of the rotors since power-on", unit="tick")}
-    fields |= {name: block(f"motor {name}") for name in names}
-    hints: dict[str, Any] = {"tick": i8} | dict.fromkeys(names, Stepper)
     # The base's metaclass reads these to lay the structure out.
-    body = {"__module__": __name__, "__doc__": "Registers of a stage.", "__annotations__": hints, **fields}
+    body: dict[str, Any] = {"__module__": __name__, "__doc__": "Registers of a stage."}
+    body["__annotations__"] = {"tick": i8} | dict.fromkeys(names, Stepper)
+    body["tick"] = register("time steps of the rotors since power-on", unit="tick")
+    body |= {name: block(f"motor {name}") for name in names}
     make: Any = type(Registers)
     return make("Stage", (Registers,), body)
 
@@ -52,9 +51,8 @@ class StageMotor:
         switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.plant.rotor.step_angle)
         self.controller: Any = self.r.controller
         self.feed: tuple[Any, ...] = tables(self.tables.up.entries, self.tables.down.entries)
-        self.rows, self.picks = _NO_ROWS
-        self.rested = 0.0
-        """When its last step was over [s], at the last event."""
+        self.rows, self.picks = np.zeros((1, 1), np.uint8), np.zeros(0, np.int64)  # no record of it
+        self.rested = 0.0  # when its last step was over [s], at the last event
 
     @property
     def position(self) -> int:
@@ -66,6 +64,11 @@ class StageMotor:
         """The same as a length [m]."""
         return self.table.position_of(self.position)
 
+    def along(self, heading: int) -> tuple[StepEnvelope, StepEnvelope]:
+        """Table of a direction of motion, and of the other one."""
+        up, down = self.tables.up, self.tables.down
+        return (up, down) if heading > 0 else (down, up)
+
     @property
     def resting(self) -> bool:
         """True when it stands and no start waits to be taken."""
@@ -75,10 +78,8 @@ class StageMotor:
     def compare(self, method: int, way: range, start_hz: float) -> None:
         """Let a method of `control.step_comparison` drive, upwards over a way [step]."""
         acceleration = self.table.limits.acceleration / self.table.step
-        zones = self.tables.up.zones
-        self.p, self.r = take_over(
-            self.p, self.r, zones, way, method=method, start_hz=start_hz, acceleration=acceleration
-        )
+        run: Any = {"method": method, "start_hz": start_hz, "acceleration": acceleration}
+        self.p, self.r = take_over(self.p, self.r, self.tables.up.zones, way, **run)
         self.controller, self.feed = self.r.controller, ()
 
     def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
@@ -101,19 +102,14 @@ class Stage:
         self.spec, self.tick, self.recorder = spec, instant(spec), recorder
         self.motors = {name: StageMotor(spec, name) for name in spec.stepper}
         self.instant = 0
-        self._columns: dict[str, Any] = {}
-        if recorder is not None:
-            self._divide(recorder)
-
-    def _divide(self, recorder: AnyRecorder) -> None:
-        """Give each motor the columns of the record that are its own."""
-        for field in stage_registers(self.spec).__fields__.values():
-            if field.block is None:
+        self._every = 0 if recorder is None else recorder.every
+        self._columns: dict[str, Any] = {}  # of the record, by the motor that they are of
+        for field in stage_registers(spec).__fields__.values():
+            if recorder is None or field.block is None:
                 continue
             end = field.offset + ctypes.sizeof(field.block)
             columns = np.flatnonzero((recorder.picks >= field.offset) & (recorder.picks < end))
-            motor = self.motors[field.name]
-            self._columns[field.name] = columns
+            motor, self._columns[field.name] = self.motors[field.name], columns
             motor.picks = np.ascontiguousarray(recorder.picks[columns] - field.offset)
             motor.rows = np.zeros((len(recorder.rows), len(columns)), np.uint8)
 
@@ -133,9 +129,9 @@ class Stage:
         waiting, end = set(names), self.instant + round(seconds / self.tick)
         reached = self.instant
         while waiting and self.instant < end:
-            stop, every = min(end, self.instant + self._room()), self._every()
+            stop = min(end, self.instant + self._room())
             for name in sorted(waiting):
-                if self.motors[name].advance_to(stop, every, until_event=True):
+                if self.motors[name].advance_to(stop, self._every, until_event=True):
                     waiting.discard(name)
                     reached = max(reached, int(self.motors[name].r.tick))
             self._bring_to(stop if waiting else max(reached, self.instant))
@@ -145,14 +141,10 @@ class Stage:
         """Instants that may pass before the record must be handed on."""
         return LONGEST_STRETCH if self.recorder is None else self.recorder.room(self.instant)
 
-    def _every(self) -> int:
-        return 0 if self.recorder is None else self.recorder.every
-
     def _bring_to(self, at: int) -> None:
         """Bring all motors to an instant that none of them has passed."""
-        every = self._every()
         for motor in self.motors.values():
-            motor.advance_to(at, every, until_event=False)
+            motor.advance_to(at, self._every, until_event=False)
         self.instant = at
         if self.recorder is not None and self.recorder.room(at) <= 0:
             self._flush(self.recorder)

@@ -190,20 +190,14 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
         plant = stage.motors[name].r.plant
         plant.rotor.peak_lag = abs(plant.rotor.lag)
         plant.gauge.peak_hz, plant.gauge.outside = 0.0, stage.instant
-    over: set[str] = set()
-    if isinstance(move, StageJog):
-        legs = {move.motor: host.jog(move)}
-    else:
-        legs, over = host.run(move)
+    legs, over = ({move.motor: host.jog(move)}, False) if isinstance(move, StageJog) else host.run(move)
     arrived = {name: stage.motors[name].rested for name in legs}
     stage.pass_time(stage.spec.controller.settle_time)
     ready = stage.time
-    motors = {
-        name: _observe(host, name, leg, before[name], arrived=arrived[name], over=name in over)
-        for name, leg in legs.items()
-    }
-    for name, motor in motors.items():
-        result.lost[name] += motor.lost
+    motors: dict[str, MotorMove] = {}
+    for name, leg in legs.items():
+        motors[name] = _observe(host, name, leg, before[name], arrived=arrived[name], over=over)
+        result.lost[name] += motors[name].lost
     stage.pass_time(move.dwell)
     return StageMoveRecord(move.number, move.label, begin, ready, stage.time, motors)
 
@@ -219,6 +213,8 @@ def _observe(  # noqa: PLR0913 - what the host knows of the motion
     """What a look at the rotor tells after a motion."""
     motor = host.stage.motors[name]
     plant, table = motor.r.plant, motor.table
+    # The part of the ramp that the motion went up and down.
+    used = motor.tables.ramp.hz[: motor.tables.ramp.index_of(float(plant.gauge.peak_hz)) + 1]
     pulses, lost = (now - then for now, then in zip(_counted(motor), before, strict=True))
     return MotorMove(
         start=table.position_of(leg.start),
@@ -232,17 +228,10 @@ def _observe(  # noqa: PLR0913 - what the host knows of the motion
         rest_lag=float(plant.rotor.lag),
         peak_lag=float(plant.rotor.peak_lag),
         peak_hz=float(plant.gauge.peak_hz),
-        margin=_margin(motor),
+        margin=float(torque_margin(stepper_motor(table), stepper_load(table), used).min()),
         overrun=over,
         naive=pulses / start_hz(table),
     )
-
-
-def _margin(motor: StageMotor) -> float:
-    """Smallest torque margin on the part of the ramp that the motion went up and down."""
-    ramp = motor.tables.ramp
-    used = ramp.hz[: ramp.index_of(float(motor.r.plant.gauge.peak_hz)) + 1]
-    return float(torque_margin(stepper_motor(motor.table), stepper_load(motor.table), used).min())
 
 
 def _verdict(spec: StepperEnvelopeSpec, result: StageRun) -> str:

@@ -6,7 +6,6 @@ from `mechanics.lower_end`, upwards.
 """
 
 import math
-from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
@@ -243,11 +242,6 @@ class StepperEnvelopeSpec(AxisSpec, frozen=True):
     axis: StepperAxisTable
     controller: ControllerTable = Field(default_factory=ControllerTable)
     stepper: dict[str, StepperTable] = named("a motor by its name", MOTOR_NAME, min_length=1, max_length=MOST_MOTORS)
-
-    def motors(self) -> Iterator[tuple[str, StepperTable, str]]:
-        """Each motor: its name, its table, and the beginning of its keys, such as ``stepper.x``."""
-        for name, table in self.stepper.items():
-            yield name, table, f"stepper.{name}"
 
 
 def fill_derived(spec: StepperEnvelopeSpec) -> StepperEnvelopeSpec:

@@ -13,7 +13,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, cast
 
-from detent.errors import InputError
 from detent.files.read import read_tables
 from detent.files.read_csv import Column, CsvRows, split_heading
 from detent.files.source import parse_source
@@ -43,11 +42,6 @@ def load_stage_job(path: str | PathLike[str], motors: Sequence[str]) -> StageJob
     """Read the job of a stepper stage with these motors; whether the axis can do it is not checked here."""
     file = Path(path)
     text = read_text(file, (".csv", ".toml"), "a list of places (.csv) or of moves (.toml)")
-    taken = [motor for motor in motors if motor in PlaceRow.known()]
-    if taken:
-        came = f'an axis with a motor named "{taken[0]}"'
-        allowed = f"motors that are not named as words of a job: {', '.join(PlaceRow.known())}"
-        raise InputError.of_file(str(file), came, allowed, "rename the motor in the axis file")
     repeat, kind, notes = 1, "moves", ()
     if file.suffix.lower() == ".csv":
         table = PlaceRows(str(file), text, stage_row(tuple(motors), PlaceRow))

@@ -44,10 +44,6 @@ def test_motors_and_zones_keep_the_order_of_the_file(load_text, good_text):
     spec = load_text(good_text).spec
     assert list(spec.stepper) == ["group_a", "group_b"]
     assert list(spec.stepper["group_a"].zone) == ["near", "far"]
-    assert [(name, key) for name, _, key in spec.motors()] == [
-        ("group_a", "stepper.group_a"),
-        ("group_b", "stepper.group_b"),
-    ]
     assert spec.stepper["group_b"].zone["fine"].direction == "both"
 
 

@@ -411,13 +411,6 @@ def test_file_in_another_encoding_or_not_there(write):
     assert told(refusal("absent.csv")) == [(0, 0, "", "no such file")]
 
 
-@pytest.mark.parametrize("name", ["job.csv", "job.toml"])
-def test_motor_that_is_named_as_a_word_of_the_files(write, name):
-    (problem,) = refusal(write(name, "#"), ("x", "dwell"))
-    assert problem.came == 'an axis with a motor named "dwell"'
-    assert problem.remedy == "rename the motor in the axis file"
-
-
 # -- the examples, and real scans ---------------------------------------------------------------------------
 
 
