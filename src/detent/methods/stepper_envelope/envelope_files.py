@@ -7,22 +7,21 @@ from the same declarations, so firmware and simulation cannot drift apart. Its t
 import csv
 import ctypes
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from string import Template
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
 from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
-from detent.kernel.registers import Registers
+from detent.kernel.registers import Field
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -36,11 +35,6 @@ CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
 METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
-
-CODES = (
-    "REST", "ACCEL", "CRUISE", "DECEL", "TURN", "FAULT", "INFEASIBLE", "OUT_OF_RANGE", "IDLE", "STEP", "PAUSE",
-)  # fmt: skip
-"""Names of `control.step_rule` that the header has too."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,30 +58,25 @@ class EnvelopeTables:
         """N, steps of the whole travel."""
         return self.up.steps
 
-    def ramp_words(self) -> Words:
-        """Word of each ramp index as the control unit holds it, shape (L,) [Hz, or tick with reload words]."""
-        return np.array(self._loaded().rule.ramp[: len(self.up.ramp)], np.int64)
+    def words(self) -> tuple[Words, Words]:
+        """Word of each ramp index, shape (L,), and of each zone limit, shape (Z,), as the control unit holds them.
 
-    def limit_words(self) -> Words:
-        """Word of each zone limit as the control unit holds it, shape (Z,) [Hz, or tick with reload words]."""
-        return np.array(self._loaded().rule.limit[: len(self.up.zones.limits)], np.int64)
+        They are frequencies [Hz], or with reload words periods [tick].
+        """
+        p, limits = StepperControllerParams(), self.up.zones.limits
+        load_rule(p, self.up.ramp, limits, self.clock_hz, reload=self.reload)
+        return np.array(p.rule.ramp[: len(self.up.ramp)], np.int64), np.array(p.rule.limit[: len(limits)], np.int64)
 
     @property
     def word_bytes(self) -> int:
         """Memory of a word of the ramp list or of a zone limit in firmware: 2, or 4 where a period needs it."""
-        return 2 if max(*self.ramp_words(), *self.limit_words()) <= 0xFFFF else 4
+        return 2 if max(words.max() for words in self.words()) <= 0xFFFF else 4
 
     def periods(self, table: StepEnvelope) -> Words:
         """Period that the timer loads for every step i of one of the tables, 0 at a sentinel, shape (N,) [tick]."""
         slower = np.maximum if self.reload else np.minimum
-        words = table.of_steps(self.ramp_words(), self.limit_words(), slower)
+        words = table.of_steps(*self.words(), slower)
         return words if self.reload else np.where(words, (self.clock_hz + words // 2) // np.maximum(words, 1), 0)
-
-    def _loaded(self) -> StepperControllerParams:
-        """Parameters of the motor's control unit, as a simulation has them."""
-        p = StepperControllerParams()
-        load_rule(p, self.up.ramp, self.up.zones.limits, self.clock_hz, reload=self.reload)
-        return p
 
 
 # ---- CSV
@@ -138,61 +127,36 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
 
 
 def _header(tables: EnvelopeTables) -> str:
-    ramp, limit = tables.ramp_words(), tables.limit_words()
-    title = f'Stepper envelope of motor "{tables.motor}", axis "{tables.axis}": tables and step rule in C99.'
+    environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True)  # noqa: S701 - C
+    environment.filters |= {"comment": _comment, "numbers": _numbers, "unit": _unit, "metres": _metres}
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
-    return Template(template).substitute(
+    ramp, limit = tables.words()
+    memory = envelope_memory(tables.up.ramp, tables.up.zones)
+    return environment.from_string(template).render(
+        tables=tables,
         motor=tables.motor,
         MOTOR=tables.motor.upper(),
-        title=_comment(title),
         version=__version__,
-        facts="\n".join(_facts(tables)),
-        steps=tables.steps,
-        up_start=tables.up.start,
-        up_stop=tables.up.stop,
-        down_start=tables.down.start,
-        down_stop=tables.down.stop,
-        ramp_length=len(ramp),
-        limit_length=len(limit),
-        clock_hz=tables.clock_hz,
-        reload=int(tables.reload),
-        pause=tables.pause,
-        word_unit="periods of the timer [tick]" if tables.reload else "frequencies [Hz]",
-        word_type="uint16_t" if tables.word_bytes == 2 else "int32_t",
+        ramp=ramp,
+        limit=limit,
+        limits=[f"{hz:g} Hz" for hz in tables.up.zones.limits],
+        table_bytes=memory.tables + 2 * ENTRY_BYTES,
+        register_bytes=ctypes.sizeof(StepRule) + ctypes.sizeof(StepTimer),
+        compact=memory.compact,
         index_mask=f"0x{INDEX_MASK:04X}",
         index_bits=INDEX_BITS,
-        rule_registers=_members(StepRule),
-        timer_registers=_members(StepTimer),
-        ramp=_numbers(ramp),
-        limit=_numbers(limit),
-        up=_numbers(tables.up.entries),
-        down=_numbers(tables.down.entries),
-        **{name: getattr(step_rule, name) for name in CODES},
+        rule=StepRule,
+        timer=StepTimer,
+        code=step_rule,
     )
 
 
-def _facts(tables: EnvelopeTables) -> Iterator[str]:
-    """What the numbers below mean, one fact per line of the opening comment."""
-    up, down, step = tables.up, tables.down, tables.travel_per_step
-    ramp, limits = up.ramp, up.zones.limits
-    memory = envelope_memory(ramp, up.zones)
-    lists = tables.word_bytes * (len(ramp) + len(limits))
-    registers = ctypes.sizeof(StepRule) + ctypes.sizeof(StepTimer)
-    first = format_quantity(tables.first_position, "m", 6)
-    travel = format_quantity(tables.steps * step, "m", 6)
-    rows = {
-        "Travel": f"{tables.steps} steps of {format_quantity(step, 'm', 6)}: {travel}; boundary 0 lies at {first}",
-        "Up": f"leaves {up.start}, stops at {up.stop}",
-        "Down": f"leaves {down.start}, stops at {down.stop}",
-        "Ramp": f"{len(ramp)} entries, {ramp.hz[0]:.6g} Hz to {ramp.hz[-1]:.6g} Hz",
-        "Limits": ", ".join(f"{hz:g} Hz" for hz in limits),
-        "Words": f"{'periods [tick]' if tables.reload else 'frequencies [Hz]'} of a timer at {tables.clock_hz} Hz",
-        "Memory": f"tables {memory.tables + 2 * ENTRY_BYTES} bytes, ramp and limits {lists}, registers {registers}",
-    }
-    if memory.compact:
-        rows["Memory"] += f"; with 8-bit ramp indices and no zone numbers a table would take {memory.compact}"
-    for name, text in rows.items():
-        yield _comment(text, f"{name:<7} ")
+def _metres(value: float) -> str:
+    return format_quantity(value, "m", 6)
+
+
+def _unit(field: Field) -> str:
+    return f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
 
 
 def _comment(text: str, heading: str = "") -> str:
@@ -201,16 +165,6 @@ def _comment(text: str, heading: str = "") -> str:
     safe = re.sub(r"[*](?=/)|/(?=[*])", r"\g<0> ", printable).replace("??", "? ?")
     lines = wrap(safe, LINE - len(heading)) or [""]
     return "\n".join(f" * {heading if row == 0 else ' ' * len(heading)}{line}" for row, line in enumerate(lines))
-
-
-def _members(registers: type[Registers]) -> str:
-    """Members of the C structure of a register file, each with its meaning."""
-    lines: list[str] = []
-    for field in registers.__fields__.values():
-        width: Any = field.width
-        unit = f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
-        lines.append(f"    {width.c_name} {field.name}; /* {field.doc}{unit} */")
-    return "\n".join(lines)
 
 
 def _numbers(values: NDArray[Any]) -> str:
