@@ -3,9 +3,12 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from statistics import median
+from typing import Any
 
+from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
 from detent.methods.stepper_envelope.comparison import time_text
@@ -18,9 +21,6 @@ WIDTH, HEIGHT = 1000.0, 560.0  # most room that the drawing takes, in its own un
 MARGIN = 46.0  # room around the tiles, for their halves and the scales
 MOST_TILES = 2000  # tiles that are drawn: more are smaller than a dot
 LABELLED = 22.0  # side of a tile from which on its name is written inside
-
-LOOK = "display:block;width:100%;min-width:560px;height:auto;max-height:600px;font:12px system-ui,sans-serif"
-"""Style of the whole drawing."""
 
 LONG = 2.0  # a tile has its full colour when its way took so many times the median
 PALEST = 0.12  # share of the colour that a tile of the median has at least
@@ -87,15 +87,9 @@ def tile_plan(figures: StageFigures) -> TilePlan | None:
 
 def plan_drawing(plan: TilePlan) -> Markup:
     """Draw the tiles and the path of the stage, to scale."""
-    tiles = plan.tiles[:MOST_TILES]
-    view, usual = _View(tiles), _usual(tiles)
-    return Markup(
-        '<div class="scroll" tabindex="0"><svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}" style="{}">'
-        "{}{}{}</svg></div>"
-    ).format(
-        WIDTH, view.height, f"Plan of {count(len(tiles), 'tile')} in their order", LOOK, _scales(plan, view),
-        Markup().join(_square(tile, view, usual) for tile in tiles), _path(plan, tiles, view),
-    )  # fmt: skip
+    view = _View(plan)
+    about = f"Plan of {count(len(view.squares), 'tile')} in their order"
+    return Markup(_macros().drawing(view, plan.motors, about))  # noqa: S704 - the template escapes
 
 
 def plan_legend(plan: TilePlan) -> Markup:
@@ -107,37 +101,18 @@ def plan_legend(plan: TilePlan) -> Markup:
     }
     if any(tile.off for tile in plan.tiles):
         swatches["a rotor stood beside its place"] = "fill:var(--bad)"
-    swatch = Markup(
-        '<span class="nowrap"><svg width="14" height="14" style="vertical-align:-2px"><rect x="1" y="1" width="12" '
-        'height="12" style="{};stroke:var(--speed)"/></svg> {}</span>'
-    )
-    items = Markup().join(swatch.format(look, text) for text, look in swatches.items())
-    return Markup('<div class="controls">Time of the way to a tile: {}</div>').format(items)
+    return Markup(_macros().legend(swatches))  # noqa: S704 - the template escapes
+
+
+@cache
+def _macros() -> Any:
+    loader = PackageLoader("detent.methods.stepper_envelope", "")
+    return Environment(loader=loader, autoescape=True).get_template("stage_plan.html.j2").module
 
 
 def _usual(tiles: Sequence[Tile]) -> float:
     """Median time of the way to a tile [s]."""
     return median(tile.move.seconds for tile in tiles) or 1.0
-
-
-class _View:
-    """From metres to places in the drawing, the same scale both ways."""
-
-    def __init__(self, tiles: Sequence[Tile]) -> None:
-        xs, ys = ([tile.target[axis] for tile in tiles] for axis in (0, 1))
-        across, up = _pitch(xs), _pitch(ys)
-        # Tiles of a single row or column are squares.
-        pitch = (across or up or LONE, up or across or LONE)
-        spans = [max(places) - min(places) + one for places, one in zip((xs, ys), pitch, strict=True)]
-        self.scale = min((WIDTH - 2 * MARGIN) / spans[0], (HEIGHT - 2 * MARGIN) / spans[1])
-        self.height = spans[1] * self.scale + 2 * MARGIN
-        self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
-        self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
-
-    def at(self, place: Place) -> Place:
-        """Place in the drawing; up is to larger positions."""
-        x = WIDTH / 2 + (place[0] - self.middle[0]) * self.scale
-        return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
 
 
 def _pitch(places: Sequence[float]) -> float:
@@ -152,52 +127,43 @@ def _look(seconds: float, usual: float) -> str:
     return f"fill:var(--speed);fill-opacity:{PALEST + (0.85 - PALEST) * share:.2f}"
 
 
-def _square(tile: Tile, view: _View, usual: float) -> Markup:
-    (x, y), (width, height), move = view.at(tile.target), view.sides, tile.move
-    left, top, text = x - width / 2, y - height / 2, Markup()
-    lag = max((motor.peak_lag for motor in move.motors.values()), default=0.0)
-    if min(view.sides) >= LABELLED and move.label:
-        # Above the path, which goes through the middle.
-        ink = "card" if tile.off or move.seconds > (1 + LONG) / 2 * usual else "ink"
-        text = Markup('<text x="{:.1f}" y="{:.1f}" style="fill:var(--{})">{}</text>').format(
-            left + 4, top + 13, ink, move.label[:6]
-        )
-    return Markup(
-        '<g><title>{}</title><rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" '
-        'style="{};stroke:var(--speed);stroke-width:.7"/>{}</g>'
-    ).format(
-        f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(lag)} steps",
-        left, top, width, height,
-        "fill:var(--bad);fill-opacity:.8" if tile.off else _look(move.seconds, usual), text,
-    )  # fmt: skip
+class _View:
+    """The plan in the units of the drawing, the same scale both ways; up is to larger positions."""
 
+    def __init__(self, plan: TilePlan) -> None:
+        tiles = plan.tiles[:MOST_TILES]
+        xs, ys = ([tile.target[axis] for tile in tiles] for axis in (0, 1))
+        across, up = _pitch(xs), _pitch(ys)
+        # Tiles of a single row or column are squares.
+        pitch = (across or up or LONE, up or across or LONE)
+        spans = [max(places) - min(places) + one for places, one in zip((xs, ys), pitch, strict=True)]
+        self.scale = min((WIDTH - 2 * MARGIN) / spans[0], (HEIGHT - 2 * MARGIN) / spans[1])
+        self.width, self.height = WIDTH, spans[1] * self.scale + 2 * MARGIN
+        self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
+        self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
+        usual = _usual(tiles)
+        self.squares = [self._square(tile, usual) for tile in tiles]
+        self.way = [self._at(place) for place in (plan.start, *(tile.place for tile in tiles))]
+        self.radius = min(max(min(self.sides) / 14, 1.5), 4.0)  # of the points at the stops
+        # The bar of the scale: the largest of 1, 2 and 5 times a power of ten in a fifth of the width [m].
+        wanted = 0.2 * WIDTH / self.scale
+        power = 10.0 ** math.floor(math.log10(wanted))
+        length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
+        self.bar, self.length = length * self.scale, f"{stated(length * 1e3)} mm"
 
-def _path(plan: TilePlan, tiles: Sequence[Tile], view: _View) -> Markup:
-    """The way of the stage, with a ring where the first tile is taken and a point at every stop."""
-    stops = [view.at(tile.place) for tile in tiles]
-    places = " ".join(f"{x:.1f},{y:.1f}" for x, y in (view.at(plan.start), *stops))
-    radius = min(max(min(view.sides) / 14, 1.5), 4.0)
-    dot = Markup('<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}"/>')
-    return Markup(
-        '<polyline points="{}" style="fill:none;stroke:var(--left);stroke-width:{:.1f};stroke-linejoin:round"/>'
-        '<g style="fill:var(--left)">{}</g>'
-        '<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}" style="fill:none;stroke:var(--left);stroke-width:2"/>'
-    ).format(
-        places, max(radius / 2, 1), Markup().join(dot.format(*stop, radius) for stop in stops), *stops[0], 2.2 * radius
-    )
+    def _at(self, place: Place) -> Place:
+        x = self.width / 2 + (place[0] - self.middle[0]) * self.scale
+        return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
 
-
-def _scales(plan: TilePlan, view: _View) -> Markup:
-    """A bar for the scale, and the names of the motors along the edges."""
-    wanted = 0.2 * WIDTH / view.scale
-    power = 10.0 ** math.floor(math.log10(wanted))
-    length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
-    x, y, bar = WIDTH - 12.0, view.height - 12.0, length * view.scale
-    return Markup(
-        '<g style="stroke:var(--soft);stroke-width:2"><path d="M{:.1f} {:.1f}H{:.1f}"/></g>'
-        '<g style="fill:var(--soft)"><text x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>'
-        '<text x="12" y="{:.1f}">{}</text><text x="12" y="16">{}</text></g>'
-    ).format(
-        x - bar, y, x, x - bar / 2, y - 6, f"{stated(length * 1e3)} mm", y, f"{plan.motors[0]} \u2192",
-        f"\u2191 {plan.motors[1]}",
-    )  # fmt: skip
+    def _square(self, tile: Tile, usual: float) -> dict[str, Any]:
+        (x, y), (width, height), move = self._at(tile.target), self.sides, tile.move
+        lag = max((motor.peak_lag for motor in move.motors.values()), default=0.0)
+        return {
+            "title": f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(lag)} steps",
+            "left": x - width / 2,
+            "top": y - height / 2,
+            "look": "fill:var(--bad);fill-opacity:.8" if tile.off else _look(move.seconds, usual),
+            # Above the path, which goes through the middle.
+            "label": move.label[:6] if min(self.sides) >= LABELLED else "",
+            "ink": "card" if tile.off or move.seconds > (1 + LONG) / 2 * usual else "ink",
+        }
