@@ -13,9 +13,18 @@ from detent.control.step_rule import FAULT, REST, STEP, acknowledge, deflect, st
 from detent.kernel.loop import advance, ticks
 from detent.kernel.registers import Leaf
 from detent.kernel.step import hot_step
-from detent.methods.stepper_envelope.compared import Compared, ComparedParams, step_compared, take_over
-from detent.methods.stepper_envelope.controller import NOWHERE, call_at, load_rule
-from detent.methods.stepper_envelope.system import Stepper, StepperParams, alone, switch_on, tables
+from detent.methods.stepper_envelope.controller import NOWHERE, load_rule
+from detent.methods.stepper_envelope.system import (
+    Compared,
+    ComparedParams,
+    Stepper,
+    StepperParams,
+    alone,
+    step_compared,
+    switch_on,
+    tables,
+    take_over,
+)
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
 from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
@@ -213,12 +222,12 @@ class Rig:
 
     def run_to(self, position: int) -> "Rig":
         """On the rig, until the step that reaches `position` has begun."""
-        call_at(self.r.controller, position)
+        self.r.controller.stop_at = position
         begin = self.timer.expires
         self._turn(10**9)
         assert self.position == position
         self.seconds += (self.timer.expires - begin) / self.clock_hz
-        call_at(self.r.controller, NOWHERE)
+        self.r.controller.stop_at = NOWHERE
         return self
 
     def run_to_rest(self) -> "Rig":

@@ -1,12 +1,12 @@
 """From a checked specification to ramp, zones and parameters of each motor: SI values to steps and timer words."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable, ZoneTable
+from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import (
@@ -85,13 +85,7 @@ def _given(value: float | None) -> float:
 def stepper_load(table: StepperTable) -> StepperLoad:
     """What hangs on the shaft."""
     m = table.mechanics
-    return StepperLoad(
-        pitch=m.travel_per_revolution,
-        mass=m.moving_mass,
-        spindle_inertia=m.screw_inertia,
-        coupling_inertia=m.coupling_inertia,
-        friction_torque=m.friction_torque,
-    )
+    return StepperLoad(m.travel_per_revolution, m.moving_mass, m.screw_inertia, m.coupling_inertia, m.friction_torque)
 
 
 def bare_start_hz(table: StepperTable) -> float:
@@ -169,17 +163,20 @@ def starts(table: StepperTable) -> bool:
 def zone_maps(table: StepperTable) -> tuple[ZoneMap, ZoneMap]:
     """Speed limits upwards and downwards; both number their limits alike, for one control unit."""
     limits = [table.max_hz, *(table.hz(zone.speed) for zone in table.zone.values())]
-    up = _apart(_zone(table, zone) for zone in table.zone.values() if zone.direction != "down")
-    down = _apart(_zone(table, zone) for zone in table.zone.values() if zone.direction != "up")
-    return ZoneMap(table.steps, table.max_hz, up, limits), ZoneMap(table.steps, table.max_hz, down, limits)
+    up, down = (
+        ZoneMap(table.steps, table.max_hz, _apart(_zones(table, {"both", way})), limits) for way in ("up", "down")
+    )
+    return up, down
 
 
-def _zone(table: StepperTable, zone: ZoneTable) -> Zone:
-    """A zone in whole steps: every step that it touches is inside."""
+def _zones(table: StepperTable, directions: set[str]) -> Iterator[Zone]:
+    """Zones of some directions in whole steps: every step that a zone touches is inside."""
     lower, step = table.mechanics.lower_end, table.step
-    begin = math.floor((zone.begin - lower) / step + 1e-6)
-    end = math.ceil((zone.end - lower) / step - 1e-6)
-    return Zone(max(begin, 0), min(end, table.steps), table.hz(zone.speed))
+    for zone in table.zone.values():
+        if zone.direction in directions:
+            begin = math.floor((zone.begin - lower) / step + 1e-6)
+            end = math.ceil((zone.end - lower) / step - 1e-6)
+            yield Zone(max(begin, 0), min(end, table.steps), table.hz(zone.speed))
 
 
 def _apart(zones: Iterable[Zone]) -> list[Zone]:

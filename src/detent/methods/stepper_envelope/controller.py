@@ -9,9 +9,7 @@ import numpy as np
 
 from detent.control.step_rule import (
     IDLE,
-    LIMITS,
     PAUSE,
-    RAMP,
     STEP,
     StepRule,
     StepRuleParams,
@@ -111,19 +109,10 @@ def control(p: StepperControllerParams, c: StepperController, lines: StepperLine
     c.now += p.instant_ticks
 
 
-def call_at(c: StepperController, position: int) -> None:
-    """Raise the event at the step that reaches a position, too; `NOWHERE`: at rest only."""
-    c.stop_at = position
-
-
 def load_rule(
     p: StepperControllerParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool
 ) -> None:
     """Put ramp list and zone limits into the control unit, in the words of its timer."""
-    if len(ramp) > RAMP or len(limits) > LIMITS:
-        raise ValueError(
-            f"{len(ramp)} ramp entries and {len(limits)} zone limits, must be {RAMP} and {LIMITS} or fewer"
-        )
     bounds = np.asarray(limits, float)
     words = reload_values(ramp.hz, clock_hz) if reload else ramp.words()
     bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)

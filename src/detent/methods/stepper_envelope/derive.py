@@ -43,17 +43,14 @@ class MotorFigures(Motor):
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         super().__init__(spec, name)
-        self.motor, self.load = stepper_motor(self.table), stepper_load(self.table)
-        self.inertia = total_inertia(self.motor, self.load)
+        self.motor, self.load = motor, load = stepper_motor(self.table), stepper_load(self.table)
+        self.inertia = total_inertia(motor, load)
         self.start_hz, self.max_hz = start_hz(self.table), self.table.max_hz
+        # Frequency at which the loaded rotor swings about its step [Hz].
+        self.natural_hz = natural_frequency(motor.steps_per_turn, motor.holding_torque, self.inertia)
         self.ramp = make_step_ramp(self.table)
-        self.linear = self.table.limits.acceleration / self.table.step
-        """Limit a_lin of the linear part of the ramp [step/s^2]."""
-
-    @property
-    def natural_hz(self) -> float:
-        """Frequency at which the loaded rotor swings about its step [Hz]."""
-        return natural_frequency(self.motor.steps_per_turn, self.motor.holding_torque, self.inertia)
+        self.shortest_way = 2 * len(self.ramp) - 1  # of a move that reaches the largest frequency [step]
+        self.linear = self.table.limits.acceleration / self.table.step  # limit a_lin of the ramp [step/s^2]
 
     def torque_left(self, hz: float) -> float:
         """Torque that is left to accelerate with at a frequency [N m]."""
@@ -93,11 +90,6 @@ class MotorFigures(Motor):
         worst = int(np.argmax(share))
         return float(share[worst]), float(following[worst])
 
-    @property
-    def shortest_way(self) -> int:
-        """Steps of the shortest move that reaches the largest frequency."""
-        return 2 * len(self.ramp) - 1
-
     @cached_property
     def travel_time(self) -> float:
         """Time from end to end, upwards, zones included [s]."""
@@ -114,7 +106,7 @@ def first_crossing(function: Callable[[float], float], low: float) -> float | No
     """Find where a function of frequency first falls to 0."""
     places = np.geomspace(low, HIGHEST_HZ, PLACES).tolist()
     below = next((k for k, hz in enumerate(places) if function(hz) <= 0), None)
-    if below is None or below == 0:
+    if not below:
         return None if below is None else low
     above, under = places[below - 1], places[below]
     for _ in range(40):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from detent.control.step_rule import FAULT, acknowledge, deflect, release, start_move
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
-from detent.methods.stepper_envelope.controller import NOWHERE, call_at
+from detent.methods.stepper_envelope.controller import NOWHERE
 from detent.methods.stepper_envelope.machine import Stage
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
@@ -106,9 +106,9 @@ class StageHost:
         """Move the stop extreme of a running motor when it passes a place; True if it lay too near."""
         motor = self.stage.motors[name]
         rule = motor.controller.rule
-        call_at(motor.controller, motor.table.step_inside(at))
+        motor.controller.stop_at = motor.table.step_inside(at)
         late = self.stage.wait_for([name], 1.0 + 2.0 * motor.table.steps / self._slowest(name))
-        call_at(motor.controller, NOWHERE)
+        motor.controller.stop_at = NOWHERE
         if late or motor.resting:
             return False
         acknowledge(rule)

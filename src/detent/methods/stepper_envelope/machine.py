@@ -15,9 +15,8 @@ from detent.control.step_rule import FAULT, REST, acknowledge
 from detent.kernel.loop import advance
 from detent.kernel.registers import Registers, block, i8, register
 from detent.methods.stepper_envelope.build import MotorTables, build_stepper, instant, make_tables
-from detent.methods.stepper_envelope.compared import take_over
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.system import Stepper, switch_on, tables
+from detent.methods.stepper_envelope.system import Stepper, switch_on, tables, take_over
 from detent.planning.step_envelope import StepEnvelope
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder
 

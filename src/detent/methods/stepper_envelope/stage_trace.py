@@ -12,8 +12,7 @@ from detent.methods.stepper_envelope.build import make_step_ramp, stepper_load, 
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
 from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
 from detent.methods.stepper_envelope.summary import stated
-from detent.page.chart import Chart, Curve, Panel
-from detent.page.loops import Loop, loop_chart
+from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import has
 from detent.page.words import GAP, count

@@ -4,7 +4,7 @@ import pytest
 from tests.stepper_rig import Rig
 
 from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release
-from detent.methods.stepper_envelope.controller import StepperLines, call_at, control
+from detent.methods.stepper_envelope.controller import StepperLines, control
 
 
 def said(rig: Rig, ticks: int) -> list[tuple[int, int, int, int]]:
@@ -50,7 +50,7 @@ def test_no_tick_has_two_pulses_where_the_period_is_the_shortest():
 
 def test_a_place_is_told_when_the_step_to_it_has_begun():
     rig = Rig(20).start()
-    call_at(rig.r.controller, 2)
+    rig.r.controller.stop_at = 2
     while not rig.rule.event:
         said(rig, 1)
     assert (rig.position, rig.timer.pulses) == (2, 2)

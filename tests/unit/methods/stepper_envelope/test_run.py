@@ -9,7 +9,6 @@ from detent import examples
 from detent.control.step_rule import INFEASIBLE, acknowledge
 from detent.errors import STEP_FAULT_TEXT, AxisError, InputError
 from detent.methods.load import read_axis
-from detent.methods.stepper_envelope.controller import call_at
 from detent.methods.stepper_envelope.host import Leg, StageHost
 from detent.methods.stepper_envelope.run import run_stage, stage_signals
 from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
@@ -154,7 +153,7 @@ def test_a_fault_of_the_rule_ends_the_job(spec):
     motor = host.stage.motors["group_a"]
     legs = {"group_a": Leg(0, 400)}
     host.start(legs)
-    call_at(motor.controller, 150)
+    motor.controller.stop_at = 150
     host.stage.wait_for(["group_a"], 1.0)
     acknowledge(motor.controller.rule)
     motor.tables.up.entries[150:] = -1  # a table that was cut off
