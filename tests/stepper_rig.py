@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from detent.control.step_comparison import CONSTANT_FREQUENCY
-from detent.control.step_rule import FAULT, REST, STEP, acknowledge, deflect, start_move
+from detent.control.step_rule import FAULT, PAUSE, REST, STEP, acknowledge, deflect, next_entry, start_move
 from detent.kernel.loop import advance, ticks
 from detent.kernel.registers import Leaf
 from detent.kernel.step import hot_step
-from detent.methods.stepper_envelope.controller import NOWHERE, load_rule
+from detent.methods.stepper_envelope.controller import NOWHERE, Entries, load_rule, step_once
 from detent.methods.stepper_envelope.system import (
     Compared,
     ComparedParams,
     Stepper,
     StepperParams,
-    alone,
     step_compared,
     switch_on,
     tables,
@@ -74,6 +73,23 @@ def rotor_params(
     )
     fill_curve(p, motor.pull_out, top)
     return p
+
+
+class AloneParams(StepperParams):
+    """Parameters of a controller without its plant: as in firmware a tick is a step."""
+
+
+@ticks(AloneParams)
+@hot_step
+def tick_alone(p: AloneParams, r: Stepper, up: Entries, down: Entries) -> bool:
+    """One step, as firmware makes it; none while the motor rests, or has raised an event."""
+    outcome = PAUSE
+    while outcome == PAUSE and r.controller.rule.event == 0:
+        outcome = step_once(p.controller, r.controller, next_entry(r.controller.rule, up, down))
+    if outcome != STEP:
+        return False
+    r.tick += 1
+    return True
 
 
 class ComparedAloneParams(ComparedParams):
@@ -182,7 +198,8 @@ class Rig:
     @property
     def alone(self) -> Any:
         """Parameters for running without the rotor."""
-        return ComparedAloneParams.from_buffer(self.p) if isinstance(self.p, ComparedParams) else alone(self.p)
+        made = ComparedAloneParams if isinstance(self.p, ComparedParams) else AloneParams
+        return made.from_buffer(self.p)
 
     @property
     def resting(self) -> bool:

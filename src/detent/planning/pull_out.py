@@ -5,21 +5,15 @@ because coil current rises at a limited rate and the rotor's own voltage opposes
 stepper-envelope specification 3.1, the constants of the winding, or points read from a published curve.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import hypot, pi, sqrt
-from typing import Protocol
 
 FIRST_HARMONIC = 4 / pi  # fundamental of a square wave of amplitude 1: full steps switch each coil so
 
 
-class PullOut(Protocol):
-    """Pull-out torque [N m] at a step frequency [Hz]; 0 where the motor drives nothing."""
-
-    def __call__(self, hz: float) -> float:
-        """Pull-out torque at `hz`."""
-        ...
+PullOut = Callable[[float], float]  # pull-out torque [N m] at a step frequency [Hz]; 0 where the motor drives nothing
 
 
 @dataclass(frozen=True, slots=True)

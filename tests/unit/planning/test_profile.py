@@ -102,29 +102,6 @@ def test_a_sample_period_of_a_move_is_refused():
         plan_job(joblist(Move(1, 2, target=0.1, sample_period=2e-3)), 0.0, LIMITS, T)
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"speed": 0.0}, "speed 0.0 m/s"),
-        ({"speed": math.inf}, "speed inf m/s"),
-        ({"acceleration": -1.0}, "acceleration -1.0"),
-        ({"acceleration": math.nan}, "acceleration nan"),
-        ({"jerk": 0.0}, "jerk 0.0"),
-        ({"jerk": math.nan}, "jerk nan"),
-    ],
-)
-def test_limits_that_no_move_can_keep_are_refused(changes, text):
-    with pytest.raises(DetentError, match=text):
-        MotionLimits(**{"speed": 1.0, "acceleration": 1.0} | changes)
-
-
-@pytest.mark.parametrize("arguments", [(math.nan, 1.0, T), (0.0, math.inf, T), (0.0, 1.0, 0.0), (0.0, 1.0, math.nan)])
-def test_places_and_periods_that_do_not_exist_are_refused(arguments):
-    start, target, period = arguments
-    with pytest.raises(DetentError, match="must be"):
-        plan_move(start, target, LIMITS, period)
-
-
 def test_what_ruckig_does_not_find_is_said():
     with pytest.raises(DetentError, match=r"no profile from 0 m to 1 m within 0\.5 m/s"):
         plan_move(0.0, 1.0, MotionLimits(0.5, 1e-300, 1e300), T)

@@ -8,6 +8,7 @@ import csv
 import ctypes
 import re
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from textwrap import wrap
@@ -21,7 +22,6 @@ from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
-from detent.kernel.registers import Field
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -128,7 +128,8 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
 
 def _header(tables: EnvelopeTables) -> str:
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True)  # noqa: S701 - C
-    environment.filters |= {"comment": _comment, "numbers": _numbers, "unit": _unit, "metres": _metres}
+    metres = partial(format_quantity, unit="m", digits=6)
+    environment.filters |= {"comment": _comment, "numbers": _numbers, "metres": metres}
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
     ramp, limit = tables.words()
     memory = envelope_memory(tables.up.ramp, tables.up.zones)
@@ -149,14 +150,6 @@ def _header(tables: EnvelopeTables) -> str:
         timer=StepTimer,
         code=step_rule,
     )
-
-
-def _metres(value: float) -> str:
-    return format_quantity(value, "m", 6)
-
-
-def _unit(field: Field) -> str:
-    return f" [{field.unit}]" if field.unit not in {"", "count", "code"} else ""
 
 
 def _comment(text: str, heading: str = "") -> str:

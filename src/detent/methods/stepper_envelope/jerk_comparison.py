@@ -33,11 +33,10 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Speed over time; that of `steps` holds until the next moment."""
+    """Speed over time; a jump has two rows of one moment."""
 
     t: Numbers  # [s] from the start
     speed: Numbers  # [m/s]
-    steps: bool = False
 
     @property
     def seconds(self) -> float:
@@ -46,14 +45,9 @@ class Profile:
 
     def at(self, t: Numbers) -> Numbers:
         """Speed at any moments [m/s], shape (n,); NaN after its end."""
-        if self.steps:
-            rows = (np.searchsorted(self.t, t, side="right") - 1).clip(0)
-            speed: Numbers = self.speed[rows]
-        else:
-            speed = np.interp(t, self.t, self.speed)
         # One point more than the profile has: a curve that ends at rest.
         after = np.searchsorted(t, self.seconds) + 1
-        return np.where(np.arange(len(t)) < after, speed, np.nan)
+        return np.where(np.arange(len(t)) < after, np.interp(t, self.t, self.speed), np.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,4 +176,6 @@ def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:
     table = spec.stepper[name].model_copy(update={"zone": {}})
     tables = envelope_tables(spec.model_copy(update={"stepper": {name: table}}), name)
     seconds = tables.periods(StepEnvelope(tables.up.ramp, tables.up.zones)) / tables.clock_hz
-    return Profile(np.append(0.0, np.cumsum(seconds)), np.append(table.step / seconds, 0.0), steps=True)
+    # The speed of a step holds until the next one.
+    t, speed = np.append(0.0, np.cumsum(seconds)), table.step / seconds
+    return Profile(np.repeat(t, 2)[1:], np.append(np.repeat(speed, 2), 0.0))

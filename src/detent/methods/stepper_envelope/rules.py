@@ -12,21 +12,7 @@ from detent.files.fields import unit_of
 from detent.files.findings import Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
 from detent.files.problems import field_at
-from detent.methods.stepper_envelope.build import (
-    bare_start_hz,
-    changed,
-    has_pull_out,
-    instant,
-    is_drivable,
-    make_step_ramp,
-    missing_constants,
-    ramp_fits,
-    rises,
-    start_hz,
-    starts,
-    stepper_load,
-    stepper_motor,
-)
+from detent.methods.stepper_envelope import build
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.planning.step_envelope import MAX_RAMP
 from detent.planning.step_ramp import LEAST_GAIN_HZ, MAX_HZ, natural_frequency
@@ -128,8 +114,8 @@ def _steps(m: Motor) -> Found:
         allowed = f"up to {MOST_STEPS} steps of {text(step, 'm')}: a table has an entry for each"
         yield m.wrong(f"limits.travel {STEP_KEYS}", allowed, m.most("limits.travel", MOST_STEPS * step))
     if not 1 <= hz <= MAX_HZ:
-        slow = changed(table, "limits.speed", MAX_HZ * step * (1 - BARELY))
-        lower = m.most("limits.speed", MAX_HZ * step) if not is_drivable(slow) or ramp_fits(slow) else ""
+        slow = build.changed(table, "limits.speed", MAX_HZ * step * (1 - BARELY))
+        lower = m.most("limits.speed", MAX_HZ * step) if not build.is_drivable(slow) or build.ramp_fits(slow) else ""
         yield m.wrong(
             f"limits.speed {STEP_KEYS}",
             f"from {text(step, 'm/s')} to {text(MAX_HZ * step, 'm/s')}, step frequencies of 1 Hz to {MAX_HZ} Hz, here "
@@ -207,7 +193,7 @@ def _places(m: Motor) -> Found:
 def _constants(m: Motor) -> Found:
     """The chosen way of stating the pull-out torque has its constants."""
     way = m.table.motor.pull_out
-    for name in missing_constants(m.table):
+    for name in build.missing_constants(m.table):
         path = m.keys(f"motor.{name}")
         example = describe_kind(unit_of(field_at(StepperEnvelopeSpec, tuple(path.split(".")))))[1]
         other = "or name a motor of the catalogue that has it, " if way == "winding" else ""
@@ -232,7 +218,7 @@ def _curve(m: Motor) -> Found:
     elif len(torque) != len(hz):
         allowed = f"as many as curve_frequency has, {len(hz)}, here {len(torque)}"
         yield m.wrong("motor.curve_torque motor.curve_frequency", allowed, "state one torque for each frequency")
-    elif not rises(hz):
+    elif not build.rises(hz):
         order = "order the points by frequency, torques with them, and remove what stands there twice"
         yield m.wrong("motor.curve_frequency", "frequencies that rise, each once", order)
     elif torque[0] <= 0:
@@ -247,7 +233,7 @@ def _torques(m: Motor) -> Found:
     name, pull_out = "pull_out_torque", motor.pull_out_torque or 0.0
     if motor.pull_out == "points":
         name, pull_out = "curve_torque", max(motor.curve_torque, default=0.0)
-    if motor.pull_out != "winding" and has_pull_out(table) and pull_out > held * (1 + BARELY):
+    if motor.pull_out != "winding" and build.has_pull_out(table) and pull_out > held * (1 + BARELY):
         yield m.wrong(
             f"motor.{name} motor.holding_torque drive.current motor.rated_current",
             f"up to the holding torque at the current of the drive, {text(held, 'N*m')}",
@@ -255,7 +241,9 @@ def _torques(m: Motor) -> Found:
         )
     tolerance = min(m.spec.controller.tolerance, SURE_REST)
     most = held * math.sin(math.pi / 2 * tolerance)
-    if table.mechanics.friction_torque > most * (1 + BARELY) and not (is_drivable(table) and not starts(table)):
+    if table.mechanics.friction_torque > most * (1 + BARELY) and not (
+        build.is_drivable(table) and not build.starts(table)
+    ):
         yield m.wrong(
             "mechanics.friction_torque motor.holding_torque controller.tolerance",
             f"up to {text(most, 'N*m')}: against more the field of a resting motor does not bring the rotor within "
@@ -268,11 +256,11 @@ def _torques(m: Motor) -> Found:
 def _ramp(m: Motor) -> Found:
     """There is torque to accelerate with, the ramp reaches the largest speed, and its entries have room."""
     table = m.table
-    if not is_drivable(table) or ramp_fits(table):
+    if not build.is_drivable(table) or build.ramp_fits(table):
         return
-    start = start_hz(table)
-    if not starts(table):
-        torque = stepper_motor(table).pull_out(start)
+    start = build.start_hz(table)
+    if not build.starts(table):
+        torque = build.stepper_motor(table).pull_out(start)
         yield m.wrong(
             f"mechanics.friction_torque drive.torque_safety limits.speed {TORQUE_KEYS} {START_KEYS}",
             f"below {text(torque / table.drive.torque_safety, 'N*m')}: the pull-out torque at the start frequency, "
@@ -280,7 +268,7 @@ def _ramp(m: Motor) -> Found:
             "lower friction or drive.torque_safety, or choose a stronger motor",
         )
         return
-    found = make_step_ramp(table)
+    found = build.make_step_ramp(table)
     end = float(found.hz[min(len(found), MAX_RAMP) - 1])
     reached = f"it ends with entry {len(found)} at {text(end * table.step, 'm/s')}, {text(end, 'Hz')}"
     if found.hz[-1] >= table.max_hz:
@@ -289,7 +277,7 @@ def _ramp(m: Motor) -> Found:
     fastest_zone = max((zone.speed for zone in table.zone.values()), default=0.0)
     has_slower = fastest_zone <= end * table.step * (1 - 1e-3) and end > start
     slower = m.most("limits.speed", end * table.step) if has_slower else ""
-    if ramp_fits(changed(table, "limits.acceleration", STEEPEST)):
+    if build.ramp_fits(build.changed(table, "limits.acceleration", STEEPEST)):
         yield m.wrong(
             f"limits.acceleration {RAMP_KEYS}",
             f"such that the ramp up to limits.speed has {MAX_RAMP} entries or fewer, each {LEAST_GAIN_HZ:g} Hz above "
@@ -308,7 +296,7 @@ def _ramp(m: Motor) -> Found:
 @per_motor
 def _start_frequency(m: Motor) -> Found:
     """The start frequency is no standstill."""
-    if has_pull_out(m.table) and (hz := bare_start_hz(m.table)) < 1:
+    if build.has_pull_out(m.table) and (hz := build.bare_start_hz(m.table)) < 1:
         safety = m.table.drive.start_safety * hz
         yield m.wrong(
             START_KEYS,
@@ -320,10 +308,10 @@ def _start_frequency(m: Motor) -> Found:
 @per_motor
 def _rotor_swing(m: Motor) -> Found:
     """The rotor swings slowly enough for the time step of its equation of motion (7.2)."""
-    load = stepper_load(m.table).inertia
+    load = build.stepper_load(m.table).inertia
     inertia = m.table.motor.rotor_inertia + load
     hz = natural_frequency(m.table.motor.steps_per_turn, m.table.held_torque, inertia)
-    most = FASTEST_SWING / (2 * math.pi * instant(m.spec))
+    most = FASTEST_SWING / (2 * math.pi * build.instant(m.spec))
     if hz > most:
         yield m.wrong(
             f"motor.rotor_inertia motor.holding_torque motor.steps_per_turn {LOAD_KEYS} drive.current "
@@ -381,9 +369,9 @@ def _zone_overlap(m: Motor) -> Found:
 def _zone_speed(m: Motor) -> Found:
     """A zone is not slower than the start frequency, and not faster than the motor."""
     table = m.table
-    if not is_drivable(table):
+    if not build.is_drivable(table):
         return
-    start, fastest = start_hz(table), table.limits.speed
+    start, fastest = build.start_hz(table), table.limits.speed
     slowest = start * table.step
     # Between two bounds that are as good as one there is no short number.
     digits = 15 if slowest * (1 + 1e-3) > fastest else 4

@@ -151,18 +151,16 @@ class MechanicsTable(Table, frozen=True):
     )
 
 
+def _extreme(description: str, derived: str = "mechanics.lower_end") -> Any:
+    return optional(description, math.nan, derived=derived, ge=-100.0, le=200.0)
+
+
 class ExtremesTable(Table, frozen=True):
     """Extremes of the envelope as it is at power-on (2.1): start, turn and stop; moves set their own."""
 
-    start: Length = optional(
-        "where the run upwards begins", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
-    )
-    turn: Length = optional(
-        "where it ends and the run downwards begins", math.nan, derived="upper end", ge=-100.0, le=200.0
-    )
-    stop: Length = optional(
-        "where the run downwards ends", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
-    )
+    start: Length = _extreme("where the run upwards begins")
+    turn: Length = _extreme("where it ends and the run downwards begins", "upper end")
+    stop: Length = _extreme("where the run downwards ends")
 
 
 class ZoneTable(Table, frozen=True):
@@ -250,10 +248,9 @@ def fill_derived(spec: StepperEnvelopeSpec) -> StepperEnvelopeSpec:
 
 
 def _filled(table: StepperTable) -> StepperTable:
-    lower, upper = table.mechanics.lower_end, table.upper_end
+    lower, drive = table.mechanics.lower_end, table.drive
     mechanics = _given(table.mechanics, start_position=lower)
-    extremes = _given(table.extremes, start=lower, turn=upper, stop=lower)
-    drive = table.drive
+    extremes = _given(table.extremes, start=lower, turn=table.upper_end, stop=lower)
     if drive.current is None:
         drive = drive.model_copy(update={"current": table.motor.rated_current})
     return table.model_copy(update={"mechanics": mechanics, "extremes": extremes, "drive": drive})

@@ -92,7 +92,12 @@ class PlaceRows(CsvRows[StageRow]):
             usual = [self.heading_of(motor) for motor in self.model.motors]
             allowed = f"a column for at least one motor: {', '.join(usual)}"
             self.refuse_header(allowed, f"begin with a header such as {self.separator.join(usual)}")
-        self.notes = tuple(self._tell())
+        cells = [short(cell) for cell in self.header.cells]
+        passed = [cells[k] or "a column without a name" for k, one in enumerate(self.columns) if not one.key]
+        if passed:
+            more = f" and {len(passed) - _MOST_NAMED} more" if len(passed) > _MOST_NAMED else ""
+            taken = ", ".join(cells[k] for k, one in enumerate(self.columns) if one.key in self.model.motors)
+            self.notes = (f"columns {taken}", f"passed over: {', '.join(passed[:_MOST_NAMED])}{more}")
 
     def read_heading(self, index: int, cell: str) -> Column:
         """Read key and unit of a column; a slip of one that says something of the motion must not be passed over."""
@@ -103,17 +108,17 @@ class PlaceRows(CsvRows[StageRow]):
         head = name.partition("_")[0].lower()
         # By the first letter: wells of a plate have nothing to do with a dwell.
         near = [word for word in difflib.get_close_matches(head, ("dwell", "repeat"), cutoff=0.8) if head[0] == word[0]]
-        motors = {motor.lower(): motor for motor in self.model.motors}
-        near += [motors[key] for key in [self._match(name.lower(), unit, tuple(motors))[0]] if key in motors]
+        meant = self._match(name.lower(), unit)[0]  # motors have small letters
+        near += [meant] if meant in self.model.motors else []
         if not near:
             return Column()
         allowed = ", ".join(map(self.heading_of, (*self.model.motors, "dwell", "repeat")))
         return self.refuse_heading(index, f'the unknown column "{short(cell)}"', allowed, f'did you mean "{near[0]}"?')
 
-    def _match(self, name: str, unit: str | None, motors: Sequence[str] = ()) -> tuple[str, str | None]:
+    def _match(self, name: str, unit: str | None) -> tuple[str, str | None]:
         """Key and unit of a heading whose name may end in its unit and further words."""
         # A motor x_um before a motor x, which could have such a column too.
-        for key in sorted((*(motors or self.model.motors), "dwell"), key=len, reverse=True):
+        for key in sorted((*self.model.motors, "dwell"), key=len, reverse=True):
             usual = _NAME_UNITS["s" if key == "dwell" else "m"]
             token = name.removeprefix(f"{key}_").partition("_")[0]
             if unit is None and name.startswith(f"{key}_") and token in usual:
@@ -124,23 +129,14 @@ class PlaceRows(CsvRows[StageRow]):
         """Pass over all columns of a motor but one."""
         cells = self.header.cells
         found = [index for index, column in enumerate(self.columns) if column.key == motor]
+        if len(found) < 2:
+            return
         nominal = [index for index in found if _PREFERRED in cells[index].lower()]
-        if len(found) > 1 and len(nominal) != 1:
+        if len(nominal) != 1:
             came = f"{len(found)} columns for {motor}: {', '.join(short(cells[index]) for index in found)}"
             allowed = f'one column for each motor, or one with the word "{_PREFERRED}" among several'
             unit = self.columns[found[0]].unit
             remedy = f"name the column of the places to go to {motor}_{unit}_{_PREFERRED}"
             self.refuse_heading(found[1], came, allowed, remedy)
-        for index in found if len(found) > 1 else ():
-            if index not in nominal:
-                self.columns[index] = Column()
-
-    def _tell(self) -> list[str]:
-        """Say which columns were taken and which were not; nothing where all were."""
-        cells = self.header.cells
-        passed = [short(cells[k]) or "a column without a name" for k, one in enumerate(self.columns) if not one.key]
-        if not passed:
-            return []
-        more = f" and {len(passed) - _MOST_NAMED} more" if len(passed) > _MOST_NAMED else ""
-        taken = ", ".join(short(cells[k]) for k, one in enumerate(self.columns) if one.key in self.model.motors)
-        return [f"columns {taken}", f"passed over: {', '.join(passed[:_MOST_NAMED])}{more}"]
+        for index in set(found).difference(nominal):
+            self.columns[index] = Column()

@@ -40,7 +40,13 @@ class StageFigures:
         self.asked = run.job.count  # moves of the job
         self.by_move: list[list[Motion]] = []  # motions of each move; none of a move in which all stay
         self.placed = 0  # moves after which every rotor stood in its place: it had lost no step up to then
-        self._judge()
+        lost = dict.fromkeys(spec.stepper, 0)  # steps, up to each move
+        for move in run.moves:
+            for name, motor in move.motors.items():
+                lost[name] += motor.lost
+            motions = [Motion(move, name, made, lost[name] + made.missed) for name, made in move.motors.items()]
+            self.by_move.append(motions)
+            self.placed += not any(lost.values()) and not any(map(self.astray, motions))
         self.motions = [motion for motions in self.by_move for motion in motions]
         names = {motion.name for motion in self.motions}
         self.moved = [name for name in spec.stepper if name in names]
@@ -57,16 +63,6 @@ class StageFigures:
         self.rest = largest(self.motions, lambda motion: abs(motion.motor.rest_lag))  # when a move was done [step]
         self.peak_hz = largest(self.motions, lambda motion: motion.motor.peak_hz)
         self.peak_speed = largest(self.motions, lambda motion: motion.motor.peak_hz * spec.stepper[motion.name].step)
-
-    def _judge(self) -> None:
-        """Go through all moves, the steps lost up to each in mind."""
-        lost = dict.fromkeys(self.spec.stepper, 0)
-        for move in self.run.moves:
-            for name, motor in move.motors.items():
-                lost[name] += motor.lost
-            motions = [Motion(move, name, made, lost[name] + made.missed) for name, made in move.motors.items()]
-            self.by_move.append(motions)
-            self.placed += not any(lost.values()) and not any(map(self.astray, motions))
 
     def _longest(self, time: Callable[[Motion], float]) -> float:
         """Sum over the moves of the longest time of a motor [s]."""

@@ -4,17 +4,16 @@
                                                         ^              |
                                                         +-- period over+
 
-A tick is a time step of the rotor, the judge of whether the motor follows; without the plant, as in firmware, it is a
-step (`alone`). The order is: decide and drive the lines, move, record; an open-loop motor has nothing to sample. What
-the host has laid ready are both tables. Several motors are several of these records, each with its own tables; nothing
-is shared.
+A tick is a time step of the rotor, the judge of whether the motor follows. The order is: decide and drive the lines,
+move, record; an open-loop motor has nothing to sample. What the host has laid ready are both tables. Several motors are
+several of these records, each with its own tables; nothing is shared.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.step_comparison import Comparison, ComparisonParams, next_compared_step
-from detent.control.step_rule import PAUSE, STEP, next_entry, place_motor
+from detent.control.step_rule import place_motor
 from detent.kernel.loop import lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step
@@ -27,7 +26,6 @@ from detent.methods.stepper_envelope.controller import (
     begin_period,
     control,
     put_out,
-    step_once,
 )
 from detent.methods.stepper_envelope.plant import StepperPlant, StepperPlantParams, move
 from detent.planning.step_envelope import ZoneMap
@@ -39,10 +37,6 @@ class StepperParams(Registers):
 
     controller: StepperControllerParams = block("control unit and timer")
     plant: StepperPlantParams = block("motor and load")
-
-
-class AloneParams(StepperParams):
-    """The same for a controller without its plant: as in firmware a tick is a step."""
 
 
 class Stepper(Registers):
@@ -64,24 +58,6 @@ def tick(p: StepperParams, r: Stepper, up: Entries, down: Entries) -> bool:
     move(p.plant, r.tick, r.lines, r.plant)
     r.tick += 1
     return True
-
-
-@ticks(AloneParams)
-@hot_step
-def tick_alone(p: AloneParams, r: Stepper, up: Entries, down: Entries) -> bool:
-    """One step, as firmware makes it; none while the motor rests, or has raised an event."""
-    outcome = PAUSE
-    while outcome == PAUSE and r.controller.rule.event == 0:
-        outcome = step_once(p.controller, r.controller, next_entry(r.controller.rule, up, down))
-    if outcome != STEP:
-        return False
-    r.tick += 1
-    return True
-
-
-def alone(p: StepperParams) -> AloneParams:
-    """The same parameters, in the same memory, for running without the rotor."""
-    return AloneParams.from_buffer(p)
 
 
 def tables(up: NDArray[np.int16], down: NDArray[np.int16]) -> tuple[Entries, Entries]:

@@ -87,6 +87,6 @@ def jerk_comparison() -> JerkComparison:
     smooth = np.array([0.0, 0.1, 2.0, 2.1])
     return JerkComparison(
         motor="x", way=40 * MM, speed=20 * MM, acceleration=0.2, jerk=54.8,
-        envelope=Profile(steps, np.array([2 * MM, 20 * MM, 2 * MM, 0.0]), steps=True),
+        envelope=Profile(np.repeat(steps, 2)[1:], np.append(np.repeat([2 * MM, 20 * MM, 2 * MM], 2), 0.0)),
         smooth=Profile(smooth, np.array([0.0, 20 * MM, 20 * MM, 0.0])),
     )  # fmt: skip
