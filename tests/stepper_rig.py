@@ -26,20 +26,21 @@ from detent.methods.stepper_envelope.system import (
 )
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
-from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, acceleration_limit, make_ramp, total_inertia
+from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, make_ramp
 from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
 
 N = 8000
 START_HZ, MAX_HZ, FINE_HZ = 400.0, 4000.0, 1000.0
 A_LIN = 40_000.0
+LOAD = StepperLoad(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
 MOTOR = StepperMotor(
     steps_per_turn=200,
     rotor_inertia=9.0e-7,
     holding_torque=0.06,
     pull_out=FirstOrderPullOut(torque=0.045, corner_hz=1200.0),
     unloaded_start_hz=900.0,
+    load=LOAD,
 )
-LOAD = StepperLoad(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
 DT = 2e-6
 SETTLE = 0.05
 CLOCK_HZ = 1_000_000_000
@@ -49,18 +50,16 @@ RELOAD_CLOCK_HZ = 1_000_000
 
 
 def default_ramp(max_hz: float = MAX_HZ) -> StepRamp:
-    return make_ramp(START_HZ, max_hz, acceleration_limit(MOTOR, LOAD, A_LIN))
+    return make_ramp(START_HZ, max_hz, MOTOR.acceleration_limit(A_LIN))
 
 
 RAMP = default_ramp()
 COARSE_FINE = (Zone(2000, 2600, FINE_HZ), Zone(5000, 6000, FINE_HZ))
 
 
-def rotor_params(
-    motor: StepperMotor = MOTOR, load: StepperLoad = LOAD, inertia: float | None = None, top: float = MAX_HZ
-) -> RotorParams:
+def rotor_params(motor: StepperMotor = MOTOR, inertia: float | None = None, top: float = MAX_HZ) -> RotorParams:
     """Rotor of specification 7.2; `inertia` in place of the sum of motor and load [kg m^2], driven up to `top` [Hz]."""
-    total = total_inertia(motor, load) if inertia is None else inertia
+    total = motor.inertia if inertia is None else inertia
     teeth = motor.steps_per_turn / 4
     p = RotorParams(
         dt=DT,
@@ -69,7 +68,7 @@ def rotor_params(
         inertia=total,
         torque=motor.holding_torque,
         damping=0.4 * math.sqrt(teeth * motor.holding_torque * total),
-        friction=load.friction_torque,
+        friction=motor.load.friction_torque,
     )
     fill_curve(p, motor.pull_out, top)
     return p
@@ -135,7 +134,7 @@ class Rig:
         max_hz: float = MAX_HZ,
         ramp: StepRamp = RAMP,
         motor: StepperMotor = MOTOR,
-        load: StepperLoad = LOAD,
+        load: StepperLoad | None = None,
         inertia: float | None = None,
         reload: bool = False,
         literal: bool = False,
@@ -143,6 +142,7 @@ class Rig:
         down_zones: Sequence[Zone] | None = None,
     ) -> None:
         turn = steps if turn is None else turn
+        motor = motor if load is None else replace(motor, load=load)
         other = zones if down_zones is None else down_zones
         self.ramp, self.zones = ramp, ZoneMap(steps, max_hz, zones, [max_hz, *(zone.max_hz for zone in other)])
         self.down_zones = ZoneMap(steps, max_hz, other, self.zones.limits)
@@ -155,7 +155,7 @@ class Rig:
         self.p.controller.rule.literal, self.p.controller.pause = literal, pause
         self.p.controller.instant_ticks = round(DT * self.clock_hz)
         self.p.plant.clock_hz = self.clock_hz
-        self.p.plant.rotor = rotor_params(motor, load, inertia, max(max_hz, float(ramp.hz[-1])))
+        self.p.plant.rotor = rotor_params(motor, inertia, max(max_hz, float(ramp.hz[-1])))
         switch_on(self.r, at, motor.step_angle)
         self.seconds = 0.0
         """Time of all runs so far, up to the end of the last period [s]."""

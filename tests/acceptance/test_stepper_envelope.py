@@ -40,7 +40,6 @@ from detent.kernel.loop import advance
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope.build import changed, stepper_motor
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory
-from detent.planning.step_ramp import start_frequency, total_inertia
 
 TOP = len(RAMP) - 1
 L = len(RAMP)
@@ -77,7 +76,7 @@ def test_01_ramp_list():
     linear = RAMP.hz < 3500
     assert RAMP.hz[linear] == pytest.approx(np.sqrt(START_HZ**2 + 2 * A_LIN * np.arange(L)[linear]), rel=1e-12)
     # The start frequency of 400 Hz is what loading and reserve leave of 900 Hz, rounded down.
-    assert start_frequency(MOTOR, LOAD) == pytest.approx(848 / 2.1, rel=1e-3)
+    assert MOTOR.start_hz() == pytest.approx(848 / 2.1, rel=1e-3)
 
 
 EVENTS = {
@@ -475,12 +474,12 @@ def test_16_time_against_the_impossible():
 @pytest.mark.parametrize(("factor", "lost"), [(2, False), (4, False), (6, False), (8, False), (12, True)])
 def test_17_margin_for_the_inertia(factor, lost, reload):
     """The factors are those of the whole inertia J; see below."""
-    rig = Rig(inertia=factor * total_inertia(MOTOR, LOAD), reload=reload).start().run()
+    rig = Rig(inertia=factor * MOTOR.inertia, reload=reload).start().run()
     assert (rig.lost != 0) == lost
 
 
 def test_17_the_factor_of_the_inertia_is_that_of_the_whole_shaft():
-    inertia = total_inertia(MOTOR, LOAD)
+    inertia = MOTOR.inertia
     # The rotor falls behind where J alpha + T_fric exceeds what the rig's motor has at the end of the linear ramp.
     peak = MOTOR.holding_torque / math.hypot(1, 3510 / 1200)
     needed = A_LIN * MOTOR.step_angle * inertia

@@ -156,7 +156,6 @@ class StepCase:
             max_hz=axis.max_hz if chance(rng, 0.7) else top * rng.uniform(0.5, 1.5),
             ramp=axis.ramp,
             motor=axis.motor,
-            load=axis.load,
             reload=top * RELOAD_TICKS <= RELOAD_CLOCK_HZ and chance(rng, 0.5),
             pause=1 if axis.must_wait else whole(rng, 0, 1),
             down_zones=None if chance(rng, 0.3) else draw_zones(rng, axis, steps),

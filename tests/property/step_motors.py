@@ -21,22 +21,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from tests.property.numbered_cases import chance, log_uniform, whole
-from tests.stepper_rig import LOAD, MOTOR, START_HZ
+from tests.stepper_rig import MOTOR, START_HZ
 
 from detent.planning.pull_out import FIRST_HARMONIC, FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
 from detent.planning.step_ramp import (
     StepperLoad,
     StepperMotor,
     StepRamp,
-    acceleration_limit,
     make_ramp,
-    natural_frequency,
-    total_inertia,
 )
 
 FRICTION = 0.1
 """Friction, as a part of the holding torque."""
-START = START_HZ / natural_frequency(MOTOR.steps_per_turn, MOTOR.holding_torque, total_inertia(MOTOR, LOAD))
+START = START_HZ / MOTOR.natural_hz
 """Start frequency, as a multiple of the natural frequency."""
 AT_START = 0.9
 """Torque at the highest start frequency, as a part of that at standstill."""
@@ -49,10 +46,9 @@ LONGEST_RAMP = 400
 
 @dataclass(frozen=True)
 class Axis:
-    """A motor inside the margin, its load and its ramp."""
+    """A motor inside the margin, and its ramp."""
 
     motor: StepperMotor
-    load: StepperLoad
     ramp: StepRamp
     natural_hz: float
     max_hz: float
@@ -96,8 +92,8 @@ def draw_measured(rng: np.random.Generator, natural: float, _teeth: float) -> tu
 FORMS = (draw_first_order, draw_winding, draw_measured)
 
 
-def draw_motor(rng: np.random.Generator) -> tuple[StepperMotor, StepperLoad, float]:
-    """Motor and load, and their natural frequency [Hz]."""
+def draw_motor(rng: np.random.Generator) -> tuple[StepperMotor, float]:
+    """Motor with its load, and their natural frequency [Hz]."""
     natural = log_uniform(rng, 250.0, 1200.0) if chance(rng, 0.9) else log_uniform(rng, 60.0, 250.0)
     steps = (48, 96, 100, 200, 360, 400)[whole(rng, 0, 5)]
     pull_out, torque = FORMS[whole(rng, 0, 2)](rng, natural, steps / 4)
@@ -111,13 +107,12 @@ def draw_motor(rng: np.random.Generator) -> tuple[StepperMotor, StepperLoad, flo
         coupling_inertia=0.0,
         friction_torque=0.0 if chance(rng, 0.1) else rng.uniform(0.0, FRICTION) * torque,
     )
-    return StepperMotor(steps, rotor, torque, pull_out, natural), load, natural
+    return StepperMotor(steps, rotor, torque, pull_out, natural, load), natural
 
 
-def is_inside_margin(motor: StepperMotor, load: StepperLoad, ramp: StepRamp) -> bool:
+def is_inside_margin(motor: StepperMotor, ramp: StepRamp) -> bool:
     """Whether the rotor is promised to follow this ramp."""
-    inertia, friction = total_inertia(motor, load), load.friction_torque
-    natural = natural_frequency(motor.steps_per_turn, motor.holding_torque, inertia)
+    inertia, friction, natural = motor.inertia, motor.load.friction_torque, motor.natural_hz
     torque = np.array([motor.pull_out(float(hz)) for hz in ramp.hz]) * motor.holding_torque / motor.pull_out(0.0)
     taken = friction + inertia * motor.step_angle * np.diff(ramp.hz**2, append=ramp.hz[-1] ** 2)
     return bool(
@@ -128,10 +123,10 @@ def is_inside_margin(motor: StepperMotor, load: StepperLoad, ramp: StepRamp) -> 
     )
 
 
-def spare_acceleration(motor: StepperMotor, load: StepperLoad, hz: float) -> float:
+def spare_acceleration(motor: StepperMotor, hz: float) -> float:
     """What the margin leaves at a frequency to accelerate with [step/s^2]."""
     torque = motor.pull_out(hz) / motor.pull_out(0.0) * motor.holding_torque
-    return (USED * torque - load.friction_torque) / 2 / (total_inertia(motor, load) * motor.step_angle)
+    return (USED * torque - motor.load.friction_torque) / 2 / (motor.inertia * motor.step_angle)
 
 
 def draw_share(rng: np.random.Generator) -> float:
@@ -146,14 +141,14 @@ def draw_share(rng: np.random.Generator) -> float:
 def draw_axis(rng: np.random.Generator) -> Axis:
     """Draw until a ramp lies inside the margin and is of a length that a test has time for."""
     while True:
-        motor, load, natural = draw_motor(rng)
+        motor, natural = draw_motor(rng)
         start = natural * (START if chance(rng, 0.3) else rng.uniform(0.3, START))
         top = start * log_uniform(rng, 1.0 if chance(rng, 0.1) else 2.0, 20.0)
-        steepest = spare_acceleration(motor, load, top) * draw_share(rng)
+        steepest = spare_acceleration(motor, top) * draw_share(rng)
         if not steepest * 2 * LONGEST_RAMP > top**2 - start**2:
             continue
-        acceleration = acceleration_limit(motor, load, steepest, safety_factor=rng.uniform(1.5, 5.0))
+        acceleration = motor.acceleration_limit(steepest, rng.uniform(1.5, 5.0))
         if acceleration(start) > 0:
             ramp = make_ramp(start, top, acceleration)
-            if len(ramp) <= 2 * LONGEST_RAMP and is_inside_margin(motor, load, ramp):
-                return Axis(motor, load, ramp, natural, top)
+            if len(ramp) <= 2 * LONGEST_RAMP and is_inside_margin(motor, ramp):
+                return Axis(motor, ramp, natural, top)

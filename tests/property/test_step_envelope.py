@@ -27,7 +27,7 @@ from tests.stepper_rig import A_LIN, LOAD, MAX_HZ, MOTOR, RAMP, Rig, heavier
 from detent.control.step_rule import FAULT, REST
 from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
-from detent.planning.step_ramp import StepperMotor, acceleration_limit, make_ramp, natural_frequency
+from detent.planning.step_ramp import StepperMotor, make_ramp, natural_frequency
 
 pytestmark = pytest.mark.early
 
@@ -49,17 +49,17 @@ def axes(draw: st.DrawFn) -> Axis:
     )
     natural = natural_frequency(200, torque, inertia + load.inertia)
     pull_out = FirstOrderPullOut(0.75 * torque, draw(st.floats(3.1, 12.0)) * natural)
-    motor = StepperMotor(200, inertia, torque, pull_out, 900.0)
+    motor = StepperMotor(200, inertia, torque, pull_out, 900.0, load)
     start = draw(st.floats(0.3, START)) * natural
     top = start * draw(st.floats(1.0, 12.0))
-    spare = spare_acceleration(motor, load, top)
+    spare = spare_acceleration(motor, top)
     assume(spare > 0)
-    acceleration = acceleration_limit(motor, load, draw(st.floats(0.05, 1.5)) * spare)
+    acceleration = motor.acceleration_limit(draw(st.floats(0.05, 1.5)) * spare)
     assume(acceleration(start) > 0)
     ramp = make_ramp(start, top, acceleration)
     assume(len(ramp) <= MAX_RAMP)
-    assume(is_inside_margin(motor, load, ramp))
-    return Axis(motor, load, ramp, natural, top)
+    assume(is_inside_margin(motor, ramp))
+    return Axis(motor, ramp, natural, top)
 
 
 @st.composite
@@ -103,7 +103,6 @@ def make_rig(draw: st.DataObject, axis: Axis, steps: int, zones: tuple[Zone, ...
         max_hz=float(axis.ramp.hz[-1]),
         ramp=axis.ramp,
         motor=axis.motor,
-        load=axis.load,
         reload=draw.draw(st.booleans(), label="reload"),
         pause=draw.draw(st.integers(int(axis.must_wait), 1), label="pause"),
     )
@@ -173,11 +172,11 @@ KINDS = (
 
 
 def test_the_default_motor_lies_inside_the_margin_and_not_far_inside():
-    assert is_inside_margin(MOTOR, LOAD, RAMP)
-    assert not is_inside_margin(MOTOR, heavier(LOAD, friction_torque=0.0061), RAMP)
-    assert not is_inside_margin(MOTOR, heavier(LOAD, spindle_inertia=1.5e-7), RAMP)
-    assert not is_inside_margin(MOTOR, LOAD, make_ramp(410, MAX_HZ, acceleration_limit(MOTOR, LOAD, A_LIN)))
-    assert not is_inside_margin(replace(MOTOR, pull_out=FirstOrderPullOut(0.045, 800.0)), LOAD, RAMP)
+    assert is_inside_margin(MOTOR, RAMP)
+    assert not is_inside_margin(replace(MOTOR, load=heavier(LOAD, friction_torque=0.0061)), RAMP)
+    assert not is_inside_margin(replace(MOTOR, load=heavier(LOAD, spindle_inertia=1.5e-7)), RAMP)
+    assert not is_inside_margin(MOTOR, make_ramp(410, MAX_HZ, MOTOR.acceleration_limit(A_LIN)))
+    assert not is_inside_margin(replace(MOTOR, pull_out=FirstOrderPullOut(0.045, 800.0)), RAMP)
 
 
 @pytest.mark.compiled

@@ -14,24 +14,10 @@ from numpy.typing import NDArray
 
 from detent.planning.pull_out import PullOut
 
+Numbers = NDArray[np.float64]
+
 LEAST_GAIN_HZ = 0.5  # a ramp ends where a step gains less than this: the torque left over is used up
 MAX_HZ = 65535  # largest frequency in a 16-bit word
-
-
-@dataclass(frozen=True, slots=True)
-class StepperMotor:
-    """What a stepper can do."""
-
-    steps_per_turn: int  # 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
-    rotor_inertia: float  # [kg m^2]
-    holding_torque: float  # peak of the static torque curve [N m]
-    pull_out: PullOut  # pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`
-    unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
-
-    @property
-    def step_angle(self) -> float:
-        """Angle of one step [rad]."""
-        return 2 * pi / self.steps_per_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,54 +41,69 @@ def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float
     return sqrt(steps_per_turn / 4 * holding_torque / inertia) / (2 * pi)
 
 
-def total_inertia(motor: StepperMotor, load: StepperLoad) -> float:
-    """Inertia that the motor accelerates, its own rotor included [kg m^2]."""
-    return motor.rotor_inertia + load.inertia
+@dataclass(frozen=True, slots=True)
+class StepperMotor:
+    """What a stepper can do with its load."""
 
+    steps_per_turn: int  # 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
+    rotor_inertia: float  # [kg m^2]
+    holding_torque: float  # peak of the static torque curve [N m]
+    pull_out: PullOut  # pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`
+    unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
+    load: StepperLoad
 
-def start_frequency(motor: StepperMotor, load: StepperLoad, safety: float = 2.1) -> float:
-    """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
-    return motor.unloaded_start_hz / sqrt(1 + load.inertia / motor.rotor_inertia) / safety
+    @property
+    def step_angle(self) -> float:
+        """Angle of one step [rad]."""
+        return 2 * pi / self.steps_per_turn
 
+    @property
+    def inertia(self) -> float:
+        """Inertia that the motor accelerates, its own rotor included [kg m^2]."""
+        return self.rotor_inertia + self.load.inertia
 
-def acceleration_limit(
-    motor: StepperMotor, load: StepperLoad, max_acceleration: float, safety_factor: float = 2.0
-) -> Callable[[float], float]:
-    """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""
-    per_torque = 1 / (total_inertia(motor, load) * motor.step_angle)
+    @property
+    def natural_hz(self) -> float:
+        """Frequency at which the loaded rotor swings about a step [Hz]."""
+        return natural_frequency(self.steps_per_turn, self.holding_torque, self.inertia)
 
-    def acceleration(hz: float) -> float:
-        spare = motor.pull_out(hz) / safety_factor - load.friction_torque
-        return min(max_acceleration, spare * per_torque)
+    def start_hz(self, safety: float = 2.1) -> float:
+        """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
+        return self.unloaded_start_hz / sqrt(1 + self.load.inertia / self.rotor_inertia) / safety
 
-    return acceleration
+    def acceleration_limit(self, max_acceleration: float, safety: float = 2.0) -> Callable[[float], float]:
+        """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""
+        per_torque = 1 / (self.inertia * self.step_angle)
 
+        def acceleration(hz: float) -> float:
+            spare = self.pull_out(hz) / safety - self.load.friction_torque
+            return min(max_acceleration, spare * per_torque)
 
-def needed_torque(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Torque that the motor must give in each step of a run.
+        return acceleration
 
-    Magnitude of J theta a + T_fric with a = (f_i^2 - f_(i-1)^2) / 2, 0 in the first step [N m]: the inverse of the
-    ramp's rule; friction helps to brake.
-    """
-    acceleration = np.diff(hz**2, prepend=hz[:1] ** 2) / 2
-    return np.abs(total_inertia(motor, load) * motor.step_angle * acceleration + load.friction_torque)
+    def needed_torque(self, hz: Numbers) -> Numbers:
+        """Torque that the motor must give in each step of a run.
 
+        Magnitude of J theta a + T_fric with a = (f_i^2 - f_(i-1)^2) / 2, 0 in the first step [N m]: the inverse of the
+        ramp's rule; friction helps to brake.
+        """
+        acceleration = np.diff(hz**2, prepend=hz[:1] ** 2) / 2
+        return np.abs(self.inertia * self.step_angle * acceleration + self.load.friction_torque)
 
-def torque_margin(motor: StepperMotor, load: StepperLoad, hz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Pull-out torque over the torque needed in each step of a run, shape (n,); below 1 the rotor falls behind.
+    def torque_margin(self, hz: Numbers) -> Numbers:
+        """Pull-out torque over the torque needed in each step of a run, shape (n,); below 1 the rotor falls behind.
 
-    Parameters are those of `needed_torque`. A step that needs no torque has an infinite margin.
-    """
-    available = np.array([motor.pull_out(f) for f in hz.tolist()])
-    needed = needed_torque(motor, load, hz)
-    return np.divide(available, needed, out=np.full(len(hz), np.inf), where=needed > 0)
+        A step that needs no torque has an infinite margin.
+        """
+        available, needed = np.array([self.pull_out(f) for f in hz.tolist()]), self.needed_torque(hz)
+        return np.divide(available, needed, out=np.full(len(hz), np.inf), where=needed > 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepRamp:
     """The frequencies of a run-up from rest, one per step."""
 
-    hz: NDArray[np.float64]  # strictly increasing; `hz[0]` is the frequency to start and to stop at [Hz]
+    hz: Numbers  # strictly increasing; `hz[0]` is the frequency to start and to stop at [Hz]
 
     def __len__(self) -> int:
         return len(self.hz)

@@ -7,24 +7,21 @@ from tests.stepper_rig import LOAD, MOTOR, Rig, heavier
 
 from detent.planning.pull_out import MeasuredPullOut
 from detent.planning.step_ramp import (
-    acceleration_limit,
     make_ramp,
     natural_frequency,
-    start_frequency,
-    total_inertia,
 )
 
 
 def test_inertia_of_the_default_load():
     assert LOAD.inertia == pytest.approx(6.0e-8 + 5.0e-8 + 0.12 * (1e-3 / (2 * math.pi)) ** 2)
-    assert total_inertia(MOTOR, LOAD) == pytest.approx(1.013e-6, rel=1e-3)
+    assert MOTOR.inertia == pytest.approx(1.013e-6, rel=1e-3)
 
 
 def test_a_stage_with_two_millimetres_pitch_starts_more_slowly():
     stage = heavier(LOAD, pitch=2e-3, mass=1.0)
     assert stage.inertia - 1.1e-7 == pytest.approx(1.01e-7, rel=0.01)
-    assert start_frequency(MOTOR, stage, 1.0) == pytest.approx(810, abs=1)
-    assert start_frequency(MOTOR, stage, 2.1) == pytest.approx(810 / 2.1, abs=0.5)
+    assert replace(MOTOR, load=stage).start_hz(1.0) == pytest.approx(810, abs=1)
+    assert replace(MOTOR, load=stage).start_hz(2.1) == pytest.approx(810 / 2.1, abs=0.5)
 
 
 def test_torque_falls_with_the_step_frequency():
@@ -34,7 +31,7 @@ def test_torque_falls_with_the_step_frequency():
 
 
 def test_acceleration_is_limited_first_by_the_stated_value_then_by_the_torque():
-    a = acceleration_limit(MOTOR, LOAD, 40_000.0)
+    a = MOTOR.acceleration_limit(40_000.0)
     assert a(400) == a(3500) == 40_000
     assert a(3520) < 40_000
     assert a(4000) == pytest.approx(14_600, rel=0.01)
@@ -51,7 +48,7 @@ def test_a_constant_acceleration_gives_the_closed_form_to_the_last_bit():
 
 
 def test_the_list_ends_where_the_torque_is_used_up():
-    ramp = make_ramp(400.0, 10_000.0, acceleration_limit(MOTOR, LOAD, 40_000.0))
+    ramp = make_ramp(400.0, 10_000.0, MOTOR.acceleration_limit(40_000.0))
     assert 4200 < ramp.hz[-1] < 4340
     assert np.diff(ramp.hz).min() >= 0.5
 
@@ -85,7 +82,7 @@ def test_a_ramp_ends_where_the_torque_does_even_within_a_step():
     """Acceleration is taken at the middle of a step: the ramp once climbed past the end of a measured curve."""
     hz = [0.0, 500.0, 1000.0, 1500.0, 2000.0, 2500.0, 3000.0]
     ends = replace(MOTOR, pull_out=MeasuredPullOut(hz, [MOTOR.pull_out(f) for f in hz]))
-    ramp = make_ramp(400.0, 4000.0, acceleration_limit(ends, LOAD, 40_000.0))
+    ramp = make_ramp(400.0, 4000.0, ends.acceleration_limit(40_000.0))
     assert 2980 < ramp.hz[-1] <= 3000
     rig = Rig(2000, ramp=ramp, motor=ends).start().run()
     assert rig.lost == 0

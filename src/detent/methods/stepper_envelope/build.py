@@ -9,17 +9,7 @@ from typing import TYPE_CHECKING
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
-from detent.planning.step_ramp import (
-    MAX_HZ,
-    StepperLoad,
-    StepperMotor,
-    StepRamp,
-    acceleration_limit,
-    make_ramp,
-    natural_frequency,
-    start_frequency,
-    total_inertia,
-)
+from detent.planning.step_ramp import MAX_HZ, StepperLoad, StepperMotor, StepRamp, make_ramp, natural_frequency
 
 if TYPE_CHECKING:
     from detent.methods.stepper_envelope.system import StepperParams
@@ -52,12 +42,13 @@ def instant(spec: StepperEnvelopeSpec) -> float:
 
 
 def stepper_motor(table: StepperTable) -> StepperMotor:
-    """What the motor of a table can do with its drive, current and supply included."""
+    """What the motor of a table can do with its drive, current and supply included, and its load."""
     motor, held = table.motor, table.held_torque
     start = motor.start_frequency
     if start is None:
         start = UNLOADED_STARTS * natural_frequency(motor.steps_per_turn, held, motor.rotor_inertia)
-    return StepperMotor(motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start)
+    load = stepper_load(table)
+    return StepperMotor(motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start, load)
 
 
 def pull_out(table: StepperTable) -> PullOut:
@@ -90,7 +81,7 @@ def stepper_load(table: StepperTable) -> StepperLoad:
 
 def bare_start_hz(table: StepperTable) -> float:
     """Start frequency with load and reserve, whatever the largest one [Hz]."""
-    return start_frequency(stepper_motor(table), stepper_load(table), table.drive.start_safety)
+    return stepper_motor(table).start_hz(table.drive.start_safety)
 
 
 def start_hz(table: StepperTable) -> float:
@@ -106,7 +97,7 @@ def make_step_ramp(table: StepperTable) -> StepRamp:
 def _acceleration(table: StepperTable) -> Callable[[float], float]:
     """Acceleration that torque and limit allow [step/s^2], of a frequency [Hz]."""
     limit = table.limits.acceleration / table.step
-    return acceleration_limit(stepper_motor(table), stepper_load(table), limit, table.drive.torque_safety)
+    return stepper_motor(table).acceleration_limit(limit, table.drive.torque_safety)
 
 
 # ---- what can be worked out at all
@@ -219,16 +210,16 @@ def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> 
     from detent.plant.stepper_rotor import fill_curve
 
     p, table = StepperParams(), spec.stepper[name]
-    motor, load = stepper_motor(table), stepper_load(table)
+    motor = stepper_motor(table)
     reload = spec.controller.words == "reload"
     clock_hz = p.plant.clock_hz = round(spec.controller.timer)
     load_rule(p.controller, tables.ramp, tables.up.zones.limits, clock_hz, reload=reload)
     p.controller.rule.literal = table.method.rule == "literal"
     p.controller.pause, p.controller.instant_ticks = table.drive.reversal_pause, instant_ticks(spec)
     p.plant.tolerance = spec.controller.tolerance
-    r, inertia = p.plant.rotor, total_inertia(motor, load)
+    r, inertia = p.plant.rotor, motor.inertia
     r.dt, r.teeth, r.step_angle, r.inertia = instant(spec), motor.steps_per_turn / 4, motor.step_angle, inertia
-    r.torque, r.friction = motor.holding_torque, load.friction_torque
+    r.torque, r.friction = motor.holding_torque, motor.load.friction_torque
     r.damping = DAMPING * math.sqrt(r.teeth * motor.holding_torque * inertia)
     fill_curve(r, motor.pull_out, table.max_hz)
     return p

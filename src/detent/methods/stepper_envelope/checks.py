@@ -79,7 +79,7 @@ def _start(m: MotorFigures) -> Iterator[Caution]:
 
 def _reserves(m: MotorFigures) -> Iterator[Caution]:
     """The ramp and friction leave torque, and no run jumps to a speed."""
-    (share, hz), friction, most = m.torque_used, m.load.friction_torque, MOST_FRICTION * m.motor.holding_torque
+    (share, hz), friction, most = m.torque_used, m.motor.load.friction_torque, MOST_FRICTION * m.motor.holding_torque
     if share > MOST_USED * (1 + BARELY):
         yield Caution(
             "torque used on the ramp",

@@ -15,14 +15,12 @@ from detent.files.findings import Derived
 from detent.methods.stepper_envelope.build import (
     make_step_ramp,
     start_hz,
-    stepper_load,
     stepper_motor,
     zone_maps,
 )
 from detent.methods.stepper_envelope.rules import Motor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import StepEnvelope, envelope_memory
-from detent.planning.step_ramp import natural_frequency, total_inertia
 from detent.units import format_quantity
 
 HIGHEST_HZ = 1e6  # frequency up to which the end of the torque is looked for [Hz]
@@ -43,18 +41,16 @@ class MotorFigures(Motor):
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         super().__init__(spec, name)
-        self.motor, self.load = motor, load = stepper_motor(self.table), stepper_load(self.table)
-        self.inertia = total_inertia(motor, load)
+        self.motor = stepper_motor(self.table)
+        self.inertia, self.natural_hz = self.motor.inertia, self.motor.natural_hz
         self.start_hz, self.max_hz = start_hz(self.table), self.table.max_hz
-        # Frequency at which the loaded rotor swings about its step [Hz].
-        self.natural_hz = natural_frequency(motor.steps_per_turn, motor.holding_torque, self.inertia)
         self.ramp = make_step_ramp(self.table)
         self.shortest_way = 2 * len(self.ramp) - 1  # of a move that reaches the largest frequency [step]
         self.linear = self.table.limits.acceleration / self.table.step  # limit a_lin of the ramp [step/s^2]
 
     def torque_left(self, hz: float) -> float:
         """Torque that is left to accelerate with at a frequency [N m]."""
-        return self.motor.pull_out(hz) / self.table.drive.torque_safety - self.load.friction_torque
+        return self.motor.pull_out(hz) / self.table.drive.torque_safety - self.motor.load.friction_torque
 
     def acceleration_torque(self, acceleration: float) -> float:
         """Torque that an acceleration [step/s^2] takes [N m]."""
@@ -86,7 +82,7 @@ class MotorFigures(Motor):
         hz = self.ramp.hz
         twice = self.acceleration_torque(1.0) * np.diff(hz**2, append=hz[-1] ** 2)
         following = np.append(hz[1:], hz[-1])
-        share = (self.load.friction_torque + twice) / self.torque_there(following)
+        share = (self.motor.load.friction_torque + twice) / self.torque_there(following)
         worst = int(np.argmax(share))
         return float(share[worst]), float(following[worst])
 
@@ -140,7 +136,7 @@ def _steps(m: MotorFigures) -> Iterator[Row]:
 
 def _rotor(m: MotorFigures) -> Iterator[Row]:
     """How the rotor with its load swings and starts."""
-    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.load.inertia / m.motor.rotor_inertia:.3g} x rotor"
+    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.motor.load.inertia / m.motor.rotor_inertia:.3g} x rotor"
     yield "inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2"
     yield "natural frequency", m.natural_hz, "Hz", "", "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
     speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.natural_hz
@@ -148,7 +144,7 @@ def _rotor(m: MotorFigures) -> Iterator[Row]:
     formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
     yield "start frequency", m.start_hz, "Hz", text, formula
     # The distance from its step at which friction can hold a resting rotor.
-    error = math.asin(min(m.load.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
+    error = math.asin(min(m.motor.load.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
     text = f"{error:.3g} steps, {format_quantity(error * m.table.step, 'm')}"
     yield "error at rest", error, "count", text, "asin(friction / holding torque) / 90 deg, at most"
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.methods.stepper_envelope.build import stepper_load, stepper_motor
+from detent.methods.stepper_envelope.build import stepper_motor
 from detent.methods.stepper_envelope.comparison import time_text
 from detent.methods.stepper_envelope.envelope_files import envelope_tables
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -21,7 +21,6 @@ from detent.page.table import TextTable
 from detent.page.words import GAP, number
 from detent.planning.profile import MotionLimits, move_sections
 from detent.planning.step_envelope import StepEnvelope
-from detent.planning.step_ramp import natural_frequency, total_inertia
 from detent.units import format_quantity
 
 POINTS = 900  # points of one curve
@@ -162,8 +161,7 @@ def compare_jerk(spec: StepperEnvelopeSpec, name: str = "") -> JerkComparison:
     """Hold the envelope of a motor, the first one, over its whole travel upwards against a profile of limited jerk."""
     name = name or next(iter(spec.stepper))
     table = spec.stepper[name]
-    motor, way = stepper_motor(table), table.steps * table.step
-    swing = natural_frequency(motor.steps_per_turn, motor.holding_torque, total_inertia(motor, stepper_load(table)))
+    swing, way = stepper_motor(table).natural_hz, table.steps * table.step
     limits = MotionLimits(table.limits.speed, table.limits.acceleration, table.limits.acceleration * swing)
     sections = move_sections(0.0, way, limits)
     t = np.linspace(0.0, float(sections.t[-1]), 2001)

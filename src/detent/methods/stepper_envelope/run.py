@@ -4,12 +4,11 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from detent.errors import AxisError
-from detent.methods.stepper_envelope.build import start_hz, stepper_load, stepper_motor
+from detent.methods.stepper_envelope.build import start_hz, stepper_motor
 from detent.methods.stepper_envelope.host import Leg, StageHost, check_stage_job
 from detent.methods.stepper_envelope.machine import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
-from detent.planning.step_ramp import torque_margin
 from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
@@ -228,7 +227,7 @@ def _observe(  # noqa: PLR0913 - what the host knows of the motion
         rest_lag=float(plant.rotor.lag),
         peak_lag=float(plant.rotor.peak_lag),
         peak_hz=float(plant.gauge.peak_hz),
-        margin=float(torque_margin(stepper_motor(table), stepper_load(table), used).min()),
+        margin=float(stepper_motor(table).torque_margin(used).min()),
         overrun=over,
         naive=pulses / start_hz(table),
     )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.control.step_rule import TURN
-from detent.methods.stepper_envelope.build import make_step_ramp, stepper_load, stepper_motor, zone_maps
+from detent.methods.stepper_envelope.build import make_step_ramp, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
 from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
 from detent.methods.stepper_envelope.summary import stated
@@ -17,7 +17,6 @@ from detent.page.parts import Numbers
 from detent.page.run_page import has
 from detent.page.words import GAP, count
 from detent.planning.step_envelope import StepEnvelope, ZoneMap
-from detent.planning.step_ramp import needed_torque
 from detent.record.trace import Trace
 
 NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
@@ -158,8 +157,7 @@ def step_torques(table: StepperTable, legs: Sequence[Leg]) -> NDArray[np.float64
 
     Shape (3, n); None where the ramp indices were not recorded, or no step was made.
     """
-    motor, load = stepper_motor(table), stepper_load(table)
-    ramp, maps = make_step_ramp(table).hz, zone_maps(table)
+    motor, ramp, maps = stepper_motor(table), make_step_ramp(table).hz, zone_maps(table)
     rows: list[Numbers] = []
     for leg in legs:
         planned = _planned_hz(leg, ramp, maps[0] if leg.direction > 0 else maps[1])
@@ -168,7 +166,7 @@ def step_torques(table: StepperTable, legs: Sequence[Leg]) -> NDArray[np.float64
         # Between two rows of the trace the square rises evenly.
         way = np.abs(leg.made.position - leg.start)
         hz = np.sqrt(np.interp(np.arange(1, abs(leg.stop - leg.start) + 1), way, planned**2))
-        rows.append(np.array([hz, [motor.pull_out(f) for f in hz.tolist()], needed_torque(motor, load, hz)]))
+        rows.append(np.array([hz, [motor.pull_out(f) for f in hz.tolist()], motor.needed_torque(hz)]))
     found = np.concatenate(rows, axis=1)
     return found if found.size else None
 

@@ -25,7 +25,6 @@ from detent.methods.stepper_envelope.build import (
     make_step_ramp,
     make_tables,
     start_hz,
-    stepper_load,
     stepper_motor,
     zone_maps,
 )
@@ -156,7 +155,7 @@ def build(name, *overrides, example="zoom"):
 
 def test_the_motor_of_the_zoom_is_that_of_the_specification():
     table = load().stepper["group_a"]
-    motor, load_ = stepper_motor(table), stepper_load(table)
+    motor = stepper_motor(table)
     assert (motor.steps_per_turn, motor.rotor_inertia, motor.holding_torque) == (
         MOTOR.steps_per_turn,
         pytest.approx(MOTOR.rotor_inertia),
@@ -164,7 +163,7 @@ def test_the_motor_of_the_zoom_is_that_of_the_specification():
     )
     assert isinstance(motor.pull_out, FirstOrderPullOut)
     assert motor.pull_out(2000.0) == pytest.approx(MOTOR.pull_out(2000.0))
-    assert load_.inertia == pytest.approx(LOAD.inertia)
+    assert motor.load.inertia == pytest.approx(LOAD.inertia)
     ramp = make_step_ramp(table)
     assert len(ramp) == len(RAMP)
     assert ramp.hz == pytest.approx(RAMP.hz, abs=0.5)
