@@ -11,8 +11,6 @@ from itertools import pairwise
 from math import hypot, pi, sqrt
 
 FIRST_HARMONIC = 4 / pi  # fundamental of a square wave of amplitude 1: full steps switch each coil so
-
-
 PullOut = Callable[[float], float]  # pull-out torque [N m] at a step frequency [Hz]; 0 where the motor drives nothing
 
 

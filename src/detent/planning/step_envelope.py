@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from detent.planning.step_ramp import StepRamp
 
-INDEX_BITS = 11
-"""Bits of the ramp index in an entry; the zone number has the four above them, the sign is the sentinel's."""
+INDEX_BITS = 11  # bits of the ramp index in an entry; above them the zone number's four and the sentinel's sign
 
 INDEX_MASK = (1 << INDEX_BITS) - 1
 MAX_RAMP = 1 << INDEX_BITS

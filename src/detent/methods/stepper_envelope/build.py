@@ -14,13 +14,9 @@ from detent.planning.step_ramp import MAX_HZ, StepperLoad, StepperMotor, StepRam
 if TYPE_CHECKING:
     from detent.methods.stepper_envelope.system import StepperParams
 
-ROTOR_STEP = 2e-6
-"""Time step of the rotor's equation of motion (7.2) [s], rounded down to whole ticks of the timer; at least one."""
-
+ROTOR_STEP = 2e-6  # time step of the rotor (7.2) [s], in whole ticks of the timer, rounded down; 1 or more
 DAMPING = 0.4  # damping of the rotor against its field, over sqrt(teeth T_hold J): a fifth of the critical one (7.2)
-
-UNLOADED_STARTS = 3.0
-"""Start frequency of a bare rotor over its natural one where no data sheet states it; 3.1 with the defaults of 7.1."""
+UNLOADED_STARTS = 3.0  # start frequency of a bare rotor over its natural one where nobody states it; 3.1 with 7.1
 
 
 NEEDED = {

@@ -22,10 +22,7 @@ from detent.units import parse_quantity
 __all__ = ["RULES", "find_cautions"]
 
 START_RESERVE = 1.4604  # start frequency over the natural one up to which no step was lost; that of 7.1
-
-LEAST_NEAR_START = 0.9
-"""Torque up to that frequency, as a part of that at standstill, down to which no step was lost; 0.95 with 7.1."""
-
+LEAST_NEAR_START = 0.9  # torque up to there, over that at standstill, down to which no step was lost; 0.95 with 7.1
 MOST_USED = 0.45  # share of its torque that a ramp takes, up to which no step was lost; 0.44 with 7.1
 MOST_FRICTION = 0.1  # friction over the holding torque up to which no step was lost; that of 7.1
 LEAST_SAFETY = 2.0  # divisors of pull-out torque and start frequency that age, temperature and resonance call for (7.1)

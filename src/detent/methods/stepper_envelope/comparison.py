@@ -24,9 +24,7 @@ from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import Progress
 from detent.units import format_quantity
 
-WAYS = (100, 500, 2000, 8000)
-"""Ways that are compared, as far as the travel has room for them [step]; those of acceptance test 16."""
-
+WAYS = (100, 500, 2000, 8000)  # that are compared where the travel has room [step]; those of acceptance test 16
 SETTLING = 0.05  # time that a rotor is given to come to rest before its lost steps are counted (7.2) [s]
 
 A, B = "A: braking distance per step", "B: speed per step"

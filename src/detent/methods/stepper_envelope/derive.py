@@ -25,9 +25,7 @@ from detent.units import format_quantity
 
 HIGHEST_HZ = 1e6  # frequency up to which the end of the torque is looked for [Hz]
 PLACES = 1000  # places of that range at which a curve is looked at first, evenly on a logarithmic scale
-
-Row = tuple[str, float | None, str, str, str]
-"""Name, value, unit, text and formula of a figure; no value where there is none, no text where it is the quantity."""
+Row = tuple[str, float | None, str, str, str]  # name, value or none, unit, text unless it is the quantity, formula
 
 PULL_OUT_FORMULA = {
     "winding": "from winding, current and supply",

@@ -105,9 +105,6 @@ def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str
     return max(tied, key=lambda motion: motion.motor.steps), why
 
 
-# ---- under the table of the move
-
-
 def _table_figure(shown: ShownMotion) -> Figure:
     motion, table, legs = shown.motion, shown.table, shown.legs
     way = motion.motor.stop - motion.motor.start
@@ -126,9 +123,6 @@ def _table_figure(shown: ShownMotion) -> Figure:
 
 def _mm(length: float) -> str:
     return f"{stated(length * MM)}{GAP}mm"
-
-
-# ---- torque of every step
 
 
 def _torque_figure(shown: ShownMotion) -> Figure | None:
@@ -181,9 +175,6 @@ def torque_charts(available: Numbers, needed: Numbers, safety: float) -> list[Ch
 def _top(values: Numbers) -> float:
     """Upper end of an axis from 0, with room for a name above the curve."""
     return round(1.15 * float(values.max(initial=1e-3)), 3)
-
-
-# ---- how the rotor followed
 
 
 def _rotor_figures(shown: ShownMotion, trace: Trace | None) -> list[Figure]:
@@ -250,9 +241,6 @@ def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
     return time_charts(
         Timeline(name="rest", t=rows.t[part], label="time since the start signal", bands=[after]), [panel]
     )
-
-
-# ---- what happened, and when
 
 
 def motion_events(shown: ShownMotion) -> list[Event]:

@@ -21,12 +21,8 @@ GREY = "#7d8996"
 INK = "#17202a"
 
 MM = 1e-3
-HEADROOM = 1.32
-"""Height of each half over its largest limit: room for the limits in figures, and further out for the direction."""
-
-UPRIGHT, NONE = 0.07, 0.015
-"""A zone narrower than the first part of the travel has its limit written upright, below the second not at all."""
-
+HEADROOM = 1.32  # height of each half over its largest limit: room for the limits and, further out, the direction
+UPRIGHT, NONE = 0.07, 0.015  # parts of the travel: narrower zones have their limit written upright, or not at all
 BESIDE = 0.17  # part of the travel that the name of an extreme may take, beside its point
 
 LABEL: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}

@@ -43,10 +43,8 @@ class EnvelopeTables:
 
     motor: str  # name of the motor, the prefix of all names in C
     axis: str  # name of the axis, for people
-    # up, down: tables towards growing and towards falling positions: one ramp, one travel, one numbering of the zone
-    # limits
-    up: StepEnvelope
-    down: StepEnvelope
+    up: StepEnvelope  # table towards growing positions
+    down: StepEnvelope  # and towards falling ones: the same ramp, travel and numbering of the zone limits
     clock_hz: int  # ticks of the step timer per second [Hz]
     reload: bool  # words are periods of the timer in ticks instead of frequencies in Hz
     travel_per_step: float  # travel of the moved mass per step [m]

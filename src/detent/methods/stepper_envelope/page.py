@@ -97,9 +97,6 @@ def recorded_steps(figures: StageFigures, trace: Trace | None) -> dict[str, Made
     return {name: made for name, made in found.items() if made is not None and len(made.t)}
 
 
-# ---- what came out, in one glance
-
-
 def _headline(figures: StageFigures) -> Headline:
     run, axis = figures.run, figures.spec.axis.name
     asked = count(figures.asked, figures.word)
@@ -151,9 +148,6 @@ def _notes(figures: StageFigures) -> list[Note]:
         if motor.overrun
     ]
     return [*notes, Note("note", f"how {job.name} was read: {'; '.join(job.notes)}")] if job.notes else notes
-
-
-# ---- places over time
 
 
 def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
@@ -216,9 +210,6 @@ def target_of(figures: StageFigures, name: str, t: Numbers) -> Numbers:
     return np.array(targets)[np.searchsorted(moments, t, side="right") - 1]
 
 
-# ---- frequency against position
-
-
 def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[Figure]:
     runs = [runs for runs in (motor_runs(figures, name, steps) for name, steps in made.items()) if runs.arcs]
     drawn: list[Figure] = []
@@ -256,9 +247,6 @@ def _zones_text(runs: Runs) -> str:
         return ""
     more = f" and {count(len(named) - MOST_ZONES)} more" if len(named) > MOST_ZONES else ""
     return f" The shaded zones have a limit of their own: {', '.join(named[:MOST_ZONES])}{more}."
-
-
-# ---- table
 
 
 def _every_move(figures: StageFigures) -> Figure:

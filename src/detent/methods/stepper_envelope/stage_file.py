@@ -30,9 +30,7 @@ from detent.methods.stepper_envelope.stage_job import (
 )
 
 CSV_KEYS = ("dwell", "repeat", "label", "tile")  # keys beside the motors that a list of places may have
-
-_NAME_UNITS = {"m": ("um", "mm", "cm", "m", "in"), "s": ("us", "ms", "s")}
-"""Units that a name such as ``x_um`` may end in; in brackets any unit may stand."""
+_NAME_UNITS = {"m": ("um", "mm", "cm", "m", "in"), "s": ("us", "ms", "s")}  # a name such as ``x_um`` may end in them
 
 _PREFERRED = "nominal"
 _MOST_NAMED = 12

@@ -21,10 +21,8 @@ WIDTH, HEIGHT = 1000.0, 560.0  # most room that the drawing takes, in its own un
 MARGIN = 46.0  # room around the tiles, for their halves and the scales
 MOST_TILES = 2000  # tiles that are drawn: more are smaller than a dot
 LABELLED = 22.0  # side of a tile from which on its name is written inside
-
 LONG = 2.0  # a tile has its full colour when its way took so many times the median
 PALEST = 0.12  # share of the colour that a tile of the median has at least
-
 SAME = 1e-7  # places that are nearer than this to one another are in one row or column [m]
 LONE = 1e-3  # side of a tile that stands alone [m]
 Place = tuple[float, float]  # to the right, and up in the picture [m]

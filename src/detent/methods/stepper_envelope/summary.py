@@ -108,8 +108,9 @@ def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[s
             lost = f"{by_motor} (from move {count(figures.first_lost.move.number)} on),"
         rows.append(("lost steps", f"{lost} of {count(figures.steps)}"))
     if lag := figures.lag:
-        most = f"up to {steps(lag.value)} ({figures.whose(lag.of)})"
-        rows.append(("rotor lag", f"{most}; falls out of step at {number(PULL_OUT_LAG)}"))
+        most = number(lag.value) + (" step" if number(lag.value) == "1" else " steps")
+        where = f"({figures.whose(lag.of)}); falls out of step at {number(PULL_OUT_LAG)}"
+        rows.append(("rotor lag", f"up to {most} {where}"))
     if rest := figures.rest:
         rows.append(("at rest", f"within {number(rest.value, 2)} steps of its place ({figures.whose(rest.of)})"))
     if margin := figures.margin:
@@ -133,16 +134,6 @@ def stated(value: float) -> str:
 def called(move: StageMoveRecord, kind: str) -> str:
     """What a move is called in a sentence: a tile goes by its name."""
     return f"tile {move.label}" if kind == "tiles" and move.label else f"move {count(move.number)}"
-
-
-def steps(value: float) -> str:
-    """Write a distance in steps.
-
-    >>> steps(1.0), steps(0.0561), steps(1.01738)
-    ('1 step', '0.0561 steps', '1.02 steps')
-    """
-    text = number(value)
-    return f"{text} {'step' if text == '1' else 'steps'}"
 
 
 def margin_text(motion: Motion) -> str:
