@@ -93,13 +93,12 @@ class StageHost:
             for name in legs:  # it is the only one
                 over = self._change(name, move.change.at, move.change.to)
         self.wait(legs)
-        if over:  # the stop it was given lay behind the nearest possible one: come back to it
-            for name in legs:
-                motor = self.stage.motors[name]
-                back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
-                if back[name].steps:
-                    self.start(back)
-                    self.wait(back)
+        for name in legs if over else ():  # its new stop lay behind the nearest possible one: come back to it
+            motor = self.stage.motors[name]
+            back = {name: Leg(motor.position, motor.table.step_inside(self.goal[name]))}
+            if back[name].steps:
+                self.start(back)
+                self.wait(back)
         return legs, over
 
     def _change(self, name: str, at: float, to: float) -> bool:

@@ -77,8 +77,9 @@ class StageMotor:
     def compare(self, method: int, way: range, start_hz: float) -> None:
         """Let a method of `control.step_comparison` drive, upwards over a way [step]."""
         acceleration = self.table.limits.acceleration / self.table.step
-        run: Any = {"method": method, "start_hz": start_hz, "acceleration": acceleration}
-        self.p, self.r = take_over(self.p, self.r, self.tables.up.zones, way, **run)
+        self.p, self.r = take_over(
+            self.p, self.r, self.tables.up.zones, way, method=method, start_hz=start_hz, acceleration=acceleration
+        )
         self.controller, self.feed = self.r.controller, ()
 
     def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
