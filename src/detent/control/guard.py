@@ -5,10 +5,13 @@ a row in which something is wrong, and the first one that lasts too long is the 
 enabled anew. A watch that has no samples is off. The faults are numbered as in `errors.GUARD_TEXT`.
 
 An axis cannot speed up against its own effort, unless the sensor counts the wrong way round or a force beyond the
-effort drives it; and it cannot stand under an effort that breaks it loose, unless the sensor is stuck.
+effort drives it; and it cannot stand under an effort that breaks it loose, unless the sensor is stuck. A controller
+that weighs its effort (`weigh_effort`) tells the first two apart. Behind a sensor that counts the wrong way round, more
+effort speeds the axis up more. Against a force from outside it speeds the axis up less, which is no fault by itself:
+what comes of it is, the end of the travel, a command at its limit, a speed, a following error.
 """
 
-from detent.kernel.registers import Registers, i1, i4, i8, register, u1
+from detent.kernel.registers import Registers, f8, i1, i4, i8, register, u1
 from detent.kernel.step import hot_step, step
 
 STUCK, JUMPED, REVERSED = 2, 3, 4
@@ -50,6 +53,12 @@ class Guard(Registers):
     push: i1 = register("direction of that effort")
     began: i8 = register("movement in the first sample of the window", unit="count")
     awaited: i8 = register("ticks or samples in which the axis must still arrive; 0: none waits", unit="count")
+    effort: f8 = register("effort since the last sample, where it is weighed", unit="V")
+    moved: i8 = register("movement up to the last sample, where the effort is weighed", unit="count")
+    against: i4 = register("samples of motion against the effort", unit="count")
+    first: i8 = register("speed against it in the sample before them", unit="count")
+    efforts: f8 = register("sum of the effort over them", unit="V")
+    answer: f8 = register("sum of the effort times what the speed against it grew by", unit="V.count")
 
 
 @step
@@ -57,7 +66,8 @@ def enable_guard(g: Guard) -> None:
     """Forget the last fault and what led to it: the axis is enabled."""
     g.code = g.side = g.push = g.pushed = 0
     g.following = g.saturated = g.stuck = g.fast = g.jumps = 0
-    g.awaited = 0
+    g.awaited = g.moved = g.against = 0
+    g.effort = 0.0
 
 
 @step
@@ -82,6 +92,32 @@ def trip(g: Guard, code: int) -> None:
 
 
 @step
+def weigh_effort(g: Guard, effort: float, moved: int) -> None:
+    """Note what the effort since the last sample has made of a motion against it; from now on it is `effort` [V]."""
+    if moved == 0 or moved * g.moved < 0 or moved * g.effort > 0.0:
+        g.against = 0
+    else:
+        speed, before = abs(moved), abs(g.moved)
+        if g.against == 0:
+            g.first, g.efforts, g.answer = before, 0.0, 0.0
+        g.against += 1
+        g.efforts += abs(g.effort)
+        g.answer += abs(g.effort) * (speed - before)
+    g.effort, g.moved = effort, moved
+
+
+@step
+def is_driven(g: Guard, moved: int) -> bool:
+    """True when the weighed effort holds the axis back: a force from outside drives it.
+
+    With u the effort, a what the speed against it grows by in a sample, and means over the motion against it, the sum
+    of (u / mean(u) - 1) a is above 0 if the axis speeds up by its effort, and below if it does so in spite of it. The
+    sensor rounds a speed by up to one count, so that much is doubt.
+    """
+    return g.answer * g.against < g.efforts * (abs(moved) - g.first - 1)
+
+
+@step
 def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
     """Sensor stuck or the wrong way round, by what the effort makes of the movement."""
     g.stuck = lasting(pushing != 0 and moved == 0, g.stuck)
@@ -94,7 +130,7 @@ def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
         return
     g.pushed += 1
     if 0 < p.reversed <= g.pushed:
-        if pushing * moved < 0 and pushing * moved < pushing * g.began - 1:
+        if pushing * moved < 0 and pushing * moved < pushing * g.began - 1 and not is_driven(g, moved):
             trip(g, REVERSED)
         g.pushed = 0
 

@@ -15,6 +15,7 @@ from detent.control.guard import (
     enable_guard,
     is_overdue,
     watch,
+    weigh_effort,
 )
 from detent.errors import GUARD_TEXT
 
@@ -74,6 +75,27 @@ def test_a_jump_is_a_fault_the_second_time():
 def test_speeding_up_against_the_effort_is_a_sensor_the_wrong_way_round(way):
     runaway = [{"pushing": way, "moved": -way * k} for k in range(1, 10)]
     assert fault(runaway) == (REVERSED, 6)
+
+
+def runaway(way, push, answer, samples=12):
+    """Effort and counts of an axis under a constant push: its effort grows with its speed against it, to a limit."""
+    effort, speed = 0.0, 0.0
+    for _ in range(samples):
+        effort = max(effort, min(8.0, 0.5 * speed))
+        yield way * effort, -way * round(speed)
+        speed += push + answer * effort
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("push", "answer", "code"), [(1.0, 1.0, REVERSED), (12.0, -1.0, 0), (30.0, -1.0, 0)])
+def test_effort_that_holds_back_what_a_force_drives_is_no_reversed_sensor(way, push, answer, code):
+    p, g = GuardParams(reversed=10), Guard()
+    for effort, moved in runaway(way, push, answer):
+        weigh_effort(g, effort, moved)
+        watch(p, g, 0, 0, 0, way if abs(effort) > 1.0 else 0, moved)
+    assert g.code == code
+    enable_guard(g)
+    assert (g.code, g.effort, g.moved, g.against) == (0, 0.0, 0, 0)
 
 
 @pytest.mark.parametrize("way", [1, -1])

@@ -111,8 +111,8 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
     p.guard.following = 1
     if resolution == 0.0:  # an ideal encoder has no counts to be looked after
         p.guard.speed = p.guard.jump = p.guard.stuck = p.guard.reversed = 0
-    if p.guard.reversed:
-        p.guard.reversed += spec.drive.delay + spec.encoder.delay
+    if p.guard.reversed:  # and one swing, in which the motor need not go where effort and force together send the axis
+        p.guard.reversed += spec.drive.delay + spec.encoder.delay + samples(spec.swing, period)
 
 
 def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:

@@ -270,10 +270,7 @@ def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> 
 
 def held_frequency(spec: CascadeSpec) -> float:
     """Frequency at which the load swings against a motor that its loop holds [Hz]; NaN for a rigid axis."""
-    coupling, mass = spec.mechanics.coupling, spec.mechanics.load_mass
-    if coupling is None or mass <= 0:
-        return math.nan
-    return math.sqrt(coupling.stiffness / mass) / math.tau
+    return 1 / spec.swing if spec.swing else math.nan
 
 
 def smooth_jerk(spec: CascadeSpec) -> float:

@@ -15,6 +15,7 @@ from detent.control.guard import (
     is_overdue,
     lasting,
     watch,
+    weigh_effort,
 )
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
@@ -156,6 +157,7 @@ def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> 
         pushing = 1 if c.law.command > 0.0 else -1
     moved = count - c.count
     c.count = count
+    weigh_effort(c.guard, c.law.command, moved)
     return watch(p.guard, c.guard, late, beyond_ends(p, c), c.law.limited > 0, pushing, moved)
 
 

@@ -267,6 +267,12 @@ class CascadeSpec(AxisSpec, frozen=True):
         return self.limits.lowest + self.limits.travel
 
     @property
+    def swing(self) -> float:
+        """Time of one swing of the load against a motor that its loop holds [s]; 0 for a rigid axis."""
+        coupling, mass = self.mechanics.coupling, self.mechanics.load_mass
+        return 0.0 if coupling is None else math.tau * math.sqrt(mass / coupling.stiffness)
+
+    @property
     def static_friction(self) -> float:
         """Force that breaks motor and load loose, in the direction that takes more [N]."""
         tables = (self.mechanics.friction, self.mechanics.load_friction)

@@ -7,7 +7,7 @@ import pytest
 from tests.cascade_rig import SAMPLE_TICKS, Rig, make_params
 
 import detent
-from detent.control.guard import FOLLOWING, NO_ARRIVAL, SATURATED, TRAVEL
+from detent.control.guard import FOLLOWING, NO_ARRIVAL, REVERSED, SATURATED, TRAVEL
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.controller import (
     ARRIVED,
@@ -189,3 +189,52 @@ def test_a_blocked_load_is_a_following_error_in_the_same_sample_every_time(piece
     # At 100 mm/s the reference is 1 mm ahead after 40 samples of 0.25 ms; in some more the coupling still gave way.
     assert (event, host.controller.guard.code) == (FAULT, FOLLOWING)
     assert host.controller.samples == 4000 + 44
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (),
+        ("mechanics.coupling.stiffness=6 N/um", "mechanics.coupling.backlash=40 um"),
+        ("mechanics.coupling.stiffness=600 N/um",),
+        ("encoder.delay=2",),
+        ("load_encoder.resolution=1 um", "mechanics.coupling.stiffness=6 N/um"),
+    ],
+    ids=["screw", "soft", "stiff", "late", "load"],
+)
+def test_an_end_is_seen_as_late_as_the_sample_the_count_and_the_twist_make_it(changes):
+    """The calculation stands in docs/explanation/cascade-axis.md."""
+    push = ("disturbance.push.force=-2000 N", "disturbance.push.at=10 ms", "disturbance.push.duration=1 s")
+    spec = load_spec(detent.example("cascade.toml"), [*push, "mechanics.start_position=1 mm", *changes])
+    host = CascadeHost(spec)
+    load = host.watch(400)["plant.machine.load.position"]
+    assert host.controller.guard.code == TRAVEL
+    passed = int(np.argmax(load < spec.limits.lowest - spec.method.in_position))
+    late = host.controller.samples - (passed + 1)
+    step, way = load[passed - 1] - load[passed], 0.5 * spec.encoder.resolution
+    coupling = spec.mechanics.coupling
+    assert coupling is not None
+    if spec.load_encoder is None:
+        force = (2000.0 * spec.motor_mass + spec.largest_effort * spec.mechanics.load_mass) / spec.mass
+        way += 2.0 * force / coupling.stiffness + coupling.backlash
+    assert 1 + spec.encoder.delay <= late <= 1 + spec.encoder.delay + math.ceil(way / step)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("resolution", ["1 um", "5 um", "20 um"])
+@pytest.mark.parametrize("weight", [0.0, 300.0])
+@pytest.mark.parametrize("way", [0.1, -0.01])
+def test_a_motor_with_its_leads_exchanged_is_found_before_it_has_gone_far(resolution, weight, way):
+    changes = [f"encoder.resolution={resolution}", f"mechanics.weight={weight} N"]
+    spec = load_spec(detent.example("cascade.toml"), changes)
+    host, start = CascadeHost(spec), spec.mechanics.start_position
+    host.params.plant.source.gain *= -1.0
+    host.follow(plan_move(start, start + way, motion_limits(spec), host.period))
+    load = host.watch(1000)["plant.machine.load.position"]
+    assert host.controller.guard.code == REVERSED
+    # From rest with all the effort and the weight, for one window; it may take a second one where counts are coarse.
+    acceleration, window = (spec.largest_effort + weight) / spec.mass, host.params.controller.guard.reversed
+    gone = abs(load[host.controller.samples - 1] - start)
+    assert gone < 0.5 * acceleration * (2 * window * host.period) ** 2 < 0.4 * spec.limits.travel
+    assert gone < 0.01

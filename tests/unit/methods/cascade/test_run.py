@@ -111,15 +111,6 @@ def test_a_rotary_file_is_read_in_degrees_and_a_length_refused():
         load_moves(detent.example("turn_moves.csv"))
 
 
-OTHERS_OFF = (
-    "protection.reversed_time=0 s",
-    "protection.overspeed=0",
-    "protection.jump=0",
-    "protection.stuck_time=0 s",
-)
-"""A force beyond that of the drive is seen by how the axis speeds up long before it has passed an end."""
-
-
 def failed(spec, *moves):
     run = run_cascade_moves(spec, job(*moves) if moves else THERE_AND_BACK)
     assert not run.done
@@ -145,16 +136,24 @@ def test_a_following_error_beyond_its_limit_switches_the_drive_off():
 
 def test_a_load_beyond_its_way_switches_the_drive_off():
     push = ("disturbance.push.force=-2000 N", "disturbance.push.at=0.2 s", "disturbance.push.duration=1 s")
-    spec = linear(*push, *OTHERS_OFF, "mechanics.start_position=1 mm")
+    spec = linear(*push, "mechanics.start_position=1 mm")
     run = failed(spec, {"target": 0.0, "dwell": 1.0})
     assert "ran over the lower end of its way, 0 m, limits.lowest, and the drive is off" in run.failure
 
 
-def test_a_force_beyond_that_of_the_drive_is_seen_by_how_the_axis_speeds_up():
-    spec = linear("mechanics.weight=900 N", "method.following_error=100 m")
-    run = failed(spec)
-    assert "the axis sped up against its own effort for 20 ms, and the drive is off" in run.failure
-    assert spec.protection.reversed_time < run.time_off < 2 * spec.protection.reversed_time
+@pytest.mark.parametrize(
+    ("axis", "force", "cause"),
+    [
+        (linear, "-700 N", "following error"),
+        (linear, "900 N", "following error"),
+        (linear, "-2000 N", "ran faster than"),
+        (rotary, "3.6 N*m", "following error"),
+        (rotary, "6 N*m", "ran faster than"),
+    ],
+)
+def test_a_push_beyond_the_force_of_the_drive_ends_with_what_comes_of_it(axis, force, cause):
+    push = (f"disturbance.push.force={force}", "disturbance.push.at=0.6 s", "disturbance.push.duration=2 s")
+    assert cause in failed(axis(*push), {"target": 0.12, "dwell": 3.0}).failure
 
 
 def test_an_axis_that_does_not_come_into_its_window_in_time_has_failed():
@@ -173,17 +172,14 @@ def test_an_axis_that_is_not_in_position_after_power_on_makes_no_move():
     assert run.moves == []
 
 
+def test_a_force_beyond_that_of_the_drive_moves_the_axis_over_its_end():
+    run = failed(linear("mechanics.weight=900 N", "method.following_error=100 m"))
+    assert run.failure.startswith("after power-on: the axis ran over the lower end")
+
+
 def test_a_command_that_stays_at_its_limit_switches_the_drive_off():
-    spec = linear("mechanics.weight=900 N", "method.following_error=100 m", *OTHERS_OFF)
-    run = failed(spec)
-    assert "ran over the lower end" in run.failure
-    spec = linear(
-        "mechanics.weight=900 N",
-        "method.following_error=100 m",
-        "limits.lowest=-1000 m",
-        "limits.travel=2000 m",
-        *OTHERS_OFF,
-    )
+    far = ("method.following_error=100 m", "limits.lowest=-1000 m", "limits.travel=2000 m")
+    spec = linear("mechanics.weight=900 N", *far, "protection.overspeed=0", "protection.jump=0")
     run = failed(spec)
     assert "the command stayed at its limit for 1 s, and the drive is off" in run.failure
     assert run.time_off == pytest.approx(spec.protection.saturation_time, abs=0.05)
