@@ -128,14 +128,12 @@ def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:
 
 
 def _fill_feed_forward(p: FeedForwardParams, spec: CascadeSpec) -> None:
-    shares, mechanics = spec.method.feed_forward, spec.mechanics
-    per_command, frictions = spec.effort_per_command, (mechanics.friction, mechanics.load_friction)
-    viscous = sum(0.5 * (f.positive.viscous + f.negative.viscous) for f in frictions)
+    shares, mechanics, per_command = spec.method.feed_forward, spec.mechanics, spec.effort_per_command
     p.velocity = shares.velocity
     p.acceleration = shares.acceleration * spec.mass / per_command
-    p.viscous = shares.viscous * (viscous + spec.back_emf_drag) / per_command
-    p.coulomb_positive = shares.coulomb * sum(f.positive.coulomb + f.offset for f in frictions) / per_command
-    p.coulomb_negative = shares.coulomb * sum(f.negative.coulomb - f.offset for f in frictions) / per_command
+    p.viscous = shares.viscous * (spec.viscous + spec.back_emf_drag) / per_command
+    p.coulomb_positive = shares.coulomb * spec.friction(1).coulomb / per_command
+    p.coulomb_negative = shares.coulomb * spec.friction(-1).coulomb / per_command
     p.dead_band = shares.dead_band
     p.weight = shares.weight * mechanics.weight / per_command
     p.pendulum = shares.weight * mechanics.pendulum / per_command

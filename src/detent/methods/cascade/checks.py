@@ -312,7 +312,7 @@ def _bandwidth(m: Machine) -> Iterator[Caution]:
     """Each loop keeps below what it acts on."""
     loop, method = m.loop, m.spec.method
     inner, outer = loop.velocity_loop.crossover, loop.position_loop.crossover
-    near = NEAR_RESONANCE * m.anti_resonance / (2 * math.pi)
+    near = NEAR_RESONANCE * m.anti_resonance
     if 0 < inner < SLOWER * outer:
         yield Caution(
             "bandwidth of the position loop",
@@ -373,7 +373,7 @@ def _resolution(m: Machine) -> Iterator[Caution]:
 def _force(m: Machine) -> Iterator[Caution]:
     """The drive has the force that the limits ask for."""
     spec, speed, acceleration, unit = m.spec, m.speed, m.spec.limits.acceleration, m.spec.unit("N")
-    loose, strongest = m.breaking(spec.mechanics.weight) + spec.mechanics.pendulum, m.available(0.0)
+    loose, strongest = m.breaking(), m.available(0.0)
     hold, needed, available = m.needed(speed), m.needed(speed, acceleration), m.available(speed)
     if loose >= strongest:
         yield Caution(

@@ -6,7 +6,7 @@ hardly does.
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -25,22 +25,14 @@ from detent.planning.profile import MotionLimits, plan_move
 from detent.record.machine import Progress
 from detent.sensing.gauge import set_gauge
 
-WATCHED_TIME = 0.5
-"""Time after the reference has come to rest in which the axis is watched, at least [s]."""
-
-SWINGS = 4
-"""And at least so many swings of the coupling."""
-
-REST_TIME = 0.1
-"""Time the axis stands before the move [s]."""
+WATCHED_TIME, SWINGS = 0.5, 4  # how long it is watched after the reference has ended, at least: time [s], swings
+REST_TIME = 0.1  # time the axis stands before the move [s]
+SHOWN_SWINGS = 10  # swings of the coupling that are shown after the end of the reference
 
 SHAPES, FEEDS = ("trapezoid", "limited jerk"), ("no feed-forward", "feed-forward")
 
 COLOURS = dict(zip(SHAPES, ("left", "speed"), strict=True))
 DASHES = dict(zip(FEEDS, ((5, 4), None), strict=True))
-
-SHOWN_SWINGS = 10
-"""Swings of the coupling that are shown after the end of the reference."""
 
 Numbers = NDArray[np.float64]
 
@@ -129,6 +121,13 @@ class ProfileComparison:
         return Units(rotary=self.rotary)
 
     @property
+    def move(self) -> str:
+        """The move in words."""
+        scale = self.units.place
+        way = f"{number(round(self.way * scale.factor, 6))}{GAP}{scale.name}"
+        return f"A move of {way} at {self.units.speed_text(self.speed)}"
+
+    @property
     def table(self) -> TextTable:
         """The figures of the four cases."""
         heads = ("profile", "takes", "largest following error", "settles after", "twist after that", "peak command")
@@ -143,7 +142,7 @@ class ProfileComparison:
             )
             for case in self.cases
         ]
-        title = f"{_the_move(self)}, in four ways".replace(GAP, " ")
+        title = f"{self.move}, in four ways".replace(GAP, " ")
         return TextTable(title, heads, [tuple(cell.replace(GAP, " ") for cell in row) for row in rows])
 
     def figures(self) -> tuple[Figure, ...]:
@@ -153,41 +152,29 @@ class ProfileComparison:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
-        curves = {"t", "speed", "following", "twist"}
-        names = ("way", "speed", "acceleration", "jerk", "stated", "frequency", "tolerance", "rotary")
-        cases = [{key: value for key, value in asdict(case).items() if key not in curves} for case in self.cases]
-        return {name: getattr(self, name) for name in names} | {"cases": cases}
+        cases = [{k: v for k, v in asdict(case).items() if not isinstance(v, np.ndarray)} for case in self.cases]
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"cases": cases}
 
 
 # ---- what is shown
-
-
-def _the_move(found: ProfileComparison) -> str:
-    scale = found.units.place
-    way = f"{number(round(found.way * scale.factor, 6))}{GAP}{scale.name}"
-    return f"A move of {way} at {found.units.speed_text(found.speed)}"
 
 
 def _move_figure(found: ProfileComparison) -> Figure:
     """Speed of both references, and the following error of the four cases."""
     jerk = "the jerk of the axis file" if found.stated else "a jerk chosen for it, as the axis file states none"
     caption = (
-        f"{_the_move(found)} in four ways: as a trapezoid of the speed and with {jerk}, each without feed-forward "
+        f"{found.move} in four ways: as a trapezoid of the speed and with {jerk}, each without feed-forward "
         "(dashed) and with it. Look for: without feed-forward the axis lags in proportion to its speed, whatever the "
         "profile; with it an error is left where the acceleration jumps."
     )
     t, scale = found.cases[-1].t, found.units.speed
-    speeds = [
-        Curve(label=case.shape, colour=COLOURS[case.shape], width=2, thin=POINTS,
-              y=np.interp(t, case.t, case.speed) * scale.factor)
-        for case in (found.cases[0], found.cases[2])
-    ]  # fmt: skip
+    asked = {case.shape: np.interp(t, case.t, case.speed) * scale.factor for case in found.cases}
+    speeds = [Curve(label=shape, colour=COLOURS[shape], width=2, y=asked[shape], thin=POINTS) for shape in SHAPES]
+    speed = Panel(name="profile-speed", label=f"speed [{scale.name}]", height=150, zero=True, curves=speeds)
     following = [np.interp(t, case.t, case.following) for case in found.cases]
-    charts = time_charts(Timeline(name="profiles", t=t, label="time since the move began"), [
-        Panel(name="profile-speed", label=f"speed [{scale.name}]", height=150, zero=True, curves=speeds),
-        _case_panel(found, "profile-following", "following error", following),
-    ])  # fmt: skip
+    lag = _case_panel(found, "profile-following", "following error", following)
     title = "What profile and feed-forward are worth: the same move in four ways"
+    charts = time_charts(Timeline(name="profiles", t=t, label="time since the move began"), [speed, lag])
     return Figure(title=title, caption=caption, charts=charts)
 
 
@@ -252,7 +239,7 @@ def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> 
     found: list[ProfileCase] = []
     for shape, own in zip(SHAPES, (math.inf, jerk), strict=True):
         for feed in FEEDS:
-            found.append(_case(spec, MotionLimits(limits.speed, limits.acceleration, own), shape, feed))
+            found.append(_case(spec, replace(limits, jerk=own), shape, feed))
             if progress is not None:
                 progress(len(found) / 4, found[-1].name)
     return ProfileComparison(
@@ -261,16 +248,11 @@ def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> 
         acceleration=limits.acceleration,
         jerk=jerk,
         stated=math.isfinite(limits.jerk),
-        frequency=held_frequency(spec),
+        frequency=1 / spec.swing if spec.swing else math.nan,
         tolerance=spec.method.in_position,
         rotary=spec.axis.motion == "rotary",
         cases=tuple(found),
     )
-
-
-def held_frequency(spec: CascadeSpec) -> float:
-    """Frequency at which the load swings against a motor that its loop holds [Hz]; NaN for a rigid axis."""
-    return 1 / spec.swing if spec.swing else math.nan
 
 
 def smooth_jerk(spec: CascadeSpec) -> float:
@@ -279,35 +261,31 @@ def smooth_jerk(spec: CascadeSpec) -> float:
     Its ramps of the acceleration last one swing of the load, which then ends without one; those of a rigid axis last a
     quarter of the time that the axis needs to come to speed.
     """
-    limits, frequency = spec.limits, held_frequency(spec)
-    ramp = 0.25 * limits.speed / limits.acceleration if math.isnan(frequency) else 1 / frequency
-    return limits.acceleration / ramp
+    return spec.limits.acceleration / (spec.swing or 0.25 * spec.limits.speed / spec.limits.acceleration)
 
 
 def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> ProfileCase:
+    """The move made in one way."""
     start = spec.limits.lowest + 0.25 * spec.limits.travel
     target = start + 0.5 * spec.limits.travel
-    share = float(feed == FEEDS[1])
-    own = spec.method.feed_forward
-    shares: dict[str, float] = dict.fromkeys(("velocity", "acceleration", "viscous", "coulomb"), share)
+    shares: dict[str, float] = dict.fromkeys(
+        ("velocity", "acceleration", "viscous", "coulomb"), float(feed == FEEDS[1])
+    )
     # A weight is held in both: the axis must not drop before the move.
-    method = spec.method.model_copy(update={"feed_forward": own.model_copy(update=shares)})
+    method = spec.method.model_copy(update={"feed_forward": spec.method.feed_forward.model_copy(update=shares)})
     alone = spec.model_copy(update={"method": method, "disturbance": DisturbanceTable()})
     host = CascadeHost(alone, position=start, guarded=False)
     host.pass_samples(math.ceil(REST_TIME / host.period - 1e-9))
-    begin = host.time
+    begin, plant = host.time, host.state.plant
     profile = plan_move(start, target, limits, host.period)
-    plant = host.state.plant
     set_gauge(plant.gauge, host.state.tick, start, target, spec.method.in_position)
     host.follow(profile)
-    frequency = held_frequency(spec)
-    watched = WATCHED_TIME if math.isnan(frequency) else max(WATCHED_TIME, SWINGS / frequency)
-    rows = host.watch(math.ceil(((profile.count - 1) * host.period + watched) / host.period - 1e-9))
+    duration = (profile.count - 1) * host.period
+    watched = duration + max(WATCHED_TIME, SWINGS * spec.swing)
+    rows = host.watch(math.ceil(watched / host.period - 1e-9))
     settled = plant.gauge.outside * host.tick - begin
     resting = abs(plant.machine.load.position - target) <= spec.method.in_position
-    duration = (profile.count - 1) * host.period
     twist = rows["plant.machine.motor.position"] - rows["plant.machine.load.position"]
-    after = twist[profile.count - 1 :]
     speed = np.zeros(len(rows))
     speed[: profile.count] = profile.velocity[: len(rows)]
     return ProfileCase(
@@ -316,7 +294,7 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
         duration=duration,
         peak_following=float(np.abs(rows["controller.law.position_error"]).max()),
         settling=max(settled - duration, 0.0) if resting else math.nan,
-        twist_after=math.nan if math.isnan(frequency) else float(np.ptp(after)),
+        twist_after=float(np.ptp(twist[profile.count - 1 :])) if spec.swing else math.nan,
         peak_command=float(np.abs(rows["controller.law.command"]).max()),
         t=np.arange(len(rows), dtype=np.float64) * host.period,
         speed=speed,

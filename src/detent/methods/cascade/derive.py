@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, quantity_figure
-from detent.methods.cascade.schema import CascadeSpec, FrictionTable
+from detent.methods.cascade.schema import CascadeSpec
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ class Machine:
 
     def __init__(self, spec: CascadeSpec) -> None:
         self.spec = spec
-        self.frictions: tuple[FrictionTable, FrictionTable] = (spec.mechanics.friction, spec.mechanics.load_friction)
         self.speed = spec.limits.speed
         self.per_command = spec.effort_per_command
 
@@ -44,50 +43,16 @@ class Machine:
         return LinearLoop(self.spec)
 
     @property
-    def is_stable(self) -> bool:
-        """Whether every mode of the loops decays."""
-        return self.loop.spectral_radius < 1.0
-
-    @property
     def anti_resonance(self) -> float:
-        """The load swings against the motor held still [rad/s]; 0 for a rigid axis."""
-        coupling = self.spec.mechanics.coupling
-        return 0.0 if coupling is None else math.sqrt(coupling.stiffness / self.spec.mechanics.load_mass)
-
-    @property
-    def resonance(self) -> float:
-        """Both masses swing against each other [rad/s]; 0 for a rigid axis."""
-        coupling = self.spec.mechanics.coupling
-        return 0.0 if coupling is None else math.sqrt(coupling.stiffness * self.inverse_mass)
-
-    @property
-    def inverse_mass(self) -> float:
-        """Sum of the inverse masses [1/kg]."""
-        return 1.0 / self.spec.motor_mass + 1.0 / self.spec.mechanics.load_mass
-
-    @property
-    def damping(self) -> float:
-        """Damping ratio of that swing."""
-        coupling = self.spec.mechanics.coupling
-        return 0.0 if coupling is None else 0.5 * coupling.damping * self.inverse_mass / self.resonance
-
-    def resisting(self, sense: int, speed: float) -> float:
-        """Force that holds a speed [m/s] in the direction `sense`, 1 or -1, without back-EMF [N]."""
-        force = sense * self.spec.mechanics.weight
-        for friction in self.frictions:
-            table = friction.positive if sense > 0 else friction.negative
-            force += table.coulomb + table.viscous * speed + sense * friction.offset
-        return force
-
-    @property
-    def holding(self) -> float:
-        """Force that holds the load against its weight, hanging loads at a quarter turn [N]."""
-        return abs(self.spec.mechanics.weight) + self.spec.mechanics.pendulum
+        """The load swings against the motor held still [Hz]; 0 for a rigid axis."""
+        return 1 / self.spec.swing if self.spec.swing else 0.0
 
     def needed(self, speed: float, acceleration: float = 0.0) -> float:
         """Force of the motor at a speed [m/s] and an acceleration [m/s^2] in the harder direction [N]."""
-        resisting = max(self.resisting(1, speed), self.resisting(-1, speed), 0.0)
-        return resisting + self.spec.mechanics.pendulum + self.spec.mass * acceleration
+        frictions = {sense: self.spec.friction(sense) for sense in (1, -1)}
+        weight, pendulum = self.spec.mechanics.weight, self.spec.mechanics.pendulum
+        resisting = [sense * weight + one.coulomb + one.viscous * speed for sense, one in frictions.items()]
+        return max(*resisting, 0.0) + pendulum + self.spec.mass * acceleration
 
     def available(self, speed: float) -> float:
         """Largest force behind the transmission at a speed [m/s]; a voltage drive's falls by the back-EMF [N]."""
@@ -95,31 +60,18 @@ class Machine:
         by_voltage = spec.largest_command * self.per_command - spec.back_emf_drag * speed
         return max(0.0, min(spec.largest_effort, by_voltage)) * (1.0 - spec.mechanics.transmission_loss)
 
-    def command(self, force: float, speed: float) -> float:
-        """Command for a force behind the transmission [N] at a speed [m/s] [V]."""
-        passed = force / (1.0 - self.spec.mechanics.transmission_loss)
-        return (passed + self.spec.back_emf_drag * speed) / self.per_command
-
-    def breaking(self, weight: float) -> float:
-        """Force that breaks the axis loose in the harder direction, with a weight [N] along the axis [N]."""
-        forward = backward = 0.0
-        for friction in self.frictions:
-            forward += max(friction.positive.static, friction.positive.coulomb) + friction.offset
-            backward += max(friction.negative.static, friction.negative.coulomb) - friction.offset
-        return max(forward + weight, backward - weight)
+    def breaking(self, share: float = 1.0) -> float:
+        """Force that breaks the axis loose in the harder direction, with a share of its weight [N]."""
+        weight, pendulum = share * self.spec.mechanics.weight, abs(share) * self.spec.mechanics.pendulum
+        return max(self.spec.friction(1).static + weight, self.spec.friction(-1).static - weight) + pendulum
 
     def _left(self, sense: int) -> float:
         """Command at limits.speed that feed-forward leaves to the loops [V]."""
-        shares, drag = self.spec.method.feed_forward, self.spec.back_emf_drag
-        viscous = coulomb = mean = 0.0
-        for friction in self.frictions:
-            table = friction.positive if sense > 0 else friction.negative
-            viscous += table.viscous
-            mean += 0.5 * (friction.positive.viscous + friction.negative.viscous)
-            coulomb += table.coulomb + sense * friction.offset
-        force = (viscous + drag) * self.speed - shares.viscous * (mean + drag) * self.speed
-        beyond = coulomb if self.speed <= shares.dead_band else (1 - shares.coulomb) * coulomb
-        return (force + beyond + sense * (1 - shares.weight) * self.spec.mechanics.weight) / self.per_command
+        spec, shares, friction = self.spec, self.spec.method.feed_forward, self.spec.friction(sense)
+        drag = spec.back_emf_drag
+        force = (friction.viscous + drag) * self.speed - shares.viscous * (spec.viscous + drag) * self.speed
+        beyond = friction.coulomb if self.speed <= shares.dead_band else (1 - shares.coulomb) * friction.coulomb
+        return (force + beyond + sense * (1 - shares.weight) * spec.mechanics.weight) / self.per_command
 
     @property
     def following_error(self) -> float:
@@ -144,13 +96,6 @@ class Machine:
         return self.speed + (0.0 if method.velocity_integral > 0 else max(*lags, 0.0))
 
     @property
-    def stiffness(self) -> float:
-        """Force per error at rest without the integral [N/m]."""
-        method = self.spec.method
-        gain = method.proportional if method.structure == "pid" else method.velocity_gain * method.position_gain
-        return gain * self.per_command
-
-    @property
     def integrates(self) -> bool:
         """Whether an integral takes the error at rest away."""
         method = self.spec.method
@@ -161,9 +106,9 @@ class Machine:
         """Largest error at which static friction and weight still hold the axis [m]; 0 with an integral."""
         if self.integrates:
             return 0.0
-        left = 1 - self.spec.method.feed_forward.weight
-        held = self.breaking(left * self.spec.mechanics.weight) + abs(left) * self.spec.mechanics.pendulum
-        return held / self.stiffness
+        method = self.spec.method
+        gain = method.proportional if method.structure == "pid" else method.velocity_gain * method.position_gain
+        return self.breaking(1 - method.feed_forward.weight) / (gain * self.per_command)
 
     @property
     def counted_velocity(self) -> float:
@@ -174,12 +119,10 @@ class Machine:
     @property
     def jump(self) -> float:
         """Command by which one count of the velocity moves the drive [V]."""
-        method = self.spec.method
-        by_velocity = method.velocity_gain
-        smoothed = self.loop.velocity_share
+        method, gain = self.spec.method, self.spec.method.velocity_gain
         if method.structure == "pid":
-            by_velocity = method.derivative * self.loop.derivative_share
-        return by_velocity * smoothed * self.counted_velocity
+            gain = method.derivative * self.loop.derivative_share
+        return gain * self.loop.velocity_share * self.counted_velocity
 
 
 def derive(spec: CascadeSpec) -> tuple[Derived, ...]:
@@ -208,12 +151,16 @@ def _masses(machine: Machine) -> Iterator[Derived]:
 
 def _swings(machine: Machine) -> Iterator[Derived]:
     """Both masses on their coupling."""
-    if machine.spec.mechanics.coupling is None:
+    spec, coupling = machine.spec, machine.spec.mechanics.coupling
+    if coupling is None:
         return
-    yield quantity_figure("anti-resonance", machine.anti_resonance / (2 * math.pi), "Hz", "sqrt(k / m2) / 2 pi")
-    yield quantity_figure("resonance", machine.resonance / (2 * math.pi), "Hz", "sqrt(k (1/m1 + 1/m2)) / 2 pi")
+    inverse = 1.0 / spec.motor_mass + 1.0 / spec.mechanics.load_mass
+    resonance = math.sqrt(coupling.stiffness * inverse)
+    damping = 0.5 * coupling.damping * inverse / resonance
+    yield quantity_figure("anti-resonance", machine.anti_resonance, "Hz", "sqrt(k / m2) / 2 pi")
+    yield quantity_figure("resonance", resonance / (2 * math.pi), "Hz", "sqrt(k (1/m1 + 1/m2)) / 2 pi")
     formula = "d (1/m1 + 1/m2) / (2 x 2 pi resonance)"
-    yield Derived("damping of the resonance", machine.damping, "", f"{machine.damping:.3g}", formula)
+    yield Derived("damping of the resonance", damping, "", f"{damping:.3g}", formula)
 
 
 def _clocks(machine: Machine) -> Iterator[Derived]:
@@ -238,17 +185,17 @@ def _drive(machine: Machine) -> Iterator[Derived]:
     )
     hardest = machine.needed(speed, acceleration)
     yield _figure(machine, f"{what} of an acceleration", hardest, "N", "m a + friction at limits.speed + weight")
-    yield quantity_figure("command of an acceleration", machine.command(hardest, speed), "V", "that, and back-EMF")
+    command = (hardest / (1.0 - spec.mechanics.transmission_loss) + spec.back_emf_drag * speed) / machine.per_command
+    yield quantity_figure("command of an acceleration", command, "V", "that, and back-EMF")
     if spec.motor is not None and spec.drive.input == "current":
         current = hardest / spec.force_constant
         formula = "R x current of an acceleration + back-EMF at limits.speed: the amplifier needs as much"
         voltage = spec.motor.resistance * current + spec.emf_constant * speed
         yield quantity_figure("voltage of the motor", voltage, "V", formula)
-    if machine.holding > 0:
-        yield quantity_figure("command that holds the weight", machine.holding / machine.per_command, "V", "at rest")
+    if spec.holding > 0:
+        yield quantity_figure("command that holds the weight", spec.holding / machine.per_command, "V", "at rest")
     yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a, jerk aside")
-    way = speed**2 / (2 * acceleration)
-    yield _figure(machine, "way of an acceleration", way, "m", "v^2 / (2 a), jerk aside")
+    yield _figure(machine, "way of an acceleration", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk aside")
 
 
 def _loops(machine: Machine) -> Iterator[Derived]:

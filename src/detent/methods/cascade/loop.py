@@ -150,48 +150,45 @@ class LinearLoop:
         """Share of a new velocity error that the filter of a PID's derivative takes over."""
         return smoothing(self.spec.method.derivative_filter, self.period)
 
-    # ----------------------------------------------------------------------------------------------- modes
-
     def transition(self, more: float = 1.0) -> Numbers:
-        """State from sample to sample, the reference at 0."""
-        rows = _Rows(len(self.plant.b), self._memories())
-        position = rows.late("position", rows.plant(self.position_place), self.position_sensor.delay)
+        """State from sample to sample, the reference at 0, with `more` times the gain.
+
+        Behind the plant it holds what encoders and amplifier remember, the newest first, then the filtered velocity,
+        the integral, and the filter of a PID's derivative. Quantities of a sample are rows over the state before it.
+        """
         read = self.velocity_sensor
-        place = rows.plant(self.velocity_place)
-        newest = rows.late("velocity", place, read.delay)
-        difference = newest - rows.late("velocity", place, read.delay + read.velocity_span)
-        share = self.velocity_share
-        velocity = rows.part("speed")
-        velocity = velocity + share * (difference / (read.velocity_span * self.period) - velocity)
-        error, integral = self._law(rows, position, velocity)
-        command = error + integral
-        output = more * self.gain * rows.late("command", command, self.spec.drive.delay)
+        sizes = [len(self.plant.b), self.position_sensor.delay, read.delay + read.velocity_span, self.spec.drive.delay]
+        parts: list[Numbers] = np.split(np.eye(sum(sizes) + 3), np.cumsum(sizes))
+        x, positions, places, commands, rest = parts
+        positions = np.vstack([x[self.position_place], positions])
+        places = np.vstack([x[self.velocity_place], places])
+        velocity, integral, filtered = rest
+        difference = (places[read.delay] - places[-1]) / (read.velocity_span * self.period)
+        velocity = velocity + self.velocity_share * (difference - velocity)
+        command, integral, filtered = self._law(positions[-1], velocity, integral, filtered)
+        commands = np.vstack([command, commands])
         held, driven = self.held
-        after = [held @ rows.plant_rows + np.outer(driven, output)]
-        after += [rows.shifted("position", rows.plant(self.position_place)), rows.shifted("velocity", place)]
-        after += [rows.shifted("command", command), velocity[None], integral[None], rows.filtered[None]]
-        return np.vstack(after)
+        plant = held @ x + np.outer(driven, more * self.gain * commands[-1])
+        after: Any = np.vstack([plant, positions[:-1], places[:-1], commands[:-1], velocity, integral, filtered])
+        return after
 
-    def _memories(self) -> dict[str, int]:
-        read = self.velocity_sensor
-        past = {"position": self.position_sensor.delay, "velocity": read.delay + read.velocity_span}
-        return past | {"command": self.spec.drive.delay, "speed": 1, "integral": 1, "filter": 1}
+    def _law(
+        self, position: Numbers, velocity: Numbers, integral: Numbers, filtered: Numbers
+    ) -> tuple[Numbers, Numbers, Numbers]:
+        """Command, and its integral part and the filter of the derivative after the sample.
 
-    def _law(self, rows: "_Rows", position: Numbers, velocity: Numbers) -> tuple[Numbers, Numbers]:
-        """Command without its integral part, and that; sets the filter of the derivative.
-
-        An integral that is not used stays 0: its own mode would be one that does not decay.
+        What is not used stays 0: its own mode would be one that does not decay.
         """
         m = self.spec.method
         if m.structure == "cascade":
             error = -m.position_gain * position - velocity
-            fast, rate = m.velocity_gain * error, m.velocity_integral * error
+            fast, slow, gain = m.velocity_gain * error, error, m.velocity_integral
+            filtered = np.zeros_like(filtered)
         else:
-            share = self.derivative_share
-            rows.filtered = (1.0 - share) * rows.part("filter") - share * velocity
-            fast, rate = -m.proportional * position + m.derivative * rows.filtered, -m.integral * position
-        integrates = m.velocity_integral if m.structure == "cascade" else m.integral
-        return fast, rows.part("integral") + self.period * rate if integrates > 0 else np.zeros_like(fast)
+            filtered = (1.0 - self.derivative_share) * filtered - self.derivative_share * velocity
+            fast, slow, gain = -m.proportional * position + m.derivative * filtered, -position, m.integral
+        integral = integral + self.period * (gain * slow) if gain > 0 else np.zeros_like(integral)
+        return fast + integral, integral, filtered
 
     @cached_property
     def spectral_radius(self) -> float:
@@ -220,8 +217,6 @@ class LinearLoop:
             middle = math.sqrt(low * high)
             low, high = (middle, high) if _radius(self.transition(middle)) < 1.0 else (low, middle)
         return low
-
-    # ----------------------------------------------------------------------------------------------- frequency
 
     @cached_property
     def frequencies(self) -> Numbers:
@@ -270,36 +265,6 @@ class LinearLoop:
         """Open velocity loop."""
         m, (_, velocity, z) = self.spec.method, self._responses
         return (m.velocity_gain + m.velocity_integral * self.period * z / (z - 1.0)) * velocity
-
-
-class _Rows:
-    """Quantities of a sample as rows over the state at its beginning."""
-
-    def __init__(self, size: int, parts: dict[str, int]) -> None:
-        self._places: dict[str, slice] = {}
-        begin = size
-        for name, length in parts.items():
-            self._places[name] = slice(begin, begin + length)
-            begin += length
-        self._unit = np.eye(begin)
-        self.plant_rows = self._unit[:size]
-        self.filtered = np.zeros(begin)
-
-    def plant(self, place: int) -> Numbers:
-        """A state of the plant."""
-        return self._unit[place]
-
-    def part(self, name: str) -> Numbers:
-        """A state of one number."""
-        return self._unit[self._places[name]][0]
-
-    def late(self, name: str, newest: Numbers, samples: int) -> Numbers:
-        """What a memory gives that has just taken `newest`, so many samples late."""
-        return newest if samples == 0 else self._unit[self._places[name]][samples - 1]
-
-    def shifted(self, name: str, newest: Numbers) -> Numbers:
-        """A memory at the end of the sample."""
-        return np.vstack([newest[None], self._unit[self._places[name]]])[: self._unit[self._places[name]].shape[0]]
 
 
 def smoothing(time_constant: float, period: float) -> float:

@@ -8,7 +8,7 @@ errors of a simulation: the norm of the difference over the norm of the measurem
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.methods.cascade.host import CascadeHost, Rows
-from detent.methods.cascade.recorded_motion import recorded_profile, smooth_velocity, starting_velocity
-from detent.methods.cascade.replay_job import ReplayJob
+from detent.methods.cascade.replay_job import ReplayJob, recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import set_off
 from detent.record.machine import AnyRecorder, Progress
@@ -38,7 +37,7 @@ CHUNK = 8192
 Numbers = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Compared:
     """One signal, as recorded and as simulated, at the instants of the recording.
 
@@ -113,9 +112,7 @@ class ReplayRun(RunRecord[ReplayJob]):
     peak_following: float = math.nan
     limited: float = 0.0
 
-    told: ClassVar[tuple[str, ...]] = (
-        "open_loop", "period", "peak_following", "limited",
-    )  # fmt: skip
+    told: ClassVar[tuple[str, ...]] = ("open_loop", "period", "peak_following", "limited")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
@@ -135,7 +132,9 @@ def run_cascade_replay(
     The loops follow the recorded reference; without one the amplifier gets the recorded effort. The drive does not go
     off: what it would have gone off for is a warning.
     """
-    host = _start(spec, job, recorder)
+    host = CascadeHost(spec, recorder, position=float(job.position[0]), guarded=False)
+    if speed := starting_velocity(job.t, job.position):
+        set_off(host.params, host.state, speed)
     result = ReplayRun(job, period=host.period)
     samples = math.floor(job.seconds / host.period + 1e-6) + 1
     if job.reference is not None:
@@ -146,32 +145,17 @@ def run_cascade_replay(
         at = float(job.t[0]) + (np.arange(samples) + 1e-6) * host.period
         rows = np.searchsorted(job.t, at, side="right") - 1
         host.drive(np.ascontiguousarray(command[rows]))
+    seen: list[Rows] = []
     try:
-        seen = _watch(host, samples, progress)
+        for begin in range(0, samples, CHUNK):
+            seen.append(host.watch(min(CHUNK, samples - begin)))
+            if progress is not None:
+                progress(min(begin + CHUNK, samples) / samples, "replaying the recording")
     finally:
         host.machine.close()
     result.time_end = host.time
-    _judge(spec, result, host, seen)
+    _judge(spec, result, host, np.concatenate(seen))
     return result
-
-
-def _start(spec: CascadeSpec, job: ReplayJob, recorder: AnyRecorder | None) -> CascadeHost:
-    """The axis where the recorded one stood, moving as it moved."""
-    host = CascadeHost(spec, recorder, position=float(job.position[0]), guarded=False)
-    speed = starting_velocity(job.t, job.position)
-    if speed:
-        set_off(host.params, host.state, speed)
-    return host
-
-
-def _watch(host: CascadeHost, samples: int, progress: Progress | None) -> Rows:
-    """Every sample of the replay."""
-    kept: list[Rows] = []
-    for begin in range(0, samples, CHUNK):
-        kept.append(host.watch(min(CHUNK, samples - begin)))
-        if progress is not None:
-            progress(min(begin + CHUNK, samples) / samples, "replaying the recording")
-    return np.concatenate(kept)
 
 
 # ---- what drove the axis
@@ -242,40 +226,31 @@ def at_stamps(t: Numbers, at: Numbers, values: Numbers) -> Numbers:
 
 def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
     """Positions, velocity and acceleration."""
-    way, speed = spec.unit("m"), spec.unit("m/s")
+    way = spec.unit("m")
     # The one encoder that was recorded is the one that the position loop uses.
     on_load = spec.method.feedback.position == "load" and job.load_position is None
     place = simulated("controller.load_sensor.position" if on_load else "controller.motor_sensor.position")
-    found = [Compared(name="position", unit=way, measured=job.position, simulated=place)]
+    found = [Compared("position", way, job.position, place)]
     if job.load_position is not None:
         load = simulated("controller.load_sensor.position")
-        found.append(Compared(name="position of the load", unit=way, measured=job.load_position, simulated=load))
+        found.append(Compared("position of the load", way, job.load_position, load))
+    measured, came = (smooth_velocity(job.t, values) for values in (job.position, place))
+    accelerations = np.gradient(measured, job.t), np.gradient(came, job.t)
     if job.velocity is not None and not on_load:
-        velocity = simulated("controller.motor_sensor.velocity")
-        found.append(Compared(name="velocity", unit=speed, measured=job.velocity, simulated=velocity))
-    else:
-        measured, came = (smooth_velocity(job.t, values) for values in (job.position, place))
-        found.append(Compared(name="velocity", unit=speed, measured=measured, simulated=came))
-    measured, came = (np.gradient(smooth_velocity(job.t, values), job.t) for values in (job.position, place))
-    found.append(Compared(name="acceleration", unit=spec.unit("m/s^2"), measured=measured, simulated=came))
-    return found
+        measured, came = job.velocity, simulated("controller.motor_sensor.velocity")
+    found.append(Compared("velocity", spec.unit("m/s"), measured, came))
+    return [*found, Compared("acceleration", spec.unit("m/s^2"), *accelerations)]
 
 
 def _efforts(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
     """Every recorded effort that this axis has too."""
-    units: Mapping[str, str] = {"force": "N", "torque": "N*m", "current": "A", "voltage": "V", "command": "V"}
+    units = {"force": "N", "torque": "N*m", "current": "A", "voltage": "V", "command": "V"}
     came = {name: gain * simulated("plant.source.command") for name, gain in per_command(spec).items()}
     if spec.drive.input == "voltage":
         current = simulated("plant.machine.current")
-        came |= {
-            "current": current,
-            "torque" if spec.axis.motion == "rotary" else "force": spec.force_constant * current,
-        }
-    return [
-        Compared(name=name, unit=units[name], measured=values, simulated=came[name])
-        for name, values in job.efforts.items()
-        if name in came
-    ]
+        force = "torque" if spec.axis.motion == "rotary" else "force"
+        came |= {"current": current, force: spec.force_constant * current}
+    return [Compared(name, units[name], values, came[name]) for name, values in job.efforts.items() if name in came]
 
 
 def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:

@@ -12,7 +12,7 @@ from detent.methods.cascade.summary import relative
 from detent.methods.cascade.units import percent, units_of
 from detent.page.chart import Chart, Panel, Timeline, time_charts
 from detent.page.figure import Figure
-from detent.page.frame import Card, Headline, Page, Section, card
+from detent.page.frame import Headline, Page, Section, card
 from detent.page.parts import Note
 from detent.page.run_page import page_title, warnings
 from detent.page.table import Table, bar_cell
@@ -24,10 +24,18 @@ ZOOM_SHARE, ZOOM_LEAST = 0.04, 0.4
 
 def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | None = None) -> Page:
     """The page of a replay."""
+    written = units_of(spec).written
     return Page(
         title=page_title(spec.axis.name, run, done="replayed"),
         headline=_headline(spec, run),
-        cards=_cards(spec, run),
+        cards=[
+            card(
+                f"{one.name}, rms difference".capitalize(),
+                written(one.rms, one.unit),
+                f"largest {written(one.peak, one.unit)}; {relative(one)}",
+            )
+            for one in shown_signals(run)
+        ],
         notes=warnings(run.warnings) + [Note("note", text) for text in run.job.notes],
         sections=[
             Section("Recorded and simulated", _curves(spec, run)),
@@ -61,18 +69,6 @@ def _apart(spec: CascadeSpec, run: ReplayRun) -> str:
     if efforts:
         text += f" Its {efforts[0].name} differs from the recorded one by {percent(efforts[0].relative)}."
     return text
-
-
-def _cards(spec: CascadeSpec, run: ReplayRun) -> list[Card]:
-    written = units_of(spec).written
-    return [
-        card(
-            f"{one.name}, rms difference".capitalize(),
-            written(one.rms, one.unit),
-            f"largest {written(one.peak, one.unit)}; {relative(one)}",
-        )
-        for one in shown_signals(run)
-    ]
 
 
 def shown_signals(run: ReplayRun) -> list[Compared]:

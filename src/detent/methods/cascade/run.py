@@ -1,6 +1,7 @@
 """A list of moves on a simulated cascade axis, from power-on: what its drive sees, and an observer beside the load."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -18,8 +19,7 @@ from detent.record.run import RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
 
-COAST = 0.1
-"""Time that a run goes on after the drive has gone off [s]."""
+COAST = 0.1  # time that a run goes on after the drive has gone off [s]
 
 CASCADE_SIGNALS = (
     "controller.reference.position", "controller.reference.velocity", "controller.motor_sensor.position",
@@ -224,34 +224,30 @@ class _Mover:
         if event == ARRIVED:
             ready = host.time
             event = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9)) if move.dwell > 0 else 0
-        self._note(move, (begin, arrived, ready), (start, target))
+        self._note(move, begin=begin, arrived=arrived, ready=ready, start=start, target=target)
         return f"move {move.number} to {self._text(target, 6)}: {self._cause()}" if event == FAULT else ""
 
-    def _note(self, move: Move, times: tuple[float, float, float], way: tuple[float, float]) -> None:
+    def _note(self, move: Move, *, ready: float, target: float, **known: float) -> None:
         """Put the move into the result."""
         host, gauge, peaks, load = self.host, self.plant.gauge, self.controller.peaks, self.plant.machine.load
-        begin, arrived, ready = times
-        outside = abs(way[1] - load.position) > self.result.tolerance
-        self.result.moves.append(
-            CascadeMove(
-                number=move.number,
-                label=move.label,
-                begin=begin,
-                arrived=arrived,
-                ready=ready,
-                settled=math.nan if outside else gauge.outside * host.tick,
-                end=host.time,
-                start=way[0],
-                target=way[1],
-                position=load.position,
-                overshoot=max(float(gauge.beyond), 0.0),
-                peak_speed=float(gauge.peak_speed),
-                peak_following=peaks.following,
-                peak_command=peaks.command,
-                limited=peaks.limited * host.period,
-                in_position=not math.isnan(ready),
-            )
+        outside = abs(target - load.position) > self.result.tolerance
+        made = CascadeMove(
+            number=move.number,
+            label=move.label,
+            ready=ready,
+            settled=math.nan if outside else gauge.outside * host.tick,
+            end=host.time,
+            target=target,
+            position=load.position,
+            overshoot=max(float(gauge.beyond), 0.0),
+            peak_speed=float(gauge.peak_speed),
+            peak_following=peaks.following,
+            peak_command=peaks.command,
+            limited=peaks.limited * host.period,
+            in_position=not math.isnan(ready),
+            **known,
         )
+        self.result.moves.append(made)
 
     def _cause(self) -> str:
         """Why the drive went off, and what to do."""
@@ -289,13 +285,12 @@ def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
         return []
     worst = max(off, key=lambda move: abs(move.error))
     text = format_quantity(abs(worst.error), spec.unit("m"), 3)
-    return [
-        (
-            f"{len(off)} of {len(run.moves)} moves were in position while the load stood beside its target, move "
-            f"{worst.number} by {text}: the encoder of the position loop does not see coupling and backlash, or the "
-            'velocity loop has no integral; state method.feedback.position = "load", or widen method.in_position'
-        )
-    ]
+    said = (
+        f"{len(off)} of {len(run.moves)} moves were in position while the load stood beside its target, move "
+        f"{worst.number} by {text}: the encoder of the position loop does not see coupling and backlash, or the "
+        'velocity loop has no integral; state method.feedback.position = "load", or widen method.in_position'
+    )
+    return [said]
 
 
 # ---- the job
@@ -309,32 +304,26 @@ def check_cascade_job(spec: CascadeSpec, job: MoveJob) -> list[float]:
     for move in job.moves:
         place = place + move.by if move.by is not None else float(move.target or 0.0)
         targets.append(place)
-        if len(problems) < MOST_PROBLEMS:
-            problems += _bad_move(spec, job.name, move, place)
+        line = 1 if move.row else 0
+        problems += [FileProblem(job.name, move.row, line, *words) for words in _refused(spec, move, place)]
     if problems:
-        raise InputError(problems)
+        raise InputError(problems[:MOST_PROBLEMS])
     return targets
 
 
-def _bad_move(spec: CascadeSpec, name: str, move: Move, place: float) -> list[FileProblem]:
-    """What is wrong with one move."""
-    found: list[FileProblem] = []
-
-    def problem(key: str, came: str, allowed: str, remedy: str) -> None:
-        found.append(FileProblem(name, move.row, 1 if move.row else 0, key, came, allowed, remedy))
-
+def _refused(spec: CascadeSpec, move: Move, place: float) -> Iterator[tuple[str, str, str, str]]:
+    """Key, what came, what is allowed and what to do, of each word of a move that the axis cannot do."""
     way, speed = spec.unit("m"), spec.unit("m/s")
     low, high, slack = spec.limits.lowest, spec.highest, 1e-9 * spec.limits.travel
     if not low - slack <= place <= high + slack:
         ends = f"{format_quantity(low, way, 5)} to {format_quantity(high, way, 5)}"
-        key = "target" if move.by is None else "by"
         allowed = f"a position from limits.lowest to limits.lowest + limits.travel, {ends}"
-        problem(key, format_quantity(place, way, 6), allowed, "keep the move between the two ends")
+        key = "target" if move.by is None else "by"
+        yield key, format_quantity(place, way, 6), allowed, "keep the move between the two ends"
     if move.speed is not None and not 0 < move.speed <= spec.limits.speed * (1 + 1e-9):
         allowed = f"up to limits.speed, {format_quantity(spec.limits.speed, speed)}"
-        problem("speed", format_quantity(move.speed, speed), allowed, "lower it, or raise limits.speed")
+        yield "speed", format_quantity(move.speed, speed), allowed, "lower it, or raise limits.speed"
     if move.sample_period is not None:
         own = format_quantity(spec.method.sample_period, "s")
         allowed = f"no sample_period: the loops of this axis have a fixed one, {own}"
-        problem("sample_period", format_quantity(move.sample_period, "s"), allowed, "leave it out")
-    return found
+        yield "sample_period", format_quantity(move.sample_period, "s"), allowed, "leave it out"

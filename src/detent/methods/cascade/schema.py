@@ -272,11 +272,26 @@ class CascadeSpec(AxisSpec, frozen=True):
         coupling, mass = self.mechanics.coupling, self.mechanics.load_mass
         return 0.0 if coupling is None else math.tau * math.sqrt(mass / coupling.stiffness)
 
-    @property
-    def static_friction(self) -> float:
-        """Force that breaks motor and load loose, in the direction that takes more [N]."""
+    def friction(self, sense: int) -> DirectionTable:
+        """Friction of motor and load together in the direction 1 or -1, offsets with it; its Stribeck curve apart."""
         tables = (self.mechanics.friction, self.mechanics.load_friction)
-        return max(sum(t.positive.static + t.offset for t in tables), sum(t.negative.static - t.offset for t in tables))
+        sides = [(t.positive if sense > 0 else t.negative, sense * t.offset) for t in tables]
+        return DirectionTable.model_construct(
+            coulomb=sum(side.coulomb + offset for side, offset in sides),
+            static=sum(side.static + offset for side, offset in sides),
+            viscous=sum(side.viscous for side, _ in sides),
+        )
+
+    @property
+    def viscous(self) -> float:
+        """Viscous friction of motor and load together, of both directions the mean [N*s/m]."""
+        tables = (self.mechanics.friction, self.mechanics.load_friction)
+        return sum(0.5 * (t.positive.viscous + t.negative.viscous) for t in tables)
+
+    @property
+    def holding(self) -> float:
+        """Force that holds the load against its weight, hanging loads at a quarter turn [N]."""
+        return abs(self.mechanics.weight) + self.mechanics.pendulum
 
     @property
     def radius(self) -> float:
@@ -376,13 +391,10 @@ def fill_derived(spec: CascadeSpec) -> CascadeSpec:
     }
     stated = {name: value for name, value in derived.items() if math.isnan(getattr(method, name))}
     tables = {"mechanics": mechanics.model_copy(update=filled), "method": method.model_copy(update=stated)}
-    return _fill_protection(spec.model_copy(update=tables))
-
-
-def _fill_protection(spec: CascadeSpec) -> CascadeSpec:
-    """What breaks the axis loose takes its weight, too."""
+    spec = spec.model_copy(update=tables)
     if not math.isnan(spec.protection.stuck_effort):
         return spec
-    holding = spec.static_friction + abs(spec.mechanics.weight) + spec.mechanics.pendulum
-    share = breaking_effort(holding, spec.largest_effort)
+    # What breaks the axis loose takes its weight, too.
+    loose = max(spec.friction(1).static, spec.friction(-1).static) + spec.holding
+    share = breaking_effort(loose, spec.largest_effort)
     return spec.model_copy(update={"protection": spec.protection.model_copy(update={"stuck_effort": share})})

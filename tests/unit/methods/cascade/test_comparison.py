@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import detent
-from detent.methods.cascade.comparison import FEEDS, SHAPES, compare_profiles, held_frequency, smooth_jerk
+from detent.methods.cascade.comparison import FEEDS, SHAPES, compare_profiles, smooth_jerk
 from detent.methods.load import load_spec
 
 pytestmark = pytest.mark.compiled
@@ -46,15 +46,15 @@ def test_a_limited_jerk_takes_a_ramp_more_and_leaves_less_twist(found):
 
 def test_an_axis_without_a_jerk_gets_one_whose_ramp_is_a_swing():
     turning = load_spec(detent.example("turntable.toml"))
-    assert held_frequency(turning) == pytest.approx(math.sqrt(900 / 0.12) / math.tau)
-    assert turning.limits.acceleration / smooth_jerk(turning) == pytest.approx(1 / held_frequency(turning))
+    assert 1 / turning.swing == pytest.approx(math.sqrt(900 / 0.12) / math.tau)
+    assert turning.limits.acceleration / smooth_jerk(turning) == pytest.approx(turning.swing)
 
 
 def test_a_rigid_axis_has_no_twist():
     spec = linear()
     rigid = spec.model_copy(update={"mechanics": spec.mechanics.model_copy(update={"coupling": None})})
     rigid = rigid.model_copy(update={"limits": spec.limits.model_copy(update={"jerk": None})})
-    assert math.isnan(held_frequency(rigid))
+    assert rigid.swing == 0.0
     assert smooth_jerk(rigid) == pytest.approx(5.0 / (0.25 * 0.1))
     found = compare_profiles(rigid)
     assert not found.stated

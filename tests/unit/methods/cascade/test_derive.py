@@ -145,8 +145,8 @@ def test_feed_forward_of_coulomb_ends_at_its_dead_band(load_text, good_text):
 def test_forces_of_the_harder_direction(load_text, good_text):
     up = Machine(load_text(good_text, "mechanics.weight=50 N", "mechanics.friction.offset=4 N").spec)
     assert up.needed(0.0) == pytest.approx(14 + 8 + 4 + 50)
-    assert up.breaking(50.0) == pytest.approx(18 + 9.2 + 4 + 50)
-    assert up.breaking(-50.0) == pytest.approx(20 + 9.2 - 4 + 50)
+    assert up.breaking() == pytest.approx(18 + 9.2 + 4 + 50)
+    assert up.breaking(-1.0) == pytest.approx(20 + 9.2 - 4 + 50)
     down = Machine(load_text(good_text, "mechanics.weight=-50 N").spec)
     assert down.needed(0.0) == pytest.approx(16 + 8 + 50)
 

@@ -12,9 +12,8 @@ from tests.planned_jobs import plan_job
 import detent
 from detent.errors import DetentError
 from detent.methods.cascade.host import CascadeHost
-from detent.methods.cascade.recorded_motion import starting_velocity
 from detent.methods.cascade.replay import at_stamps, per_command, run_cascade_replay
-from detent.methods.cascade.replay_job import ReplayJob, make_replay_job
+from detent.methods.cascade.replay_job import ReplayJob, make_replay_job, starting_velocity
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits
