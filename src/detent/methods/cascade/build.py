@@ -5,25 +5,26 @@ import math
 from detent.axisfile.protection import fill_guard, samples
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.controller import CascadeControllerParams
-from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, DirectionTable, EncoderTable, FrictionTable
+from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable, FrictionTable
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
-from detent.plant.stribeck import DirectionFriction, StribeckFriction
+from detent.plant.stribeck import StribeckFriction
 from detent.plant.two_mass import TwoMassParams, fastest_rate
 from detent.sensing.position_sensor import PositionSensorParams
 
 LARGEST_ANGLE = 0.5
 """Fastest rate of the plant times the tick: a swing of that rate then loses 0.02 % of its amplitude per radian."""
 
-LONGEST_TICK = 1e-4
-"""Longest tick [s]: a push begins, and a record is written, at whole ticks."""
+LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written, at whole ticks
 
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
     p = CascadeParams()
     _fill_machine(p.plant.machine, spec)
-    _fill_source(p, spec)
+    source, drive = p.plant.source, spec.drive
+    source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
+    source.step, source.limit, source.delay = drive.command_step, spec.largest_command, drive.delay
     _fill_sensor(p.controller.motor_sensor, spec.encoder, spec.method.sample_period)
     _fill_sensor(p.controller.load_sensor, spec.load_encoder or IDEAL_ENCODER, spec.method.sample_period)
     set_count(p, spec.encoder.resolution, (spec.load_encoder or IDEAL_ENCODER).resolution)
@@ -44,11 +45,6 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
 def sample_ticks(sample_period: float, rate: float) -> int:
     """Ticks in a sample."""
     return max(1, math.ceil(sample_period * max(rate / LARGEST_ANGLE, 1 / LONGEST_TICK) * (1 - 1e-9)))
-
-
-def start_position(spec: CascadeSpec) -> float:
-    """Position of motor and load at power-on [m]."""
-    return spec.mechanics.start_position
 
 
 def motion_limits(spec: CascadeSpec) -> MotionLimits:
@@ -74,22 +70,8 @@ def _fill_machine(p: TwoMassParams, spec: CascadeSpec) -> None:
 
 def _fill_friction(p: StribeckFriction, table: FrictionTable) -> None:
     p.offset = table.offset
-    _fill_direction(p.positive, table.positive)
-    _fill_direction(p.negative, table.negative)
-
-
-def _fill_direction(p: DirectionFriction, table: DirectionTable) -> None:
-    p.coulomb, p.static, p.stribeck, p.viscous = table.coulomb, table.static, table.stribeck, table.viscous
-
-
-def _fill_source(p: CascadeParams, spec: CascadeSpec) -> None:
-    drive = spec.drive
-    p.plant.source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
-    p.plant.source.step, p.plant.source.limit, p.plant.source.delay = (
-        drive.command_step,
-        spec.largest_command,
-        drive.delay,
-    )
+    for side, own in ((p.positive, table.positive), (p.negative, table.negative)):
+        side.coulomb, side.static, side.stribeck, side.viscous = own.coulomb, own.static, own.stribeck, own.viscous
 
 
 def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:

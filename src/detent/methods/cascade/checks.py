@@ -11,37 +11,24 @@ from detent.axisfile.motion import rotary_model
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies, at_most, put
 from detent.methods.cascade.derive import Machine, dead_time
-from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, EncoderTable
+from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable
 from detent.units import format_quantity as text
 
-FASTEST = 1e7
-"""Fastest rate of the plant [1/s]: the tick is then 50 ns, and a simulated second takes some seconds."""
-
-LEAST_MASS = 1e-12
-"""Smallest mass [kg] or moment of inertia [kg m^2]: a thousandth of the lightest rotor of a file."""
-
-MOST_COUNTS = 2**53
-"""Counts of an encoder: beyond them a float no longer knows each."""
-
-QUICK = 0.1
-"""Bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit."""
+FASTEST = 1e7  # fastest rate of the plant [1/s]: the tick is then 50 ns, and a simulated second takes some seconds
+LEAST_MASS = 1e-12  # smallest mass [kg] or moment of inertia [kg m^2]: a thousandth of the lightest rotor of a file
+MOST_COUNTS = 2**53  # counts of an encoder: beyond them a float no longer knows each
+QUICK = 0.1  # bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit
 
 LEAST_GAIN_MARGIN = 1.5
 
-LEAST_PHASE_MARGIN = math.radians(30)
-"""Phase margin below which a loop rings."""
-
-SLOWER = 2.0
-"""By how much the velocity loop should be faster than the position loop around it."""
+LEAST_PHASE_MARGIN = math.radians(30)  # phase margin below which a loop rings
+SLOWER = 2.0  # by how much the velocity loop should be faster than the position loop around it
 
 NEAR_RESONANCE = 0.5
 """Share of the anti-resonance from which on a velocity loop on the motor no longer moves the load with it."""
 
-LARGEST_JUMP = 0.1
-"""Share of the largest command by which one count may move the drive."""
-
-MOST_COMMAND = 0.95
-"""Share of what the drive can do that a move at its limits may take."""
+LARGEST_JUMP = 0.1  # share of the largest command by which one count may move the drive
+MOST_COMMAND = 0.95  # share of what the drive can do that a move at its limits may take
 
 
 def remedy_of(spec: CascadeSpec) -> Remedies:
@@ -49,7 +36,7 @@ def remedy_of(spec: CascadeSpec) -> Remedies:
     return Remedies(rotary_model(CascadeSpec) if spec.axis.motion == "rotary" else CascadeSpec)
 
 
-# --------------------------------------------------------------------------------------------------- contradictions
+# ---- contradictions
 
 
 def _motor(spec: CascadeSpec) -> Iterator[Contradiction]:
@@ -128,15 +115,16 @@ def _encoders(spec: CascadeSpec) -> Iterator[Contradiction]:
         if getattr(feedback, loop) == "load" and spec.load_encoder is None:
             key = f"method.feedback.{loop}"
             yield wrong(key, '"motor" where there is no [load_encoder]', put(key, '"motor"'))
-    tables: dict[str, EncoderTable | None] = {"encoder": spec.encoder, "load_encoder": spec.load_encoder}
+    both = {"encoder": spec.encoder, "load_encoder": spec.load_encoder}
+    tables = {name: table for name, table in both.items() if table is not None}
     finest = 2 * max(abs(spec.limits.lowest), abs(spec.highest)) / MOST_COUNTS
     for name, table in tables.items():
-        if table is not None and table.delay + table.velocity_span > MOST_SAMPLES:
+        if table.delay + table.velocity_span > MOST_SAMPLES:
             allowed = f"up to {MOST_SAMPLES} samples together with {name}.delay"
             fewer = put(f"{name}.velocity_span", MOST_SAMPLES - table.delay)
             yield wrong(f"{name}.velocity_span {name}.delay", allowed, fewer)
     for name, table in tables.items():
-        if table is not None and 0 < table.resolution < finest:
+        if 0 < table.resolution < finest:
             yield wrong(
                 f"{name}.resolution limits.travel",
                 f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be told apart",
@@ -257,13 +245,13 @@ RULES: tuple[Callable[[CascadeSpec], Iterator[Contradiction]], ...] = (
 """Contradictions are told in this order."""
 
 
-# --------------------------------------------------------------------------------------------------------- cautions
+# ---- cautions
 
 
 def find_cautions(spec: CascadeSpec) -> Iterator[Caution]:
     """Look a cascade axis over."""
     machine = Machine(spec)
-    for look in (_loops, _bandwidth, _position, _resolution, _force, _current, _following, _rest):
+    for look in (_loops, _bandwidth, _position, _force, _current, _following):
         yield from look(machine)
 
 
@@ -332,7 +320,7 @@ def _bandwidth(m: Machine) -> Iterator[Caution]:
 
 
 def _position(m: Machine) -> Iterator[Caution]:
-    """Position is measured where and as finely as it is held."""
+    """Position is measured where and as finely as it is held, and a count of velocity does not shake the drive."""
     spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
     count = spec.position_encoder.resolution
     if coupling is not None and coupling.backlash > 0 and method.feedback.position == "load" and m.integrates:
@@ -351,11 +339,7 @@ def _position(m: Machine) -> Iterator[Caution]:
             "one count off, and the axis is not in position",
             remedy_of(spec).least("method.in_position", count),
         )
-
-
-def _resolution(m: Machine) -> Iterator[Caution]:
-    """A count of velocity does not shake the drive."""
-    spec, table, most = m.spec, m.spec.velocity_encoder, LARGEST_JUMP * m.spec.largest_command
+    table, most = spec.velocity_encoder, LARGEST_JUMP * spec.largest_command
     name = "encoder" if spec.method.feedback.velocity == "motor" else "load_encoder"
     if m.jump > most:
         span = math.ceil(table.velocity_span * m.jump / most * (1 - BARELY))
@@ -416,7 +400,7 @@ def _current(m: Machine) -> Iterator[Caution]:
 
 
 def _following(m: Machine) -> Iterator[Caution]:
-    """At limits.speed the axis keeps within the limits of its loops."""
+    """At limits.speed the axis keeps within the limits of its loops, and at rest friction does not hold it outside."""
     method, unit, speed = m.spec.method, m.spec.unit("m"), m.spec.unit("m/s")
     error, demand, remedy = m.following_error, m.velocity_demand, remedy_of(m.spec)
     if error >= method.following_error:
@@ -435,15 +419,10 @@ def _following(m: Machine) -> Iterator[Caution]:
             "without an integral friction slows the axis below its reference, and the demand cannot make up for it",
             remedy.least("method.velocity_limit", demand, "state method.velocity_integral"),
         )
-
-
-def _rest(m: Machine) -> Iterator[Caution]:
-    """Without an integral friction does not hold the axis outside its window."""
-    method, unit, error = m.spec.method, m.spec.unit("m"), m.resting_error
-    if error > method.in_position:
+    if m.resting_error > method.in_position:
         yield Caution(
             "error at rest",
-            text(error, unit),
+            text(m.resting_error, unit),
             f"up to method.in_position, {text(method.in_position, unit)}",
             "friction or weight may hold the axis outside, and a move then fails",
             "state method.integral" if method.structure == "pid" else "state method.velocity_integral",

@@ -29,8 +29,7 @@ from detent.sensing.position_sensor import (
     stand_sensor,
 )
 
-ARRIVED, FAULT = 1, 2
-"""Events."""
+ARRIVED, FAULT = 1, 2  # events
 
 
 class FeedbackParams(Registers):
@@ -99,13 +98,6 @@ class CascadeLines(Registers):
     sync: u1 = register("1 where the encoders latch in the next tick, and the amplifier then takes over", by=CONTROLLER)
     enable: u1 = register("0: the amplifier takes no command", by=CONTROLLER)
     command: f8 = register("command to the amplifier", unit="V", by=CONTROLLER)
-
-
-@step
-def read_sensors(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines) -> None:
-    """Sample: take the words of both encoders."""
-    read_word(p.motor_sensor, c.motor_sensor, lines.motor)
-    read_word(p.load_sensor, c.load_sensor, lines.load)
 
 
 @hot_step
@@ -195,7 +187,8 @@ def sample(
 ) -> None:
     """Read, decide, command; where there are commands, the loops are open, and 0 comes behind the last one."""
     c.samples += 1
-    read_sensors(p, c, lines)
+    read_word(p.motor_sensor, c.motor_sensor, lines.motor)
+    read_word(p.load_sensor, c.load_sensor, lines.load)
     output, entries = 0.0, len(command)
     if c.on and entries > 0:
         output = command[c.entry] if c.entry < entries else 0.0

@@ -112,10 +112,6 @@ class CascadeHost:
         self.feed = driven(command)
         controller.follow(self.controller)
 
-    def switch_off(self) -> None:
-        """Take the drive's command away; the axis coasts."""
-        controller.switch_off(self.controller)
-
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
         if self._seen is None:
             return advance(p, r, ticks, *recording, *self.feed)

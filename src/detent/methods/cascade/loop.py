@@ -22,22 +22,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable, FrictionTable
+from detent.methods.cascade.schema import CascadeSpec, FrictionTable
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 
-GRID = 4000
-"""Frequencies at which an open loop is looked at, evenly spaced on a logarithmic scale."""
-
-DECADES = 6
-"""Of frequency, below half the sample rate."""
-
-LARGEST_MARGIN = 1e3
-"""Largest gain margin that is looked for."""
-
-MARGIN_STEP = 1.2
-"""Steps in which the limit of stability is approached."""
+GRID = 4000  # frequencies at which an open loop is looked at, evenly spaced on a logarithmic scale
+DECADES = 6  # of frequency, below half the sample rate
+LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
+MARGIN_STEP = 1.2  # steps in which the limit of stability is approached
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,15 +113,16 @@ class LinearLoop:
         drags = [min(f.positive.viscous, f.negative.viscous) for f in frictions]
         self.plant = plant_of(spec, (drags[0], drags[1]))
         self.gain = spec.drive.voltage_gain if spec.drive.input == "voltage" else spec.effort_per_command
-        feedback = spec.method.feedback
-        self.position_sensor, self.position_place = self._sensor(on_load=feedback.position == "load")
-        self.velocity_sensor, self.velocity_place = self._sensor(on_load=feedback.velocity == "load")
-
-    def _sensor(self, *, on_load: bool) -> tuple[EncoderTable, int]:
-        """An encoder, and the place of the position that it reads."""
-        if on_load:
-            return self.spec.load_encoder or IDEAL_ENCODER, self.plant.load
-        return self.spec.encoder, self.plant.motor
+        # Encoders of both loops, and the places of the positions that they read.
+        self.position_sensor, self.velocity_sensor = spec.position_encoder, spec.velocity_encoder
+        places = {"motor": self.plant.motor, "load": self.plant.load}
+        self.position_place = places[spec.method.feedback.position]
+        self.velocity_place = places[spec.method.feedback.velocity]
+        # Shares of a new velocity, and of a new velocity error of a PID, that their filters take over.
+        self.velocity_share = smoothing(self.velocity_sensor.velocity_filter, self.period)
+        self.derivative_share = smoothing(spec.method.derivative_filter, self.period)
+        highest = math.log10(0.5 / self.period)
+        self.frequencies = np.logspace(highest - DECADES, highest, GRID, endpoint=False)  # of the open loops [Hz]
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
@@ -139,16 +133,6 @@ class LinearLoop:
         a[:size, :size], a[:size, size] = self.plant.a, self.plant.b
         whole = expm(a * self.period)
         return whole[:size, :size], whole[:size, size]
-
-    @property
-    def velocity_share(self) -> float:
-        """Share of a new velocity that its filter takes over."""
-        return smoothing(self.velocity_sensor.velocity_filter, self.period)
-
-    @property
-    def derivative_share(self) -> float:
-        """Share of a new velocity error that the filter of a PID's derivative takes over."""
-        return smoothing(self.spec.method.derivative_filter, self.period)
 
     def transition(self, more: float = 1.0) -> Numbers:
         """State from sample to sample, the reference at 0, with `more` times the gain.
@@ -217,12 +201,6 @@ class LinearLoop:
             middle = math.sqrt(low * high)
             low, high = (middle, high) if _radius(self.transition(middle)) < 1.0 else (low, middle)
         return low
-
-    @cached_property
-    def frequencies(self) -> Numbers:
-        """At which the open loops are looked at [Hz]."""
-        highest = math.log10(0.5 / self.period)
-        return np.logspace(highest - DECADES, highest, GRID, endpoint=False)
 
     @cached_property
     def _responses(self) -> tuple[Phasors, Phasors, Phasors]:

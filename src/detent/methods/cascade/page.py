@@ -1,7 +1,7 @@
 """The page about a list of moves on a cascade axis: did it follow, did it arrive, and what it took."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from detent.methods.cascade.panels import POINTS, both_sides, command_panel, err
 from detent.methods.cascade.run import CascadeMove, CascadeRun
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.summary import arrived, worst_rest, worst_settling
-from detent.methods.cascade.units import Scale, milliseconds, units_of
+from detent.methods.cascade.units import milliseconds, units_of
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -36,11 +36,8 @@ FOLLOWING, COMMAND = "controller.law.position_error", "plant.source.command"
 NEEDED = (REFERENCE, REFERENCE_SPEED, LOAD, LOAD_SPEED, FOLLOWING, COMMAND)
 """Signals that the figures over time are drawn from; of a trace without them these figures are left out."""
 
-REST_WINDOWS = 5
-"""How far from the target the figure of the end of a move begins, in windows."""
-
-AFTERWARDS = 0.02
-"""How long after its last event that figure ends [s]."""
+REST_WINDOWS = 5  # how far from the target the figure of the end of a move begins, in windows
+AFTERWARDS = 0.02  # how long after its last event that figure ends [s]
 
 
 def cascade_page(
@@ -78,12 +75,12 @@ def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
         f"{asked} in {duration(run.seconds)}. "
         f"On the way the axis was never more than {error(run.worst_following)} from where it should be"
     )
-    doubt = ""
+    doubt, rest = "", error(run.worst_error)
     if run.worst_error > run.tolerance:
         doubt = "Done, but beside its targets"
-        lead += f", but the load stood up to {error(run.worst_error)} beside its target while the loop was in position."
+        lead += f", but the load stood up to {rest} beside its target while the loop was in position."
     else:
-        lead += f"; at the end of each move the load stood within {error(run.worst_error)} of its target."
+        lead += f"; at the end of each move the load stood within {rest} of its target."
     return run_headline(spec.axis.name, run, lead, doubt=doubt, words=("Every move in position", "Not done"))
 
 
@@ -228,37 +225,35 @@ def _rest_figure(
 
 
 def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
-    units = units_of(spec)
-    off = units.small(max(run.worst_error, run.worst_overshoot))
-    lag = units.small(run.worst_following)
-    place = units.place.name
-    heads = [("move", True), ("begin [s]", True), (f"from [{place}]", True), (f"to [{place}]", True),
-             ("reference [ms]", True), ("settles after [ms]", True), (f"following error [{lag.name}]", True),
-             (f"overshoot [{off.name}]", True), (f"error [{off.name}]", True), ("peak command [V]", True),
-             ("in position", False)]  # fmt: skip
-    rows = [_row(spec, run, move, lag, off) for move in run.moves]
+    units, place = units_of(spec), units_of(spec).place.name
+    off, lag = units.small(max(run.worst_error, run.worst_overshoot)), units.small(run.worst_following)
+
+    def following(move: CascadeMove) -> Cell:
+        beyond = move.peak_following > spec.method.following_error
+        return bar_cell(move.peak_following * lag.factor, run.worst_following * lag.factor or 1.0, over=beyond)
+
+    def error(move: CascadeMove) -> Cell:
+        # A move that failed may have stopped anywhere; its bar is a full one, no longer.
+        furthest = max(run.worst_error, abs(move.error)) * off.factor or 1.0
+        return offset_cell(move.error * off.factor, furthest, over=abs(move.error) > run.tolerance)
+
+    columns: dict[str, Callable[[CascadeMove], str | Cell]] = {
+        "move": lambda move: count(move.number),
+        "begin [s]": lambda move: f"{move.begin - run.time_ready:.3f}",
+        f"from [{place}]": lambda move: units.position(move.start),
+        f"to [{place}]": lambda move: units.position(move.target),
+        "reference [ms]": lambda move: number(round((move.arrived - move.begin) * 1e3, 6)),
+        "settles after [ms]": lambda move: number(round(move.settling * 1e3, 6)),
+        f"following error [{lag.name}]": following,
+        f"overshoot [{off.name}]": lambda move: number(move.overshoot * off.factor, 2),
+        f"error [{off.name}]": error,
+        "peak command [V]": lambda move: number(move.peak_command),
+        "in position": lambda move: "✔" if move.in_position else Cell(text="✘ no", over=True),
+    }
+    heads = [(name, name != "in position") for name in columns]
+    rows = [[cell(move) for cell in columns.values()] for move in run.moves]
     caption = (
         "The reference takes its time; then the load settles within the window. Following error is the largest of the "
         "move; error is target less position of the load at the end of the move."
     )
     return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))
-
-
-def _row(spec: CascadeSpec, run: CascadeRun, move: CascadeMove, lag: Scale, off: Scale) -> list[str | Cell]:
-    units, longest = units_of(spec), run.worst_following * lag.factor or 1.0
-    beyond = move.peak_following > spec.method.following_error
-    # A move that failed may have stopped anywhere; its bar is a full one, no longer.
-    furthest = max(run.worst_error, abs(move.error)) * off.factor or 1.0
-    return [
-        count(move.number),
-        f"{move.begin - run.time_ready:.3f}",
-        units.position(move.start),
-        units.position(move.target),
-        number(round((move.arrived - move.begin) * 1e3, 6)),
-        number(round(move.settling * 1e3, 6)),
-        bar_cell(move.peak_following * lag.factor, longest, over=beyond),
-        number(move.overshoot * off.factor, 2),
-        offset_cell(move.error * off.factor, furthest, over=abs(move.error) > run.tolerance),
-        number(move.peak_command),
-        "✔" if move.in_position else Cell(text="✘ no", over=True),
-    ]

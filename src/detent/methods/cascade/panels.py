@@ -6,11 +6,8 @@ from detent.methods.cascade.units import Scale, Units
 from detent.page.chart import Curve, Panel
 from detent.page.parts import Numbers
 
-POINTS = 1500
-"""Rows that are chosen for one curve's sake: plot areas stand above one another."""
-
-WINDOW_SHARE = 0.02
-"""Windows and limits narrower than this share of the curves would only blacken the line at zero."""
+POINTS = 1500  # rows that are chosen for one curve's sake: plot areas stand above one another
+WINDOW_SHARE = 0.02  # windows and limits narrower than this share of the curves would only blacken the line at zero
 
 Named = tuple[str, Numbers]
 """Name of a curve, and its values in SI units."""

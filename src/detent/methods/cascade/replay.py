@@ -31,8 +31,7 @@ EFFORTS: dict[str, tuple[str, ...]] = {
 }
 """Signals that drive an axis open loop, by its ``drive.input``; the first that was recorded is taken."""
 
-CHUNK = 8192
-"""Samples between two words of progress."""
+CHUNK = 8192  # samples between two words of progress
 
 Numbers = NDArray[np.float64]
 

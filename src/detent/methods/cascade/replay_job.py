@@ -20,11 +20,8 @@ CUTOFF = 100.0
 """Velocities that were not recorded, and accelerations, are those of positions low-passed at this frequency, both alike
 [Hz]; at most a fifth of the sample rate."""
 
-START_SPAN, START_SAMPLES = 0.012, 8
-"""Time from which the velocity at the begin is taken [s], and its samples at least."""
-
-STILL = 5
-"""Samples on both sides through which a recorded reference that stands does not change."""
+START_SPAN, START_SAMPLES = 0.012, 8  # time from which the velocity at the begin is taken [s], and its samples at least
+STILL = 5  # samples on both sides through which a recorded reference that stands does not change
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

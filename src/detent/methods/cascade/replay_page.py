@@ -27,7 +27,13 @@ def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | No
     written = units_of(spec).written
     return Page(
         title=page_title(spec.axis.name, run, done="replayed"),
-        headline=_headline(spec, run),
+        headline=Headline(
+            level="good" if run.done else "bad",
+            verdict="Replayed" if run.done else "Not replayed",
+            name=run.job.name,
+            kicker=f"A recording beside the simulated axis {spec.axis.name}",
+            lead=_apart(spec, run) if run.done else f"{run.failure[:1].upper()}{run.failure[1:]}.",
+        ),
         cards=[
             card(
                 f"{one.name}, rms difference".capitalize(),
@@ -42,16 +48,6 @@ def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | No
             Section("In figures", [_table(spec, run)] if run.compared else []),
         ],
         settings=settings or {},
-    )
-
-
-def _headline(spec: CascadeSpec, run: ReplayRun) -> Headline:
-    return Headline(
-        level="good" if run.done else "bad",
-        verdict="Replayed" if run.done else "Not replayed",
-        name=run.job.name,
-        kicker=f"A recording beside the simulated axis {spec.axis.name}",
-        lead=_apart(spec, run) if run.done else f"{run.failure[:1].upper()}{run.failure[1:]}.",
     )
 
 

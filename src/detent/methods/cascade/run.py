@@ -9,7 +9,7 @@ from detent.axisfile.protection import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
-from detent.methods.cascade.controller import ARRIVED, FAULT, clear_peaks
+from detent.methods.cascade.controller import ARRIVED, FAULT, clear_peaks, switch_off
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
@@ -183,7 +183,7 @@ def run_cascade_moves(
                 progress(done / len(targets), f"move {done} of {len(targets)}")
         if result.failure:
             result.time_off = host.time
-            host.switch_off()
+            switch_off(host.controller)
             host.pass_samples(math.ceil(COAST / host.period))
     finally:
         host.machine.close()

@@ -33,8 +33,7 @@ from detent.files.quantities import (
     VoltagePerVelocity,
 )
 
-MOST_SAMPLES = 63
-"""Samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)."""
+MOST_SAMPLES = 63  # samples that the memory of an encoder or of the amplifier reaches back (`sensing.position_sensor`)
 
 
 class CascadeAxisTable(AxisTable, frozen=True):
@@ -367,12 +366,8 @@ class CascadeSpec(AxisSpec, frozen=True):
     @property
     def largest_effort(self) -> float:
         """Largest force at standstill [N]."""
-        return min(self.limits.effort, self.largest_command * self.effort_per_command, self._by_current)
-
-    @property
-    def _by_current(self) -> float:
-        """Force of the largest current [N]."""
-        return self.max_current * self.force_constant if self.force_constant > 0 else math.inf
+        by_current = self.max_current * self.force_constant if self.force_constant > 0 else math.inf
+        return min(self.limits.effort, self.largest_command * self.effort_per_command, by_current)
 
 
 def fill_derived(spec: CascadeSpec) -> CascadeSpec:

@@ -31,8 +31,7 @@ from detent.plant.two_mass import TwoMass, fastest_rate
 
 Numbers = NDArray[np.float64]
 
-MAX_RATE = 1.0
-"""Fastest rate of the plant times the tick, at most; see `plant.two_mass.fastest_rate`."""
+MAX_RATE = 1.0  # fastest rate of the plant times the tick, at most; see `plant.two_mass.fastest_rate`
 
 
 class CascadeParams(Registers):
@@ -76,8 +75,7 @@ Feed = tuple[HostArray, HostArray, HostArray, HostArray]
 
 _NONE = lay_ready(np.zeros(0))
 
-STANDING: Feed = (_NONE, _NONE, _NONE, _NONE)
-"""Feed of an axis whose reference stands in its registers."""
+STANDING: Feed = (_NONE, _NONE, _NONE, _NONE)  # feed of an axis whose reference stands in its registers
 
 
 def along(position: Numbers, velocity: Numbers, acceleration: Numbers) -> Feed:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from detent.methods.cascade.schema import CascadeSpec
 from detent.page.words import ARCSEC, GAP, SMALL, angle, degrees, length, number
 
-MICRO = 1e-3
-"""Lengths below this are drawn in micrometres [m]."""
+MICRO = 1e-3  # lengths below this are drawn in micrometres [m]
 
 
 @dataclass(frozen=True, slots=True)

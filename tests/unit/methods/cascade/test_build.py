@@ -19,7 +19,6 @@ from detent.methods.cascade.build import (
     build_cascade,
     motion_limits,
     sample_ticks,
-    start_position,
 )
 from detent.methods.cascade.checks import find_cautions
 from detent.methods.cascade.derive import derive
@@ -148,7 +147,7 @@ def registers(name, overrides):
     """What the axis has come to after a move there and back, and on the way."""
     spec = load(name, *overrides)
     p = build_cascade(spec)
-    start, way = start_position(spec), 0.05
+    start, way = spec.mechanics.start_position, 0.05
     rig, seen = Rig(p, start), []
     for target in (start + way, start):
         move = plan_move(
@@ -200,11 +199,11 @@ def test_an_encoder_without_counts_is_not_looked_after():
 
 def test_a_pendulum_pulls_a_rotary_axis_down():
     hanging = load("turntable", "mechanics.pendulum=0.5 N*m", "mechanics.start_position=90 deg")
-    rig = Rig(build_cascade(hanging), start_position(hanging))
+    rig = Rig(build_cascade(hanging), hanging.mechanics.start_position)
     rig.drive([0.0], 200 * rig.p.controller.sample_ticks)
     assert rig.x < math.radians(89)
     still = load("turntable", "mechanics.pendulum=0.5 N*m")
-    rig = Rig(build_cascade(still), start_position(still))
+    rig = Rig(build_cascade(still), still.mechanics.start_position)
     assert rig.drive([0.0], 200 * rig.p.controller.sample_ticks).x == 0.0
 
 

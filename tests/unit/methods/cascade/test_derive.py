@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.cascade_rig import Rig
 
-from detent.methods.cascade.build import build_cascade, motion_limits, start_position
+from detent.methods.cascade.build import build_cascade, motion_limits
 from detent.methods.cascade.derive import Machine, derive
 from detent.planning.profile import plan_move
 
@@ -67,7 +67,7 @@ def test_a_force_drive_has_no_motor_figures(load_text, short_text):
 def steady_error(spec, sense):
     """Following error of the axis at limits.speed [m], the mean of the last tenth before it slows down."""
     p = build_cascade(spec)
-    start = start_position(spec)
+    start = spec.mechanics.start_position
     limits = motion_limits(spec)
     move = plan_move(start, start + sense * 0.2, limits, spec.method.sample_period)
     rig = Rig(p, start)

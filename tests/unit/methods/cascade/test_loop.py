@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.cascade_rig import Rig
 
-from detent.methods.cascade.build import build_cascade, start_position
+from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.loop import LinearLoop, fastest_rate
 from detent.plant.two_mass import fastest_rate as plant_rate
 
@@ -51,11 +51,11 @@ def test_the_fastest_rate_of_one_mass(load_text, rigid_text):
 def swing(spec, seconds):
     """Largest position error after a push at rest, in the first and in the last quarter of a run [m]."""
     p = build_cascade(spec)
-    rig = Rig(p, start_position(spec))
+    rig = Rig(p, spec.mechanics.start_position)
     rig.r.plant.machine.motor.velocity = rig.r.plant.machine.load.velocity = 1e-3
     samples = round(seconds / spec.method.sample_period)
     run = rig.record(samples * p.controller.sample_ticks, ["plant.machine.motor.position"], p.controller.sample_ticks)
-    error = np.abs(run["plant.machine.motor.position"] - start_position(spec))
+    error = np.abs(run["plant.machine.motor.position"] - spec.mechanics.start_position)
     quarter = samples // 4
     return error[:quarter].max(), error[-quarter:].max()
 
