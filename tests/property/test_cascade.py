@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.cascade_rig import set_friction
 
 from detent.planning.profile import MotionLimits, plan_move
-from detent.plant.two_mass import TwoMass, TwoMassParams, fastest_rate, stand_masses
+from detent.plant.linear_two_mass import fastest_rate
+from detent.plant.two_mass import TwoMass, TwoMassParams, stand_masses
 from detent.plant.two_mass_motion import move_masses
 
 masses = st.floats(0.1, 10.0)

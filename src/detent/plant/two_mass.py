@@ -15,11 +15,6 @@ for kg.
 is made of them stands in `plant.two_mass_motion`.
 """
 
-import math
-
-import numpy as np
-from numpy.typing import NDArray
-
 from detent.kernel.elementary import sin
 from detent.kernel.registers import Registers, block, f8, i1, register
 from detent.kernel.step import hot_step
@@ -226,47 +221,3 @@ def stand_masses(r: TwoMass, position: float) -> None:
     r.motor.position = r.load.position = position
     r.motor.velocity = r.load.velocity = r.current = 0.0
     r.side = 0
-
-
-def fastest_rate(p: TwoMassParams) -> float:
-    """Largest magnitude of the eigenvalues of motor, coupling and load [1/s].
-
-    Times the tick it should be 1 at most: a swing of that rate then loses 0.7 % of its amplitude per radian.
-    """
-    w = p.winding
-    drags = [_steepest(m.friction) for m in (p.motor, p.load)]
-    at_once = bool(w.used) and w.inductance == 0.0
-    if at_once:
-        drags[0] += w.force_constant * w.emf_constant / w.resistance
-    one_mass = p.stiffness == 0.0
-    a = _rigid_matrix(p, sum(drags)) if one_mass else _coupled_matrix(p, drags)
-    if w.used and not at_once:
-        a[0, 0], a[0, 2] = -w.resistance / w.inductance, -w.emf_constant / w.inductance
-        a[2, 0] = w.force_constant / (p.motor.mass + p.load.mass if one_mass else p.motor.mass)
-    return float(np.max(np.abs(np.linalg.eigvals(a))))
-
-
-def _rigid_matrix(p: TwoMassParams, drag: float) -> NDArray[np.float64]:
-    """Rates of current, position and velocity; those of the current are still 0."""
-    mass = p.motor.mass + p.load.mass
-    return np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -p.pendulum / mass, -drag / mass]])
-
-
-def _coupled_matrix(p: TwoMassParams, drags: list[float]) -> NDArray[np.float64]:
-    """Rates of current, position and velocity of the motor and of the load; those of the current are still 0."""
-    a = np.zeros((5, 5))
-    a[1, 2] = a[3, 4] = 1.0
-    k, d = p.stiffness, p.damping
-    a[2, 1:] = np.array([-k, -d - drags[0], k, d]) / p.motor.mass
-    a[4, 1:] = np.array([k, d, -k - p.pendulum, -d - drags[1]]) / p.load.mass
-    return a
-
-
-def _steepest(p: StribeckFriction) -> float:
-    """Largest slope of the friction of both directions, its falling part included [N.s/m]."""
-    slopes = [0.0]
-    for d in (p.positive, p.negative):
-        # The curve falls steepest at vs / sqrt(2).
-        falls = (d.static - d.coulomb) * math.sqrt(2.0 / math.e) / d.stribeck if d.stribeck > 0.0 else 0.0
-        slopes.append(max(d.viscous, falls - d.viscous))
-    return max(slopes)

@@ -2,7 +2,7 @@
 
 The mechanics have no exact solution: the Stribeck curve and the pendulum are not linear, and there would be a matrix
 for each of 18 regimes (direction of each mass or its standstill, contact or not). Within a regime the equations are
-smooth: the classical Runge-Kutta step has order 4, and `plant.two_mass.fastest_rate` says whether the tick is short
+smooth: the classical Runge-Kutta step has order 4, and `linear_two_mass.fastest_rate` says whether the tick is short
 enough. At the end of a regime the tick is split: the moment at which a mass comes to rest or a flank is met is found to
 rounding, so that the order is not lost there. A mass that stops and is pushed on within the same step shows in its way:
 the parabola through both velocities with that way goes below 0, and the tick is split there. A mass at rest stays

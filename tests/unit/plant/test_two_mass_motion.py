@@ -7,7 +7,8 @@ import pytest
 from tests.cascade_rig import set_friction
 from tests.two_mass_rig import M1, H, K, M, coupled, energy, machine, motor, moving, run, state
 
-from detent.plant.two_mass import TwoMass, TwoMassParams, fastest_rate
+from detent.plant.linear_two_mass import fastest_rate
+from detent.plant.two_mass import TwoMass, TwoMassParams
 from detent.plant.two_mass_motion import move_masses
 
 # -- friction ----------------------------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ from detent.methods.cascade.system import (
     switch_on,
 )
 from detent.planning.profile import profile_of_recording
-from detent.plant.two_mass import fastest_rate
+from detent.plant.linear_two_mass import fastest_rate
 from detent.record.recorder import byte_places, choose_leaves
 from detent.sensing.position_sensor import MEMORY
 

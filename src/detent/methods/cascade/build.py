@@ -8,8 +8,9 @@ from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable, FrictionTable
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
+from detent.plant.linear_two_mass import fastest_rate
 from detent.plant.stribeck import StribeckFriction
-from detent.plant.two_mass import TwoMassParams, fastest_rate
+from detent.plant.two_mass import TwoMassParams
 from detent.sensing.position_sensor import PositionSensorParams
 
 LARGEST_ANGLE = 0.5

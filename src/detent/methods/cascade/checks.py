@@ -156,11 +156,12 @@ def directions(spec: CascadeSpec) -> dict[str, DirectionTable]:
 
 def _rate(spec: CascadeSpec) -> Iterator[Contradiction]:
     """The plant is slow enough to be simulated."""
-    from detent.methods.cascade.loop import fastest_rate
+    from detent.methods.cascade.loop import machine_of
+    from detent.plant.linear_two_mass import fastest_rate
 
     if not _is_solid(spec):
         return
-    rate = fastest_rate(spec)
+    rate = fastest_rate(machine_of(spec))
     if rate > FASTEST:
         key = _culprit(spec)
         rises = key.endswith(("stribeck", "resistance", "inductance"))

@@ -17,12 +17,14 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.methods.cascade.schema import CascadeSpec, FrictionTable
+from detent.methods.cascade.schema import CascadeSpec
+from detent.plant.linear_two_mass import linear_plant
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
@@ -33,66 +35,23 @@ LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
 MARGIN_STEP = 1.2  # steps in which the limit of stability is approached
 
 
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """Motor, coupling and load as linear equations x' = A x + b u."""
-
-    a: Numbers  # shape (n, n), n = 2 to 5
-    b: Numbers  # shape (n,); the input is what the amplifier puts out, a voltage [V] or a force [N]
-    motor: int  # and load: places of both positions in x; the same where the coupling is rigid
-    load: int
-
-
-def plant_of(spec: CascadeSpec, drags: tuple[float, float]) -> Plant:
-    """Linear equations of the plant."""
-    winding = spec.drive.input == "voltage" and spec.motor is not None and spec.motor.inductance > 0
-    first, coupled = int(winding), spec.mechanics.coupling is not None
-    size = first + (4 if coupled else 2)
-    a, b = np.zeros((size, size)), np.zeros(size)
-    load = first + 2 if coupled else first
-    for position in {first, load}:
-        a[position, position + 1] = 1.0
-    mass = spec.motor_mass if coupled else spec.mass
-    a[first + 1, first + 1] = -(drags[0] + (0.0 if winding else spec.back_emf_drag)) / mass
-    if spec.mechanics.coupling is not None:
-        k, d = spec.mechanics.coupling.stiffness, spec.mechanics.coupling.damping
-        twist = np.array([-k, -d, k, d])
-        a[first + 1, first:] += twist / mass
-        a[load + 1, first:] -= twist / spec.mechanics.load_mass
-    load_mass = spec.mechanics.load_mass if coupled else mass
-    a[load + 1, load + 1] -= drags[1] / load_mass
-    a[load + 1, load] -= spec.mechanics.pendulum / load_mass
-    _drive(spec, a, b, first, mass)
-    return Plant(a, b, first, load)
-
-
-def _drive(spec: CascadeSpec, a: Numbers, b: Numbers, first: int, mass: float) -> None:
-    """Put in how the amplifier's output acts; `first` is the place of the motor's position."""
-    motor = spec.motor
-    if spec.drive.input != "voltage" or motor is None:
-        b[first + 1] = 1.0 / mass
-    elif first == 0:
-        b[1] = spec.force_constant / motor.resistance / mass
-    else:
-        a[0, 0], a[0, 2] = -motor.resistance / motor.inductance, -spec.emf_constant / motor.inductance
-        a[2, 0], b[0] = spec.force_constant / mass, 1.0 / motor.inductance
-
-
-def fastest_rate(spec: CascadeSpec) -> float:
-    """Largest magnitude of the plant's eigenvalues, with the steepest friction [1/s]; as `plant.two_mass` has it."""
-    mechanics = spec.mechanics
-    plant = plant_of(spec, (steepest(mechanics.friction), steepest(mechanics.load_friction)))
-    return float(np.max(np.abs(np.linalg.eigvals(plant.a))))
-
-
-def steepest(table: FrictionTable) -> float:
-    """Largest slope of a friction over speed, that of a falling Stribeck curve included [N*s/m]."""
-    slopes = [0.0]
-    for d in (table.positive, table.negative):
-        # The curve falls steepest at vs / sqrt(2).
-        falls = (d.static - d.coulomb) * math.sqrt(2.0 / math.e) / d.stribeck if d.stribeck > 0.0 else 0.0
-        slopes.append(max(d.viscous, falls - d.viscous))
-    return max(slopes)
+def machine_of(spec: CascadeSpec) -> Any:
+    """Motor, coupling and load with the names of `plant.two_mass.TwoMassParams`, which would load compiled blocks."""
+    mechanics, coupling, motor = spec.mechanics, spec.mechanics.coupling, spec.motor
+    return SimpleNamespace(
+        motor=SimpleNamespace(mass=spec.motor_mass, friction=mechanics.friction),
+        load=SimpleNamespace(mass=mechanics.load_mass, friction=mechanics.load_friction),
+        stiffness=coupling.stiffness if coupling else 0.0,
+        damping=coupling.damping if coupling else 0.0,
+        pendulum=mechanics.pendulum,
+        winding=SimpleNamespace(
+            used=motor is not None and spec.drive.input == "voltage",
+            resistance=motor.resistance if motor else math.nan,
+            inductance=motor.inductance if motor else math.nan,
+            force_constant=spec.force_constant,
+            emf_constant=spec.emf_constant,
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +70,7 @@ class LinearLoop:
         self.period = spec.method.sample_period
         frictions = (spec.mechanics.friction, spec.mechanics.load_friction)
         drags = [min(f.positive.viscous, f.negative.viscous) for f in frictions]
-        self.plant = plant_of(spec, (drags[0], drags[1]))
+        self.plant = linear_plant(machine_of(spec), (drags[0], drags[1]))
         self.gain = spec.drive.voltage_gain if spec.drive.input == "voltage" else spec.effort_per_command
         # Encoders of both loops, and the places of the positions that they read.
         self.position_sensor, self.velocity_sensor = spec.position_encoder, spec.velocity_encoder

@@ -27,11 +27,12 @@ from detent.methods.cascade.controller import (
     power_on,
 )
 from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, move, sense, stand
-from detent.plant.two_mass import TwoMass, fastest_rate
+from detent.plant.linear_two_mass import fastest_rate
+from detent.plant.two_mass import TwoMass
 
 Numbers = NDArray[np.float64]
 
-MAX_RATE = 1.0  # fastest rate of the plant times the tick, at most; see `plant.two_mass.fastest_rate`
+MAX_RATE = 1.0  # fastest rate of the plant times the tick, at most; see `plant.linear_two_mass.fastest_rate`
 
 
 class CascadeParams(Registers):

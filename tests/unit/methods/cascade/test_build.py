@@ -26,7 +26,7 @@ from detent.methods.cascade.system import MAX_RATE
 from detent.methods.load import axis_of
 from detent.methods.reference import reference_rows
 from detent.planning.profile import MotionLimits, plan_move
-from detent.plant.two_mass import fastest_rate
+from detent.plant.linear_two_mass import fastest_rate
 
 pytestmark = pytest.mark.compiled
 

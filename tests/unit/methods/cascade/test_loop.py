@@ -7,8 +7,8 @@ import pytest
 from tests.cascade_rig import Rig
 
 from detent.methods.cascade.build import build_cascade
-from detent.methods.cascade.loop import LinearLoop, fastest_rate
-from detent.plant.two_mass import fastest_rate as plant_rate
+from detent.methods.cascade.loop import LinearLoop, machine_of
+from detent.plant.linear_two_mass import fastest_rate
 
 FREE = [
     f"mechanics.{mass}.{sense}.{kind}=0 N"
@@ -39,13 +39,15 @@ PID = [
 )
 def test_the_fastest_rate_is_that_of_the_plant(load_text, rotary_text, overrides):
     spec = load_text(rotary_text, *overrides).spec
-    assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).plant.machine), rel=1e-9)
+    assert fastest_rate(machine_of(spec)) == pytest.approx(fastest_rate(build_cascade(spec).plant.machine), rel=1e-9)
 
 
 def test_the_fastest_rate_of_one_mass(load_text, rigid_text):
     for overrides in ([], ["drive.input=voltage", "motor.inductance=2 mH"], ["drive.input=voltage"]):
         spec = load_text(rigid_text, *overrides).spec
-        assert fastest_rate(spec) == pytest.approx(plant_rate(build_cascade(spec).plant.machine), rel=1e-9)
+        assert fastest_rate(machine_of(spec)) == pytest.approx(
+            fastest_rate(build_cascade(spec).plant.machine), rel=1e-9
+        )
 
 
 def swing(spec, seconds):
