@@ -7,8 +7,9 @@ enabled anew. A watch that has no samples is off. The faults are numbered as in 
 An axis cannot speed up against its own effort, unless the sensor counts the wrong way round or a force beyond the
 effort drives it; and it cannot stand under an effort that breaks it loose, unless the sensor is stuck. A controller
 that weighs its effort (`weigh_effort`) tells the first two apart. Behind a sensor that counts the wrong way round, more
-effort speeds the axis up more. Against a force from outside it speeds the axis up less, which is no fault by itself:
-what comes of it is, the end of the travel, a command at its limit, a speed, a following error.
+effort speeds the axis up more. Against a force from outside it speeds the axis up less, and a sensor that has once
+counted right does so ever after. Such a force is no fault by itself: what comes of it is, the end of the travel, a
+command at its limit, a speed, a following error.
 """
 
 from detent.kernel.registers import Registers, f8, i1, i4, i8, register, u1
@@ -59,6 +60,7 @@ class Guard(Registers):
     first: i8 = register("speed against it in the sample before them", unit="count")
     efforts: f8 = register("sum of the effort over them", unit="V")
     answer: f8 = register("sum of the effort times what the speed against it grew by", unit="V.count")
+    proven: u1 = register("1 once a weighed effort has sped the axis up in its own direction: the sensor counts right")
 
 
 @step
@@ -66,7 +68,7 @@ def enable_guard(g: Guard) -> None:
     """Forget the last fault and what led to it: the axis is enabled."""
     g.code = g.side = g.push = g.pushed = 0
     g.following = g.saturated = g.stuck = g.fast = g.jumps = 0
-    g.awaited = g.moved = g.against = 0
+    g.awaited = g.moved = g.against = g.proven = 0
     g.effort = 0.0
 
 
@@ -108,13 +110,13 @@ def weigh_effort(g: Guard, effort: float, moved: int) -> None:
 
 @step
 def is_driven(g: Guard, moved: int) -> bool:
-    """True when the weighed effort holds the axis back: a force from outside drives it.
+    """True when the weighed effort holds the axis back, or has moved it as it should: a force from outside drives it.
 
     With u the effort, a what the speed against it grows by in a sample, and means over the motion against it, the sum
     of (u / mean(u) - 1) a is above 0 if the axis speeds up by its effort, and below if it does so in spite of it. The
     sensor rounds a speed by up to one count, so that much is doubt.
     """
-    return g.answer * g.against < g.efforts * (abs(moved) - g.first - 1)
+    return g.proven > 0 or g.answer * g.against < g.efforts * (abs(moved) - g.first - 1)
 
 
 @step
@@ -130,8 +132,11 @@ def watch_effort(p: GuardParams, g: Guard, pushing: int, moved: int) -> None:
         return
     g.pushed += 1
     if 0 < p.reversed <= g.pushed:
-        if pushing * moved < 0 and pushing * moved < pushing * g.began - 1 and not is_driven(g, moved):
+        gained = pushing * (moved - g.began)
+        if pushing * moved < 0 and gained < -1 and not is_driven(g, moved):
             trip(g, REVERSED)
+        if pushing * moved > 0 and gained > 1 and g.effort != 0.0:
+            g.proven = 1
         g.pushed = 0
 
 

@@ -99,6 +99,18 @@ def test_effort_that_holds_back_what_a_force_drives_is_no_reversed_sensor(way, p
 
 
 @pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("weighed", "code"), [(True, 0), (False, REVERSED)])
+def test_a_sensor_that_has_counted_right_once_is_not_reversed(way, weighed, code):
+    p, g = GuardParams(reversed=6), Guard()
+    right, against = [way * k for k in range(8)], [-way * k for k in range(20)]
+    for moved in right + against:
+        if weighed:
+            weigh_effort(g, 1.0 * way, moved)
+        watch(p, g, 0, 0, 0, way, moved)
+    assert (g.code, g.proven) == (code, weighed)
+
+
+@pytest.mark.parametrize("way", [1, -1])
 def test_braking_is_none(way):
     braking = [{"pushing": way, "moved": -way * k} for k in range(10, -1, -1)]
     back = [{"pushing": way, "moved": way * k} for k in range(10)]

@@ -149,6 +149,7 @@ def test_a_load_beyond_its_way_switches_the_drive_off():
         (linear, "-2000 N", "ran faster than"),
         (rotary, "3.6 N*m", "following error"),
         (rotary, "6 N*m", "ran faster than"),
+        (rotary, "-4.5 N*m", "ran faster than"),
     ],
 )
 def test_a_push_beyond_the_force_of_the_drive_ends_with_what_comes_of_it(axis, force, cause):
