@@ -2,6 +2,7 @@
 
 import math
 
+from detent.axisfile.interference import fill_push
 from detent.axisfile.protection import fill_guard, samples
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.controller import CascadeControllerParams
@@ -35,10 +36,7 @@ def build_cascade(spec: CascadeSpec) -> CascadeParams:
     _fill_limits(p.controller, spec)
     ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.plant.machine))
     tick = spec.method.sample_period / ticks
-    push = spec.disturbance.push
-    if push is not None:
-        p.plant.push.force = push.force
-        p.plant.push.begin, p.plant.push.end = round(push.at / tick), round((push.at + push.duration) / tick)
+    fill_push(p.plant.push, spec.disturbance.push, tick)
     fill_clocks(p, tick, ticks)
     return p
 

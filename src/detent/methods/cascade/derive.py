@@ -78,13 +78,12 @@ class Machine:
         """Largest following error at limits.speed once it is steady, pendulum aside [m]."""
         method = self.spec.method
         behind = (1 - method.feed_forward.velocity) * self.speed
-        left = [self._left(sense) for sense in (1, -1)]
-        if method.structure == "pid":
-            if method.integral > 0:
-                return 0.0
-            return max(abs(one + method.derivative * behind) / method.proportional for one in left)
-        lags = [0.0, 0.0] if method.velocity_integral > 0 else [one / method.velocity_gain for one in left]
-        return max(abs(behind + lag) for lag in lags) / method.position_gain
+        left = [0.0] if self.integrates else [self._left(sense) for sense in (1, -1)]
+        if method.structure == "cascade":
+            return max(abs(behind + one / method.velocity_gain) for one in left) / method.position_gain
+        if self.integrates:
+            return 0.0
+        return max(abs(one + method.derivative * behind) / method.proportional for one in left)
 
     @property
     def velocity_demand(self) -> float:
@@ -92,8 +91,8 @@ class Machine:
         method = self.spec.method
         if method.structure == "pid":
             return 0.0
-        lags = [self._left(sense) / method.velocity_gain for sense in (1, -1)]
-        return self.speed + (0.0 if method.velocity_integral > 0 else max(*lags, 0.0))
+        left = 0.0 if self.integrates else max(self._left(1), self._left(-1), 0.0)
+        return self.speed + left / method.velocity_gain
 
     @property
     def integrates(self) -> bool:

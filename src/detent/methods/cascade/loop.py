@@ -205,7 +205,7 @@ class LinearLoop:
 
 
 def smoothing(time_constant: float, period: float) -> float:
-    """Share of a new value that a first-order filter takes over at a sample; as `systems.cascade` has it."""
+    """Share of a new value that a first-order filter takes over at a sample; `system.smoothing` without compiled blocks."""
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 
 

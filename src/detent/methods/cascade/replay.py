@@ -24,13 +24,6 @@ from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
 from detent.units import format_quantity
 
-EFFORTS: dict[str, tuple[str, ...]] = {
-    "force": ("force", "torque", "voltage", "command"),
-    "current": ("current", "voltage", "command", "force", "torque"),
-    "voltage": ("voltage", "command"),
-}
-"""Signals that drive an axis open loop, by its ``drive.input``; the first that was recorded is taken."""
-
 CHUNK = 8192  # samples between two words of progress
 
 Numbers = NDArray[np.float64]
@@ -161,24 +154,23 @@ def run_cascade_replay(
 
 
 def per_command(spec: CascadeSpec) -> dict[str, float]:
-    """Each effort that a recording can hold, per volt of this axis's command."""
-    found = {"command": 1.0}
+    """Each effort that a recording can hold, per volt of this axis's command; what tells most about it comes first."""
     if spec.drive.input == "voltage":
-        return found | {"voltage": spec.drive.voltage_gain}
-    force = "torque" if spec.axis.motion == "rotary" else "force"
-    found |= {"voltage": 1.0, force: spec.effort_per_command}
+        return {"voltage": spec.drive.voltage_gain, "command": 1.0}
+    force = {"torque" if spec.axis.motion == "rotary" else "force": spec.effort_per_command}
+    command = {"voltage": 1.0, "command": 1.0}
     if spec.drive.input == "current":
-        found["current"] = spec.drive.current_per_volt
-    return found
+        return {"current": spec.drive.current_per_volt} | command | force
+    return force | command
 
 
 def _open_loop(spec: CascadeSpec, job: ReplayJob) -> tuple[str, Numbers]:
     """Signal that drives the axis, and the command that it comes from [V]."""
     gains = per_command(spec)
-    for name in EFFORTS[spec.drive.input]:
-        if name in job.efforts and name in gains:
-            return name, job.efforts[name] / gains[name]
-    allowed = " or ".join(name for name in EFFORTS[spec.drive.input] if name in gains)
+    for name, gain in gains.items():
+        if name in job.efforts:
+            return name, job.efforts[name] / gain
+    allowed = " or ".join(gains)
     raise DetentError(
         f"{job.name}: came {', '.join(job.efforts)} and no reference; allowed: a reference, or {allowed}, for an axis "
         f'with drive.input = "{spec.drive.input}"; name the column, or change drive.input'

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from detent.axisfile.motion import unit_in
-from detent.axisfile.tables import AxisSpec, AxisTable, MotionProtectionTable, MotorTable, breaking_effort
+from detent.axisfile.tables import AxisSpec, AxisTable, MotionProtectionTable, MotorTable, PushTable, breaking_effort
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
     Acceleration,
@@ -228,18 +228,16 @@ class MethodTable(Table, frozen=True):
     feed_forward: FeedForwardTable = Field(default_factory=FeedForwardTable)
 
 
-class PushTable(Table, frozen=True):
+class LoadPushTable(PushTable, frozen=True):
     """A force on the load for a while."""
 
     force: Force = required("force on the load, + in the positive direction", '"30 N"', ge=-1e7, le=1e7)
-    at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
-    duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)
 
 
 class DisturbanceTable(Table, frozen=True):
     """What the axis does not know of."""
 
-    push: PushTable | None = None
+    push: LoadPushTable | None = None
 
 
 class CascadeSpec(AxisSpec, frozen=True):

@@ -128,9 +128,9 @@ def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:
     """Be in motion [m/s] at power-on: motor, load, and what the encoders have seen so far."""
     r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
+    way = velocity * p.controller.law.period
     for sensor in (r.controller.motor_sensor, r.controller.load_sensor):
-        back = np.arange(len(sensor.memory))
+        places = len(sensor.memory)
         # Place 0 is one sample before the first; before that lies the end of the ring.
-        way = velocity * p.controller.law.period
-        sensor.memory[:] = [sensor.position - way * (1 + (-k) % len(sensor.memory)) for k in back.tolist()]
+        sensor.memory[:] = [sensor.position - way * (1 + (-k) % places) for k in range(places)]
         sensor.velocity = velocity
