@@ -1,17 +1,17 @@
 """From a checked specification to the parameters of the cascade axis, in the coordinate of the axis."""
 
 import math
+from typing import Any
 
 from detent.axisfile.interference import fill_push
 from detent.axisfile.protection import fill_guard, samples
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.controller import CascadeControllerParams
-from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable, FrictionTable
+from detent.methods.cascade.loop import machine_of
+from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
 from detent.plant.linear_two_mass import fastest_rate
-from detent.plant.stribeck import StribeckFriction
-from detent.plant.two_mass import TwoMassParams
 from detent.sensing.position_sensor import PositionSensorParams
 
 LARGEST_ANGLE = 0.5
@@ -23,7 +23,7 @@ LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written,
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
     p = CascadeParams()
-    _fill_machine(p.plant.machine, spec)
+    _fill(p.plant.machine, machine_of(spec))
     source, drive = p.plant.source, spec.drive
     source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
     source.step, source.limit, source.delay = drive.command_step, spec.largest_command, drive.delay
@@ -52,25 +52,14 @@ def motion_limits(spec: CascadeSpec) -> MotionLimits:
     return MotionLimits(limits.speed, limits.acceleration, math.inf if limits.jerk is None else limits.jerk)
 
 
-def _fill_machine(p: TwoMassParams, spec: CascadeSpec) -> None:
-    mechanics, coupling, motor = spec.mechanics, spec.mechanics.coupling, spec.motor
-    p.motor.mass, p.load.mass = spec.motor_mass, mechanics.load_mass
-    _fill_friction(p.motor.friction, mechanics.friction)
-    _fill_friction(p.load.friction, mechanics.load_friction)
-    if coupling is not None:
-        p.stiffness, p.damping, p.half_gap = coupling.stiffness, coupling.damping, 0.5 * coupling.backlash
-    p.weight, p.pendulum, p.loss = mechanics.weight, mechanics.pendulum, mechanics.transmission_loss
-    if motor is not None and spec.drive.input == "voltage":
-        w = p.winding
-        w.used, w.max_current = True, spec.max_current
-        w.resistance, w.inductance = motor.resistance, motor.inductance
-        w.force_constant, w.emf_constant = spec.force_constant, spec.emf_constant
-
-
-def _fill_friction(p: StribeckFriction, table: FrictionTable) -> None:
-    p.offset = table.offset
-    for side, own in ((p.positive, table.positive), (p.negative, table.negative)):
-        side.coulomb, side.static, side.stribeck, side.viscous = own.coulomb, own.static, own.stribeck, own.viscous
+def _fill(p: Any, values: Any) -> None:
+    """Fill registers from what has their names, block by block."""
+    named: dict[str, Any] = values.__dict__
+    for name, value in named.items():
+        if hasattr(value, "__dict__"):
+            _fill(getattr(p, name), value)
+        else:
+            setattr(p, name, value)
 
 
 def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:

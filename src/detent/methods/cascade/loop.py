@@ -37,20 +37,23 @@ MARGIN_STEP = 1.2  # steps in which the limit of stability is approached
 
 def machine_of(spec: CascadeSpec) -> Any:
     """Motor, coupling and load with the names of `plant.two_mass.TwoMassParams`, which would load compiled blocks."""
-    mechanics, coupling, motor = spec.mechanics, spec.mechanics.coupling, spec.motor
+    mechanics, motor = spec.mechanics, spec.motor
+    coupling = mechanics.coupling or SimpleNamespace(stiffness=0.0, damping=0.0, backlash=0.0)
+    winding = SimpleNamespace(used=motor is not None and spec.drive.input == "voltage")
+    if motor is not None and winding.used:
+        winding.resistance, winding.inductance = motor.resistance, motor.inductance
+        winding.max_current = spec.max_current
+        winding.force_constant, winding.emf_constant = spec.force_constant, spec.emf_constant
     return SimpleNamespace(
+        winding=winding,
         motor=SimpleNamespace(mass=spec.motor_mass, friction=mechanics.friction),
         load=SimpleNamespace(mass=mechanics.load_mass, friction=mechanics.load_friction),
-        stiffness=coupling.stiffness if coupling else 0.0,
-        damping=coupling.damping if coupling else 0.0,
+        stiffness=coupling.stiffness,
+        damping=coupling.damping,
+        half_gap=0.5 * coupling.backlash,
+        weight=mechanics.weight,
         pendulum=mechanics.pendulum,
-        winding=SimpleNamespace(
-            used=motor is not None and spec.drive.input == "voltage",
-            resistance=motor.resistance if motor else math.nan,
-            inductance=motor.inductance if motor else math.nan,
-            force_constant=spec.force_constant,
-            emf_constant=spec.emf_constant,
-        ),
+        loss=mechanics.transmission_loss,
     )
 
 
@@ -205,7 +208,7 @@ class LinearLoop:
 
 
 def smoothing(time_constant: float, period: float) -> float:
-    """Share of a new value that a first-order filter takes over at a sample; `system.smoothing` without compiled blocks."""
+    """Share of a new value that a first-order filter takes over at a sample; as `system.smoothing`, not compiled."""
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 
 
