@@ -93,7 +93,7 @@ def trip(g: Guard, code: int) -> None:
         g.code = code
 
 
-@step
+@hot_step
 def weigh_effort(g: Guard, effort: float, moved: int) -> None:
     """Note what the effort since the last sample has made of a motion against it; from now on it is `effort` [V]."""
     if moved == 0 or moved * g.moved < 0 or moved * g.effort > 0.0:
