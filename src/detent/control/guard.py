@@ -88,8 +88,8 @@ def lasting(wrong: int, before: int) -> int:
 
 @hot_step
 def trip(g: Guard, code: int) -> None:
-    """A fault: the first one stays, what follows it is its consequence."""
-    if g.code == 0:
+    """A fault: the first one stays, what follows is its consequence. A late arrival is none, and gives way to one."""
+    if g.code in (0, NO_ARRIVAL):
         g.code = code
 
 
@@ -155,7 +155,7 @@ def watch_speed(p: GuardParams, g: Guard, moved: int) -> None:
 
 @step
 def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing: int, moved: int) -> int:
-    """One sample; returns the code of the fault, 0 while there is none.
+    """One sample; returns the code of the fault that switches off, 0 while there is none.
 
     `late`: 1 while the following error is beyond its largest; `side`: -1 or 1 beyond the lower or upper end of the
     travel; `limited`: 1 while the command is at its limit; `pushing`: direction of an effort that breaks the axis
@@ -164,15 +164,16 @@ def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing:
     g.following = lasting(late, g.following)
     if 0 < p.following <= g.following:
         trip(g, FOLLOWING)
-    if p.travel and side and g.code == 0:
-        g.side = side
-        g.code = TRAVEL
+    if p.travel and side:
+        trip(g, TRAVEL)
+        if g.code == TRAVEL and g.side == 0:
+            g.side = side
     g.saturated = lasting(limited, g.saturated)
     if 0 < p.saturated <= g.saturated:
         trip(g, SATURATED)
     watch_effort(p, g, pushing, moved)
     watch_speed(p, g, moved)
-    return g.code
+    return 0 if g.code == NO_ARRIVAL else g.code
 
 
 @hot_step

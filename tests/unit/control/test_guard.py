@@ -138,6 +138,16 @@ def test_an_arrival_is_awaited_for_so_many_ticks():
     assert g.code == 0
 
 
+def test_a_late_arrival_switches_nothing_off_and_gives_way_to_what_does():
+    p, g = GuardParams(**WATCHES), Guard()
+    await_arrival(g, 1)
+    assert is_overdue(g)
+    assert [watch(p, g, 0, 0, 0, 0, 5) for _ in range(50)] == [0] * 50
+    assert g.code == NO_ARRIVAL
+    assert watch(p, g, 0, 1, 0, 0, 5) == TRAVEL
+    assert (g.code, g.side) == (TRAVEL, 1)
+
+
 def test_every_fault_has_its_text():
     assert set(GUARD_TEXT) == {
         STUCK, JUMPED, REVERSED, FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL, TRAVEL

@@ -73,6 +73,7 @@ def test_a_move_that_does_not_arrive_is_told_and_held():
     code, failure = fault_of(host)
     assert code == NO_ARRIVAL
     assert "did not arrive" in failure
+    host.stands(0.1)
     assert host.controller.deviation.state != FAULT
 
 
