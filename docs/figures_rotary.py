@@ -12,8 +12,12 @@ from figures import BLUE, FOLDER, GREEN, GREY, ORANGE, draw_stale, label, pictur
 
 PINK = "#CC79A7"
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "fontsize": 9}
-LITERAL = tuple(f"position.{number}.direction=as commanded" for number in range(5))
-"""The example's positions as an axis without the turn counter can take them."""
+LITERAL = (
+    *(f"position.{number}.direction=as commanded" for number in range(5)),
+    *(f"protection.{watch}=0" for watch in ("overspeed", "jump")),
+    *(f"protection.{watch}_time=0 s" for watch in ("following", "stuck", "reversed")),
+)
+"""The example's positions as an axis without the turn counter can take them; and nothing stops it when it fails."""
 SLOW, FAST = 0.1, 60.0
 """Slowest and fastest manual feed of the specification [deg/s]."""
 

@@ -15,6 +15,7 @@ PAGES = [
     ROOT / "docs" / "explanation" / name
     for name in (
         "one-tick.md", "print-head.md", "phase-servo.md", "filtered-servo.md", "rotary-table.md", "stepper-envelope.md",
+        "what-protects-an-axis.md",
     )
 ]  # fmt: skip
 # `module.function`, `module.Class.method`, `block.register`; a file name such as `letter.txt` has a known ending.

@@ -168,6 +168,7 @@ def test_nothing_depends_on_how_many_turns_the_table_has_made(turns):
         rig = Rig(359.0, noise=2.0, seed=5)
         rig.r.plant.train.motor.turns += turns * RATIO
         rig.angle.position += turns * T
+        rig.r.controller.watched += turns * T
         rig.press(1).run_until(2.0).release().run_until(2.5).press(-1).run_until(6.0)
         return rig
 
@@ -175,6 +176,7 @@ def test_nothing_depends_on_how_many_turns_the_table_has_made(turns):
     assert there.angle.position - here.angle.position == turns * T
     assert there.angle.crossings == here.angle.crossings >= 2
     there.angle.position = here.angle.position
+    there.r.controller.watched -= turns * T
     there.r.plant.train.motor.turns -= turns * RATIO
     assert bytes(there.r) == bytes(here.r)
 
@@ -314,7 +316,7 @@ def test_the_table_never_jumps(place, acts, noise, seed, task_at):
         assert abs(rig.present - rig.target) <= (2 * noise + 2) * COUNT
         assert 0 <= rig.positioner.oar < T
     else:
-        assert noise > 0 or acts[-1].speed < 60
+        assert noise > 0 or min(act.speed for act in acts) < 60
 
 
 @pytest.mark.compiled

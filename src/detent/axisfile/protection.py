@@ -6,7 +6,7 @@ effort under which a standing sensor counts as stuck is twice what breaks the ma
 
 import math
 
-from detent.axisfile.tables import MotionProtectionTable, ProtectionTable
+from detent.axisfile.tables import MotionProtectionTable, ProtectionTable, TurnProtectionTable
 from detent.control.guard import Guard, GuardParams
 from detent.errors import GUARD_TEXT
 from detent.units import format_quantity
@@ -15,12 +15,13 @@ from detent.units import format_quantity
 def fill_guard(p: GuardParams, table: ProtectionTable, *, sample: float, speed: float) -> None:
     """Guard of a controller that samples every `sample` [s] an axis of at most `speed` [count/s]."""
     p.saturated, p.stuck = samples(table.saturation_time, sample), samples(table.stuck_time, sample)
-    if not isinstance(table, MotionProtectionTable):
+    if not isinstance(table, TurnProtectionTable):
         return
     most = speed * sample
     p.speed = math.ceil(table.overspeed * most) + 1 if table.overspeed else 0
     p.jump = math.ceil(table.jump * most) + 2 if table.jump else 0
-    p.reversed, p.travel = samples(table.reversed_time, sample), table.travel
+    p.reversed = samples(table.reversed_time, sample)
+    p.travel = isinstance(table, MotionProtectionTable) and table.travel
 
 
 def samples(time: float, sample: float) -> int:
@@ -38,6 +39,6 @@ def describe_fault(
     """What a fault of the guard means and what to do, by the keys of the file; largest speed and ends for people."""
     limits = {"stuck": format_quantity(table.stuck_time, "s"), "saturated": format_quantity(table.saturation_time, "s")}
     limits |= {"side": "upper", "end": upper} if guard.side > 0 else {"side": "lower", "end": lower}
-    if isinstance(table, MotionProtectionTable):
+    if isinstance(table, TurnProtectionTable):
         limits |= {"reversed": format_quantity(table.reversed_time, "s"), "speed": f"{table.overspeed:g} x {speed}"}
     return GUARD_TEXT[guard.code].format(**limits | more)

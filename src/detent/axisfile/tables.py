@@ -152,7 +152,7 @@ class ProtectionTable(Table, frozen=True):
     )  # fmt: skip
 
 
-class MotionProtectionTable(ProtectionTable, frozen=True):
+class TurnProtectionTable(ProtectionTable, frozen=True):
     """The same of an axis whose controller can trust what its sensor counts, from sample to sample and for good."""
 
     overspeed: float = optional("speed that is a fault, as a share of limits.speed; 0: any", 1.1, ge=0.0, le=100.0)
@@ -161,6 +161,11 @@ class MotionProtectionTable(ProtectionTable, frozen=True):
         1.5, ge=0.0, le=100.0,
     )  # fmt: skip
     reversed_time: Time = optional("how long the axis may speed up against its effort", 0.02, ge=0.0, le=10.0)
+
+
+class MotionProtectionTable(TurnProtectionTable, frozen=True):
+    """The same of an axis whose way has ends."""
+
     travel: bool = optional("switch off beyond an end of the travel", default=True)
 
 

@@ -61,7 +61,7 @@ class Positioner(Registers):
     dial: i8 = register("speed dial, written by the host", unit="count/2^f")
     number: u1 = register("position number, written by the host", unit="code")
     start: u1 = register("1: start a positioning, written by the host, cleared when taken")
-    event: u1 = register("1 when the axis has come to rest in HOLD; the host clears it")
+    event: u1 = register("1 when the axis has come to rest in HOLD, or its guard speaks; the host clears it")
     refused: i8 = register("starts that were not taken", unit="count")
     reason: u1 = register("why the last was not: 1 busy, 2 no such position, 3 too far", unit="code")
     state: u1 = register("0 power-on, 1 hold, 2 jog, 3 stopping, 4 move", unit="code")

@@ -2,10 +2,12 @@
 
 import math
 
+from detent.axisfile.protection import fill_guard, samples
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
 from detent.control.table_positioner import ATOMIC, BY_ACTUAL, BY_THEORETICAL, FLAG_FIRST, REMAINING_FIRST
 from detent.kernel.turn_table import FRACTION, TURN
+from detent.methods.rotary_table.controller import TableControllerParams
 from detent.methods.rotary_table.schema import CoarseTable, FineTable, RotaryTableSpec
 from detent.methods.rotary_table.system import TICK, RotaryTableParams
 from detent.plant.gearing import GearParams, fill_eccentricity
@@ -14,6 +16,9 @@ from detent.sensing.resolver_counter import ResolverParams, fill_resolver
 
 FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
 JUDGES = {"theoretical": BY_THEORETICAL, "actual": BY_ACTUAL}
+GUARD_PERIOD = 20e-3
+"""Time between two looks of the guard [s]; a strobe period where that is longer."""
+
 UPDATES = {"atomic": ATOMIC, "flag first": FLAG_FIRST, "remaining first": REMAINING_FIRST}
 DIRECTIONS = {"shortest": SHORTEST, "positive": POSITIVE, "negative": NEGATIVE, "as commanded": AS_COMMANDED}
 
@@ -28,6 +33,7 @@ def build_rotary_table(spec: RotaryTableSpec) -> RotaryTableParams:
     _fill_detector(p, spec)
     _fill_positioner(p, spec)
     _fill_positions(p, spec)
+    _fill_guard(p.controller, spec)
     _fill_machine(p, spec)
     load = spec.disturbance.load
     if load is not None:
@@ -106,13 +112,25 @@ def _fill_positions(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     pdt.tolerance = round(spec.method.short_way / spec.count)
 
 
+def _fill_guard(c: TableControllerParams, spec: RotaryTableSpec) -> None:
+    protection, strobe = spec.protection, spec.method.strobe_period
+    c.look_interrupts = max(1, round(GUARD_PERIOD / strobe))
+    look = c.look_interrupts * strobe
+    fill_guard(c.guard, protection, sample=look, speed=(spec.limits.speed + spec.breaking_speed) / spec.count)
+    # Without position control the deviation says nothing.
+    c.guard.following = samples(protection.following_time, look) if spec.method.position_control else 0
+    c.following = round(protection.following_error / spec.count * (1 << spec.method.fraction_bits))
+    c.breaking = math.ceil(protection.stuck_effort * spec.largest_word)
+    noise = 2 * math.ceil(spec.detector.fine.noise / math.tau * spec.detector.fine.counts)
+    c.guard.speed += noise if c.guard.speed else 0
+    c.guard.jump += noise if c.guard.jump else 0
+
+
 def _fill_machine(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     a, m, mechanics = p.plant.amplifier, p.plant.train.motor, spec.mechanics
-    # Stiffness plus viscous friction give the time constant, their shares the droop.
-    damping = spec.inertia / spec.drive.time_constant
-    a.stiffness, a.max_torque = (1 - spec.drive.droop) * damping, spec.limits.effort
+    a.stiffness, a.max_torque = spec.stiffness, spec.limits.effort
     a.speed_per_count = spec.speed_per_word * spec.ratio
-    m.inertia, m.viscous, m.period = spec.inertia, spec.drive.droop * damping, TICK
+    m.inertia, m.viscous, m.period = spec.inertia, spec.viscous, TICK
     m.coulomb, m.static = mechanics.coulomb, mechanics.static
     fill_motor(m, a.stiffness)
     _fill_gear(p.plant.train.gear, spec.ratio, mechanics.backlash, mechanics.eccentricity, mechanics.eccentricity_angle)

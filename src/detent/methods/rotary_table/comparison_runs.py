@@ -107,6 +107,7 @@ def _variant(spec: RotaryTableSpec, place: float, **changes: object) -> RotaryTa
             "mechanics": spec.mechanics.model_copy(update={"start_angle": place}),
             "method": spec.method.model_copy(update=usual | changes),
             "disturbance": DisturbanceTable(),
+            "protection": spec.protection.lifted(),
         }
     )
 

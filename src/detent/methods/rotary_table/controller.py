@@ -1,9 +1,10 @@
-"""Controller of the rotary table: three clocks, the composition of the angle, and the positioner.
+"""Controller of the rotary table: three clocks, the composition of the angle, the positioner, and its guard.
 
 Its clocks are divisions of the base tick: the strobe of the real-time clock, the interrupt a fixed delay later, and the
 timer task. What holds the dial, the buttons and the position number is the host.
 """
 
+from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
 from detent.control.table_positioner import Positioner, PositionerParams, begin_task, end_task, interrupt
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i4, i8, register, u1, u4
@@ -34,6 +35,10 @@ class TableControllerParams(Registers):
     clocks: TableClockParams = block("clocks")
     composition: CompositionParams = block("unit 19")
     positioner: PositionerParams = block("positioner A")
+    guard: GuardParams = block("protection")
+    look_interrupts: i8 = register("time between two looks of the guard, in interrupts", unit="count")
+    following: i8 = register("largest deviation dR that is none to worry about", unit="count/2^f")
+    breaking: i8 = register("speed word under which the table must move", unit="count")
 
 
 class TableController(Registers):
@@ -43,6 +48,9 @@ class TableController(Registers):
     clocks: TableClocks = block("clocks")
     absolute: AbsoluteAngle = block("unit 19")
     positioner: Positioner = block("positioner A")
+    guard: Guard = block("protection")
+    watched: i8 = register("position of record at the last look of the guard", unit="count")
+    look: i8 = register("interrupts until its next look", unit="count")
 
 
 class TableLines(Registers):
@@ -53,6 +61,34 @@ class TableLines(Registers):
     strobe: u1 = register("1: both comparators latch at the beginning of the next tick", by=CONTROLLER)
     word: i4 = register("speed register 5, to the D/A converter", unit="count", by=CONTROLLER)
     interrupt: u1 = register("1 in a tick with an interrupt", by=CONTROLLER)
+    enable: u1 = register("1 lets the amplifier drive the motor", by=CONTROLLER)
+
+
+@step
+def protect(p: TableControllerParams, c: TableController, lines: TableLines) -> None:
+    """The guard looks: deviation dR and speed word as they are, way since the last look; a fault switches off."""
+    q = c.positioner
+    moved = q.angle.position - c.watched
+    c.watched, c.look = q.angle.position, p.look_interrupts
+    if q.interrupts == 1 or lines.enable == 0:  # the first angle is no way
+        return
+    late = 1 if abs(q.dr) > p.following else 0
+    pushing = 1 if q.s4 >= p.breaking else -1 if q.s4 <= -p.breaking else 0
+    limited = 1 if abs(q.s4) >= p.positioner.max_word else 0
+    if watch(p.guard, c.guard, late, 0, limited, pushing, moved):
+        lines.enable, q.event = 0, 1
+
+
+@step
+def take_interrupt(p: TableControllerParams, c: TableController, lines: TableLines) -> None:
+    """Interrupt S8, and what looks after it."""
+    interrupt(p.positioner, c.positioner, c.absolute.theta)
+    c.look -= 1
+    if c.look <= 0:
+        protect(p, c, lines)
+    if c.guard.awaited and is_overdue(c.guard):
+        c.positioner.event = 1
+    lines.word, lines.interrupt = c.positioner.s4 if lines.enable else 0, 1
 
 
 @step
@@ -68,8 +104,7 @@ def serve(p: TableControllerParams, c: TableController, lines: TableLines) -> No
         begin_task(p.positioner, c.positioner)
     if c.tick == clocks.interrupt:
         clocks.interrupt += p.clocks.strobe_ticks
-        interrupt(p.positioner, c.positioner, c.absolute.theta)
-        lines.word, lines.interrupt = c.positioner.s4, 1
+        take_interrupt(p, c, lines)
     if task:
         end_task(p.positioner, c.positioner)
     clocks.wake = min(clocks.strobe, clocks.interrupt, clocks.task)
@@ -93,7 +128,8 @@ def control(p: TableControllerParams, c: TableController, lines: TableLines) -> 
 def power_on(p: TableControllerParams, c: TableController, lines: TableLines, task_at: int) -> None:
     """The first strobe is in the first tick, the first pass of the task at a tick."""
     c.clocks.interrupt, c.clocks.task = p.clocks.delay_ticks, task_at
-    c.positioner.z = lines.strobe = 1
+    c.positioner.z = lines.strobe = lines.enable = 1
+    enable_guard(c.guard)
 
 
 @step
@@ -121,6 +157,12 @@ def start_position(c: TableController, number: int) -> None:
 
 
 @step
+def arrive_within(c: TableController, interrupts: int) -> None:
+    """The table must come to rest within so many interrupts; 0 lifts it."""
+    await_arrival(c.guard, interrupts)
+
+
+@step
 def acknowledge(c: TableController) -> None:
-    """The host has seen that the table has come to rest."""
+    """The host has seen that the table has come to rest, or what the guard says."""
     c.positioner.event = 0

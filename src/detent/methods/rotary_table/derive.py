@@ -26,9 +26,7 @@ class Machine:
 
     def __init__(self, spec: RotaryTableSpec) -> None:
         self.spec = spec
-        damping = spec.inertia / spec.drive.time_constant
-        self.stiffness = (1 - spec.drive.droop) * damping
-        self.viscous = spec.drive.droop * damping
+        self.stiffness, self.viscous = spec.stiffness, spec.viscous
         self.gain = spec.method.position_gain
         self.speed = spec.limits.speed
 

@@ -10,6 +10,8 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
+from detent.axisfile.protection import describe_fault
+from detent.control.guard import NO_ARRIVAL
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import BARELY, at_least, at_most
@@ -65,11 +67,26 @@ class TableHost:
     @property
     def at_rest(self) -> bool:
         """The table has come to rest: the host has to acknowledge it."""
-        return bool(self._positioner.event)
+        return bool(self._positioner.event) and not self._controller.guard.code
+
+    @property
+    def failure(self) -> str:
+        """Why the guard has switched off, and what to do; empty while it has not."""
+        guard, spec = self._controller.guard, self.spec
+        if guard.code in {0, NO_ARRIVAL}:
+            return ""
+        following = f"{format_quantity(spec.protection.following_error, 'rad')}, protection.following_error"
+        speed = format_quantity(spec.limits.speed + spec.breaking_speed, "rad/s")
+        return describe_fault(guard, spec.protection, speed, following=following)
 
     def acknowledge(self) -> None:
         """The host has seen that the table is at rest."""
         controller.acknowledge(self._controller)
+
+    def arrive_within(self, seconds: float) -> None:
+        """The table must come to rest within a time [s]; 0 lifts it."""
+        strobes = seconds / self.spec.method.strobe_period
+        controller.arrive_within(self._controller, max(1, math.floor(strobes)) if seconds else 0)
 
     @property
     def is_moving(self) -> bool:

@@ -69,9 +69,13 @@ def sense(p: TablePlantParams, r: TablePlant, train: Train, lines: TableLines) -
 
 @hot_step
 def move(p: TablePlantParams, r: TablePlant, train: Train, lines: TableLines, tick: int) -> None:
-    """Lines to plant: amplifier, motor and gears through the tick."""
-    drive = drive_torque(p.amplifier, r.amplifier, lines.word, train.motor.velocity)
-    drive += load_torque(p.train.load, tick)
-    travel = rotate(p.train.motor, train.motor, drive, r.amplifier.limited == 0)
+    """Lines to plant: amplifier, motor and gears through the tick; switched off, the amplifier gives no current."""
+    drive, held = load_torque(p.train.load, tick), False
+    if lines.enable:
+        drive += drive_torque(p.amplifier, r.amplifier, lines.word, train.motor.velocity)
+        held = r.amplifier.limited == 0
+    else:
+        r.amplifier.torque = 0.0
+    travel = rotate(p.train.motor, train.motor, drive, held)
     follow(p.train.gear, train.gear, travel)
     follow(p.train.reduction, train.reduction, travel)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from detent.axisfile.tables import AxisSpec, AxisTable
+from detent.axisfile.tables import AxisSpec, AxisTable, TurnProtectionTable, breaking_effort
 from detent.files.fields import Naming, Table, named, optional, required
 from detent.files.quantities import (
     Angle,
@@ -185,6 +185,31 @@ class PositionTable(Table, frozen=True):
     )
 
 
+class TableProtectionTable(TurnProtectionTable, frozen=True):
+    """What ends a motion that is not what was asked for; a time of 0 switches its watch off.
+
+    The speed word may be at its limit: what a drive cannot follow shows in the deviation.
+    """
+
+    saturation_time: Time = optional("how long the speed word may stay at its limit", 0.0, ge=0.0, le=1000.0)
+    overspeed: float = optional(
+        "speed that is a fault, as a share of limits.speed and what breaks the table loose; 0: any",
+        1.25, ge=0.0, le=100.0,
+    )  # fmt: skip
+    reversed_time: Time = optional("how long the table may speed up against its effort", 0.05, ge=0.0, le=10.0)
+    following_error: Angle = optional(
+        "deviation dR that is a fault", math.nan, derived="twice that of limits.speed with the static friction",
+        gt=0.0, le=100.0,
+    )  # fmt: skip
+    following_time: Time = optional("how long it may last", 0.06, ge=0.0, le=10.0)
+
+    def lifted(self) -> "TableProtectionTable":
+        """The same with every watch off: for an axis that shall be seen to run away."""
+        watches = ("saturation_time", "stuck_time", "overspeed", "jump", "reversed_time", "following_time")
+        off: dict[str, float] = dict.fromkeys(watches, 0.0)
+        return self.model_copy(update=off)
+
+
 class LoadTable(Table, frozen=True):
     """A torque on the table for a while."""
 
@@ -210,6 +235,7 @@ class RotaryTableSpec(AxisSpec, frozen=True):
     detector: DetectorTable = Field(default_factory=DetectorTable)
     method: MethodTable = Field(default_factory=MethodTable)
     position: dict[str, PositionTable] = named("a position by its number", POSITION_NUMBER, max_length=128)
+    protection: TableProtectionTable = Field(default_factory=TableProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 
     @property
@@ -232,6 +258,21 @@ class RotaryTableSpec(AxisSpec, frozen=True):
         """All that turns, at the motor shaft [kg m^2]."""
         m = self.mechanics
         return self.motor.rotor_inertia + m.gear_inertia + m.table_inertia / self.ratio**2
+
+    @property
+    def viscous(self) -> float:
+        """Friction at the motor that makes the droop [N m s/rad]."""
+        return self.drive.droop * self.inertia / self.drive.time_constant
+
+    @property
+    def stiffness(self) -> float:
+        """Torque of the amplifier per speed error [N m s/rad]; with the viscous friction it makes the time constant."""
+        return (1 - self.drive.droop) * self.inertia / self.drive.time_constant
+
+    @property
+    def breaking_speed(self) -> float:
+        """Speed signal whose torque at standstill is the static friction, at the table [rad/s]."""
+        return self.mechanics.static / self.stiffness / self.ratio
 
     @property
     def largest_word(self) -> int:
@@ -272,4 +313,16 @@ def fill_derived(spec: RotaryTableSpec) -> RotaryTableSpec:
         for number, entry in spec.position.items()
     }
     detector = spec.detector.model_copy(update={"coarse": coarse})
-    return spec.model_copy(update={"drive": drive, "detector": detector, "position": position})
+    filled = spec.model_copy(update={"drive": drive, "detector": detector, "position": position})
+    return filled.model_copy(update={"protection": _filled_protection(filled)})
+
+
+def _filled_protection(spec: RotaryTableSpec) -> TableProtectionTable:
+    """The effort that must move the table, and the deviation that is a fault."""
+    protection, changes = spec.protection, dict[str, float]()
+    if math.isnan(protection.stuck_effort):
+        changes["stuck_effort"] = breaking_effort(spec.mechanics.static, spec.stiffness * spec.drive.full_speed)
+    if math.isnan(protection.following_error):
+        speed = spec.limits.speed / (1 - spec.drive.droop) + spec.breaking_speed
+        changes["following_error"] = 2 * speed / spec.method.position_gain
+    return protection.model_copy(update=changes)

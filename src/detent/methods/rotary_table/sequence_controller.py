@@ -6,6 +6,7 @@ from itertools import islice
 from detent.errors import AxisError
 from detent.methods.rotary_table.build import ticks
 from detent.methods.rotary_table.host import TableHost, dial_speed
+from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Stretches, Wait, join_stretches
 from detent.units import format_quantity
 
@@ -79,7 +80,9 @@ class SequenceController:
         self._way = host.way
         speed = min(host.spec.position[str(step.number)].speed, host.spec.limits.speed)
         limit = host.move_time(host.way, speed)
+        host.arrive_within(limit)
         self._pass_until(host.tick + ticks(limit), rest=True)
+        host.arrive_within(0)
         if not host.at_rest:
             raise AxisError(
                 f"it was not in position within {format_quantity(limit, 's')}; it is "
@@ -158,6 +161,8 @@ class SequenceController:
             edge = self._edges[self._taken][0] if self._taken < len(self._edges) else tick
             host.machine.pass_ticks(min(tick, edge, host.tick + CHECKED) - host.tick)
             self._take_edges()
+            if host.failure:
+                raise AxisError("; ".join(filter(None, (host.failure, weakness(host.spec)))))
             self._watch(self.asked)
 
     def _take_edges(self) -> None:
@@ -182,7 +187,14 @@ def input_edges(inputs: dict[str, Stretches], start: int) -> list[tuple[int, str
 
 def suspect(host: TableHost) -> str:
     """What to look at when a table does not do what it is told."""
-    spec = host.spec
+    return weakness(host.spec) or (
+        "look at deviation and torque in the report: a load, friction, limits.effort too low for the acceleration, or "
+        "noise of the detector keeps the table away"
+    )
+
+
+def weakness(spec: RotaryTableSpec) -> str:
+    """What the form of the method or of the detector is known to fail by; empty for the sound ones."""
     method = spec.method
     if not method.position_control:
         return "nothing corrects the table's angle: set method.position_control = true"
@@ -192,7 +204,4 @@ def suspect(host: TableHost) -> str:
         return f'the form "{method.form}" loses a turn at the boundary: set method.form = "turn counter"'
     if spec.detector.composition != "rounded":
         return 'the detected angle jumps by motor turns: set detector.composition = "rounded"'
-    return (
-        "look at deviation and torque in the report: a load, friction, limits.effort too low for the acceleration, or "
-        "noise of the detector keeps the table away"
-    )
+    return ""

@@ -18,6 +18,7 @@ from detent.control.table_positioner import ATOMIC, BY_ACTUAL, FLAG_FIRST, HOLD,
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
 from detent.methods.rotary_table.build import build_rotary_table, start_turns
+from detent.methods.rotary_table.schema import TableProtectionTable
 
 pytestmark = pytest.mark.compiled
 
@@ -99,7 +100,9 @@ ELSEWHERE = {
     "axis.method": "tests/unit/methods/test_registry.py",
     "detector.clock": "test_rules.py: clock; test_derive.py: conversions",
     "detector.coarse.reduction": "test_rules.py: it has one value that is right",
-}
+} | dict.fromkeys(
+    (f"protection.{key}" for key in TableProtectionTable.model_fields), "test_guard.py: what each of them sees"
+)
 
 
 def test_each_key_of_the_schema_is_tried() -> None:

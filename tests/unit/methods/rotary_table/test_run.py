@@ -29,6 +29,10 @@ FAST = math.radians(60)
 
 # Positions as a conventional unit goes to them: the forms without a turn counter know no other way.
 CONVENTIONAL = tuple(f"position.{number}.direction=as commanded" for number in range(5))
+UNGUARDED = (
+    "protection.following_time=0 s", "protection.stuck_time=0 s", "protection.reversed_time=0 s",
+    "protection.overspeed=0", "protection.jump=0",
+)  # fmt: skip
 
 
 def table(*overrides):
@@ -252,7 +256,9 @@ def test_what_the_axis_cannot_do_is_refused_before_anything_moves():
     ],
 )
 def test_a_literal_form_ends_with_what_happened_and_what_to_do(start, over):
-    found = run(Jog(1, duration=14.0, row=5), Go(1), over=[*over, *CONVENTIONAL, f"mechanics.start_angle={start}"])
+    found = run(
+        Jog(1, duration=14.0, row=5), Go(1), over=[*over, *CONVENTIONAL, *UNGUARDED, f"mechanics.start_angle={start}"]
+    )
     assert not found.done
     assert found.failure.startswith("step 1 of 2 (line 5), jog + at 60 deg/s for 14 s: the table has ")
     assert 'set method.form = "turn counter"' in found.failure
@@ -262,7 +268,9 @@ def test_a_literal_form_ends_with_what_happened_and_what_to_do(start, over):
 
 def test_a_table_thrown_back_is_told_by_what_it_lost():
     """Test 12: the literal form from 0 deg; the table goes back a turn at each rollover."""
-    found = run(Jog(1, duration=14.0), over=["method.form=flag", "mechanics.start_angle=0 deg", *CONVENTIONAL])
+    found = run(
+        Jog(1, duration=14.0), over=["method.form=flag", "mechanics.start_angle=0 deg", *CONVENTIONAL, *UNGUARDED]
+    )
     assert "the table has turned 120.0" in found.failure
     assert "deg where 840 deg were asked" in found.failure
     assert not math.isnan(found.steps[0].target)  # it came to rest
@@ -270,7 +278,7 @@ def test_a_table_thrown_back_is_told_by_what_it_lost():
 
 def test_a_table_that_runs_away_is_stopped_within_a_turn_or_so():
     """Test 11: without extension the deviation jumps by a turn and the table never stops."""
-    over = ["method.form=raw", *CONVENTIONAL, "position.3.angle=540 deg", "mechanics.start_angle=100 deg"]
+    over = ["method.form=raw", *CONVENTIONAL, *UNGUARDED, "position.3.angle=540 deg", "mechanics.start_angle=100 deg"]
     found = run(Go(3), over=over)
     assert "the table has run away: it has turned " in found.failure
     assert "and turns on at 126.7 deg/s" in found.failure  # the largest word, less the droop
@@ -303,7 +311,7 @@ def test_a_detector_wrong_by_a_motor_turn_is_told():
 
 
 def test_a_weak_amplifier_does_not_get_there():
-    found = run(Go(1), over=["limits.effort=0.02 N*m"])
+    found = run(Go(1), over=["limits.effort=0.02 N*m", *UNGUARDED])
     assert "was not in position within 8.252 s" in found.failure
     assert "limits.effort" in found.failure
     assert found.steps[0].target == pytest.approx(math.pi / 2)
@@ -311,7 +319,7 @@ def test_a_weak_amplifier_does_not_get_there():
 
 def test_a_jog_that_falls_behind_is_told():
     over = ["disturbance.load.torque=-270 N*m", "disturbance.load.at=0 s", "disturbance.load.duration=100 s"]
-    found = run(Jog(1, duration=20.0), over=over)
+    found = run(Jog(1, duration=20.0), over=[*over, *UNGUARDED])
     assert not found.done
     assert "look at deviation and torque in the report" in found.failure
 
