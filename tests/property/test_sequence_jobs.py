@@ -15,8 +15,7 @@ import detent
 from detent.errors import InputError
 from detent.methods.load import load_spec
 from detent.methods.rotary_table.run import run_sequence
-from detent.methods.rotary_table.sequence_faults import find_faults
-from detent.methods.rotary_table.sequence_file import load_sequence
+from detent.methods.rotary_table.sequence_file import find_faults, load_sequence
 from detent.methods.rotary_table.sequence_job import (
     MOST_STEPS,
     Go,
@@ -25,10 +24,8 @@ from detent.methods.rotary_table.sequence_job import (
     Repeat,
     SequenceJob,
     Wait,
-    count_actions,
     join_stretches,
     next_on,
-    write_out,
 )
 
 TIMES = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6)}
@@ -156,7 +153,7 @@ def test_any_file_gives_a_job_or_an_input_error(data, tmp_path_factory):
         assert all(0 <= problem.column <= len(data) + 1 for problem in problems)
     else:
         assert 1 <= job.count <= MOST_STEPS
-        assert find_faults(job.steps, job.inputs) == []
+        assert find_faults(job) == []
 
 
 # -- loops and stretches --------------------------------------------------------------------------------------
@@ -190,9 +187,9 @@ def flatten(tree, steps):
 def test_loops_inside_one_another_are_written_out(tree):
     steps = []
     done = flatten(tree, steps)
-    assert [index for index, _ in write_out(steps)] == done
-    assert count_actions(steps) == len(done)
-    assert find_faults(steps, {}) == []
+    assert [index for index, _ in SequenceJob("", tuple(steps)).actions()] == done
+    assert SequenceJob("", tuple(steps)).count == len(done)
+    assert find_faults(SequenceJob("", tuple(steps))) == []
 
 
 @given(st.integers(1, 8), st.lists(st.tuples(st.integers(0, 7), st.integers(0, 8)), min_size=1, max_size=4))
@@ -209,7 +206,7 @@ def test_loops_are_refused_exactly_where_two_of_them_cross(leaves, loops):
                 spans.append((places[first], len(steps)))
                 steps.append(Repeat(f"n{first}", 2))
     crossing = any(a < c <= b < d for a, b in spans for c, d in spans)
-    assert bool([fault for _, fault in find_faults(steps, {}) if fault.key == "repeat"]) == crossing
+    assert bool([fault for _, fault in find_faults(SequenceJob("", tuple(steps))) if fault.key == "repeat"]) == crossing
 
 
 stretches = st.lists(
@@ -265,7 +262,7 @@ def test_every_run_ends_and_its_records_adjoin(steps, on, start, form):
     try:
         found = run_sequence(spec, job)
     except InputError:
-        assert find_faults(job.steps, job.inputs)
+        assert find_faults(job)
         return
     assert found.done != bool(found.failure)
     assert len(found.steps) == job.count if found.done else 1 <= len(found.steps) <= job.count

@@ -47,8 +47,8 @@ def _stated_torque_constant(data: dict[str, Any]) -> float:
     return float(data.get("torque_constant", math.nan))
 
 
-def _usual_stiction(data: dict[str, Any]) -> float:
-    """Static friction [N] by default: 1.15 times Coulomb (print-head specification, 7.2)."""
+def usual_stiction(data: dict[str, Any]) -> float:
+    """Static friction [N or N.m] by default: 1.15 times Coulomb (print-head specification, 7.2)."""
     return 1.15 * float(data.get("coulomb", math.nan))
 
 
@@ -72,7 +72,7 @@ class FrictionTable(Table, frozen=True):
     coulomb: Force = required("friction while moving, at any speed", '"7.5 N"', ge=0.0, le=1e5)
     viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e5)
     static: Force = optional(
-        "force that breaks the carriage loose", _usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
+        "force that breaks the carriage loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
     )
 
 

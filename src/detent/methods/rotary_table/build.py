@@ -16,8 +16,7 @@ from detent.sensing.resolver_counter import ResolverParams, fill_resolver
 
 FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
 JUDGES = {"theoretical": BY_THEORETICAL, "actual": BY_ACTUAL}
-GUARD_PERIOD = 20e-3
-"""Time between two looks of the guard [s]; a strobe period where that is longer."""
+GUARD_PERIOD = 20e-3  # time between two looks of the guard [s]; a strobe period where that is longer
 
 UPDATES = {"atomic": ATOMIC, "flag first": FLAG_FIRST, "remaining first": REMAINING_FIRST}
 DIRECTIONS = {"shortest": SHORTEST, "positive": POSITIVE, "negative": NEGATIVE, "as commanded": AS_COMMANDED}

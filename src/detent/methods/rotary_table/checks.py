@@ -19,8 +19,7 @@ from detent.methods.rotary_table.form_checks import find_forms
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity as text
 
-LONGEST_WAY = 1 << 31
-"""Ways are shorter: IR has 32 bits before its point [count] (`control.table_positioner`)."""
+LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count] (`control.table_positioner`)
 
 FASTEST_WORD = (1 << 31) - 1
 """Largest speed in the interpolator's format: its square is taken in 64 bits (`control.angle_interpolator`)."""
@@ -28,14 +27,9 @@ FASTEST_WORD = (1 << 31) - 1
 HIGHEST_OFFSET = 0.95
 """Share of a resolver's weakest output that the comparator's offset may reach: beyond it hardly crosses at all."""
 
-LEAST_DAMPING = 0.4
-"""Damping ratio from which a step is answered with an overshoot of a quarter at most."""
-
-DIAL_RANGE = 600
-"""Largest over smallest speed of a dial: 0.1 to 60 deg/s (7)."""
-
-SMALL_ERROR = 0.01
-"""Error of a speed by rounding that is not worth a word."""
+LEAST_DAMPING = 0.4  # damping ratio from which a step is answered with an overshoot of a quarter at most
+DIAL_RANGE = 600  # largest over smallest speed of a dial: 0.1 to 60 deg/s (7)
+SMALL_ERROR = 0.01  # error of a speed by rounding that is not worth a word
 
 remedy = Remedies(RotaryTableSpec)
 

@@ -12,20 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from detent.methods.rotary_table.run import finite
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.parts import Event, Numbers
 from detent.page.table import Cell, Table, TextTable, offset_cell
 from detent.page.words import GAP, angle, degrees, number
 
-USED = "turn counter"
-"""Form of the extension that is recommended, and used unless the axis file says otherwise."""
-
-COARSE = 0.01
-"""Relative error of a mean speed that is marked."""
-
-LOOKS = (("left", 1.5), ("speed", 2.5))
-"""Colour and width of the curves, in the order of `AngleComparison.crossings`."""
+USED = "turn counter"  # form of the extension that is recommended, and used unless the axis file says otherwise
+COARSE = 0.01  # relative error of a mean speed that is marked
+LOOKS = (("left", 1.5), ("speed", 2.5))  # colour and width of the curves, in the order of `AngleComparison.crossings`
 
 DEG = 180.0 / math.pi
 
@@ -114,15 +110,10 @@ class AngleComparison:
         return {
             "speed": self.speed,
             "following_error": self.following_error,
-            "crossings": [{name: _finite(getattr(case, name)) for name in names} for case in self.crossings],
-            "feeds": [{key: _finite(value) for key, value in asdict(feed).items()} for feed in self.feeds],
+            "crossings": [{name: finite(getattr(case, name)) for name in names} for case in self.crossings],
+            "feeds": [{key: finite(value) for key, value in asdict(feed).items()} for feed in self.feeds],
             "starts": [asdict(start) for start in self.starts],
         }
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no words for infinity and NaN."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # ---- on the page

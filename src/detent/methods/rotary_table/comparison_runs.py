@@ -18,14 +18,9 @@ from detent.record.machine import Progress
 from detent.record.recorder import Recorder, make_trace
 from detent.units import format_quantity
 
-START = math.radians(100)
-"""Where the crossing begins [rad]."""
-
-TARGET = math.radians(540)
-"""Target of the conventional unit [rad]: one and a half turns."""
-
-WATCHED = 2 * math.tau
-"""Way of a jog while the crossing is watched [rad]."""
+START = math.radians(100)  # where the crossing begins [rad]
+TARGET = math.radians(540)  # target of the conventional unit [rad]: one and a half turns
+WATCHED = 2 * math.tau  # way of a jog while the crossing is watched [rad]
 
 FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
 """Speeds of manual feed [rad/s]: those of them that the axis can run at."""
@@ -33,11 +28,8 @@ FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
 FEED_START, FEED_TIME = 2.0, 10.0
 """Mean speeds are taken from after the start [s], and the steps of the word, for at least so long [s]."""
 
-FEED_COUNTS, FEED_LONGEST = 1000, 1000.0
-"""And over at least so many counts, though no longer than this [s]."""
-
-FORWARD = math.radians(840)
-"""Way of a jog that starts near the boundary [rad]: two rollovers."""
+FEED_COUNTS, FEED_LONGEST = 1000, 1000.0  # and over at least so many counts, though no longer than this [s]
+FORWARD = math.radians(840)  # way of a jog that starts near the boundary [rad]: two rollovers
 
 LAGS = (0.0, 0.25, 0.5, 1.0, 1.5)
 """Where it starts, in units of the following error: a table that lags more than it started behind fails."""

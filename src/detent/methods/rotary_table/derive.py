@@ -14,8 +14,7 @@ from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity
 
-TICK = 1e-4
-"""Base tick [s] (`methods.rotary_table.system`)."""
+TICK = 1e-4  # base tick [s] (`methods.rotary_table.system`)
 
 POINTS = 256
 """Places of a turn at which the errors of a resolver are looked at, those of its table (`kernel.turn_table`)."""

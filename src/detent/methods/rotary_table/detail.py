@@ -18,22 +18,17 @@ from detent.page.run_page import FEWEST_ROWS, Stretch, stretch
 from detent.page.words import GAP, count, degrees, number
 from detent.record.trace import Trace
 
-LEAD = 0.1
-"""Time before and after the motion that is shown [s]."""
-
-ROLLOVERS = 2
-"""Rollovers after which a long jog is cut: one of hours does the same again and again."""
+LEAD = 0.1  # time before and after the motion that is shown [s]
+ROLLOVERS = 2  # rollovers after which a long jog is cut: one of hours does the same again and again
 
 MOST_MOMENTS = 6
 """Crossings and rollovers that are marked: a table that dithers at the end of its turn crosses it again and again."""
 
-UNCHANGED = math.radians(1.0)
-"""Change of the deviation from one row to the next that is no jump [rad]."""
+UNCHANGED = math.radians(1.0)  # change of the deviation from one row to the next that is no jump [rad]
 
 FAILED = "the step that failed"
 
-POINTS = 1500
-"""Rows that are chosen for one curve's sake: there are four plot areas."""
+POINTS = 1500  # rows that are chosen for one curve's sake: there are four plot areas
 
 DEG = 180.0 / math.pi
 

@@ -19,17 +19,14 @@ from detent.kernel.loop import advance
 from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.rotary_table.sequence_faults import find_faults
+from detent.methods.rotary_table.sequence_file import find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
 from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
 
-MARGIN = 0.5
-"""What a step may take longer than twice the time of its way [s]."""
-
-SETTLING = 10.0
-"""Time that the position loop is given to settle, in units of 1 / Kp."""
+MARGIN = 0.5  # what a step may take longer than twice the time of its way [s]
+SETTLING = 10.0  # time that the position loop is given to settle, in units of 1 / Kp
 
 
 def rotary_table_machine(
@@ -168,7 +165,7 @@ def check_sequence(spec: RotaryTableSpec, job: SequenceJob) -> None:
     """Refuse a sequence that the axis cannot do, before anything moves."""
     if not job.steps:
         raise InputError.of_file(job.name, "no steps", "a sequence of at least one step", "add a step")
-    faults = find_faults(job.steps, job.inputs)
+    faults = find_faults(job)
     faults += [(index, fault) for index, step in enumerate(job.steps) for fault in _step_faults(spec, step)]
     if faults:
         raise InputError([_problem(job, *fault) for fault in faults[:MOST_PROBLEMS]])
@@ -178,7 +175,7 @@ def _problem(job: SequenceJob, index: int, fault: FileProblem) -> FileProblem:
     """A fault of a step with its line; a job that comes from no file names the step by its number."""
     row = job.steps[index].row
     step = "step" if row else f"step[{index + 1}]"
-    key = f"{step}.{fault.key}" if fault.key else step
+    key = f"{step}.{fault.key}".rstrip(".")
     return replace(fault, file=job.name, line=row, column=1 if row else 0, key=key)
 
 

@@ -12,8 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-LONGEST = 20.0
-"""Time constants after which the loop has forgotten everything."""
+LONGEST = 20.0  # time constants after which the loop has forgotten everything
 
 STEPS = 6_000
 """Strobes that are followed at most; a loop that is slower than that does not notice a longer strobe period."""

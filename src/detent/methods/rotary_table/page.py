@@ -37,25 +37,17 @@ DETECTED, AHEAD, COMMANDED = (
     "controller.positioner.interpolator.speed",
 )
 
-NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)
-"""Signals that the whole sequence is drawn from."""
-
-PHASE_TURN = float(1 << 32)
-"""Register of the true angle per turn."""
-
-LINE_SECONDS = 120.0
-"""Time that the time line shows: more than this is a grey block on any screen."""
-
-MOST_SIGNALS = 12
-"""Inputs and outputs that the time line shows."""
+NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)  # signals that the whole sequence is drawn from
+PHASE_TURN = float(1 << 32)  # register of the true angle per turn
+LINE_SECONDS = 120.0  # time that the time line shows: more than this is a grey block on any screen
+MOST_SIGNALS = 12  # inputs and outputs that the time line shows
 
 KINDS = (("go", "go to", "right"), ("jog", "jog", "left"), ("wait", "wait", "muted"))
 """Kinds of steps that last, their lanes and colours; an output is switched in no time."""
 
 COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
 
-LINE = "line"
-"""Name of the time line: its plot areas share their cursor."""
+LINE = "line"  # name of the time line: its plot areas share their cursor
 
 SINCE = "time since the sequence began"
 

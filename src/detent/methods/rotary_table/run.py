@@ -5,12 +5,14 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from detent.errors import AxisError
+from detent.kernel.turn_table import FRACTION, TURN, at_phase
 from detent.methods.rotary_table.host import TableHost, check_sequence, dial_speed
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
-from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob, Wait
-from detent.methods.rotary_table.table_observer import TableObserver
-from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Progress
+from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob
+from detent.methods.rotary_table.system import RotaryTable, RotaryTableParams
+from detent.plant.gearing import PHASE_PER_RADIAN
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 from detent.sensing.gauge import set_angle_gauge
 from detent.units import format_quantity
@@ -143,13 +145,13 @@ class SequenceRun(RunRecord[SequenceJob]):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``; null for what is not a number."""
         found = super().to_dict()
-        found["steps"] = [{key: _finite(value) for key, value in asdict(step).items()} for step in self.steps]
+        found["steps"] = [{key: finite(value) for key, value in asdict(step).items()} for step in self.steps]
         for name in ("outputs", "inputs"):
             found[name] = [{"time": time, "name": signal, "on": on} for time, signal, on in getattr(self, name)]
         return found
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """JSON has no word for NaN."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
@@ -177,6 +179,60 @@ def run_sequence(
     finally:
         host.machine.close()
     return result
+
+
+def endless_phase(p: RotaryTableParams, r: RotaryTable) -> int:
+    """True angle of the table with all its turns [turn/2^32]: `detent.plant.gearing.output_phase` goes on beyond one.
+
+    Whole numbers of any length: it is as fine after a million turns as in the first.
+    """
+    gear, motor = p.plant.train.gear, r.plant.train.motor
+    within = math.floor((motor.angle + r.plant.train.gear.slack) * PHASE_PER_RADIAN)
+    phase = ((motor.turns << 32) + within) // gear.ratio
+    return phase + at_phase(gear.eccentricity, phase & FRACTION) if gear.eccentricity.used else phase
+
+
+class TableObserver:
+    """Looks at a table whose axis has taken its first angle."""
+
+    def __init__(self, spec: RotaryTableSpec, machine: Machine[RotaryTableParams, RotaryTable]) -> None:
+        self._spec, self._machine = spec, machine
+        self._state: Any = machine.state  # ctypes gives every register its type at run time only
+        # The axis knows the angle within a turn only: it starts in [0, T) whatever turn the table is in.
+        away = self._state.controller.positioner.angle.position - self._motor_counts
+        self._start_turns = round(away / spec.period)
+
+    @property
+    def angle(self) -> float:
+        """True angle of the table [rad], endless; 0 where the motor's angle is 0."""
+        turns, phase = divmod(endless_phase(self._machine.params, self._machine.state), TURN)
+        return turns * math.tau + phase / TURN * math.tau
+
+    @property
+    def target(self) -> float:
+        """Where the positioner holds the table [rad], in the same turns."""
+        return self._target_counts * self._spec.count
+
+    @property
+    def miss(self) -> float:
+        """Target less true angle of the motor [turn of the motor]: what the detector has wrong, and what is left."""
+        return (self._target_counts - self._motor_counts) / self._spec.detector.fine.counts
+
+    @property
+    def _target_counts(self) -> int:
+        positioner = self._state.controller.positioner
+        angle = positioner.angle
+        return angle.position + positioner.oar - angle.aar - self._start_turns * self._spec.period
+
+    @property
+    def _motor_counts(self) -> float:
+        motor, fine = self._state.plant.train.motor, self._spec.detector.fine.counts
+        return motor.turns * fine + motor.angle / math.tau * fine
+
+    @property
+    def speed(self) -> float:
+        """Velocity of the motor, at the table [rad/s]."""
+        return self._state.plant.train.motor.velocity / self._spec.ratio
 
 
 class _WatchedTable:
@@ -222,34 +278,36 @@ class _WatchedTable:
         positioner = self._state.controller.positioner
         return positioner.angle.crossings, positioner.rollovers
 
-    @property
-    def _travel(self) -> float:
-        """Of the present step [rad]."""
-        return self._observer.angle - self._start
-
     def _watch(self, asked: float) -> None:
         """A table that goes a turn farther than it was asked has run away."""
         if self._host.tick - self._told > LONGEST_STRETCH:
             self._tell()
-        if abs(self._travel) > asked + self._controller.latency + math.tau:
+        travel = self._observer.angle - self._start
+        if abs(travel) > asked + self._controller.latency + math.tau:
             raise AxisError(
-                f"the table has run away: it has turned {_degrees(self._travel)} where {_degrees(asked)} were asked, "
+                f"the table has run away: it has turned {_degrees(travel)} where {_degrees(asked)} were asked, "
                 f"and turns on at {format_quantity(self._observer.speed, 'rad/s')}; {suspect(self._host)}"
             )
 
     def _verdict(self, step: Action) -> str:
         """Why a step that has ended did not do what it was asked; empty if it did."""
         if isinstance(step, Jog):
-            lost = step.direction * self._controller.asked - self._travel
-            if abs(lost) > math.tau / 2 + self._controller.latency:
-                asked = _degrees(step.direction * self._controller.asked)
-                return f"the table has turned {_degrees(self._travel)} where {asked} were asked; {suspect(self._host)}"
+            asked, travel = step.direction * self._controller.asked, self._observer.angle - self._start
+            if abs(asked - travel) > math.tau / 2 + self._controller.latency:
+                turned = f"{_degrees(travel)} where {_degrees(asked)} were asked"
+                return f"the table has turned {turned}; {suspect(self._host)}"
         elif isinstance(step, Go) and abs(self._observer.miss) > 0.5:
             spec, turns = self._host.spec, self._observer.miss
+            remedy = (
+                "keep the errors of the coarse side together (alignment, backlash, eccentricity) below half a turn of "
+                f"the motor, {format_quantity(math.pi / spec.ratio, 'rad', 3)} of the table"
+            )
+            if spec.detector.composition != "rounded":
+                remedy = 'set detector.composition = "rounded"'
             return (
                 f"the axis says that it is in position, but stands {_degrees(abs(turns) * math.tau / spec.ratio)} "
                 f"{'below' if turns > 0 else 'above'} it, {abs(turns):.1f} turns of the motor: the detected angle is "
-                f"wrong; {_detector_remedy(spec)}"
+                f"wrong; {remedy}"
             )
         return ""
 
@@ -264,7 +322,7 @@ class _WatchedTable:
         return StepRecord(
             number=self._number,
             index=index,
-            kind=_KINDS[type(step)],
+            kind=type(step).__name__.lower(),
             text=describe_step(spec, step),
             begin=begin,
             end=self._host.machine.time,
@@ -299,9 +357,6 @@ class _WatchedTable:
             result.warnings.append(f"the sequence ended before all of these inputs had come: {names}")
 
 
-_KINDS: dict[type, str] = {Go: "go", Jog: "jog", Wait: "wait", Output: "output"}
-
-
 def describe_step(spec: RotaryTableSpec, step: Action) -> str:
     """What a step asks for, for people."""
     if isinstance(step, Go):
@@ -322,14 +377,3 @@ def describe_step(spec: RotaryTableSpec, step: Action) -> str:
 
 def _degrees(angle: float) -> str:
     return format_quantity(angle, "rad", 6)
-
-
-def _detector_remedy(spec: RotaryTableSpec) -> str:
-    """What to do about a coarse word that names the wrong turn of the motor."""
-    if spec.detector.composition != "rounded":
-        return 'set detector.composition = "rounded"'
-    most = format_quantity(math.pi / spec.ratio, "rad", 3)
-    return (
-        f"keep the errors of the coarse side together (alignment, backlash, eccentricity) below half a turn of the "
-        f"motor, {most} of the table"
-    )

@@ -5,11 +5,11 @@ table unless a key says that they are the motor's.
 """
 
 import math
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from detent.axisfile.tables import AxisSpec, AxisTable, TurnProtectionTable, breaking_effort
+from detent.axisfile.tables import AxisSpec, AxisTable, TurnProtectionTable, breaking_effort, usual_stiction
 from detent.files.fields import Naming, Table, named, optional, required
 from detent.files.quantities import (
     Angle,
@@ -64,11 +64,6 @@ class DriveTable(Table, frozen=True):
     droop: Percentage = optional("share of its reference by which the speed stays behind", 0.0, ge=0.0, le=0.5)
 
 
-def _usual_stiction(data: dict[str, Any]) -> float:
-    """Static friction [N m] by default: 1.15 times Coulomb, as for the other axes."""
-    return 1.15 * float(data.get("coulomb", math.nan))
-
-
 class MechanicsTable(Table, frozen=True):
     """Gear and table."""
 
@@ -82,7 +77,7 @@ class MechanicsTable(Table, frozen=True):
     eccentricity_angle: Angle = optional("angle at which it is right and begins to lead", 0.0, ge=-6.3, le=6.3)
     coulomb: Torque = optional("Coulomb friction at the motor shaft", 0.0, ge=0.0, le=1e5)
     static: Torque = optional(
-        "torque that breaks the motor loose", _usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
+        "torque that breaks the motor loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
     )
     start_angle: Angle = optional("angle of the table at power-on", 0.0, ge=-6.3, le=6.3)
 

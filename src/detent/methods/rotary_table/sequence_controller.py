@@ -7,23 +7,18 @@ from detent.errors import AxisError
 from detent.methods.rotary_table.build import ticks
 from detent.methods.rotary_table.host import TableHost, dial_speed
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Stretches, Wait, join_stretches
+from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Stretches, join_stretches
 from detent.units import format_quantity
 
-Change = tuple[float, str, bool]
-"""A signal that was switched: time since power-on [s], its name, on or off."""
+Change = tuple[float, str, bool]  # a signal that was switched: time since power-on [s], its name, on or off
 
-Watch = Callable[[float], None]
-"""Looks at the table, which was asked to go so far since the step began [rad], not signed; raises `AxisError`."""
-
-CHECKED = 2500
-"""Ticks after which the table is looked at again at the latest."""
+CHECKED = 2500  # ticks after which the table is looked at again at the latest
 
 
 class SequenceController:
     """Steps, inputs and outputs."""
 
-    def __init__(self, host: TableHost, inputs: dict[str, Stretches], watch: Watch) -> None:
+    def __init__(self, host: TableHost, inputs: dict[str, Stretches], watch: Callable[[float], None]) -> None:
         self.host = host
         # inputs, outputs: input signals as they came, and output signals as they were switched
         self.inputs: list[Change] = []
@@ -33,7 +28,7 @@ class SequenceController:
         self._edges = input_edges(inputs, host.tick)
         self._taken = 0  # edges that have come
         self._on: set[str] = set()
-        self._watch = watch
+        self._watch = watch  # looks at a table asked to go so far since the step began [rad]; raises `AxisError`
         self._way = 0.0  # asked for by a positioning [rad]
         self._pressed = self._released = 0  # ticks of the button
         self._speed = 0.0  # of the jog [rad/s]
@@ -63,10 +58,12 @@ class SequenceController:
             self._go(step)
         elif isinstance(step, Jog):
             self._jog(step)
-        elif isinstance(step, Wait):
-            self._wait(step)
+        elif isinstance(step, Output):
+            self.outputs.append((self.host.machine.time, step.signal, step.on))
+        elif step.signal is not None:
+            self._await(step.signal, level=step.level)
         else:
-            self._switch(step)
+            self._pass_until(self.host.tick + ticks(step.duration or 0.0))
 
     # ------------------------------------------------------------------------------------------------------ steps
 
@@ -129,15 +126,6 @@ class SequenceController:
             self._pass_until(host.tick + ticks(method.strobe_period))
             inside = inside + 1 if host.in_position else 0
         return host.in_position
-
-    def _wait(self, step: Wait) -> None:
-        if step.signal is not None:
-            self._await(step.signal, level=step.level)
-        else:
-            self._pass_until(self.host.tick + ticks(step.duration or 0.0))
-
-    def _switch(self, step: Output) -> None:
-        self.outputs.append((self.host.machine.time, step.signal, step.on))
 
     # ------------------------------------------------------------------------------------------------------- time
 

@@ -1,8 +1,7 @@
 """Jobs of a rotary table: the steps of its sequence controller, and the input signals that come while it runs.
 
 A sequence controller sends the table to the positions of its table, holds the manual-feed buttons down, waits and
-switches other machinery. Job files are read in `sequence_file`; what is wrong with steps among one
-another is found in `sequence_faults`. Here everything is in SI units.
+switches other machinery. Job files are read in `sequence_file`; here everything is in SI units.
 """
 
 from __future__ import annotations
@@ -21,21 +20,12 @@ from detent.files.fields import optional, required
 from detent.files.quantities import AngularVelocity, Time
 from detent.files.read import Row, check_values
 
-MOST_STEPS = 100_000
-"""Steps of a job at most, repeats counted."""
+MOST_STEPS = 100_000  # steps of a job at most, repeats counted
+LONGEST_TIME = 1e5  # longest wait, longest jog and latest input of a job [s]: more than a day
+LAST_NUMBER = 127  # position numbers go from 0 to this
 
-LONGEST_TIME = 1e5
-"""Longest wait, longest jog and latest input of a job [s]: more than a day."""
-
-LAST_NUMBER = 127
-"""Position numbers go from 0 to this."""
-
-SIGNAL_NAME = re.compile(r"[^\W_][\w.:-]{0,39}")
-"""Names of signals and labels: a letter or digit, then up to 39 letters, digits and ``_ . : -``."""
-
+SIGNAL_NAME = re.compile(r"[^\W_][\w.:-]{0,39}")  # names of signals and labels
 WHAT_A_NAME_IS = "a letter or digit, then up to 39 letters, digits and _ . : -"
-
-
 ACTIONS: dict[str, tuple[str, ...]] = {
     "go": ("label",),
     "jog": ("speed", "while", "for", "label"),
@@ -109,26 +99,24 @@ class StepRow(Row, frozen=True):
         one = f"exactly one of {', '.join(ACTIONS)}"
         if len(actions) > 1:
             yield FileProblem.of_key(actions[1], " and ".join(actions), one, "write a [[step]] for each")
-        elif not actions:
+        elif actions:
+            (action,) = actions
+            for key in stated:
+                if key in cls.known() and key not in (action, *ACTIONS[action]):
+                    owners = " or ".join(name for name, keys in ACTIONS.items() if key in keys)
+                    allowed = f"beside {action}: {', '.join(ACTIONS[action])} ({key} belongs to {owners})"
+                    remedy = REMEDIES.get((action, key), "remove it")
+                    yield FileProblem.of_key(key, f"{key} beside {action}", allowed, remedy)
             if is_whole:
-                yield FileProblem.of_key("", "a step that does nothing", one, "add go = 1, or another of these")
-        else:
-            yield from _beside(actions[0], [key for key in stated if key in cls.known()])
-            if is_whole:
-                yield from _lacking(actions[0], stated)
+                yield from _lacking(action, stated)
+        elif is_whole:
+            yield FileProblem.of_key("", "a step that does nothing", one, "add go = 1, or another of these")
 
 
-def _beside(action: str, stated: Iterable[str]) -> Iterator[FileProblem]:
-    """Keys that do not belong to the action."""
-    remedies = {
-        ("go", "speed"): "remove it; the speed to a position stands in the axis file, in [position.NUMBER]",
-        ("repeat", "label"): "remove it; put the label on a step that does something",
-    }
-    for key in stated:
-        if key not in (action, *ACTIONS[action]):
-            owners = " or ".join(name for name, keys in ACTIONS.items() if key in keys)
-            allowed = f"beside {action}: {', '.join(ACTIONS[action])} ({key} belongs to {owners})"
-            yield FileProblem.of_key(key, f"{key} beside {action}", allowed, remedies.get((action, key), "remove it"))
+REMEDIES = {
+    ("go", "speed"): "remove it; the speed to a position stands in the axis file, in [position.NUMBER]",
+    ("repeat", "label"): "remove it; put the label on a step that does something",
+}
 
 
 def _lacking(action: str, stated: Mapping[str, Any]) -> Iterator[FileProblem]:
@@ -287,11 +275,8 @@ class Repeat:
         _check(self.row, repeat=self.label, times=self.times)
 
 
-Step = Go | Jog | Wait | Output | Repeat
-"""A step as the job says it."""
-
-Action = Go | Jog | Wait | Output
-"""A step of a job whose loops are written out."""
+Step = Go | Jog | Wait | Output | Repeat  # a step as the job says it
+Action = Go | Jog | Wait | Output  # a step of a job whose loops are written out
 
 Stretches = tuple[tuple[float, float], ...]
 """Times [s] in which a signal is on: from, to; in order, apart from one another."""
@@ -299,7 +284,7 @@ Stretches = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class SequenceJob:
-    """A program of the sequence controller; `sequence_faults` tells whether it can be run at all.
+    """A program of the sequence controller; `sequence_file.find_faults` tells whether it can be run at all.
 
     Attributes
     ----------
@@ -318,17 +303,42 @@ class SequenceJob:
 
     @property
     def count(self) -> int:
-        """Number of steps done, repeats counted."""
-        return count_actions(self.steps)
+        """Number of steps done, repeats counted.
+
+        >>> SequenceJob("tour", (Go(1, label="again"), Wait(1.0), Repeat("again", 3), Go(2))).count
+        7
+        """
+        loops = find_loops(self.steps)
+        before = [0]  # steps done before each step, inner loops counted
+        for index, step in enumerate(self.steps):
+            done = before[index]
+            if isinstance(step, Repeat):
+                begin = before[loops[index]] if index in loops else done
+                before.append(begin + (done - begin) * step.times)
+            else:
+                before.append(done + 1)
+        return before[-1]
 
     def actions(self) -> Iterator[tuple[int, Action]]:
-        """Steps in the order in which they are done, repeats written out: (index in `steps`, step)."""
-        return write_out(self.steps)
+        """Steps in the order in which they are done, repeats written out: (index in `steps`, step).
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the output signals, in the order of their first use."""
-        return tuple(dict.fromkeys(step.signal for step in self.steps if isinstance(step, Output)))
+        >>> [index for index, _ in SequenceJob("tour", (Go(1, label="a"), Wait(1.0), Repeat("a", 2), Go(2))).actions()]
+        [0, 1, 0, 1, 3]
+        """
+        loops = find_loops(self.steps)
+        left: dict[int, int] = {}
+        index = 0
+        while index < len(self.steps):
+            step = self.steps[index]
+            if not isinstance(step, Repeat):
+                yield index, step
+            elif index in loops:
+                left[index] = left.get(index, step.times) - 1
+                if left[index] > 0:
+                    index = loops[index]
+                    continue
+                del left[index]  # an outer loop that comes again does it anew
+            index += 1
 
 
 def join_stretches(stretches: Iterable[tuple[float, float]]) -> Stretches:
@@ -356,9 +366,6 @@ def next_on(stretches: Stretches, time: float) -> tuple[float, float] | None:
     return stretches[place] if place < len(stretches) else None
 
 
-# ------------------------------------------------------------------------------------------------------------ loops
-
-
 def find_loops(steps: Sequence[Step]) -> dict[int, int]:
     """First step of each loop, by the index of its `Repeat`; loops whose label does not come before are left out."""
     labels: dict[str, int] = {}
@@ -369,43 +376,3 @@ def find_loops(steps: Sequence[Step]) -> dict[int, int]:
         elif step.label in labels:
             loops[index] = labels[step.label]
     return loops
-
-
-def count_actions(steps: Sequence[Step]) -> int:
-    """Number of steps done, repeats counted.
-
-    >>> count_actions([Go(1, label="again"), Wait(1.0), Repeat("again", 3), Go(2)])
-    7
-    """
-    loops = find_loops(steps)
-    before = [0]  # steps done before each step, inner loops counted
-    for index, step in enumerate(steps):
-        done = before[index]
-        if isinstance(step, Repeat):
-            begin = before[loops[index]] if index in loops else done
-            before.append(begin + (done - begin) * step.times)
-        else:
-            before.append(done + 1)
-    return before[-1]
-
-
-def write_out(steps: Sequence[Step]) -> Iterator[tuple[int, Action]]:
-    """Steps in the order in which they are done: (index, step).
-
-    >>> [index for index, _ in write_out([Go(1, label="a"), Wait(1.0), Repeat("a", 2), Go(2)])]
-    [0, 1, 0, 1, 3]
-    """
-    loops = find_loops(steps)
-    left: dict[int, int] = {}
-    index = 0
-    while index < len(steps):
-        step = steps[index]
-        if not isinstance(step, Repeat):
-            yield index, step
-        elif index in loops:
-            left[index] = left.get(index, step.times) - 1
-            if left[index] > 0:
-                index = loops[index]
-                continue
-            del left[index]  # an outer loop that comes again does it anew
-        index += 1

@@ -19,8 +19,7 @@ from detent.plant.rotary_motor import stand_at
 from detent.sensing.gauge import read_angle_gauge
 
 TICK_US = 100
-TICK = TICK_US * 1e-6
-"""Base tick [s]."""
+TICK = TICK_US * 1e-6  # base tick [s]
 
 
 class RotaryTableParams(Registers):

@@ -4,14 +4,23 @@ from types import SimpleNamespace
 
 import pytest
 
-from detent.methods.rotary_table.sequence_faults import LONGEST_JOB, find_faults
-from detent.methods.rotary_table.sequence_job import LONGEST_TIME, MOST_STEPS, Go, Jog, Output, Repeat, Wait
+from detent.methods.rotary_table.sequence_file import LONGEST_JOB, find_faults
+from detent.methods.rotary_table.sequence_job import (
+    LONGEST_TIME,
+    MOST_STEPS,
+    Go,
+    Jog,
+    Output,
+    Repeat,
+    SequenceJob,
+    Wait,
+)
 
 FEED = {"feed": ((1.0, 2.0), (5.0, 6.0))}
 
 
 def only(steps, inputs=None):
-    ((index, fault),) = find_faults(steps, inputs or {})
+    ((index, fault),) = find_faults(SequenceJob("job", tuple(steps), inputs or {}))
     assert fault.allowed
     assert fault.remedy
     return SimpleNamespace(index=index, key=fault.key, came=fault.came, allowed=fault.allowed)
@@ -33,7 +42,7 @@ def only(steps, inputs=None):
     ],
 )
 def test_steps_that_go_together(steps):
-    assert find_faults(steps, FEED) == []
+    assert find_faults(SequenceJob("job", tuple(steps), FEED)) == []
 
 
 def test_a_label_given_twice():
@@ -56,7 +65,7 @@ def test_loops_that_cross():
 
 
 def test_more_steps_than_a_job_may_have():
-    assert find_faults([Wait(0.0, label="a"), Repeat("a", MOST_STEPS)], {}) == []
+    assert find_faults(SequenceJob("job", (Wait(0.0, label="a"), Repeat("a", MOST_STEPS)), {})) == []
     fault = only([Wait(0.0, label="a"), Wait(0.0), Repeat("a", 2), Repeat("a", MOST_STEPS)])
     assert (fault.index, fault.key, fault.came) == (3, "times", f"{4 * MOST_STEPS} steps, repeats counted")
 
@@ -93,16 +102,16 @@ def test_a_signal_that_cannot_come_any_more(steps, index, key, begins):
 
 
 def test_a_signal_may_be_on_already_when_a_step_begins():
-    assert find_faults([Wait(5.9), Jog(1, signal="feed")], FEED) == []
-    assert find_faults([Wait(5.9), Wait(signal="feed"), Wait(signal="feed")], FEED) == []
+    assert find_faults(SequenceJob("job", (Wait(5.9), Jog(1, signal="feed")), FEED)) == []
+    assert find_faults(SequenceJob("job", (Wait(5.9), Wait(signal="feed"), Wait(signal="feed")), FEED)) == []
 
 
 def test_a_job_of_many_days():
-    assert find_faults([Wait(LONGEST_TIME, label="a"), Repeat("a", 10)], {}) == []
+    assert find_faults(SequenceJob("job", (Wait(LONGEST_TIME, label="a"), Repeat("a", 10)), {})) == []
     fault = only([Wait(LONGEST_TIME, label="a"), Go(1), Repeat("a", 11)])
     assert (fault.index, fault.came) == (0, f"a sequence of more than {LONGEST_JOB:g} s")
 
 
 def test_times_are_looked_at_only_where_the_rest_is_right():
     steps = [Wait(9.0), Wait(signal="feed"), Repeat("a", 2)]
-    assert [fault.key for _, fault in find_faults(steps, FEED)] == ["repeat"]
+    assert [fault.key for _, fault in find_faults(SequenceJob("job", tuple(steps), FEED))] == ["repeat"]

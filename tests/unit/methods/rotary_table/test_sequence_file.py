@@ -274,4 +274,3 @@ def test_the_example_uses_everything():
     assert {step.direction for step in job.steps if isinstance(step, Jog)} == {1, -1}
     assert any(isinstance(step, Jog) and step.duration for step in job.steps)
     assert any(isinstance(step, Wait) and step.signal for step in job.steps)
-    assert job.outputs == ("clamp",)

@@ -14,11 +14,9 @@ from detent.methods.rotary_table.sequence_job import (
     Repeat,
     SequenceJob,
     Wait,
-    count_actions,
     find_loops,
     join_stretches,
     next_on,
-    write_out,
 )
 
 
@@ -70,9 +68,9 @@ def test_the_bounds_themselves_will_do():
 
 
 def indices(*steps):
-    found = [index for index, _ in write_out(steps)]
-    assert len(found) == count_actions(steps)
-    assert all(steps[index] is step for index, step in write_out(steps))
+    found = [index for index, _ in SequenceJob("", tuple(steps)).actions()]
+    assert len(found) == SequenceJob("", tuple(steps)).count
+    assert all(steps[index] is step for index, step in SequenceJob("", tuple(steps)).actions())
     return found
 
 
@@ -101,7 +99,7 @@ def test_loops_after_one_another():
 
 def test_the_number_of_steps_is_known_without_writing_them_out():
     deep = [Go(1, label="a"), *(Repeat("a", MOST_STEPS) for _ in range(6))]
-    assert count_actions(deep) == MOST_STEPS**6
+    assert SequenceJob("", tuple(deep)).count == MOST_STEPS**6
 
 
 def test_a_loop_begins_at_the_first_step_of_its_label_before_it():
@@ -113,7 +111,7 @@ def test_a_loop_begins_at_the_first_step_of_its_label_before_it():
 def test_a_job_knows_its_count_and_its_outputs():
     steps = (Output("b", on=True, label="x"), Output("a", on=True), Output("b", on=False), Repeat("x", 2))
     job = SequenceJob("job", steps)
-    assert (job.count, job.outputs, job.inputs) == (6, ("b", "a"), {})
+    assert (job.count, job.inputs) == (6, {})
     assert [index for index, _ in job.actions()] == [0, 1, 2, 0, 1, 2]
 
 

@@ -8,7 +8,7 @@ from tests.rotary_table_rig import RATIO, Rig
 import detent
 from detent.methods.load import load_spec
 from detent.methods.rotary_table.host import TableHost, rotary_table_machine
-from detent.methods.rotary_table.table_observer import TableObserver, endless_phase
+from detent.methods.rotary_table.run import TableObserver, endless_phase
 from detent.plant.gearing import fill_eccentricity, output_phase
 
 pytestmark = pytest.mark.compiled
