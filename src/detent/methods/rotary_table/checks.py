@@ -15,27 +15,18 @@ from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
 from detent.methods.rotary_table.derive import TICK, Machine, counted, weakest_output
-from detent.methods.rotary_table.form_checks import find_forms
+from detent.methods.rotary_table.form_checks import FORMS
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity as text
 
 LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count] (`control.table_positioner`)
-
-FASTEST_WORD = (1 << 31) - 1
-"""Largest speed in the interpolator's format: its square is taken in 64 bits (`control.angle_interpolator`)."""
-
-HIGHEST_OFFSET = 0.95
-"""Share of a resolver's weakest output that the comparator's offset may reach: beyond it hardly crosses at all."""
-
+FASTEST_WORD = (1 << 31) - 1  # largest speed of the interpolator: its square has 64 bits (`control.angle_interpolator`)
+HIGHEST_OFFSET = 0.95  # share of a resolver's weakest output that an offset may reach: beyond it hardly crosses at all
 LEAST_DAMPING = 0.4  # damping ratio from which a step is answered with an overshoot of a quarter at most
 DIAL_RANGE = 600  # largest over smallest speed of a dial: 0.1 to 60 deg/s (7)
 SMALL_ERROR = 0.01  # error of a speed by rounding that is not worth a word
 
 remedy = Remedies(RotaryTableSpec)
-
-
-def _ticks(seconds: float) -> int:
-    return round(seconds / TICK)
 
 
 def _above(keys: str, most: float, allowed: str) -> Contradiction:
@@ -112,11 +103,11 @@ def _clocks(spec: RotaryTableSpec) -> Iterator[Contradiction]:
         if abs(ticks - round(ticks)) > 1e-6:
             nearest = max(fewest, round(ticks)) * TICK
             yield _off(f"method.{name}", nearest, "a whole number of 0.1 ms, the base tick")
-    strobe, period = _ticks(method.strobe_period), text(method.strobe_period, "s")
-    if _ticks(method.interrupt_delay) >= strobe:
+    strobe, period = round(method.strobe_period / TICK), text(method.strobe_period, "s")
+    if round(method.interrupt_delay / TICK) >= strobe:
         allowed = f"below method.strobe_period, {period}: each interrupt comes before the next strobe"
         yield _off("method.interrupt_delay method.strobe_period", (strobe - 1) * TICK, allowed)
-    if _ticks(method.task_period) < strobe:
+    if round(method.task_period / TICK) < strobe:
         late = "two passes of the task would judge the same angle, and roll over twice"
         allowed = f"at least method.strobe_period, {period}: {late}"
         yield _off("method.task_period method.strobe_period", strobe * TICK, allowed)
@@ -169,7 +160,9 @@ def _acceleration(spec: RotaryTableSpec) -> Iterator[Contradiction]:
             "one interrupt to the next",
             "lengthen method.strobe_period",
         )
-    way, reserve = speed**2 / (2 * acceleration), m.jog_reserve_at(speed)
+    way, reserve = speed**2 / (2 * acceleration), m.latency_way
+    if spec.method.judge == "actual" or spec.method.guarded:
+        reserve += m.following_error(speed)  # the actual angle lags, and so does a crossing that has to be waited for
     if way >= math.tau - reserve:
         harder = speed**2 / (2 * (math.tau - reserve)) * (1 + BARELY) if reserve < math.tau else math.inf
         yield _below(
@@ -232,7 +225,7 @@ RULES = (_gear, _detector, _clocks, _speeds, _acceleration, _positions, _machine
 def find_cautions(spec: RotaryTableSpec) -> Iterator[Caution]:
     """Look a rotary-table axis over."""
     machine = Machine(spec)
-    for look in (find_forms, _loop, _drive, _torque, _rest, _slow, _composition):
+    for look in (*FORMS, _loop, _drive, _torque, _rest, _slow, _composition):
         yield from look(machine)
 
 
@@ -392,14 +385,12 @@ def _composition(m: Machine) -> Iterator[Caution]:
             put("detector.composition", '"rounded"'),
         )
     if total > allowed:
-        parts, largest = (
-            ", ".join(f"{name} {text(error, 'rad')}" for name, error in errors.items()),
-            max(errors.values()),
-        )
+        parts = ", ".join(f"{name} {text(error, 'rad')}" for name, error in errors.items())
+        largest = text(max(errors.values()), "rad")
         yield Caution(
             "coarse error",
             f"up to {text(total, 'rad')}: {parts}",
             f"up to {text(allowed, 'rad')}, half a motor turn less a count",
             f"at some angles the table reads a motor turn too much or too little, {turn}, and jumps (3.1, trap 7)",
-            f"improve the largest of them, {text(largest, 'rad')}, or choose a smaller mechanics.gear_ratio",
+            f"improve the largest of them, {largest}, or choose a smaller mechanics.gear_ratio",
         )

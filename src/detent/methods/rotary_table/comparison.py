@@ -98,7 +98,20 @@ class AngleComparison:
     @property
     def table(self) -> TextTable:
         """The method beside what it betters, for the terminal."""
-        return _text_table(self)
+        conventional, endless = self.crossings
+        both = (endless, conventional)
+        changes = (f"{degrees(case.deviation_before)} to {degrees(case.deviation_after)} deg" for case in both)
+        ways = (f"{degrees(case.travel)} deg, at {degrees(case.speed)} deg/s" for case in both)
+        rows = [("deviation across the end of the turn", *changes), (f"way after {number(endless.t[-1])} s", *ways)]
+        for feed in self.feeds:
+            dial = f"mean speed of manual feed at {math.degrees(feed.speed):.4g} deg/s"
+            rows.append((dial, _share(feed.closed), _share(feed.opened)))
+        for place, starts in self.by_place.items():
+            others = "; ".join(f"{form} {_start(start)}" for form, start in starts.items() if form != USED)
+            rows.append((f"jog from {math.degrees(place):.3f} deg", _start(starts[USED]), others))
+        title = f"Endless angle at {degrees(self.speed)} deg/s, beside its alternatives"
+        heads = ("", "turn counter, position control", "raw angle; no position control; other forms")
+        return TextTable(title, heads, rows)
 
     def figures(self) -> tuple[Figure, ...]:
         """Across the end of the turn, manual feed, and starts near the boundary."""
@@ -156,15 +169,11 @@ def _events(found: AngleComparison) -> list[Event]:
     texts: dict[float, list[str]] = {}
     for case in found.crossings:
         if not math.isnan(case.time):
-            texts.setdefault(case.time, []).append(_crossing_text(case))
+            before, after = degrees(case.deviation_before), degrees(case.deviation_after)
+            change = f"stays {after}" if before == after else f"goes from {before} to {after}"
+            texts.setdefault(case.time, []).append(f"the {case.name} deviation {change}{GAP}deg")
     what = f"the detected angle jumps back by 360{GAP}deg"
     return [Event(moment, f"{what}: {'; '.join(texts[moment])}") for moment in sorted(texts)]
-
-
-def _crossing_text(case: Crossing) -> str:
-    before, after = degrees(case.deviation_before), degrees(case.deviation_after)
-    what = f"stays {after}" if before == after else f"goes from {before} to {after}"
-    return f"the {case.name} deviation {what}{GAP}deg"
 
 
 def _feed_figure(found: AngleComparison) -> Figure:
@@ -208,24 +217,6 @@ def _start_cell(start: Start) -> Cell:
 
 
 # ---- in the terminal
-
-
-def _text_table(found: AngleComparison) -> TextTable:
-    conventional, endless = found.crossings
-    changes = [
-        f"{degrees(case.deviation_before)} to {degrees(case.deviation_after)} deg" for case in (endless, conventional)
-    ]
-    ways = [f"{degrees(case.travel)} deg, at {degrees(case.speed)} deg/s" for case in (endless, conventional)]
-    rows = [("deviation across the end of the turn", *changes), (f"way after {number(endless.t[-1])} s", *ways)]
-    rows += [
-        (f"mean speed of manual feed at {math.degrees(feed.speed):.4g} deg/s", _share(feed.closed), _share(feed.opened))
-        for feed in found.feeds
-    ]
-    for place, starts in found.by_place.items():
-        others = "; ".join(f"{form} {_start(start)}" for form, start in starts.items() if form != USED)
-        rows.append((f"jog from {math.degrees(place):.3f} deg", _start(starts[USED]), others))
-    title = f"Endless angle at {degrees(found.speed)} deg/s, beside its alternatives"
-    return TextTable(title, ("", "turn counter, position control", "raw angle; no position control; other forms"), rows)
 
 
 def _share(error: float) -> str:

@@ -22,18 +22,11 @@ START = math.radians(100)  # where the crossing begins [rad]
 TARGET = math.radians(540)  # target of the conventional unit [rad]: one and a half turns
 WATCHED = 2 * math.tau  # way of a jog while the crossing is watched [rad]
 
-FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))
-"""Speeds of manual feed [rad/s]: those of them that the axis can run at."""
-
-FEED_START, FEED_TIME = 2.0, 10.0
-"""Mean speeds are taken from after the start [s], and the steps of the word, for at least so long [s]."""
-
+FEED_SPEEDS = tuple(math.radians(speed) for speed in (0.1, 1.0, 60.0))  # of manual feed [rad/s], up to the axis's own
+FEED_START, FEED_TIME = 2.0, 10.0  # mean speeds are taken from so long after the start on, for at least so long [s]
 FEED_COUNTS, FEED_LONGEST = 1000, 1000.0  # and over at least so many counts, though no longer than this [s]
 FORWARD = math.radians(840)  # way of a jog that starts near the boundary [rad]: two rollovers
-
-LAGS = (0.0, 0.25, 0.5, 1.0, 1.5)
-"""Where it starts, in units of the following error: a table that lags more than it started behind fails."""
-
+LAGS = (0.0, 0.25, 0.5, 1.0, 1.5)  # where it starts, in following errors: a table that lags more than that fails
 FORMS: dict[str, dict[str, object]] = {
     "flag": {"form": "flag", "guarded": False},
     "guarded flag": {"form": "flag", "guarded": True},
@@ -42,9 +35,7 @@ FORMS: dict[str, dict[str, object]] = {
 """Forms of the extension, all judged by the theoretical remaining angle (specification 3.2, 3.5; test 12)."""
 
 MOST_ROWS = 400_000
-
-LONGEST_TURN = 3600.0
-"""A table that takes longer for a turn is not compared: it would take too long to see it go round [s]."""
+LONGEST_TURN = 3600.0  # a table that takes longer for a turn is not compared: nobody would see it go round [s]
 
 
 def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) -> AngleComparison:

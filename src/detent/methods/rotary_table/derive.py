@@ -16,8 +16,7 @@ from detent.units import format_quantity
 
 TICK = 1e-4  # base tick [s] (`methods.rotary_table.system`)
 
-POINTS = 256
-"""Places of a turn at which the errors of a resolver are looked at, those of its table (`kernel.turn_table`)."""
+POINTS = 256  # places of a turn at which the errors of a resolver are looked at, those of `kernel.turn_table`
 
 
 class Machine:
@@ -39,11 +38,6 @@ class Machine:
     def is_stable(self) -> bool:
         """Whether every mode of the loop decays."""
         return self.loop.spectral_radius < 1.0
-
-    @cached_property
-    def largest_gain(self) -> float:
-        """Kp at which the loop no longer settles [1/s]."""
-        return self.loop.largest_gain(0.0)
 
     def overshoot(self, speed: float) -> float:
         """Way by which the table passes a target that it comes to at this speed [rad]."""
@@ -104,13 +98,6 @@ class Machine:
     def latency_way(self) -> float:
         """Way in a period of the timer task at limits.speed [rad]."""
         return self.speed * self.spec.method.task_period
-
-    def jog_reserve_at(self, speed: float) -> float:
-        """Way from the rollover's limit within which the rollover comes at last [rad]."""
-        method = self.spec.method
-        # The actual angle lags, and so does a crossing that has to be waited for.
-        lag = self.following_error(speed) if method.judge == "actual" or method.guarded else 0.0
-        return speed * method.task_period + lag
 
     @property
     def allowed_coarse_error(self) -> float:
@@ -230,7 +217,7 @@ def _loop(machine: Machine) -> Iterator[Derived]:
     yield Derived("damping without sampling", ideal, "", f"{ideal:.3g}", "1 / (2 sqrt(Kp (1 - droop) tau))")
     formula = "least damped mode that swings, with strobe period and interrupt delay"
     yield Derived("damping of the loop", loop.damping, "", f"{loop.damping:.3g}", formula)
-    limit = machine.largest_gain
+    limit = loop.largest_gain(0.0)
     text = f"Kp = {limit:.4g} 1/s, {limit / loop.gain:.3g} x the gain"
     yield Derived("stability limit", limit, "1/s", text, "lowest Kp at which a mode does not decay")
     if machine.is_stable:

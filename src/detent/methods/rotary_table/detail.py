@@ -21,9 +21,7 @@ from detent.record.trace import Trace
 LEAD = 0.1  # time before and after the motion that is shown [s]
 ROLLOVERS = 2  # rollovers after which a long jog is cut: one of hours does the same again and again
 
-MOST_MOMENTS = 6
-"""Crossings and rollovers that are marked: a table that dithers at the end of its turn crosses it again and again."""
-
+MOST_MOMENTS = 6  # crossings and rollovers that are marked: a table that dithers at its end crosses it again and again
 UNCHANGED = math.radians(1.0)  # change of the deviation from one row to the next that is no jump [rad]
 
 FAILED = "the step that failed"
@@ -188,9 +186,13 @@ def _charts(shown: ShownStep, events: list[Event]) -> list[dict[str, Any]]:
     lag = Curve(
         label="deviation dR: how far the table lags", colour="drive", width=2, y=shown.fine_angle(DEVIATION) * DEG
     )
+    counters = [
+        Curve(label="turns n", colour="speed", width=2.5, step=True, y=rows[TURNS], digits=0),
+        Curve(label="FLG", colour="left", dash=(6, 4), step=True, y=rows[FLAG], digits=0),
+    ]
     return time_charts(Timeline(name="turn", t=rows.t, label=since, unit="s", bands=[added], events=events), [
         Panel(name="turn-angles", label="angle [deg]", height=340, zero=True, curves=_angles(shown)),
-        Panel(name="turn-count", label="turns added", height=110, zero=True, curves=_counters(rows)),
+        Panel(name="turn-count", label="turns added", height=110, zero=True, curves=counters),
         Panel(name="turn-deviation", label="lag dR [deg]", height=150, zero=True, curves=[lag]),
         Panel(name="turn-speed", label="speed [deg/s]", height=160, zero=True, curves=_speeds(shown)),
     ])  # fmt: skip
@@ -208,13 +210,6 @@ def _angles(shown: ShownStep) -> list[Curve]:
         curve("C commanded", "left", shown.command, dash=(6, 4)),
     ]
     return [one for one in drawn if not np.isnan(one.y).all()]
-
-
-def _counters(rows: Stretch) -> list[Curve]:
-    return [
-        Curve(label="turns n", colour="speed", width=2.5, step=True, y=rows[TURNS], digits=0),
-        Curve(label="FLG", colour="left", dash=(6, 4), step=True, y=rows[FLAG], digits=0),
-    ]
 
 
 def _speeds(shown: ShownStep) -> list[Curve]:
@@ -235,7 +230,10 @@ def _events(shown: ShownStep) -> list[Event]:
     texts = [(int(np.searchsorted(t, 0.0)), _start_text(shown))]
     texts += [(row, _crossing_text(shown, row)) for row in shown.crossed[:MOST_MOMENTS]]
     texts += [(row, _rollover_text(shown, row)) for row in shown.rolled[:MOST_MOMENTS]]
-    for now, text in ((STOPPING, "button released: M comes to where the table can stop"), (HOLD, _rest_text(shown))):
+    held = "at rest: the table is held"
+    if shown.spec.method.form == "turn counter":
+        held = "at rest: M, R and C come back to within one turn, where the table is held"
+    for now, text in ((STOPPING, "button released: M comes to where the table can stop"), (HOLD, held)):
         found = np.flatnonzero((t > 0) & (state == now)).tolist()
         texts += [(row, text) for row in found[:1]]
     return [Event(float(t[row]), text) for row, text in sorted(texts, key=lambda moment: moment[0])]
@@ -264,12 +262,6 @@ def _rollover_text(shown: ShownStep, row: int) -> str:
     stays = abs(after - before) < UNCHANGED
     deviation = f"stays {_angle_text(after)}" if stays else f"jumps from {_angle_text(before)} to {_angle_text(after)}"
     return f"less than one turn remains to M: rollover, R and C go back by one turn; the deviation {deviation}"
-
-
-def _rest_text(shown: ShownStep) -> str:
-    if shown.spec.method.form == "turn counter":
-        return "at rest: M, R and C come back to within one turn, where the table is held"
-    return "at rest: the table is held"
 
 
 def _angle_text(value: float) -> str:

@@ -15,12 +15,6 @@ from detent.units import format_quantity as text
 TURN_COUNTER = put("method.form", '"turn counter"')
 
 
-def find_forms(m: Machine) -> Iterator[Caution]:
-    """Look at the form of the method."""
-    for look in (_angle, _start_angles, _race, _remaining, _near_boundary):
-        yield from look(m)
-
-
 def _angle(m: Machine) -> Iterator[Caution]:
     """The angle goes on beyond a turn."""
     if m.spec.method.form == "raw":
@@ -124,3 +118,6 @@ def _near_boundary(m: Machine) -> Iterator[Caution]:
                 "the table meets the boundary on its way or by its overshoot, and runs away (test 11)",
                 TURN_COUNTER,
             )
+
+
+FORMS = (_angle, _start_angles, _race, _remaining, _near_boundary)  # looks at the form of the method

@@ -46,7 +46,7 @@ class TableHost:
         self.machine = rotary_table_machine(spec, recorder)  # the simulated axis
         # ctypes gives every register its type at run time only.
         self._controller: Any = self.machine.state.controller
-        self._positioner: Any = self._controller.positioner
+        self.positioner: Any = self._controller.positioner
         self._refused_before = 0
 
     @property
@@ -56,7 +56,7 @@ class TableHost:
 
     def start(self) -> None:
         """Wait for the first interrupt, which takes the angle over and holds the table there."""
-        while self._positioner.state == POWER_ON:
+        while self.positioner.state == POWER_ON:
             self.machine.pass_ticks(1)
 
     # ------------------------------------------------------------------------------------------------------ panel
@@ -64,7 +64,7 @@ class TableHost:
     @property
     def at_rest(self) -> bool:
         """The table has come to rest: the host has to acknowledge it."""
-        return bool(self._positioner.event) and not self._controller.guard.code
+        return bool(self.positioner.event) and not self._controller.guard.code
 
     @property
     def failure(self) -> str:
@@ -88,17 +88,12 @@ class TableHost:
     @property
     def is_moving(self) -> bool:
         """A jog, a stop or a positioning is under way."""
-        return self._positioner.state != HOLD
+        return self.positioner.state != HOLD
 
     @property
     def in_position(self) -> bool:
         """The table is within its window about the target."""
-        return abs(self._positioner.oar - self._positioner.angle.aar) <= self.spec.method.in_position
-
-    @property
-    def refused(self) -> int:
-        """Starts that were refused since power-on."""
-        return self._positioner.refused
+        return abs(self.positioner.oar - self.positioner.angle.aar) <= self.spec.method.in_position
 
     def press(self, direction: int, speed: float) -> None:
         """Set the dial to a table speed [rad/s] and hold a button down: 1 for +, -1 for -."""
@@ -111,24 +106,19 @@ class TableHost:
 
     def begin(self, number: int) -> None:
         """Set the position number and start; the positioner takes it in its next task."""
-        self._refused_before = self._positioner.refused
+        self._refused_before = self.positioner.refused
         controller.start_position(self._controller, number)
-
-    @property
-    def is_pending(self) -> bool:
-        """A start has not been taken yet."""
-        return bool(self._positioner.start)
 
     @property
     def refusal(self) -> str:
         """Why the last start was refused, and what to do; empty if it was not."""
-        refused = self._positioner.refused != self._refused_before
-        return TABLE_REFUSAL_TEXT[self._positioner.reason] if refused else ""
+        refused = self.positioner.refused != self._refused_before
+        return TABLE_REFUSAL_TEXT[self.positioner.reason] if refused else ""
 
     @property
     def way(self) -> float:
         """Distance of the table from its target [rad], not signed."""
-        return abs(self._positioner.oar - self._positioner.angle.aar) * self.spec.count
+        return abs(self.positioner.oar - self.positioner.angle.aar) * self.spec.count
 
     # ------------------------------------------------------------------------------------------------------ times
 

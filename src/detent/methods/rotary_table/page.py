@@ -14,7 +14,6 @@ from detent.methods.rotary_table.summary import SequenceFigures, rollovers, time
 from detent.page.chart import Bar, Chart, Curve, Lane, Panel, Timeline, lane_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
-from detent.page.parts import Numbers
 from detent.page.run_page import (
     Stretch,
     made_card,
@@ -202,7 +201,13 @@ def _line_charts(spec: RotaryTableSpec, run: SequenceRun, rows: Stretch, lanes: 
     """Steps and signals as bars, angle and speed of the table below."""
     speed, demanded = rows[VELOCITY] / spec.ratio, rows[AHEAD] * rows[COMMANDED] / spec.per_interrupt(1.0)
 
-    target, true = _targets(run, rows.t) / math.tau, _endless_turns(rows[PHASE], run.steps[0].start)
+    target = np.full(len(rows.t), np.nan)
+    for step in run.steps:
+        if step.kind == "go":
+            span = np.searchsorted(rows.t, (step.begin - run.time_ready, step.end - run.time_ready))
+            target[slice(*span)] = step.target / math.tau
+    true: Any = np.unwrap(rows[PHASE] / PHASE_TURN, period=1.0)
+    true += round(run.steps[0].start / math.tau - float(true[0]))  # the register knows one turn
     ways = [
         Curve(label="target of a positioning", colour="left", dash=(6, 4), y=target, thin=0),
         Curve(label="true angle", colour="speed", width=2, y=true, digits=5, thin=POINTS),
@@ -221,21 +226,6 @@ def _line_charts(spec: RotaryTableSpec, run: SequenceRun, rows: Stretch, lanes: 
             Panel(name="line-speed", label="speed [deg/s]", height=180, zero=True, curves=speeds),
         ]),
     ]  # fmt: skip
-
-
-def _endless_turns(phase: Numbers, start: float) -> Numbers:
-    """True angle [turn] from the register of one turn; it begins within half a turn of `start` [rad]."""
-    turned: Any = np.unwrap(phase / PHASE_TURN, period=1.0)
-    return turned + round(start / math.tau - float(turned[0]))
-
-
-def _targets(run: SequenceRun, t: Numbers) -> Numbers:
-    """Target of the positioning that is under way at each time since the sequence began [rad]; NaN in other steps."""
-    found = np.full(len(t), np.nan)
-    for step in run.steps:
-        if step.kind == "go":
-            found[slice(*np.searchsorted(t, (step.begin - run.time_ready, step.end - run.time_ready)))] = step.target
-    return found
 
 
 # ---- table

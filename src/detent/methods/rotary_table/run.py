@@ -350,7 +350,7 @@ class _WatchedTable:
         result.crossings = sum(step.crossings for step in result.steps)
         result.rollovers = sum(step.rollovers for step in result.steps)
         result.position = self._state.controller.positioner.angle.position
-        result.refused = self._host.refused
+        result.refused = self._host.positioner.refused
         result.done = not result.failure
         if result.done and controller.coming:
             names = ", ".join(f'"{name}"' for name in controller.coming)

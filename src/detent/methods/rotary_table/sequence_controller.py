@@ -1,7 +1,6 @@
 """The sequence controller of a rotary table: does one step after the other, by the lines of its host."""
 
 from collections.abc import Callable
-from itertools import islice
 
 from detent.errors import AxisError
 from detent.methods.rotary_table.build import ticks
@@ -20,19 +19,19 @@ class SequenceController:
 
     def __init__(self, host: TableHost, inputs: dict[str, Stretches], watch: Callable[[float], None]) -> None:
         self.host = host
-        # inputs, outputs: input signals as they came, and output signals as they were switched
-        self.inputs: list[Change] = []
-        self.outputs: list[Change] = []
+        self.outputs: list[Change] = []  # output signals as they were switched
         # what went otherwise than a reader of the job expects; each text once, as a key
         self.warnings: dict[str, None] = {}
         self._edges = input_edges(inputs, host.tick)
-        self._taken = 0  # edges that have come
-        self._on: set[str] = set()
         self._watch = watch  # looks at a table asked to go so far since the step began [rad]; raises `AxisError`
         self._way = 0.0  # asked for by a positioning [rad]
         self._pressed = self._released = 0  # ticks of the button
         self._speed = 0.0  # of the jog [rad/s]
-        self._take_edges()
+
+    @property
+    def inputs(self) -> list[Change]:
+        """Input signals as they came."""
+        return [(tick * self.host.machine.tick, name, on) for tick, name, on in self._edges if tick <= self.host.tick]
 
     @property
     def asked(self) -> float:
@@ -48,7 +47,7 @@ class SequenceController:
     @property
     def coming(self) -> list[str]:
         """Input signals of which something has not come yet."""
-        return list(dict.fromkeys(name for _, name, _ in self._edges[self._taken :]))
+        return list(dict.fromkeys(name for tick, name, _ in self._edges if tick > self.host.tick))
 
     def do(self, step: Action) -> None:
         """Do one step to its end."""
@@ -70,7 +69,7 @@ class SequenceController:
     def _go(self, step: Go) -> None:
         host = self.host
         host.begin(step.number)
-        while host.is_pending:
+        while host.positioner.start:  # its next task takes it
             self._pass_until(host.tick + ticks(host.spec.method.strobe_period), rest=True)
         if host.refusal:
             raise AxisError(f"the positioner refused the start: {host.refusal}")
@@ -130,36 +129,28 @@ class SequenceController:
     # ------------------------------------------------------------------------------------------------------- time
 
     def _await(self, name: str, *, level: bool) -> None:
-        """Let time pass until an input signal has a level."""
-        while (name in self._on) != level:
-            coming = next((edge[0] for edge in islice(self._edges, self._taken, None) if edge[1] == name), None)
-            if coming is None:
-                last = max(time for time, signal, _ in self.inputs if signal == name)
-                raise AxisError(
-                    f'"{name}" went off for good at {format_quantity(last, "s")}, before the step began: it would wait '
-                    f'for ever; let "{name}" be on later, or shorten the steps before'
-                )
-            self._pass_until(coming)
+        """Let time pass until an input signal has a level: its next change brings it, where it has not."""
+        changes = [(tick, on) for tick, signal, on in self._edges if signal == name]
+        past = [change for change in changes if change[0] <= self.host.tick]
+        if bool(past and past[-1][1]) == level:
+            return
+        if len(past) == len(changes):
+            last = past[-1][0] * self.host.machine.tick
+            raise AxisError(
+                f'"{name}" went off for good at {format_quantity(last, "s")}, before the step began: it would wait for '
+                f'ever; let "{name}" be on later, or shorten the steps before'
+            )
+        self._pass_until(changes[len(past)][0])
 
     def _pass_until(self, tick: int, *, rest: bool = False) -> None:
         """Let time pass up to a tick; `rest` ends it when the table comes to rest."""
         host = self.host
         while host.tick < tick and not (rest and host.at_rest):
             host.acknowledge()
-            edge = self._edges[self._taken][0] if self._taken < len(self._edges) else tick
-            host.machine.pass_ticks(min(tick, edge, host.tick + CHECKED) - host.tick)
-            self._take_edges()
+            host.machine.pass_ticks(min(tick - host.tick, CHECKED))
             if host.failure:
                 raise AxisError("; ".join(filter(None, (host.failure, weakness(host.spec)))))
             self._watch(self.asked)
-
-    def _take_edges(self) -> None:
-        """Take over the input signals that change now."""
-        while self._taken < len(self._edges) and self._edges[self._taken][0] <= self.host.tick:
-            _, name, on = self._edges[self._taken]
-            self._taken += 1
-            (self._on.add if on else self._on.discard)(name)
-            self.inputs.append((self.host.machine.time, name, on))
 
 
 def input_edges(inputs: dict[str, Stretches], start: int) -> list[tuple[int, str, bool]]:

@@ -277,9 +277,7 @@ class Repeat:
 
 Step = Go | Jog | Wait | Output | Repeat  # a step as the job says it
 Action = Go | Jog | Wait | Output  # a step of a job whose loops are written out
-
-Stretches = tuple[tuple[float, float], ...]
-"""Times [s] in which a signal is on: from, to; in order, apart from one another."""
+Stretches = tuple[tuple[float, float], ...]  # times [s] in which a signal is on: from, to; in order, apart
 
 
 @dataclass(frozen=True, slots=True)

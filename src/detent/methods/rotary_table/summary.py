@@ -67,18 +67,14 @@ def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple
     if error := figures.error:
         rows.append(("error at rest", f"worst {unit.counts(error.value)}, {angle(error.value)} ({whose(error.of)})"))
     if deviation := figures.deviation:
-        rows.append(("travel", _travel(run)))
+        crossed = f"; end of the turn crossed {times(run.crossings)}" if run.crossings else ""
+        rows.append(("travel", turns(run.travel) + crossed + rollovers(run)))
         rows.append(("deviation", f"up to {angle(deviation.value)} ({whose(deviation.of)})"))
     if fastest := figures.peak_speed:
         rows.append(("peak speed", f"{degrees(fastest.value)} deg/s ({whose(fastest.of)})"))
     if run.refused:
         rows.append(("refused", count(run.refused, "start")))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
-
-
-def _travel(run: SequenceRun) -> str:
-    crossed = f"; end of the turn crossed {times(run.crossings)}" if run.crossings else ""
-    return turns(run.travel) + crossed + rollovers(run)
 
 
 def whose(step: StepRecord) -> str:

@@ -76,12 +76,12 @@ def test_a_button_is_held_until_it_is_released(host):
 
 def test_a_positioning_is_taken_by_the_next_task_and_says_when_it_is_there(host):
     host.begin(1)
-    assert host.is_pending
+    assert positioner(host).start
     host.machine.pass_ticks(200)
-    assert (host.is_pending, host.refusal, positioner(host).state) == (False, "", MOVE)
+    assert (positioner(host).start, host.refusal, positioner(host).state) == (0, "", MOVE)
     assert host.way == pytest.approx(math.radians(80), abs=2 * host.spec.count)
     host.machine.pass_ticks(100_000)
-    assert (host.at_rest, host.in_position, host.refused) == (True, True, 0)
+    assert (host.at_rest, host.in_position, positioner(host).refused) == (True, True, 0)
     assert host.way <= 2 * host.spec.count
 
 
@@ -92,9 +92,9 @@ def test_a_refused_start_says_why(host, number, text):
         host.machine.pass_ticks(1000)
     host.begin(number)
     host.machine.pass_ticks(400)
-    assert not host.is_pending
+    assert not positioner(host).start
     assert text in host.refusal
-    assert host.refused == 1
+    assert positioner(host).refused == 1
 
 
 def test_a_refusal_is_forgotten_with_the_next_start(host):

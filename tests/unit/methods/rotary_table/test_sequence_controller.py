@@ -148,7 +148,7 @@ def test_a_positioning_ends_in_position():
 
 def test_a_step_begins_with_the_line_acknowledged():
     bench = Bench().do(Go(1), Go(1), Go(2))
-    assert bench.host.refused == 0
+    assert bench.host.positioner.refused == 0
     assert bench.lines.angle.dar == pytest.approx(bench.host.spec.period / 2, abs=2)
 
 
