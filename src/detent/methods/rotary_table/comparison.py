@@ -8,6 +8,7 @@ but not in every case. Each of them runs on the axis that is compared; only its 
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -90,10 +91,8 @@ class AngleComparison:
     @property
     def by_place(self) -> dict[float, dict[str, Start]]:
         """Starts by angle [rad], then by form."""
-        places: dict[float, dict[str, Start]] = {}
-        for start in self.starts:
-            places.setdefault(start.angle, {})[start.form] = start
-        return places
+        places = groupby(self.starts, key=lambda start: start.angle)
+        return {place: {start.form: start for start in starts} for place, starts in places}
 
     @property
     def table(self) -> TextTable:

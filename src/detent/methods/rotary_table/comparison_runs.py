@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.methods.rotary_table.build import start_turns, ticks
@@ -15,7 +14,7 @@ from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, 
 from detent.methods.rotary_table.system import TICK, RotaryTable
 from detent.page.parts import Numbers
 from detent.record.machine import Progress
-from detent.record.recorder import Recorder, make_trace
+from detent.record.recorder import Recorder
 from detent.units import format_quantity
 
 START = math.radians(100)  # where the crossing begins [rad]
@@ -107,9 +106,8 @@ def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], Non
     Columns by the names of `Crossing`, one value per interrupt or less often, and the speed of the table [rad/s].
     """
     strobes = max(1, math.ceil(seconds / spec.method.strobe_period / MOST_ROWS))
-    blocks: list[NDArray[np.void]] = []
     every = strobes * ticks(spec.method.strobe_period)
-    recorder = Recorder(RotaryTable, _SIGNALS, every=every, period=TICK, sink=blocks.append)
+    recorder = Recorder(RotaryTable, _SIGNALS, every=every, period=TICK)
     host = TableHost(spec, recorder)
     host.start()
     start = host.tick
@@ -118,7 +116,7 @@ def _run(spec: RotaryTableSpec, seconds: float, begin: Callable[[TableHost], Non
         host.machine.pass_ticks(start + ticks(seconds) - host.tick)
         host.acknowledge()
     host.machine.close()
-    trace = make_trace(recorder, blocks, {})
+    trace = recorder.trace()
     turns = trace["plant.train.motor.turns"] - math.floor(start_turns(spec))
     return {
         "t": trace.time - start * TICK,

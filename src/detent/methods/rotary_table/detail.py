@@ -25,17 +25,12 @@ MOST_MOMENTS = 6  # crossings and rollovers that are marked: a table that dither
 UNCHANGED = math.radians(1.0)  # change of the deviation from one row to the next that is no jump [rad]
 
 FAILED = "the step that failed"
-
 POINTS = 1500  # rows that are chosen for one curve's sake: there are four plot areas
 
 DEG = 180.0 / math.pi
-
 STATE, AHEAD, TARGET = "controller.positioner.state", "controller.positioner.z", "controller.positioner.oar"
-DETECTED, PRESENT, REMAINING = (
-    "controller.positioner.angle.dar",
-    "controller.positioner.angle.aar",
-    "controller.positioner.interpolator.irr",
-)
+DETECTED, PRESENT = "controller.positioner.angle.dar", "controller.positioner.angle.aar"
+REMAINING = "controller.positioner.interpolator.irr"
 TURNS, FLAG = "controller.positioner.angle.turn", "controller.positioner.angle.flg"
 DEVIATION, SIGNAL, VELOCITY = "controller.positioner.dr", "controller.positioner.s4", "plant.train.motor.velocity"
 

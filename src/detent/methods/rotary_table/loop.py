@@ -14,8 +14,7 @@ from typing import Any
 
 LONGEST = 20.0  # time constants after which the loop has forgotten everything
 
-STEPS = 6_000
-"""Strobes that are followed at most; a loop that is slower than that does not notice a longer strobe period."""
+STEPS = 6_000  # strobes that are followed at most; a loop slower than that does not notice a longer strobe period
 
 
 @dataclass(frozen=True, slots=True)

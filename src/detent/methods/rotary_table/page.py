@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from detent.methods.rotary_table.detail import DEG, POINTS, step_section
+from detent.methods.rotary_table.detail import AHEAD, DEG, DETECTED, POINTS, VELOCITY, step_section
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change
@@ -29,13 +29,7 @@ from detent.page.table import Cell, left_out, long_table, offset_cell
 from detent.page.words import CountUnit, angle, count, degrees, duration, further
 from detent.record.trace import Trace
 
-PHASE, VELOCITY = "plant.table", "plant.train.motor.velocity"
-DETECTED, AHEAD, COMMANDED = (
-    "controller.positioner.angle.dar",
-    "controller.positioner.z",
-    "controller.positioner.interpolator.speed",
-)
-
+PHASE, COMMANDED = "plant.table", "controller.positioner.interpolator.speed"
 NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)  # signals that the whole sequence is drawn from
 PHASE_TURN = float(1 << 32)  # register of the true angle per turn
 LINE_SECONDS = 120.0  # time that the time line shows: more than this is a grey block on any screen
@@ -45,7 +39,6 @@ KINDS = (("go", "go to", "right"), ("jog", "jog", "left"), ("wait", "wait", "mut
 """Kinds of steps that last, their lanes and colours; an output is switched in no time."""
 
 COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
-
 LINE = "line"  # name of the time line: its plot areas share their cursor
 
 SINCE = "time since the sequence began"
@@ -184,16 +177,13 @@ def _signal_lanes(run: SequenceRun) -> list[Lane]:
 
 def _spans(run: SequenceRun, changes: Sequence[Change]) -> dict[str, list[tuple[float, float]]]:
     """Stretches in which each signal was on [s]; what is still on at the end is on up to there."""
-    spans: dict[str, list[tuple[float, float]]] = {}
+    spans: dict[str, list[tuple[float, float]]] = {name: [] for _, name, _ in changes}
     since: dict[str, float] = {}
-    for moment, name, on in changes:
-        found = spans.setdefault(name, [])
+    for moment, name, on in (*changes, *((run.time_end, name, False) for name in spans)):
         if on:
             since.setdefault(name, moment - run.time_ready)
         elif name in since:
-            found.append((since.pop(name), moment - run.time_ready))
-    for name, begin in since.items():
-        spans[name].append((begin, run.time_end - run.time_ready))
+            spans[name].append((since.pop(name), moment - run.time_ready))
     return spans
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import detent
 from detent.methods.load import load_spec
 from detent.methods.rotary_table.comparison import AngleComparison, Crossing, Feed, Start
-from detent.methods.rotary_table.page import AHEAD, COMMANDED, DETECTED, PHASE, VELOCITY
+from detent.methods.rotary_table.detail import AHEAD, DETECTED, VELOCITY
+from detent.methods.rotary_table.page import COMMANDED, PHASE
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_job import SequenceJob, Wait
