@@ -8,7 +8,7 @@ from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHOR
 from detent.control.table_positioner import ATOMIC, BY_ACTUAL, BY_THEORETICAL, FLAG_FIRST, REMAINING_FIRST
 from detent.kernel.turn_table import FRACTION, TURN
 from detent.methods.rotary_table.controller import TableControllerParams
-from detent.methods.rotary_table.schema import CoarseTable, FineTable, RotaryTableSpec
+from detent.methods.rotary_table.schema import CoarseTable, FineTable, MechanicsTable, RotaryTableSpec
 from detent.methods.rotary_table.system import TICK, RotaryTableParams
 from detent.plant.gearing import GearParams, fill_eccentricity
 from detent.plant.rotary_motor import fill_motor
@@ -132,13 +132,10 @@ def _fill_machine(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     m.inertia, m.viscous, m.period = spec.inertia, spec.viscous, TICK
     m.coulomb, m.static = mechanics.coulomb, mechanics.static
     fill_motor(m, a.stiffness)
-    _fill_gear(p.plant.train.gear, spec.ratio, mechanics.backlash, mechanics.eccentricity, mechanics.eccentricity_angle)
-    coarse: CoarseTable = spec.detector.coarse
-    _fill_gear(p.plant.train.reduction, spec.ratio, coarse.backlash, coarse.eccentricity, coarse.eccentricity_angle)
-
-
-def _fill_gear(p: GearParams, ratio: int, backlash: float, eccentricity: float, angle: float) -> None:
-    """A gear whose faults are stated at its output [rad]."""
-    p.ratio, p.half_backlash = ratio, 0.5 * backlash * ratio
-    if eccentricity:
-        fill_eccentricity(p, eccentricity, angle)
+    gears: tuple[tuple[GearParams, MechanicsTable | CoarseTable], ...] = (
+        (p.plant.train.gear, mechanics), (p.plant.train.reduction, spec.detector.coarse)
+    )  # fmt: skip
+    for gear, table in gears:  # whose faults are stated at its output [rad]
+        gear.ratio, gear.half_backlash = spec.ratio, 0.5 * table.backlash * spec.ratio
+        if table.eccentricity:
+            fill_eccentricity(gear, table.eccentricity, table.eccentricity_angle)

@@ -234,6 +234,15 @@ def _loop(m: Machine) -> Iterator[Caution]:
     spec, damping, most = m.spec, m.loop.damping, m.spec.largest_word
     if not spec.method.position_control:
         return
+    error = m.following_error(m.speed) + (m.overshoot(m.speed) if m.is_stable else 0.0)
+    if spec.protection.following_time > 0 and error > spec.protection.following_error * (1 + BARELY):
+        yield Caution(
+            "following error at limits.speed",
+            f"{text(error, 'rad')} after an acceleration",
+            f"up to protection.following_error, {text(spec.protection.following_error, 'rad')}",
+            "the drive goes off when a jog has come to its speed",
+            remedy.least("protection.following_error", error, "raise method.position_gain"),
+        )
     if damping < LEAST_DAMPING:
         yield Caution(
             "damping of the loop",

@@ -134,14 +134,8 @@ def power_on(p: TableControllerParams, c: TableController, lines: TableLines, ta
 
 @step
 def press(c: TableController, direction: int) -> None:
-    """Hold a button down: 1 for +, -1 for -."""
+    """Hold a button down: 1 for +, -1 for -, 0 for none."""
     c.positioner.plus, c.positioner.minus = direction > 0, direction < 0
-
-
-@step
-def release(c: TableController) -> None:
-    """No button."""
-    c.positioner.plus = c.positioner.minus = 0
 
 
 @step

@@ -102,7 +102,7 @@ class TableHost:
 
     def release(self) -> None:
         """No button."""
-        controller.release(self._controller)
+        controller.press(self._controller, 0)
 
     def begin(self, number: int) -> None:
         """Set the position number and start; the positioner takes it in its next task."""

@@ -37,6 +37,7 @@ def test_the_example_is_sound(load_text, good_text):
         (*LOAD, "disturbance.load.torque=100 N*m"),
         ("drive.full_speed=1900 rpm",),
         ("method.fraction_bits=8",),
+        ("protection.following_error=2 deg", "protection.following_time=0 s"),
     ],
 )
 def test_axes_with_nothing_to_warn_about(load_text, good_text, overrides):
@@ -62,6 +63,7 @@ FORMS = [
 DRIVE = [
     (("method.position_gain=100",), "damping of the loop"),
     (("method.position_gain=1000",), "damping of the loop"),
+    (("protection.following_error=2 deg",), "following error at limits.speed"),
     (("limits.speed=127 deg/s",), "speed word at limits.speed"),
     (("limits.speed=126 deg/s",), "speed word at limits.speed"),
     (("mechanics.coulomb=1 N*m", "limits.speed=120 deg/s"), "speed word at limits.speed"),

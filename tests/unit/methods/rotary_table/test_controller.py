@@ -11,7 +11,6 @@ from detent.methods.rotary_table.controller import (
     control,
     power_on,
     press,
-    release,
     set_dial,
     start_position,
 )
@@ -79,7 +78,7 @@ def test_buttons_and_dial(direction, buttons):
     assert (c.positioner.dial, c.positioner.plus, c.positioner.minus) == (1234, *buttons)
     bench.run(6)
     assert (c.positioner.state, c.positioner.z) == (JOG, direction)
-    release(c)
+    press(c, 0)
     assert (c.positioner.plus, c.positioner.minus) == (0, 0)
 
 
