@@ -170,7 +170,7 @@ def run_sequence(
     try:
         host.start()
         result.time_ready = host.machine.time
-        watched = _WatchedTable(host, job, result, progress)
+        watched = _WatchedTable(host, result, progress)
         for number, (index, step) in enumerate(job.actions(), start=1):
             result.failure = watched.do(number, index, step)
             if result.failure:
@@ -235,24 +235,23 @@ class TableObserver:
         return self._state.plant.train.motor.velocity / self._spec.ratio
 
 
-class _WatchedTable:
+class _WatchedTable(TableObserver):
     """Controller and table with an observer beside it, who writes the records."""
 
-    def __init__(self, host: TableHost, job: SequenceJob, result: SequenceRun, progress: Progress | None) -> None:
+    def __init__(self, host: TableHost, result: SequenceRun, progress: Progress | None) -> None:
+        super().__init__(host.spec, host.machine)
         self._host, self._result, self._progress = host, result, progress
-        self._count = job.count
-        self._state: Any = host.machine.state
-        self._observer = TableObserver(host.spec, host.machine)
+        self._count = result.job.count
         self._number = self._told = 0
-        self._start = self._first = self._observer.angle
-        self._controller = SequenceController(host, job.inputs, self._watch)
+        self._start = self._first = self.angle
+        self._controller = SequenceController(host, result.job.inputs, self._watch)
 
     def do(self, number: int, index: int, step: Action) -> str:
         """Do a step and record it; what went wrong, or nothing."""
         self._number = number
         self._tell()
         set_angle_gauge(self._state.plant.gauge)
-        self._start = self._observer.angle
+        self._start = self.angle
         begin, counters = self._host.machine.time, self._counters
         try:
             self._controller.do(step)
@@ -282,22 +281,22 @@ class _WatchedTable:
         """A table that goes a turn farther than it was asked has run away."""
         if self._host.tick - self._told > LONGEST_STRETCH:
             self._tell()
-        travel = self._observer.angle - self._start
+        travel = self.angle - self._start
         if abs(travel) > asked + self._controller.latency + math.tau:
             raise AxisError(
                 f"the table has run away: it has turned {_degrees(travel)} where {_degrees(asked)} were asked, "
-                f"and turns on at {format_quantity(self._observer.speed, 'rad/s')}; {suspect(self._host)}"
+                f"and turns on at {format_quantity(self.speed, 'rad/s')}; {suspect(self._host)}"
             )
 
     def _verdict(self, step: Action) -> str:
         """Why a step that has ended did not do what it was asked; empty if it did."""
         if isinstance(step, Jog):
-            asked, travel = step.direction * self._controller.asked, self._observer.angle - self._start
+            asked, travel = step.direction * self._controller.asked, self.angle - self._start
             if abs(asked - travel) > math.tau / 2 + self._controller.latency:
                 turned = f"{_degrees(travel)} where {_degrees(asked)} were asked"
                 return f"the table has turned {turned}; {suspect(self._host)}"
-        elif isinstance(step, Go) and abs(self._observer.miss) > 0.5:
-            spec, turns = self._host.spec, self._observer.miss
+        elif isinstance(step, Go) and abs(self.miss) > 0.5:
+            spec, turns = self._host.spec, self.miss
             remedy = (
                 "keep the errors of the coarse side together (alignment, backlash, eccentricity) below half a turn of "
                 f"the motor, {format_quantity(math.pi / spec.ratio, 'rad', 3)} of the table"
@@ -313,11 +312,11 @@ class _WatchedTable:
 
     def _make_record(self, index: int, step: Action, begin: float, counters: tuple[int, int]) -> StepRecord:
         """The record of the step that has ended."""
-        spec, gauge = self._host.spec, self._state.plant.gauge
-        stop = self._observer.angle
+        spec, gauge = self._spec, self._state.plant.gauge
+        stop = self.angle
         # During a jog the target is two turns ahead: it is nowhere to be held.
         is_held = isinstance(step, Go) or (isinstance(step, Jog) and not self._host.is_moving)
-        target = self._observer.target if is_held else math.nan
+        target = self.target if is_held else math.nan
         crossings, rollovers = self._counters
         return StepRecord(
             number=self._number,
@@ -344,7 +343,7 @@ class _WatchedTable:
         result.inputs, result.outputs = controller.inputs, controller.outputs
         result.warnings = list(controller.warnings)
         result.travel = sum(abs(step.travel) for step in result.steps)
-        net = self._observer.angle - self._first
+        net = self.angle - self._first
         # A turn is whole that ends where it began, within the window.
         result.turns = int(math.copysign(abs(net) + result.in_position + result.count, net) / math.tau)
         result.crossings = sum(step.crossings for step in result.steps)
