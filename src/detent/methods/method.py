@@ -1,14 +1,16 @@
 """The contract: everything a control method brings, so that nothing outside its package needs to know which it is.
 
 A method is a class derived from `Method`, found by the entry point of its name in the group ``detent.methods``. What it
-leaves out has the default that stands here. Importing its module must load neither compiled blocks nor pictures: they
-are imported inside the functions that need them, so that `detent check` stays quick.
+leaves out has the default that stands here. Importing its module must load neither compiled blocks nor pictures, so
+that `detent check` stays quick: a method says where its package has them.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
-    from detent.record.machine import Progress
+    from detent.record.machine import AnyRecorder, Progress
     from detent.record.trace import Trace
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
@@ -89,8 +91,16 @@ class Shown:
     settings: dict[str, str] = field(default_factory=dict[str, str])  # small print: file, seed, command
 
 
+def _untold(share: float, text: str) -> None:
+    """The progress of what nobody watches."""
+
+
 class Method(Protocol[SpecT]):
-    """A control method."""
+    """A control method: a declaration, and what it does in a way of its own.
+
+    A declaration "module:name" is a place in the method's package, or a whole ``package.module:name`` elsewhere; what
+    stands there loads when it is first needed.
+    """
 
     name: ClassVar[str]
     """What ``axis.method`` says."""
@@ -104,16 +114,55 @@ class Method(Protocol[SpecT]):
     """Model of the whole file."""
     rotary: type[SpecT] | None = None
     """The model where ``axis.motion = "rotary"``; None where the method has no such key."""
-    rules: Sequence[Callable[[SpecT], Iterable[Contradiction]]] = ()
-    """What must hold between keys; each gives the contradictions it finds."""
     catalogue: Catalogue | None = None
     """Motors that ``motor.catalogue`` may name."""
+
+    fills: ClassVar[str] = ""
+    """Place of what gives a specification the defaults that depend on another table."""
+    refuses: ClassVar[str] = ""
+    """Place of the `rules`: what must hold between keys."""
+    derives: ClassVar[str] = ""
+    """Place of the derived figures of a specification."""
+    warns: ClassVar[str] = ""
+    """Place of the cautions: what looks wrong with an axis that can be built."""
+
     state: ClassVar[str]
-    """Where its package has the class of the axis's state, or of a part of which it has several: "system:Name"."""
+    """Place of the class of the axis's state, or of a part of which it has several."""
     params: ClassVar[str]
     """The same of what does not change while it runs."""
+    clock: ClassVar[str] = "system:TICK"
+    """Place of its base tick [s]."""
+    every: ClassVar[int] = 1
+    """Ticks between two rows of a trace unless told otherwise."""
+    seed: ClassVar[str] = ""
+    """Key of the file that its noise starts from."""
+    signals: ClassVar[str | tuple[str, ...]] = ()
+    """Registers that a run records unless told otherwise, or the place of their names."""
+    timing: ClassVar[tuple[str, ...]] = ()
+    """The same for a timing diagram."""
+    takes: ClassVar[str]
+    """Place of the class of its jobs."""
+    reads: ClassVar[str]
+    """Place of what reads a job file."""
+    runs: ClassVar[str]
+    """Place of what makes a job: ``run(spec, job, recorder=, progress=)``."""
+    compares: ClassVar[tuple[str, ...]] = ()
+    """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
+
+    sums_up: ClassVar[str]
+    """Place of what gives the first figures of a run: ``rows(spec, result)``."""
+    reports: ClassVar[str]
+    """Place of the report of a run: ``page(spec, result, trace, comparisons, settings)``."""
+    says: ClassVar[tuple[str, str]] = ("{job}: every move arrived on {axis}.", "Not done: {failure}")
+    """Whether the job was done, in a sentence: when it was, and when it was not."""
     reports_comparisons: bool = True
     """Whether the report of a run shows the comparisons unless told otherwise."""
+
+    def brought(self, place: str) -> Any:
+        """What stands at a place; it loads only here."""
+        module, _, name = place.partition(":")
+        package = "" if "." in module else type(self).__module__.rpartition(".")[0] + "."
+        return getattr(import_module(package + module), name)
 
     # ---- the axis file
 
@@ -123,19 +172,22 @@ class Method(Protocol[SpecT]):
         made.spec = self.rotary or self.spec
         return made
 
+    @cached_property
+    def rules(self) -> Sequence[Callable[[SpecT], Iterable[Contradiction]]]:
+        """What must hold between keys; each gives the contradictions it finds."""
+        return self.brought(self.refuses) if self.refuses else ()
+
     def fill(self, spec: SpecT) -> SpecT:
         """The specification with the defaults that depend on another table."""
-        return spec
+        return self.brought(self.fills)(spec) if self.fills else spec
 
     def derive(self, spec: SpecT) -> tuple[Derived, ...]:
         """Derived figures, in the order they are read."""
-        del spec
-        return ()
+        return tuple(self.brought(self.derives)(spec)) if self.derives else ()
 
     def cautions(self, spec: SpecT) -> Iterable[Caution]:
         """What looks wrong with an axis that can be built."""
-        del spec
-        return ()
+        return self.brought(self.warns)(spec) if self.warns else ()
 
     # ---- the simulated axis
 
@@ -147,34 +199,67 @@ class Method(Protocol[SpecT]):
         """Class of what does not change while it runs."""
         return self.brought(self.params)
 
-    def brought(self, place: str) -> Any:
-        """What stands at ``module:name`` of the method's package; it loads only here."""
-        module, _, name = place.partition(":")
-        return getattr(import_module(f"{type(self).__module__.rpartition('.')[0]}.{module}"), name)
+    def tick(self, spec: SpecT) -> float:
+        """Base tick [s]."""
+        del spec
+        return self.brought(self.clock)
+
+    def clocking(self, spec: SpecT) -> "Clocking":
+        """How registers change inside a tick."""
+        from detent.record.capture import Clocking
+
+        del spec
+        return Clocking()
+
+    def load(self, spec: SpecT, path: Path) -> Any:
+        """Read a job file."""
+        del spec
+        return self.brought(self.reads)(path)
+
+    def run(
+        self, spec: SpecT, job: Any, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None
+    ) -> Any:
+        """Make a job, from power-on."""
+        return self.brought(self.runs)(spec, job, recorder=recorder, progress=progress)
+
+    def sample_job(self, spec: SpecT) -> Any:
+        """A short job for looking at signals."""
+        ...
 
     def simulated(self, spec: SpecT) -> Simulated:
         """The axis as the simulation takes it."""
-        ...
+        return Simulated(
+            registers=self.registers(),
+            tick=self.tick(spec),
+            every=self.every,
+            seed=attrgetter(self.seed)(spec) if self.seed else 0,
+            signals=self.brought(self.signals) if isinstance(self.signals, str) else self.signals,
+            timing=self.timing,
+            clocking=self.clocking(spec),
+            load=partial(self.load, spec),
+            job=self.brought(self.takes),
+            run=partial(self.run, spec),
+            sample_job=partial(self.sample_job, spec),
+        )
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""
-        del spec, progress
-        return ()
+        return tuple(self.brought(place)(spec, progress=progress or _untold) for place in self.compares)
 
     # ---- what people see
 
     def verdict(self, axis: str, result: Any) -> str:
         """Whether the job was done on the axis of that name, in a sentence."""
-        done = f"{result.job.name}: every move arrived on {axis}."
-        return done if result.done else f"Not done: {result.failure}"
+        done, failed = self.says
+        return (done if result.done else failed).format(job=result.job.name, axis=axis, failure=result.failure)
 
     def summary(self, spec: SpecT, result: Any) -> list[tuple[str, str]]:
         """The figures of a run that a person wants first."""
-        ...
+        return self.brought(self.sums_up)(spec, result)
 
     def page(self, spec: SpecT, result: Any, shown: Shown) -> "Page":
         """The report of a run."""
-        ...
+        return self.brought(self.reports)(spec, result, shown.trace, shown.comparisons, shown.settings)
 
     # ---- what only some methods bring; the registry tells which (`registry.bringing`)
 

@@ -1,5 +1,7 @@
 """The registry of control methods, and how a file chooses one of them."""
 
+import inspect
+import re
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
@@ -92,6 +94,17 @@ def test_a_method_is_complete(name):
     assert [dotted(path) for path, _ in leaf_fields(method.spec)][:2] == ["axis.name", "axis.method"]
     assert method.rules
     assert all(leaf.doc for declared in (method.registers(), method.parameters()) for leaf in declared.leaves())
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_what_a_method_declares_is_there(name):
+    method = METHODS[name]
+    unused = "clock" if type(method).tick is not Method.tick else ""
+    declared = [value for word, value in inspect.getmembers(method) if not word.startswith("_") and word != unused]
+    texts = [text for value in declared for text in (value if isinstance(value, tuple) else (value,))]
+    places = [text for text in texts if isinstance(text, str) and re.fullmatch(r"[\w.]+:\w+", text)]
+    assert len(places) > 8
+    assert all(method.brought(place) is not None for place in places)
 
 
 def test_the_file_chooses_its_method(load_text, good_text):

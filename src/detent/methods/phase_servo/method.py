@@ -1,21 +1,15 @@
 """The phase servo as a method: what its package brings."""
 
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from detent.axisfile.catalogue import DC_MOTORS
-from detent.files.findings import Caution, Derived
-from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
-from detent.methods.phase_servo.checks import RULES, find_cautions
-from detent.methods.phase_servo.derive import derive
-from detent.methods.phase_servo.schema import PhaseServoSpec, fill_derived
+from detent.methods.moves.method import MoveMethod
+from detent.methods.phase_servo.schema import PhaseServoSpec
 
 if TYPE_CHECKING:
-    from detent.kernel.registers import Registers
-    from detent.page.frame import Comparison, Page
-    from detent.record.machine import AnyRecorder, Progress
+    from detent.record.capture import Clocking
 
 SIGNALS = (
     "plant.train.position", "plant.train.velocity", "plant.train.current",
@@ -32,7 +26,7 @@ TIMING = (
 )  # fmt: skip
 
 
-class PhaseServoMethod(Method[PhaseServoSpec]):
+class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     """Resolver phase: pulses for speed, an absolute word for the stop."""
 
     name = "phase_servo"
@@ -40,79 +34,31 @@ class PhaseServoMethod(Method[PhaseServoSpec]):
     jobs = "a list of moves (.csv, .toml) or a line of text (.txt)"
     pace = "250 ns, every 256th"
     spec = PhaseServoSpec
-    rules = RULES
     catalogue = DC_MOTORS
+    fills, derives = "schema:fill_derived", "derive:derive"
+    refuses, warns = "checks:RULES", "checks:find_cautions"
+    state, params = "system:PhaseServo", "system:PhaseServoParams"
+    every = 256
+    seed = "detector.seed"
+    signals, timing = SIGNALS, TIMING
+    compares = "noise_comparison:compare_noise", "hold_comparison:compare_hold"
+    commands, shows = "host:PhaseHost", "page:PhaseView"
 
-    def fill(self, spec: PhaseServoSpec) -> PhaseServoSpec:
-        """The defaults that depend on another table."""
-        return fill_derived(spec)
+    def tick(self, spec: PhaseServoSpec) -> float:
+        """Period of the reference clocks [s]."""
+        return spec.tick
 
-    def derive(self, spec: PhaseServoSpec) -> tuple[Derived, ...]:
-        """Derived figures."""
-        return derive(spec)
+    def clocking(self, spec: PhaseServoSpec) -> "Clocking":
+        """Two reference clocks in a tick."""
+        return self.brought("clocking:phase_servo_clocking")(spec)
 
-    def cautions(self, spec: PhaseServoSpec) -> Iterable[Caution]:
-        """What looks wrong."""
-        return find_cautions(spec)
-
-    def registers(self) -> "type[Registers]":
-        """State of the axis."""
-        from detent.methods.phase_servo.system import PhaseServo
-
-        return PhaseServo
-
-    def parameters(self) -> "type[Registers]":
-        """Constants of the axis."""
-        from detent.methods.phase_servo.system import PhaseServoParams
-
-        return PhaseServoParams
-
-    def simulated(self, spec: PhaseServoSpec) -> Simulated:
-        """A phase servo that makes moves."""
+    def load(self, spec: PhaseServoSpec, path: Path) -> MoveJob:
+        """Moves, or a text whose characters lie on positioning points."""
         from detent.methods.moves.move_file import load_moves
-        from detent.methods.moves.run import MoveRun, run_moves
-        from detent.methods.phase_servo import system
-        from detent.methods.phase_servo.clocking import phase_servo_clocking
-        from detent.methods.phase_servo.host import PhaseHost
 
-        p = spec.printing
+        p, margin = spec.printing, round(spec.printing.left_margin / spec.pitch) * spec.pitch
+        return load_moves(path, pitch=p.character_pitch, left_margin=margin, hammer_time=p.hammer_time)
 
-        def run(job: MoveJob, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None) -> MoveRun:
-            return run_moves(PhaseHost(spec, recorder), job, progress=progress)
-
-        def load(path: Path) -> MoveJob:
-            margin = round(p.left_margin / spec.pitch) * spec.pitch
-            return load_moves(path, pitch=p.character_pitch, left_margin=margin, hammer_time=p.hammer_time)
-
-        return Simulated(
-            registers=system.PhaseServo,
-            tick=spec.tick,
-            every=256,
-            seed=spec.detector.seed,
-            signals=SIGNALS,
-            timing=TIMING,
-            clocking=phase_servo_clocking(spec),
-            load=load,
-            job=MoveJob,
-            run=run,
-            sample_job=lambda: one_move("one move of 6 pitches", 6 * spec.pitch, 0.05),
-        )
-
-    def compare(self, spec: PhaseServoSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
-        """Beside a servo that stops by counted pulses: noise, rest, load."""
-        from detent.methods.phase_servo.hold_comparison import compare_hold
-        from detent.methods.phase_servo.noise_comparison import compare_noise
-
-        return compare_noise(spec, progress=progress), compare_hold(spec)
-
-    def summary(self, spec: PhaseServoSpec, result: Any) -> list[tuple[str, str]]:
-        """Moves, times, worst errors."""
-        from detent.methods.phase_servo.page import phase_summary
-
-        return phase_summary(spec, result)
-
-    def page(self, spec: PhaseServoSpec, result: Any, shown: Shown) -> "Page":
-        """The report."""
-        from detent.methods.phase_servo.page import phase_page
-
-        return phase_page(spec, result, shown.trace, shown.comparisons, shown.settings)
+    def sample_job(self, spec: PhaseServoSpec) -> MoveJob:
+        """Six pitches."""
+        return one_move("one move of 6 pitches", 6 * spec.pitch, 0.05)
