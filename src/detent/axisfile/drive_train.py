@@ -1,9 +1,11 @@
-"""From the tables of a DC motor and its friction to the parameters of the drive train; the same for every method."""
+"""From the tables of a DC motor, its friction and its encoder to their parameters; the same for every method."""
 
 import math
+from typing import Any
 
-from detent.axisfile.tables import FrictionTables, MotorTable
+from detent.axisfile.tables import EncoderTable, FrictionTables, MotorTable, ScrewTable
 from detent.plant.drive_train import DriveTrainParams, fill_period
+from detent.sensing.encoder import EncoderParams
 
 SUBSTEP_SHARE = 0.25  # longest substep of the power series, as a share of the fastest time constant
 
@@ -34,6 +36,25 @@ def fill_drive_train(  # noqa: PLR0913 - what a drive train is made of
     t.left_end, t.right_end = start, travel
     t.period, t.substep = period, substep or SUBSTEP_SHARE / fastest_rate(t)
     fill_period(t)
+
+
+def fill_encoder(p: EncoderParams, table: EncoderTable, pulse: float) -> None:
+    """An encoder with an edge every `pulse` [m]; zero lies between two: on one, rounding alone would make a pulse."""
+    p.edge_pitch, p.origin = pulse, -pulse / 2
+    p.jitter, p.missing = table.jitter / (math.pi / 2), table.missing_edges
+
+
+def fill_slide(p: Any, spec: Any, period: float, bridge_resistance: float = 0.0) -> None:
+    """Blocks `train` and `encoder` of a slide on a screw, with its encoder on the motor; `period` is the base tick [s].
+
+    `spec` has the tables [motor], [mechanics] (`ScrewTable`), [encoder] and limits.travel, and the way of a `pulse`.
+    """
+    screw: ScrewTable = spec.mechanics
+    fill_encoder(p.encoder, spec.encoder, spec.pulse)
+    fill_drive_train(
+        p.train, spec.motor, screw.friction, radius=screw.radius, mass=screw.mass(spec.motor),
+        travel=spec.limits.travel, period=period, bridge_resistance=bridge_resistance,
+    )  # fmt: skip
 
 
 def fastest_rate(t: DriveTrainParams) -> float:

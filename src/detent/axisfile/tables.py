@@ -1,7 +1,7 @@
 """Tables of the axis file that several control methods share, and what every specification has in common."""
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from annotated_types import Ge, Le
 
@@ -15,6 +15,7 @@ from detent.files.quantities import (
     Inductance,
     Inertia,
     Length,
+    Mass,
     Resistance,
     Time,
     TorqueConstant,
@@ -39,6 +40,29 @@ class AxisSpec(Table, frozen=True):
     """What the specification of every control method has; the models of `methods.METHODS` derive from it."""
 
     axis: AxisTable
+
+    def changed(self, **tables: Any) -> Self:
+        """A copy with other values in its tables, ``changed(method={"scale": 1})``, or with other tables.
+
+        Values are in SI units, and nothing is checked.
+        """
+        made = {
+            name: getattr(self, name).model_copy(update=new) if isinstance(new, dict) else new
+            for name, new in tables.items()
+        }
+        return self.model_copy(update=made)
+
+    def filled(self, **tables: dict[str, object]) -> Self:
+        """The same where a value is still to be made, as its `derived` text says: NaN, a number below 0, or no list."""
+        return self.changed(**{
+            name: {key: value for key, value in values.items() if _is_open(getattr(getattr(self, name), key))}
+            for name, values in tables.items()
+        })  # fmt: skip
+
+
+def _is_open(value: float | list[Any]) -> bool:
+    """True for the marks of a default that is still to be made."""
+    return not value if isinstance(value, list) else not value >= 0
 
 
 def _stated_torque_constant(data: dict[str, Any]) -> float:
@@ -81,6 +105,29 @@ class FrictionTables(Table, frozen=True):
 
     right: FrictionTable
     left: FrictionTable
+
+
+class ScrewTable(Table, frozen=True):
+    """Screw and slide."""
+
+    travel_per_revolution: Length = required(
+        "lead of the screw: slide travel per motor turn", '"5 mm"', ge=1e-5, le=10.0
+    )
+    moving_mass: Mass = optional("slide with its load", 0.0, ge=0.0, le=1e5)
+    screw_inertia: Inertia = optional("screw and coupling", 0.0, ge=0.0, le=10.0)
+    start_position: Length = optional(
+        "where the slide stands at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
+    )
+    friction: FrictionTables
+
+    @property
+    def radius(self) -> float:
+        """Travel per radian of the motor [m]."""
+        return self.travel_per_revolution / (2 * math.pi)
+
+    def mass(self, motor: MotorTable) -> float:
+        """All that moves, at the slide [kg]."""
+        return self.moving_mass + (motor.rotor_inertia + self.screw_inertia) / self.radius**2
 
 
 class EncoderTable(Table, frozen=True):

@@ -6,6 +6,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from detent.kernel.loop import advance
 from detent.kernel.registers import Registers
 from detent.record.capture import Capture
 from detent.record.recorder import Recorder
@@ -23,7 +24,7 @@ class Loop:
 
     tick: float  # base tick [s]
     # ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its host
-    advance: Callable[..., int]
+    advance: Callable[..., int] = advance
     # ``by_clocks(params, state, ticks, trace, picks)``: the same, recording every clock inside a tick
     by_clocks: Callable[..., int] | None = None
 

@@ -82,6 +82,15 @@ def pass_left(p: EncoderParams, r: Encoder) -> None:
 
 
 @hot_step
+def follow(p: EncoderParams, r: Encoder, x: float) -> None:
+    """The disc goes where the carriage is, `x` [m], past all edges on its way."""
+    while x >= r.next_right:
+        pass_right(p, r)
+    while x < r.next_left:
+        pass_left(p, r)
+
+
+@hot_step
 def is_one_edge(p: EncoderParams, r: Encoder, x: float) -> bool:
     """True when certainly no more than one edge, whatever its jitter, lies between the disc's place and `x` [m]."""
     place = x - p.origin

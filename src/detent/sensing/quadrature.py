@@ -50,6 +50,11 @@ def count_edge(r: Quadrature, a: int, b: int) -> int:
     return change
 
 
+def preset(r: Quadrature, a: int, b: int) -> None:
+    """Power-on: the levels are there already."""
+    r.channel_a, r.channel_b = a, b
+
+
 @hot_step
 def clock_decoder(r: ClockedDecoder, a: int, b: int) -> None:
     """One clock: the samplers shift, and the gates show a pulse until the next clock."""

@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.drive_train import fill_drive_train
+from detent.axisfile.drive_train import fill_slide
 from detent.axisfile.interference import fill_interference, fill_push
 from detent.axisfile.protection import fill_guard
 from detent.control.pulse_generator import PER_PULSE
@@ -31,15 +31,7 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     m.amplifier.voltage_drive = drive.amplifier == "voltage"
     m.amplifier.per_count = drive.supply / full if m.amplifier.voltage_drive else drive.current_per_count
     m.amplifier.carrier_ticks = round(1 / (drive.pwm_frequency * TICK))
-    m.encoder.edge_pitch = spec.pulse
-    # Zero lies between two edges: on one, rounding alone would make a pulse at power-on.
-    m.encoder.origin = -spec.pulse / 2
-    m.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
-    m.encoder.missing = spec.encoder.missing_edges
-    fill_drive_train(
-        m.train, spec.motor, spec.mechanics.friction, radius=spec.radius, mass=spec.mass, travel=spec.limits.travel,
-        period=TICK, bridge_resistance=spec.drive.bridge_resistance,
-    )  # fmt: skip
+    fill_slide(m, spec, TICK, spec.drive.bridge_resistance)
     fill_interference(m.interference, spec.disturbance.lines, TICK)
     fill_push(m.push, spec.disturbance.push, TICK)
     fill_guard(c.guard, spec.protection, sample=GUARD_PERIOD, speed=spec.limits.speed / spec.pulse)

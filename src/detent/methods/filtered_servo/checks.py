@@ -160,7 +160,7 @@ def _machine(spec: FilteredServoSpec) -> Iterator[Contradiction]:
     """Motor, friction and disturbances can be simulated."""
     motor, friction = spec.motor, spec.mechanics.friction
     resistance = motor.resistance + spec.drive.bridge_resistance
-    coupling = motor.torque_constant * motor.back_emf_constant / spec.radius**2 / spec.mass
+    coupling = motor.torque_constant * motor.back_emf_constant / spec.mechanics.radius**2 / spec.mass
     rate = max(friction.right.viscous, friction.left.viscous) / spec.mass
     if motor.inductance > 0:
         yield from common.time_constants(

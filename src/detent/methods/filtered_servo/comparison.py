@@ -286,7 +286,7 @@ def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredSe
         "small multiplier": {"filter": "none", "scale": 1},
     }
     for name, change in changes.items():
-        yield name, spec.model_copy(update={"method": method.model_copy(update=change)})
+        yield name, spec.changed(method=change)
 
 
 def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) -> FeedbackCase:
@@ -297,7 +297,7 @@ def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) ->
     model = Figures(spec).loop
     limit = model.stability_limit()
     error, speed = trace["controller.deviation.error"], trace["controller.filter.output"]
-    force = trace["plant.train.current"] * (spec.motor.torque_constant / spec.radius)
+    force = trace["plant.train.current"] * (spec.motor.torque_constant / spec.mechanics.radius)
     shown = trace.time >= STEADY_TIME * stretch - SHOWN * WINDOW * stretch
     return FeedbackCase(
         name=name,
@@ -329,15 +329,15 @@ class _Bench:
 
     def __init__(self, spec: FilteredServoSpec, rate: float, seconds: float, recorder: Recorder | None = None) -> None:
         half = math.ceil(2 * rate * seconds) + 100_000  # pulses to either side, more than an unstable axis swings
-        limits = spec.limits.model_copy(update={"travel": 2 * half * spec.pulse})
-        mechanics = spec.mechanics.model_copy(update={"start_position": half * spec.pulse})
         stated = spec.method.command_acceleration
         acceleration = max(stated, rate * spec.pulse / RAMP) if stated > 0 else 0.0  # 0 jumps to the rate
-        method = spec.method.model_copy(update={"command_acceleration": acceleration})
-        update = {"limits": limits, "mechanics": mechanics, "method": method, "disturbance": DisturbanceTable()}
-        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(
-            spec.model_copy(update=update), recorder
+        roomy = spec.changed(
+            limits={"travel": 2 * half * spec.pulse},
+            mechanics={"start_position": half * spec.pulse},
+            method={"command_acceleration": acceleration},
+            disturbance=DisturbanceTable(),
         )
+        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(roomy, recorder)
         self.controller = self.machine.state.controller
         self.machine.pass_ticks(1)  # leaves the reset
         go_to(self.controller, ENDLESS, round(rate * PER_PULSE))

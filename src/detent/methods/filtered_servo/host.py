@@ -4,7 +4,6 @@ from detent.axisfile.protection import describe_fault
 from detent.control.deviation_counter import FAULT, GUARDED
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT, FileProblem
-from detent.kernel.loop import advance
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.controller import acknowledge, arrive_within, go_to, set_period
@@ -21,7 +20,7 @@ def filtered_servo_machine(
     """Filtered servo at power-on."""
     p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
     filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
-    loop = Loop(filtered_servo.TICK, advance, filtered_servo.advance_by_clocks)
+    loop = Loop(filtered_servo.TICK, by_clocks=filtered_servo.advance_by_clocks)
     return Machine(p, r, loop, recorder)
 
 
@@ -29,12 +28,8 @@ class FilteredHost(Host):
     """Host of a filtered servo: command pulses, in position, fault."""
 
     def __init__(self, spec: FilteredServoSpec, recorder: AnyRecorder | None = None) -> None:
-        self.spec = spec
-        self.machine = filtered_servo_machine(spec, recorder)
-        self.grid = spec.pulse
-        self.tolerance = (spec.method.in_position + 1) * spec.pulse
-        self.controller = self.machine.state.controller
-        self.home = spec.mechanics.start_position
+        machine, within = filtered_servo_machine(spec, recorder), (spec.method.in_position + 1) * spec.pulse
+        super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=spec.mechanics.start_position)
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""

@@ -1,6 +1,5 @@
 """What a filtered servo shows on the page of a list of moves: the following error, and the speed word it is held by."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, true
 from detent.page.chart import Curve, Panel
 from detent.page.parts import Numbers
 from detent.page.run_page import Stretch
-from detent.page.words import CountUnit, count, number
+from detent.page.words import count, number
 
 COMMAND, DEVIATION, WORD = "controller.generator.command", "controller.deviation.deviation", "lines.word"
 COUNTED, FILTERED, WINDOW = "controller.speed.word", "controller.filter.output", "controller.clock.period"
@@ -27,29 +26,12 @@ AT_ITS_END = (
 )
 
 
-@dataclass(frozen=True, slots=True)
 class FilteredView(MoveView):
     """What this method shows of itself, see `moves.page.MoveView`."""
 
     spec: FilteredServoSpec
-
     signals = (COMMAND, DEVIATION, WORD, COUNTED, FILTERED, WINDOW)
     captions = (IN_THE_MOVE, AT_ITS_END)
-
-    @property
-    def name(self) -> str:
-        """Name of the axis."""
-        return self.spec.axis.name
-
-    @property
-    def unit(self) -> CountUnit:
-        """A pulse of the encoder."""
-        return CountUnit(self.spec.pulse, "pulse")
-
-    @property
-    def max_speed(self) -> float:
-        """Limit of the axis [m/s]."""
-        return self.spec.limits.speed
 
     def panels(self, shown: ShownMove) -> list[Panel]:
         """Speed with the commanded one, the speed words, following error, drive word."""

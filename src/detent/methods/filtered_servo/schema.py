@@ -12,11 +12,11 @@ from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
     EncoderTable,
-    FrictionTables,
     InterferenceTable,
     MotionProtectionTable,
     MotorTable,
     PushTable,
+    ScrewTable,
     breaking_effort,
 )
 from detent.files.fields import Table, optional, required
@@ -26,9 +26,7 @@ from detent.files.quantities import (
     Force,
     Frequency,
     Inductance,
-    Inertia,
     Length,
-    Mass,
     Resistance,
     Time,
     Velocity,
@@ -83,20 +81,6 @@ class DriveTable(Table, frozen=True):
     )
 
 
-class MechanicsTable(Table, frozen=True):
-    """Screw and slide."""
-
-    travel_per_revolution: Length = required(
-        "lead of the screw: slide travel per motor turn", '"5 mm"', ge=1e-5, le=10.0
-    )
-    moving_mass: Mass = optional("slide with its load", 0.0, ge=0.0, le=1e5)
-    screw_inertia: Inertia = optional("screw and coupling", 0.0, ge=0.0, le=10.0)
-    start_position: Length = optional(
-        "where the slide stands at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
-    )
-    friction: FrictionTables
-
-
 class MethodTable(Table, frozen=True):
     """Choices and constants of the control."""
 
@@ -146,7 +130,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
     limits: LimitsTable
     motor: ServoMotorTable
     drive: DriveTable = Field(default_factory=DriveTable)
-    mechanics: MechanicsTable
+    mechanics: ScrewTable
     encoder: EncoderTable
     method: MethodTable = Field(default_factory=MethodTable)
     protection: MotionProtectionTable = Field(default_factory=MotionProtectionTable)
@@ -158,15 +142,9 @@ class FilteredServoSpec(AxisSpec, frozen=True):
         return self.mechanics.travel_per_revolution / (4 * self.encoder.cycles_per_revolution)
 
     @property
-    def radius(self) -> float:
-        """Travel per radian of the motor [m]."""
-        return self.mechanics.travel_per_revolution / (2 * math.pi)
-
-    @property
     def mass(self) -> float:
         """All that moves, at the slide [kg]."""
-        inertia = self.motor.rotor_inertia + self.mechanics.screw_inertia
-        return self.mechanics.moving_mass + inertia / self.radius**2
+        return self.mechanics.mass(self.motor)
 
     @property
     def force_per_count(self) -> float:
@@ -175,7 +153,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
         if self.drive.amplifier == "voltage":
             full = 1 << (self.drive.word_bits - 1)
             current = self.drive.supply / full / (self.motor.resistance + self.drive.bridge_resistance)
-        return current * self.motor.torque_constant / self.radius
+        return current * self.motor.torque_constant / self.mechanics.radius
 
     @property
     def gain(self) -> float:
@@ -189,7 +167,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
             return math.inf
         resistance = self.motor.resistance + self.drive.bridge_resistance
         damping = self.motor.torque_constant * self.motor.back_emf_constant / resistance
-        return self.mass * self.radius**2 / damping
+        return self.mass * self.mechanics.radius**2 / damping
 
     @property
     def word_limit(self) -> float:
@@ -220,11 +198,7 @@ class FilteredServoSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: FilteredServoSpec) -> FilteredServoSpec:
     """Fill the defaults that depend on another key, as their `derived` texts say."""
-    friction, mechanics, protection = spec.mechanics.friction, spec.mechanics, spec.protection
-    if math.isnan(mechanics.start_position):
-        mechanics = mechanics.model_copy(update={"start_position": 0.1 * spec.limits.travel})
-    if math.isnan(protection.stuck_effort):
-        static = max(friction.right.static, friction.left.static)
-        share = breaking_effort(static, spec.word_limit * spec.force_per_count)
-        protection = protection.model_copy(update={"stuck_effort": share})
-    return spec.model_copy(update={"mechanics": mechanics, "protection": protection})
+    friction = spec.mechanics.friction
+    static = max(friction.right.static, friction.left.static)
+    share = breaking_effort(static, spec.word_limit * spec.force_per_count)
+    return spec.filled(mechanics={"start_position": 0.1 * spec.limits.travel}, protection={"stuck_effort": share})

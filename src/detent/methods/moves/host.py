@@ -4,9 +4,10 @@ The place the axis stands at after power-on is known to the host (a home sensor 
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.moves.job import Move, MoveJob
@@ -27,14 +28,14 @@ class Destination:
     counts: int  # the same in counts of the axis from where it stood at power-on
 
 
-class Host(Protocol):
+class Host(ABC):
     """What each servo brings; the frame makes the moves of a job with it. What it leaves out has the default here."""
 
-    machine: Machine[Any, Any]
-    spec: Any
-    grid: float  # distance of two places at which it can stand [m]
-    tolerance: float  # error that counts as arrived [m]
-    home: float  # where it stands at power-on [m]
+    def __init__(self, spec: Any, machine: Machine[Any, Any], *, grid: float, tolerance: float, home: float) -> None:
+        self.spec, self.machine, self.controller = spec, machine, machine.state.controller
+        self.grid = grid  # distance of two places at which it can stand [m]
+        self.tolerance = tolerance  # error that counts as arrived [m]
+        self.home = home  # where it stands at power-on [m]
 
     def start(self) -> None:
         """Wait until the axis takes commands."""
@@ -50,17 +51,19 @@ class Host(Protocol):
         del to, asked
         return refused_words(move, problem, "this axis has one of its own")
 
+    @abstractmethod
     def command(self, to: Destination) -> None:
         """Begin the move."""
-        ...
 
+    @abstractmethod
     def time_limit(self, to: Destination) -> float:
         """Time after which a move that has not arrived has failed [s]."""
-        ...
 
     def wait(self, seconds: float) -> bool:
-        """Wait until it has arrived; False when it has not within `seconds`."""
-        ...
+        """Wait until it has arrived, which is the event of its controller; False when it has not within `seconds`."""
+        self.machine.pass_time(seconds)
+        arrived, self.controller.event = bool(self.controller.event), 0
+        return arrived
 
     def stands(self, dwell: float) -> None:
         """Let the axis stand [s]."""

@@ -6,7 +6,7 @@ It knows no method: what one shows of itself comes as a `MoveView`.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class ShownMove:
         return self.move.target - self.rows[POSITION]
 
 
-class MoveView(Protocol):
+class MoveView:
     """What a method shows of itself on the page of a list of moves. What it leaves out has the default here."""
 
     signals: ClassVar[Sequence[str]] = ()
@@ -79,39 +79,44 @@ class MoveView(Protocol):
     captions: ClassVar[tuple[str, str]] = ("", "")
     """What to look for in the whole move, and in the words at its end."""
 
+    def __init__(self, spec: Any) -> None:
+        self.spec = spec
+
     @property
     def name(self) -> str:
         """Name of the axis."""
-        ...
+        return self.spec.axis.name
 
     @property
     def unit(self) -> CountUnit:
         """The smallest way that the axis knows."""
-        ...
+        return CountUnit(self.spec.pulse, "pulse")
 
     @property
     def max_speed(self) -> float:
         """Limit of the axis [m/s]."""
-        ...
+        return self.spec.limits.speed
 
     def panels(self, shown: ShownMove) -> list[Panel]:
         """Plot areas of the whole move, ids "move-...", from top to bottom."""
-        ...
+        return [Panel(name="move-speed", label="speed [mm/s]", zero=True, curves=[true_speed(shown)])]
 
-    def bands(self, shown: ShownMove, /) -> list[Band]:
+    def bands(self, shown: ShownMove) -> list[Band]:
         """Stretches of the move with a ground of their own."""
         del shown
         return []
 
     def words(self, rows: Stretch) -> list[Curve]:
         """Words of the control [count] while it comes to rest."""
-        ...
+        del rows
+        return []
 
     def events(self, shown: ShownMove) -> dict[str, float]:
         """What happens in the move, and when [s]; NaN if it does not."""
-        ...
+        ready = shown.move.ready - shown.move.begin
+        return {"the host asks for the move": 0.0, "within the tolerance for good": shown.settled, "arrived": ready}
 
-    def text_figure(self, run: MoveRun, /) -> Figure | None:
+    def text_figure(self, run: MoveRun) -> Figure | None:
         """The text on paper, of an axis that prints."""
         del run
         return None
@@ -307,32 +312,6 @@ def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
 def true_speed(shown: ShownMove) -> Curve:
     """The curve that every picture of a move has."""
     return Curve(label="true speed", colour="speed", width=2, y=shown.rows[VELOCITY] * MM)
-
-
-@dataclass(frozen=True)
-class PlainView:
-    """What a method shows that has no more to say than its words: the speed, and when the move began and ended."""
-
-    name: str
-    unit: CountUnit
-    max_speed: float
-    signals: ClassVar[Sequence[str]] = ()
-    captions: ClassVar[tuple[str, str]] = ("", "")
-    bands, text_figure = MoveView.bands, MoveView.text_figure
-
-    def panels(self, shown: ShownMove) -> list[Panel]:
-        """The speed."""
-        return [Panel(name="move-speed", label="speed [mm/s]", zero=True, curves=[true_speed(shown)])]
-
-    def words(self, rows: Stretch) -> list[Curve]:
-        """None."""
-        del rows
-        return []
-
-    def events(self, shown: ShownMove) -> dict[str, float]:
-        """From the request to the arrival."""
-        ready = shown.move.ready - shown.move.begin
-        return {"the host asks for the move": 0.0, "within the tolerance for good": shown.settled, "arrived": ready}
 
 
 def drive_curve(words: Numbers) -> Curve:

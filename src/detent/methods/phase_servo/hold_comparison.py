@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from detent.axisfile.tables import PushTable
 from detent.methods.phase_servo.derive import Machine as Figures
-from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench, change_method
+from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
@@ -225,7 +225,7 @@ def _events(found: HoldComparison) -> list[Event]:
 def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> HoldComparison:
     """Record how the axis stands at its target, still and pushed, with and without dead band and integrator."""
     cases = len(STILL) + len(LOADED)
-    stopping = change_method(spec, stop_always_off=False)
+    stopping = spec.changed(method={"stop_always_off": False})
 
     def record(done: int, variant: Variant, disturbance: DisturbanceTable) -> HoldCase:
         """Tell the progress and record one variant."""
@@ -261,7 +261,7 @@ def _record(spec: PhaseServoSpec, variant: Variant, disturbance: DisturbanceTabl
     name, about, values = variant
     every = max(1, round(ROW_TIME / spec.tick))
     recorder = Recorder(PhaseServo, SIGNALS, every=every, period=spec.tick)
-    bench = PhaseBench(change_method(spec, **values), PITCHES, disturbance, recorder)
+    bench = PhaseBench(spec.changed(method=values), PITCHES, disturbance, recorder)
     arrived = _arrive(bench)
     bench.run_until(arrived + spec.method.stop_time + AFTER_STOP)
     bench.machine.close()

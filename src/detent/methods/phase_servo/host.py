@@ -5,7 +5,6 @@ import math
 from detent.axisfile.protection import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import AxisError, FileProblem
-from detent.kernel.loop import advance
 from detent.methods.moves.host import Destination, Host, Problem, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
@@ -28,18 +27,16 @@ def phase_servo_machine(
     """Phase servo at power-on."""
     p, r = build_phase_servo(spec), phase_servo.PhaseServo()
     phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
-    return Machine(p, r, Loop(spec.tick, advance), recorder)
+    return Machine(p, r, Loop(spec.tick), recorder)
 
 
 class PhaseHost(Host):
     """Host of a phase servo: set strobe with direction and distance, ready, stop."""
 
     def __init__(self, spec: PhaseServoSpec, recorder: AnyRecorder | None = None) -> None:
-        self.spec = spec
-        self.machine = phase_servo_machine(spec, recorder)
-        self.grid, self.tolerance = spec.pitch, 2 * spec.step
-        self.controller = self.machine.state.controller
-        self.home = round(spec.mechanics.start_position / spec.pitch) * spec.pitch
+        home = round(spec.mechanics.start_position / spec.pitch) * spec.pitch
+        machine = phase_servo_machine(spec, recorder)
+        super().__init__(spec, machine, grid=spec.pitch, tolerance=2 * spec.step, home=home)
         self._counts = 0
 
     def start(self) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from detent.axisfile.tables import BurstTable, InterferenceTable
 from detent.errors import DetentError
-from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench, change_method
+from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
@@ -167,7 +167,7 @@ def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress 
         raise DetentError(
             f"comparison of noise: came a move of {pitches} pitches; allowed: 1 to {most}; choose another"
         )
-    servos = [change_method(spec, final=final) for final in ("absolute", "incremental")]
+    servos = [spec.changed(method={"final": final}) for final in ("absolute", "incremental")]
     margin = spec.detector.counts // 2 - spec.method.threshold
     pulses = pulse_counts(margin)
     begin = _first_pulse(servos[0], pitches)

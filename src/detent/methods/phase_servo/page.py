@@ -1,24 +1,19 @@
 """What a phase servo shows on the page of a list of moves: its two modes, and the text that it prints."""
 
 import unicodedata
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from detent.control.phase_sequencer import POSITION_MODE
-from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, moves_page, true_speed
+from detent.methods.moves.page import MM, MoveView, ShownMove, drive_curve, true_speed
 from detent.methods.moves.run import MoveRun
-from detent.methods.moves.summary import move_summary
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.page.chart import Band, Curve, Panel, spans_of
 from detent.page.figure import Figure
-from detent.page.frame import Comparison, Page
 from detent.page.paper import Marks, paper_figure
 from detent.page.parts import INCH, Numbers
 from detent.page.run_page import Stretch
 from detent.page.words import CountUnit, count, number
-from detent.record.trace import Trace
 
 MODE, STOP = "controller.sequencer.mode", "controller.sequencer.stop"
 SETPOINT, SPEED = "controller.law.setpoint", "controller.speed.word"
@@ -39,45 +34,17 @@ AT_ITS_END = (
 )
 
 
-def phase_page(
-    spec: PhaseServoSpec,
-    run: MoveRun,
-    trace: Trace | None,
-    comparisons: Sequence[Comparison] = (),
-    settings: dict[str, str] | None = None,
-) -> Page:
-    """The page of a run."""
-    return moves_page(PhaseView(spec), run, trace, comparisons, settings)
-
-
-def phase_summary(spec: PhaseServoSpec, run: MoveRun) -> list[tuple[str, str]]:
-    """The figures of a run for the terminal."""
-    return move_summary(run, PhaseView(spec).unit)
-
-
-@dataclass(frozen=True, slots=True)
 class PhaseView(MoveView):
     """What this method shows of itself, see `moves.page.MoveView`."""
 
     spec: PhaseServoSpec
-
     signals = (MODE, STOP, SETPOINT, INTEGRAL, WORD, SPEED)
     captions = (IN_THE_MOVE, AT_ITS_END)
-
-    @property
-    def name(self) -> str:
-        """Name of the axis."""
-        return self.spec.axis.name
 
     @property
     def unit(self) -> CountUnit:
         """A step of the resolver."""
         return CountUnit(self.spec.step, "step")
-
-    @property
-    def max_speed(self) -> float:
-        """Limit of the axis [m/s]."""
-        return self.spec.limits.speed
 
     def panels(self, shown: ShownMove) -> list[Panel]:
         """Speed with what the table demands, way to go, drive word."""

@@ -26,11 +26,6 @@ LOOK = 1e-3
 UNDISTURBED = DisturbanceTable()
 
 
-def change_method(spec: PhaseServoSpec, **values: object) -> PhaseServoSpec:
-    """Axis with other values in its ``[method]`` table."""
-    return spec.model_copy(update={"method": spec.method.model_copy(update=values)})
-
-
 class PhaseBench:
     """An axis that stands at a positioning point, locked and ready, before a move by whole pitches."""
 
@@ -42,9 +37,11 @@ class PhaseBench:
         recorder: Recorder | None = None,
     ) -> None:
         begin = ROOM if pitches > 0 else ROOM - pitches
-        limits = spec.limits.model_copy(update={"travel": (abs(pitches) + 2 * ROOM) * spec.pitch})
-        mechanics = spec.mechanics.model_copy(update={"start_position": begin * spec.pitch})
-        self.spec = spec.model_copy(update={"limits": limits, "mechanics": mechanics, "disturbance": disturbance})
+        self.spec = spec.changed(
+            limits={"travel": (abs(pitches) + 2 * ROOM) * spec.pitch},
+            mechanics={"start_position": begin * spec.pitch},
+            disturbance=disturbance,
+        )
         self.pitches, self.target = pitches, (begin + pitches) * spec.pitch
         self.machine: Machine[PhaseServoParams, PhaseServo] = phase_servo_machine(self.spec, recorder)
         be_ready(self.machine.params, self.machine.state)

@@ -4,7 +4,7 @@ Sections in brackets are those of the phase-servo specification; a step is a pit
 """
 
 import math
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 from pydantic import Field
@@ -38,8 +38,6 @@ from detent.files.quantities import (
 
 TABLE_ENTRIES = 4096
 """Entries of the velocity table at most (`control.phase_sequencer`)."""
-
-TableT = TypeVar("TableT", bound=Table)
 
 Gain = Annotated[int, Ge(1), Le(1000)]
 
@@ -264,27 +262,14 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
     literal, travel = spec.clock.order == "literal", spec.limits.travel
     static = max(spec.mechanics.friction.right.static, spec.mechanics.friction.left.static)
     character = max(1, round(INCH / 10 / spec.pitch)) * spec.pitch
-    return spec.model_copy(
-        update={
-            "mechanics": _filled(spec.mechanics, start_position=0.1 * travel),
-            "detector": _filled(spec.detector, lag_counts=spec.detector.counts // 4 - 1),
-            "clock": _filled(spec.clock, integrate_tap=12 if literal else 13, sample_tap=13 if literal else 12),
-            "method": _filled(
-                spec.method,
-                speed_gains=[1, 1, 8] if literal else [1, 1, 16],
-                position_gains=[3, 6, 1] if literal else [4, 16, 1],
-            ),
-            "protection": _filled(spec.protection, stuck_effort=breaking_effort(static, spec.stall_force)),
-            "printing": _filled(spec.printing, left_margin=min(INCH, travel / 2), character_pitch=character),
-        }
+    return spec.filled(
+        mechanics={"start_position": 0.1 * travel},
+        detector={"lag_counts": spec.detector.counts // 4 - 1},
+        clock={"integrate_tap": 12 if literal else 13, "sample_tap": 13 if literal else 12},
+        method={
+            "speed_gains": [1, 1, 8] if literal else [1, 1, 16],
+            "position_gains": [3, 6, 1] if literal else [4, 16, 1],
+        },
+        protection={"stuck_effort": breaking_effort(static, spec.stall_force)},
+        printing={"left_margin": min(INCH, travel / 2), "character_pitch": character},
     )
-
-
-def _filled(table: TableT, **defaults: object) -> TableT:
-    """Copy of a table in which the keys that were left open have these values."""
-    return table.model_copy(update={key: value for key, value in defaults.items() if _is_open(getattr(table, key))})
-
-
-def _is_open(value: float | list[int]) -> bool:
-    """True for the marks of a default that is still to be made: no list, not a number, below 0."""
-    return not value if isinstance(value, list) else not value >= 0

@@ -1,13 +1,12 @@
-"""What an axis file of the bang-bang positioner may say."""
+"""What an axis file of the bang-bang positioner may say, and what follows from it."""
 
-import math
 from collections.abc import Iterator
 from typing import Literal
 
-from detent.axisfile.tables import AxisSpec, AxisTable, EncoderTable, FrictionTables, MotorTable
+from detent.axisfile.tables import AxisSpec, AxisTable, EncoderTable, MotorTable, ScrewTable
 from detent.files.fields import Table, optional, required
-from detent.files.findings import Contradiction, wrong
-from detent.files.quantities import Acceleration, Length, Mass, Time, Voltage
+from detent.files.findings import Contradiction, Derived, quantity_figure, wrong
+from detent.files.quantities import Acceleration, Length, Time, Voltage
 
 TICK = 1e-5
 
@@ -18,12 +17,6 @@ class BangBangAxisTable(AxisTable, frozen=True):
 
 class LimitsTable(Table, frozen=True):
     travel: Length = required("way of the slide", '"0.3 m"', gt=0.0)
-
-
-class MechanicsTable(Table, frozen=True):
-    lead: Length = required("slide travel per motor turn", '"5 mm"', gt=0.0)
-    mass: Mass = required("slide with its load", '"5 kg"', gt=0.0)
-    friction: FrictionTables
 
 
 class MethodTable(Table, frozen=True):
@@ -39,23 +32,27 @@ class BangBangSpec(AxisSpec, frozen=True):
     axis: BangBangAxisTable
     limits: LimitsTable
     motor: MotorTable
-    mechanics: MechanicsTable
+    mechanics: ScrewTable
     encoder: EncoderTable
     method: MethodTable
 
     @property
     def pulse(self) -> float:
-        return self.mechanics.lead / (4 * self.encoder.cycles_per_revolution)
-
-    @property
-    def radius(self) -> float:
-        return self.mechanics.lead / (2 * math.pi)
+        return self.mechanics.travel_per_revolution / (4 * self.encoder.cycles_per_revolution)
 
     @property
     def top_speed(self) -> float:
-        return self.method.supply / self.motor.back_emf_constant * self.radius
+        return self.method.supply / self.motor.back_emf_constant * self.mechanics.radius
+
+
+def fill(spec: BangBangSpec) -> BangBangSpec:
+    return spec.filled(mechanics={"start_position": 0.1 * spec.limits.travel})
 
 
 def countable(spec: BangBangSpec) -> Iterator[Contradiction]:
     if spec.top_speed * TICK > spec.pulse:
         yield wrong("encoder.cycles_per_revolution method.supply", "one edge in a tick at full speed", "lower supply")
+
+
+def derive(spec: BangBangSpec) -> Iterator[Derived]:
+    yield quantity_figure("top speed", spec.top_speed, "m/s", "supply over back-EMF constant")

@@ -4,7 +4,7 @@ from detent.kernel.loop import controls, ticks
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1
 from detent.kernel.step import hot_step
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
-from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
+from detent.sensing.encoder import Encoder, EncoderParams, follow
 from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.quadrature import Quadrature, count_edge
 
@@ -74,10 +74,7 @@ def control(p: ControllerParams, c: Controller, lines: Lines) -> None:
 @hot_step
 def move(p: PlantParams, tick: int, lines: Lines, plant: Plant) -> None:
     move_averaged(p.train, plant.train, lines.drive * p.supply, lines.drive * p.supply)
-    while plant.train.position >= plant.encoder.next_right:
-        pass_right(p.encoder, plant.encoder)
-    while plant.train.position < plant.encoder.next_left:
-        pass_left(p.encoder, plant.encoder)
+    follow(p.encoder, plant.encoder, plant.train.position)
     read_gauge(plant.gauge, tick, plant.train.position, plant.train.velocity)
 
 

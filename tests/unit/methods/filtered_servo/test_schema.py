@@ -58,9 +58,9 @@ def test_the_plant_of_the_specification(load_text, good_text):
 
 def test_the_slide_of_the_example_is_as_heavy_as_its_comment_says(load_text, good_text):
     spec = load_text(good_text).spec
-    assert spec.mechanics.moving_mass * spec.radius**2 == pytest.approx(100e-7, rel=1e-3)
+    assert spec.mechanics.moving_mass * spec.mechanics.radius**2 == pytest.approx(100e-7, rel=1e-3)
     friction = spec.mechanics.friction.right.coulomb
-    assert friction * spec.radius == pytest.approx(1.8e-3, rel=1e-3)
+    assert friction * spec.mechanics.radius == pytest.approx(1.8e-3, rel=1e-3)
     assert friction / spec.force_per_count == pytest.approx(1, abs=0.03)
 
 

@@ -9,11 +9,12 @@ import detent
 from detent.methods.load import load_spec
 from detent.methods.moves.job import MoveJob, text_job
 from detent.methods.moves.move_file import load_moves
-from detent.methods.moves.page import POSITION, TARGET, VELOCITY
+from detent.methods.moves.page import POSITION, TARGET, VELOCITY, moves_page
 from detent.methods.moves.run import MoveRun, run_moves
+from detent.methods.moves.summary import move_summary
 from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.phase_servo.method import SIGNALS
-from detent.methods.phase_servo.page import PhaseView, marks_of, phase_page, phase_summary
+from detent.methods.phase_servo.page import PhaseView, marks_of
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
 from detent.page.frame import Page
@@ -54,19 +55,19 @@ def test_what_is_drawn_is_what_is_recorded() -> None:
 
 
 def test_the_figures_of_a_whole_run(moves: Played) -> None:
-    page = phase_page(*moves, (), {"seed": "1"})
+    page = moves_page(PhaseView(moves[0]), *moves[1:], (), {"seed": "1"})
     assert [chart["id"] for chart in page.charts] == [
         "job", "rest", "move-speed", "move-to-go", "move-drive", "approach-place", "approach-words",
     ]  # fmt: skip
     assert (page.headline.level, page.settings, page.paper, list(page.notes)) == ("good", {"seed": "1"}, None, [])
-    assert dict(phase_summary(*moves[:2]))["moves"] == "10 of 10"
     unit = PhaseView(moves[0]).unit
+    assert dict(move_summary(moves[1], unit))["moves"] == "10 of 10"
     assert (unit.size, unit.words) == (moves[0].step, "steps")
 
 
 def test_the_job_follows_its_targets(moves: Played) -> None:
     spec, run, trace = moves
-    page = phase_page(spec, run, trace)
+    page = moves_page(PhaseView(spec), run, trace)
     t = np.array(chart_of(page, "job")["x"])
     place, target = (curve_of(page, "job", name) * 1e-3 for name in ("true position", "target"))
     for move in run.moves:
@@ -77,7 +78,7 @@ def test_the_job_follows_its_targets(moves: Played) -> None:
 
 def test_the_modes_divide_the_move(moves: Played) -> None:
     spec, run, trace = moves
-    page, move = phase_page(spec, run, trace), run.moves[2]
+    page, move = moves_page(PhaseView(spec), run, trace), run.moves[2]
     speed = chart_of(page, "move-speed")
     t, ((switch, end),) = np.array(speed["x"]) * 1e-3, np.array(speed["bands"][0]["spans"]) * 1e-3
     assert switch == pytest.approx(move.switched - move.begin, abs=1e-4)
@@ -101,7 +102,7 @@ def test_the_modes_divide_the_move(moves: Played) -> None:
 
 def test_what_happens_in_a_move_is_told_with_its_times(moves: Played) -> None:
     spec, run, trace = moves
-    figure = next(figure for figure in phase_page(spec, run, trace).figures if figure.events)
+    figure = next(figure for figure in moves_page(PhaseView(spec), run, trace).figures if figure.events)
     texts = [event.text.partition(":")[0] for event in figure.events]
     assert texts == ["set strobe", "8 steps to go", "within ±2 steps of the target for good", "ready", "stop"]
     times = [event.t for event in figure.events]
@@ -114,7 +115,7 @@ def test_the_move_that_stopped_a_pitch_off_is_shown() -> None:
         load_moves(detent.example("moves.csv")), "disturbance.lines.burst.kind=+", "disturbance.lines.burst.at=30 ms",
         "disturbance.lines.burst.count=30",
     )  # fmt: skip
-    page = phase_page(spec, run, trace)
+    page = moves_page(PhaseView(spec), run, trace)
     assert page.headline.level == "bad"
     figure = next(figure for figure in page.figures if figure.events)
     assert figure.title.startswith("Move 2, ")
@@ -150,7 +151,7 @@ def test_each_character_is_a_mark_where_the_carriage_stood() -> None:
     np.testing.assert_allclose(found.column, np.array([0, 1, 3, 0]) * INCH / 10, atol=1e-12)
     np.testing.assert_allclose(found.offset, [-move.error for move in run.moves], atol=1e-12)
     np.testing.assert_allclose(found.baseline, np.array([1, 1, 1, 3]) * INCH / 6)
-    page = phase_page(load_spec(detent.example("phase_servo.toml")), run, None)
+    page = moves_page(PhaseView(load_spec(detent.example("phase_servo.toml"))), run, None)
     assert page.paper is not None
     assert [line["text"] for line in page.paper["pages"][0]["lines"]] == ["abc", "d"]
 

@@ -5,7 +5,7 @@ from tests.phase_servo_rig import make_spec
 
 from detent.axisfile.tables import BurstTable, InterferenceTable
 from detent.control.phase_sequencer import HOLD, POSITION_MODE
-from detent.methods.phase_servo.phase_bench import START, PhaseBench, change_method
+from detent.methods.phase_servo.phase_bench import START, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable
 from detent.methods.phase_servo.system import PhaseServo
 from detent.record.recorder import Recorder
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.compiled
 
 def test_other_values_of_the_method_leave_the_axis_as_it_is():
     spec = make_spec()
-    changed = change_method(spec, final="incremental", threshold=6)
+    changed = spec.changed(method={"final": "incremental", "threshold": 6})
     assert (changed.method.final, changed.method.threshold) == ("incremental", 6)
     assert changed.model_copy(update={"method": spec.method}) == spec
     assert (spec.method.final, spec.method.threshold) == ("absolute", 8)
