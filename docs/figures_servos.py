@@ -264,9 +264,9 @@ def filter_answer() -> None:
 
 def model_of(spec: Any) -> Any:
     """The exact sampled-loop model of an axis."""
-    from detent.methods.filtered_servo.derive import Machine
+    from detent.methods.filtered_servo.derive import FilteredFigures
 
-    return Machine(spec).loop
+    return FilteredFigures(spec).loop
 
 
 def run_and_stop(seconds: float, rest: float, overrides: tuple[str, ...]) -> tuple[Any, Any]:

@@ -10,8 +10,7 @@ from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
 from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
 
-GUARD_PERIOD = 1e-3
-"""Time between two looks of the guard [s]."""
+GUARD_PERIOD = 1e-3  # time between two looks of the guard [s]
 
 
 def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:

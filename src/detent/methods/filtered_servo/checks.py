@@ -10,32 +10,23 @@ from collections.abc import Callable, Iterator
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies
-from detent.methods.filtered_servo.derive import Machine
+from detent.methods.filtered_servo.derive import FilteredFigures
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.units import format_quantity as text
 
-TICK = 1e-5
-"""Base tick [s] (`methods.filtered_servo.system`)."""
-
-CLOCK = 1e-6
-"""Clock of the decoder [s] (7)."""
-
-RATE_UNIT = 1e-6
-"""Rates of the command are whole multiples of this [pulses/s] (`control.pulse_generator`)."""
-
-FASTEST = 1e9
-"""Largest sum of the machine's rates [1/s]: a tick then takes 40 000 steps of the power series to prepare."""
+TICK = 1e-5  # base tick [s] (`methods.filtered_servo.system`)
+CLOCK = 1e-6  # clock of the decoder [s] (7)
+RATE_UNIT = 1e-6  # rates of the command are whole multiples of this [pulses/s] (`control.pulse_generator`)
+FASTEST = 1e9  # largest sum of the machine's rates [1/s]: a tick then takes 40 000 steps of the power series to prepare
 
 LARGEST_MOVE = 1e3
 """Pulses by which one count of drive may move the slide within a sample: a thousand times what any loop stands."""
 
-WIDEST_WORD = 2**31 - 1
-"""Largest magnitude of the filter's accumulator (32 bits)."""
+WIDEST_WORD = 2**31 - 1  # largest magnitude of the filter's accumulator (32 bits)
 
 LEAST_GAIN_MARGIN = 1.5
 
-LEAST_DAMPING = 0.25
-"""Damping ratio from which a stop rings out within two swings; A = 1/2 of trap 1 just has it."""
+LEAST_DAMPING = 0.25  # damping ratio from which a stop rings out within two swings; A = 1/2 of trap 1 just has it
 
 WELL_COUNTED = 5
 """Pulses in a sample at limits.speed below which the speed is hardly known: the example of the patent has 5."""
@@ -43,8 +34,7 @@ WELL_COUNTED = 5
 LARGEST_JUMP = 8.0
 """Counts of drive by which the uncertainty of one pulse may move the drive word: twice the conventional servo's."""
 
-SMALL_ERROR = 0.1
-"""Pulses of speed word by which a fixed-point filter may stick."""
+SMALL_ERROR = 0.1  # pulses of speed word by which a fixed-point filter may stick
 
 FINE_RAMP = 20
 """Units of its rate by which the command grows in a tick, from which rounding them down takes less than 5 %."""
@@ -192,12 +182,12 @@ RULES: tuple[Callable[[FilteredServoSpec], Iterator[Contradiction]], ...] = (
 
 def find_cautions(spec: FilteredServoSpec) -> Iterator[Caution]:
     """Look a filtered-servo axis over."""
-    machine = Machine(spec)
+    machine = FilteredFigures(spec)
     for look in (_loop, _resolution, _ramp, _drive, _acceleration, _rest, _amplifier):
         yield from look(machine)
 
 
-def _loop(m: Machine) -> Iterator[Caution]:
+def _loop(m: FilteredFigures) -> Iterator[Caution]:
     """The loop settles, and a stop does not ring."""
     margin, product = m.gain_margin, m.coefficient * m.spec.method.scale / m.spec.method.position_gain
     drive = "drive.supply" if m.spec.drive.amplifier == "voltage" else "drive.current_per_count"
@@ -224,7 +214,7 @@ def _loop(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _resolution(m: Machine) -> Iterator[Caution]:
+def _resolution(m: FilteredFigures) -> Iterator[Caution]:
     """A sample counts enough pulses, and one pulse more or less does little."""
     method, counted = m.spec.method, m.rate * m.spec.method.sample_period
     jump, lost = m.coefficient * method.scale, 1 / method.coefficient - 1
@@ -255,7 +245,7 @@ def _resolution(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _ramp(m: Machine) -> Iterator[Caution]:
+def _ramp(m: FilteredFigures) -> Iterator[Caution]:
     """The command's ramp is smooth, and the loop reaches limits.speed on it without a fault."""
     spec, method = m.spec, m.spec.method
     least, most = RATE_UNIT / TICK * spec.pulse, (1 << (method.position_bits - 1)) - 1
@@ -288,7 +278,7 @@ def _ramp(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _drive(m: Machine) -> Iterator[Caution]:
+def _drive(m: FilteredFigures) -> Iterator[Caution]:
     """The drive gives what the limits ask for."""
     spec, force, top = m.spec, m.spec.word_limit * m.spec.force_per_count, m.top_speed
     full = ((1 << (spec.drive.word_bits - 1)) - 1) * spec.force_per_count
@@ -311,7 +301,7 @@ def _drive(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _acceleration(m: Machine) -> Iterator[Caution]:
+def _acceleration(m: FilteredFigures) -> Iterator[Caution]:
     """At limits.speed there is force left for the command's acceleration."""
     spec = m.spec
     left = (spec.word_limit - spec.holding_word(spec.limits.speed)) * spec.force_per_count / spec.mass
@@ -325,7 +315,7 @@ def _acceleration(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _rest(m: Machine) -> Iterator[Caution]:
+def _rest(m: FilteredFigures) -> Iterator[Caution]:
     """Friction does not hold the slide outside its window."""
     error, window = m.resting_error, m.spec.method.in_position
     if error > window:
@@ -338,7 +328,7 @@ def _rest(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _amplifier(m: Machine) -> Iterator[Caution]:
+def _amplifier(m: FilteredFigures) -> Iterator[Caution]:
     """PWM and current follow the drive word within a sample, and the motor stands the current."""
     spec, drive, window = m.spec, m.spec.drive, m.spec.method.sample_period
     resistance = spec.motor.resistance + drive.bridge_resistance

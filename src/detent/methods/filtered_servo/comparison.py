@@ -18,7 +18,7 @@ from detent.analysis.arguments import require_positive
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.controller import acknowledge, go_to
-from detent.methods.filtered_servo.derive import Machine as Figures
+from detent.methods.filtered_servo.derive import FilteredFigures
 from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
@@ -31,94 +31,50 @@ from detent.record.recorder import Recorder, make_trace
 from detent.record.trace import Trace
 from detent.units import format_quantity
 
-RATE = 1037.0
-"""Rate of the specification [pulses/s]: not a whole number of pulses in a window of 5 ms."""
+RATE = 1037.0  # rate of the specification [pulses/s]: not a whole number of pulses in a window of 5 ms
 
 WINDOW = 20e-3
 """B TS of the worked example [s]. The times below are for it; an axis whose B TS is longer gets longer ones."""
 
-STEADY_TIME = 8.0
-"""Length of the run at constant rate [s]; figures are taken from its second half."""
+STEADY_TIME = 8.0  # length of the run at constant rate [s]; figures are taken from its second half
+RAMP = 1.0  # the command is at its rate after this time at the latest [s], whatever its acceleration
 
-RAMP = 1.0
-"""The command is at its rate after this time at the latest [s], whatever its acceleration."""
-
-STOP_AFTER = 2.0
-STOP_TIME = 2.0
-"""When the command stops, and how long the axis is watched after that [s]."""
-
-SHOWN = 10
-"""Length of the curves, in windows B TS."""
-
-LONGEST = 50.0
-"""Longest run, as a multiple of the times above."""
+STOP_AFTER = 2.0  # when the command stops [s]
+STOP_TIME = 2.0  # how long the axis is watched after that [s]
+SHOWN = 10  # length of the curves, in windows B TS
+LONGEST = 50.0  # longest run, as a multiple of the times above
 
 MOST_ROWS = 400_000
 
-SETTLED = 4
-"""An axis has settled when its following error swings by no more pulses in the last quarter after a stop."""
-
-WIDE_COUNTER = 16
-"""Width of the speed counter for the long window [bit]."""
-
-ENDLESS = 10**12
-"""Pulses that no run gets to the end of."""
+SETTLED = 4  # an axis has settled when its following error swings by no more pulses in the last quarter after a stop
+WIDE_COUNTER = 16  # width of the speed counter for the long window [bit]
+ENDLESS = 10**12  # pulses that no run gets to the end of
 
 Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FeedbackCase:
-    """One way to feed the counted speed back. Figures of a case that has failed with a fault are NaN.
+    """One way to feed the counted speed back. Figures of a case that has failed with a fault are NaN."""
 
-    Attributes
-    ----------
-    name : str
-        Such as "with filter".
-    sample_period : float
-        TS, window of the counter [s].
-    scale : int
-        B, multiplier of the count.
-    coefficient : float
-        A of the filter; 1 for none.
-    kv : float
-        Velocity-error constant K1/(B TS) [1/s].
-    std_speed, std_error : float
-        Standard deviation of the speed word y and of the error E at constant rate [count].
-    force_ripple : float
-        Standard deviation of the motor's force at constant rate [N].
-    error_range : (float, float)
-        Smallest and largest E at constant rate [count].
-    stop_overshoot : float
-        How far the axis runs beyond the place where the command has stopped [count]; NaN if it does not settle there.
-    stable : bool
-        It settles, and without a fault.
-    gain_limit : float
-        Gain K at which the loop becomes unstable, by the exact sampled-loop model [1/s^2]; infinite if there is none.
-    gain_margin : float
-        `gain_limit` over the gain of the axis.
-    t : ndarray, shape (n,)
-        Time since power-on [s]: the end of the run at constant rate.
-    error, speed_word : ndarray, shape (n,)
-        E and y [count].
-    """
-
-    name: str
-    sample_period: float
-    scale: int
-    coefficient: float
-    kv: float
-    std_speed: float
-    std_error: float
-    force_ripple: float
-    error_range: tuple[float, float]
+    name: str  #: such as "with filter"
+    sample_period: float  #: TS, window of the counter [s]
+    scale: int  #: B, multiplier of the count
+    coefficient: float  #: A of the filter; 1 for none
+    kv: float  #: velocity-error constant K1/(B TS) [1/s]
+    std_speed: float  #: standard deviation of the speed word y at constant rate [count]
+    std_error: float  #: the same of the error E [count]
+    force_ripple: float  #: standard deviation of the motor's force at constant rate [N]
+    error_range: tuple[float, float]  #: smallest and largest E at constant rate [count]
+    #: how far the axis runs beyond the place where the command has stopped [count]; NaN if it does not settle there
     stop_overshoot: float
-    stable: bool
+    stable: bool  #: it settles, and without a fault
+    #: gain K at which the loop becomes unstable, by the exact sampled-loop model [1/s^2]; infinite if there is none
     gain_limit: float
-    gain_margin: float
-    t: Numbers
-    error: Numbers
-    speed_word: Numbers
+    gain_margin: float  #: `gain_limit` over the gain of the axis
+    t: Numbers  #: time since power-on [s], at the end of the run at constant rate; shape (n,)
+    error: Numbers  #: E [count]; shape (n,)
+    speed_word: Numbers  #: y [count]; shape (n,)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
@@ -132,24 +88,12 @@ class FeedbackCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FeedbackComparison:
-    """Result of `compare_feedback`.
+    """Result of `compare_feedback`."""
 
-    Attributes
-    ----------
-    cases : tuple of FeedbackCase
-        Conventional, with filter, long window, small multiplier.
-    rate : float
-        Rate of the command pulses [1/s].
-    gain : float
-        K, drive word to acceleration [1/s^2].
-    tau_m : float
-        Mechanical time constant of back-EMF and viscous friction [s]; infinite without both.
-    """
-
-    cases: tuple[FeedbackCase, ...]
-    rate: float
-    gain: float
-    tau_m: float
+    cases: tuple[FeedbackCase, ...]  #: conventional, with filter, long window, small multiplier
+    rate: float  #: rate of the command pulses [1/s]
+    gain: float  #: K, drive word to acceleration [1/s^2]
+    tau_m: float  #: mechanical time constant of back-EMF and viscous friction [s]; infinite without both
 
     @property
     def table(self) -> TextTable:
@@ -272,7 +216,7 @@ def compare_feedback(
         if progress is not None:
             progress(len(cases) / len(variants), name)
         cases.append(_measure(name, variant, rate, stretch))
-    return FeedbackComparison(cases=tuple(cases), rate=rate, gain=spec.gain, tau_m=Figures(spec).tau_m)
+    return FeedbackComparison(cases=tuple(cases), rate=rate, gain=spec.gain, tau_m=FilteredFigures(spec).tau_m)
 
 
 def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredServoSpec]]:
@@ -294,7 +238,7 @@ def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) ->
     trace = _run_steadily(spec, rate, STEADY_TIME * stretch)
     overshoot = _stop(spec, rate, stretch)
     failed = not len(trace) or math.isnan(overshoot)
-    model = Figures(spec).loop
+    model = FilteredFigures(spec).loop
     limit = model.stability_limit()
     error, speed = trace["controller.deviation.error"], trace["controller.filter.output"]
     force = trace["plant.train.current"] * (spec.motor.torque_constant / spec.mechanics.radius)

@@ -32,11 +32,8 @@ from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_p
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, edge_direction, is_settled, preset_decoder
 from detent.sensing.speed_filter import SpeedFilter, SpeedFilterParams, filter_speed
 
-CLOCKS = 10
-"""Decoder clocks of 1 us in a tick."""
-
-LEVELS = (1 << CLOCKS) - 1
-"""A channel that is high in all clocks of a tick."""
+CLOCKS = 10  # decoder clocks of 1 us in a tick
+LEVELS = (1 << CLOCKS) - 1  # a channel that is high in all clocks of a tick
 
 
 class FilteredLines(Registers):

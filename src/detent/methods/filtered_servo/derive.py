@@ -17,14 +17,11 @@ if TYPE_CHECKING:
     from detent.analysis.sampled_loop import Response, SampledLoop
     from detent.analysis.transfer_function import ServoTransfer
 
-RAMP_WINDOWS = 2000
-"""Windows of a ramp that are computed at most: its beginning is forgotten by then."""
-
-SETTLING_WINDOWS = 200
-"""Windows after a ramp in which the largest count is looked for."""
+RAMP_WINDOWS = 2000  # windows of a ramp that are computed at most: its beginning is forgotten by then
+SETTLING_WINDOWS = 200  # windows after a ramp in which the largest count is looked for
 
 
-class Machine:
+class FilteredFigures:
     """The machine behind a specification, with the model of its loop."""
 
     def __init__(self, spec: FilteredServoSpec) -> None:
@@ -131,11 +128,11 @@ def damping_of(loop: "SampledLoop") -> float:
 
 def derive(spec: FilteredServoSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = Machine(spec)
+    machine = FilteredFigures(spec)
     return (*_scales(machine), *_drive(machine), *_speed(machine), *_filter(machine), *_loop(machine))
 
 
-def _scales(machine: Machine) -> Iterator[Derived]:
+def _scales(machine: FilteredFigures) -> Iterator[Derived]:
     """What a pulse is, and how many there are."""
     spec = machine.spec
     yield quantity_figure("pulse", spec.pulse, "m", "travel per revolution / (4 cycles per revolution)")
@@ -145,7 +142,7 @@ def _scales(machine: Machine) -> Iterator[Derived]:
     yield Derived("count at limits.speed", counted, "count", text, "pulse rate x TS, rounded up")
 
 
-def _drive(machine: Machine) -> Iterator[Derived]:
+def _drive(machine: FilteredFigures) -> Iterator[Derived]:
     """Forces, and the constants of the plant."""
     spec = machine.spec
     yield quantity_figure("moving mass", spec.mass, "kg", "slide + (rotor + screw) / r^2")
@@ -163,7 +160,7 @@ def _drive(machine: Machine) -> Iterator[Derived]:
     yield Derived("error at rest", error, "count", f"|P| up to {error}", formula)
 
 
-def _speed(machine: Machine) -> Iterator[Derived]:
+def _speed(machine: FilteredFigures) -> Iterator[Derived]:
     """The constants of 3.6: how the following error goes with speed."""
     spec, method = machine.spec, machine.spec.method
     yield quantity_figure("K2", machine.transfer.speed_gain, "s", "B x TS")
@@ -176,7 +173,7 @@ def _speed(machine: Machine) -> Iterator[Derived]:
     yield Derived("following error at limits.speed", error, "count", text, formula)
 
 
-def _filter(machine: Machine) -> Iterator[Derived]:
+def _filter(machine: FilteredFigures) -> Iterator[Derived]:
     """The filter alone (3.4)."""
     from detent.analysis.first_order_filter import cutoff_hz, equivalent_time_constant, noise_gain
 
@@ -196,7 +193,7 @@ def _filter(machine: Machine) -> Iterator[Derived]:
     yield Derived("noise gain of the filter", gain, "", f"{gain:.3g}", "sqrt(A / (2 - A))")
 
 
-def _loop(machine: Machine) -> Iterator[Derived]:
+def _loop(machine: FilteredFigures) -> Iterator[Derived]:
     """How the loop settles (3.6, 3.7)."""
     spec, transfer = machine.spec, machine.transfer
     stiffness = spec.gain * spec.method.sample_period**2

@@ -28,8 +28,7 @@ from detent.plant.drive_train import DriveTrain
 from detent.sensing.encoder import stand_at
 from detent.sensing.interference import start_interference
 
-TICK = 10 * 1e-6
-"""Base tick [s]."""
+TICK = 10 * 1e-6  # base tick [s]
 
 
 class FilteredServoParams(Registers):

@@ -27,8 +27,7 @@ AnyRow = TypeVar("AnyRow", bound=Row)
 MOST_MOVES = 100_000
 """Moves of a job at most, repeats counted: hours of any axis, and still a job that fits into a report."""
 
-TAB_WIDTH = 8
-"""Characters between the tab stops of plain text."""
+TAB_WIDTH = 8  # characters between the tab stops of plain text
 
 # A form feed brings another sheet under the hammer: to the carriage that is the beginning of a line, like the others.
 _LINE_BEGINS = {"\n", "\r", "\f"}
@@ -58,40 +57,20 @@ class MoveFile(Table, Generic[AnyRow], frozen=True):
 class Move:
     """One move of an axis, and how long the axis stands after it.
 
-    Attributes
-    ----------
-    number : int
-        Counted from 1 through the whole job, repeats counted.
-    row : int
-        Line of the file that asks for the move, from 1.
-    target : float or None
-        Where to [m].
-    by : float or None
-        How far from where the move before went to [m], positive in the positive direction of the axis. Exactly one of
-        `target` and `by` is given.
-    dwell : float
-        Time the axis stands after it is ready [s], 0 or more.
-    speed : float or None
-        Speed of this move [m/s], above 0; None for the axis's own.
-    sample_period : float or None
-        Sample period of the servo during this move [s], above 0; None for the axis's own.
-    label : str
-        What the move is for: the character, in a text.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above, or not finite.
+    A value that is outside what is said here, or not finite, is a `DetentError`.
     """
 
-    number: int
-    row: int
-    target: float | None = None
+    number: int  #: counted from 1 through the whole job, repeats counted
+    row: int  #: line of the file that asks for the move, from 1
+    target: float | None = None  #: where to [m]
+    #: how far from where the move before went to [m], positive in the positive direction of the axis. Exactly one of
+    #: `target` and `by` is given
     by: float | None = None
-    dwell: float = 0.0
-    speed: float | None = None
+    dwell: float = 0.0  #: time the axis stands after it is ready [s], 0 or more
+    speed: float | None = None  #: speed of this move [m/s], above 0; None for the axis's own
+    #: sample period of the servo during this move [s], above 0; None for the axis's own
     sample_period: float | None = None
-    label: str = ""
+    label: str = ""  #: what the move is for, in a text the character
 
     def __post_init__(self) -> None:
         """Refuse what no axis could do."""
@@ -101,21 +80,11 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class MoveJob:
-    """A list of moves.
+    """A list of moves."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the file, without its folders.
-    kind : str
-        "moves", or "text" where each move is a character.
-    moves : tuple of Move
-        In order, numbered from 1; repeats are written out.
-    """
-
-    name: str
-    kind: str
-    moves: tuple[Move, ...]
+    name: str  #: name of the file, without its folders
+    kind: str  #: "moves", or "text" where each move is a character
+    moves: tuple[Move, ...]  #: in order, numbered from 1; repeats are written out
 
     @property
     def count(self) -> int:

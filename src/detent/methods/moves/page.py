@@ -39,14 +39,9 @@ from detent.record.trace import Trace
 POSITION, VELOCITY, TARGET = "plant.train.position", "plant.train.velocity", "plant.gauge.target"
 """Signals that every axis of moves records."""
 
-FEWEST_MOVES = 5
-"""Moves below which a histogram says less than the table."""
-
-FINEST_BAR = 0.1
-"""Narrowest bar of the histogram [µm]."""
-
-CLOSE = 5
-"""The approach begins where this many tolerances are left to the target."""
+FEWEST_MOVES = 5  # moves below which a histogram says less than the table
+FINEST_BAR = 0.1  # narrowest bar of the histogram [µm]
+CLOSE = 5  # the approach begins where this many tolerances are left to the target
 
 MM, UM = 1e3, 1e6
 

@@ -15,46 +15,20 @@ from detent.units import format_quantity
 
 @dataclass(frozen=True, slots=True)
 class MoveRecord:
-    """How one move went; lengths in metres, times in seconds since power-on.
+    """How one move went; lengths in metres, times in seconds since power-on."""
 
-    Attributes
-    ----------
-    number : int
-        From 1.
-    label : str
-        The character, in a text.
-    begin : float
-        When it was commanded.
-    start, target : float
-        Where the axis stood, and where it had to go.
-    switched : float
-        When position mode was entered; NaN for an axis of one mode.
-    ready : float
-        When the axis said that it had arrived.
-    settled : float
-        When it was outside the tolerance for the last time.
-    end : float
-        End of the dwell.
-    overshoot : float
-        How far it went beyond the target, 0 if it did not.
-    error : float
-        Target less position at the end of the dwell.
-    peak_speed : float
-        Largest speed [m/s].
-    """
-
-    number: int
-    label: str
-    begin: float
-    start: float
-    target: float
-    switched: float
-    ready: float
-    settled: float
-    end: float
-    overshoot: float
-    error: float
-    peak_speed: float
+    number: int  #: from 1
+    label: str  #: the character, in a text
+    begin: float  #: when it was commanded
+    start: float  #: where the axis stood
+    target: float  #: where it had to go
+    switched: float  #: when position mode was entered; NaN for an axis of one mode
+    ready: float  #: when the axis said that it had arrived
+    settled: float  #: when it was outside the tolerance for the last time
+    end: float  #: end of the dwell
+    overshoot: float  #: how far it went beyond the target, 0 if it did not
+    error: float  #: target less position at the end of the dwell
+    peak_speed: float  #: largest speed [m/s]
 
     @property
     def move_time(self) -> float:
@@ -66,27 +40,16 @@ class MoveRecord:
 class MoveRun(RunRecord[MoveJob]):
     """Outcome of a list of moves. Times [s], lengths [m], current [A], energy [J].
 
-    Attributes
-    ----------
-    done : bool
-        Every move arrived and stood within the tolerance.
-    failure : str
-        Why not, and what to do; empty if `done`.
-    time_ready, time_end : float
-        First readiness and end of the job, since power-on.
-    moves : list of MoveRecord
-        Moves made, in order.
-    tolerance, grid : float
-        Distance that counts as arrived; step of the positions the axis can be sent to.
-    faults : dict
-        Pulses put in and taken away, samples lost and corrupted by interference.
+    Also `done`: every move arrived and stood within the tolerance; `failure`: why not, and what to do, empty if `done`;
+    `time_ready` and `time_end`: first readiness and end of the job, since power-on.
     """
 
-    moves: list[MoveRecord] = field(default_factory=list[MoveRecord])
-    tolerance: float = 0.0
-    grid: float = 0.0
+    moves: list[MoveRecord] = field(default_factory=list[MoveRecord])  #: moves made, in order
+    tolerance: float = 0.0  #: distance that counts as arrived
+    grid: float = 0.0  #: step of the positions the axis can be sent to
     peak_current: float = 0.0
     energy: float = 0.0
+    #: pulses put in and taken away, samples lost and corrupted by interference
     faults: dict[str, int] = field(default_factory=dict[str, int])
 
     told: ClassVar[tuple[str, ...]] = (

@@ -9,8 +9,7 @@ from detent.methods.moves.run import MoveRecord, MoveRun
 from detent.page.run_page import Worst, median_of, worst
 from detent.page.words import GAP, CountUnit, count, duration, length, milliseconds, number
 
-SOONEST = 1e-6
-"""An axis that says so by less than this before it is within the tolerance says so in time [s]."""
+SOONEST = 1e-6  # an axis that says so by less than this before it is within the tolerance says so in time [s]
 
 FAULT_WORDS = {
     "inserted": ("pulse put in", "pulses put in"),

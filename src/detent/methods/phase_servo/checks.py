@@ -9,31 +9,18 @@ from collections.abc import Callable, Iterator
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies, at_most, put
-from detent.methods.phase_servo.derive import Machine
+from detent.methods.phase_servo.derive import PhaseFigures
 from detent.methods.phase_servo.detector import JITTER_PEAK, edge_separation
 from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
 from detent.units import format_quantity as text
 
-LONGEST_DISTANCE = 65535
-"""Longest distance that the command counter holds [steps] (16 bits, 7)."""
-
-WIDEST_SUM = 2**31 - 1
-"""Largest sum of the arithmetic unit, which works with 32 bits."""
-
-LONGEST_SUBSTEP = 1e-5
-"""Longest step of the power series that makes the matrices of a tick [s] (`build.SUBSTEP`)."""
-
-SERIES_SHARE = 0.25
-"""Largest step of the power series, as a share of the fastest time constant (`plant.drive_train`)."""
-
-PWM_RATIO = 20
-"""PWM frequency over electrical corner from which the ripple of the current is small (7)."""
-
-OVERSHOOT = 4
-"""Counts by which the speed may pass the velocity table after the acceleration (test 24)."""
-
-CURRENT_STEP = 0.02
-"""Share of the current limit by which the current may pass it before the comparator is asked again."""
+LONGEST_DISTANCE = 65535  # longest distance that the command counter holds [steps] (16 bits, 7)
+WIDEST_SUM = 2**31 - 1  # largest sum of the arithmetic unit, which works with 32 bits
+LONGEST_SUBSTEP = 1e-5  # longest step of the power series that makes the matrices of a tick [s] (`build.SUBSTEP`)
+SERIES_SHARE = 0.25  # largest step of the power series, as a share of the fastest time constant (`plant.drive_train`)
+PWM_RATIO = 20  # PWM frequency over electrical corner from which the ripple of the current is small (7)
+OVERSHOOT = 4  # counts by which the speed may pass the velocity table after the acceleration (test 24)
+CURRENT_STEP = 0.02  # share of the current limit by which the current may pass it before the comparator is asked again
 
 LEAST_GAIN_MARGIN = 1.5
 
@@ -205,7 +192,7 @@ def _edges(spec: PhaseServoSpec) -> Iterator[Contradiction]:
 
 def _machine(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     """Motor, friction and disturbances can be simulated."""
-    m, friction = Machine(spec), spec.mechanics.friction
+    m, friction = PhaseFigures(spec), spec.mechanics.friction
     plant = common.Plant(m.resistance, spec.motor.inductance, m.force_per_ampere * m.volts_per_speed / m.mass, m.mass)
     yield from common.time_constants(plant, friction, SERIES_SHARE / min(spec.tick, LONGEST_SUBSTEP))
     yield from common.static_friction(common.sides(friction))
@@ -231,12 +218,12 @@ RULES: tuple[Callable[[PhaseServoSpec], Iterator[Contradiction]], ...] = (
 
 def find_cautions(spec: PhaseServoSpec) -> Iterator[Caution]:
     """Look a phase-servo axis over."""
-    machine = Machine(spec)
+    machine = PhaseFigures(spec)
     for look in (_current, _force, _end_of_move, _speed, _settling, _integral, _detector, _burst):
         yield from look(machine)
 
 
-def _current(m: Machine) -> Iterator[Caution]:
+def _current(m: PhaseFigures) -> Iterator[Caution]:
     """PWM, comparator and supply keep the current near its limit."""
     ratio, step, limit, stall = m.pwm_hz / m.corner_hz, m.current_per_tick, m.spec.limits.effort, m.stall_current
     if ratio <= PWM_RATIO:
@@ -268,7 +255,7 @@ def _current(m: Machine) -> Iterator[Caution]:
     yield from common.overheating("current limit", min(limit, stall), most, lower)
 
 
-def _force(m: Machine) -> Iterator[Caution]:
+def _force(m: PhaseFigures) -> Iterator[Caution]:
     """The force follows the velocity table."""
     asked, available = m.spec.method.table_acceleration, m.acceleration
     if asked >= available:
@@ -282,7 +269,7 @@ def _force(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _end_of_move(m: Machine) -> Iterator[Caution]:
+def _end_of_move(m: PhaseFigures) -> Iterator[Caution]:
     """From the change of mode the carriage can stop, and stands when it says that it is ready."""
     ready, available = m.spec.method.ready_time, m.acceleration
     if m.switch_deceleration >= available > 0:
@@ -304,7 +291,7 @@ def _end_of_move(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _speed(m: Machine) -> Iterator[Caution]:
+def _speed(m: PhaseFigures) -> Iterator[Caution]:
     """The supply is enough for the peak speed; tracker and speed word hold a little more than that."""
     spec, top, most = m.spec, m.top_speed, (1 << (m.spec.method.speed_bits - 1)) - 1
     reached = spec.peak_count + OVERSHOOT
@@ -342,7 +329,7 @@ def _speed(m: Machine) -> Iterator[Caution]:
             )
 
 
-def _settling(m: Machine) -> Iterator[Caution]:
+def _settling(m: PhaseFigures) -> Iterator[Caution]:
     """The position loop settles, and friction does not hold it off."""
     k1, k2, k3 = m.spec.method.position_gains
     rest = m.breakaway_counts / (k1 * k3)
@@ -364,7 +351,7 @@ def _settling(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _integral(m: Machine) -> Iterator[Caution]:
+def _integral(m: PhaseFigures) -> Iterator[Caution]:
     """The integral is slow enough, comes to rest and is strong enough."""
     method, clock, k3 = m.spec.method, m.spec.clock, m.spec.method.position_gains[2]
     if not method.integrator or method.stop_always_off:
@@ -396,7 +383,7 @@ def _integral(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _detector(m: Machine) -> Iterator[Caution]:
+def _detector(m: PhaseFigures) -> Iterator[Caution]:
     """The detector is aligned and quiet."""
     spec, table = m.spec, m.spec.detector
     n, lag = table.counts, table.lag_counts
@@ -422,7 +409,7 @@ def _detector(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _burst(m: Machine) -> Iterator[Caution]:
+def _burst(m: PhaseFigures) -> Iterator[Caution]:
     """Pulses of the disturbances are no more than the protection is said to stand."""
     spec, lines, expected = m.spec, m.spec.disturbance.lines, m.spec.method.expected_spurious
     longest = spec.limits.travel / m.peak_speed + m.peak_speed / spec.method.table_acceleration

@@ -6,6 +6,7 @@ the velocity table; sections are those of the phase-servo specification.
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -17,140 +18,69 @@ STIFFEST = 1e3
 """Steps per sample that a step of error may be worth for the exact model of the loop to be worth its numbers."""
 
 
-class Machine:
+class PhaseFigures:
     """The machine behind a specification, in the units of its logic."""
 
     def __init__(self, spec: PhaseServoSpec) -> None:
-        motor, mechanics, friction = spec.motor, spec.mechanics, spec.mechanics.friction
+        motor, mechanics, friction, drive = spec.motor, spec.mechanics, spec.mechanics.friction, spec.drive
         self.spec = spec
         self.radius = mechanics.pulley_circumference / (2 * math.pi)
-        self.resistance = motor.resistance + spec.drive.bridge_resistance
+        self.resistance = motor.resistance + drive.bridge_resistance
         self.mass = mechanics.carriage_mass + (motor.rotor_inertia + mechanics.pulley_inertia) / self.radius**2
         self.force_per_ampere = motor.torque_constant / self.radius
         self.volts_per_speed = motor.back_emf_constant / self.radius
         self.coulomb = max(friction.right.coulomb, friction.left.coulomb)
         self.static = max(friction.right.static, friction.left.static)
         # One count of the drive word changes the mean of a sawtooth between -ES and +ES by this (3.9).
-        self.volts_per_count = 2 * spec.drive.supply / (1 << spec.drive.pwm_bits)
+        self.volts_per_count = 2 * drive.supply / (1 << drive.pwm_bits)
+        # Drive word that breaks the carriage loose [counts].
+        self.breakaway_counts = self.static / self.force_per_ampere * self.resistance / self.volts_per_count
+        self.pwm_hz = spec.clock.oscillator / (1 << drive.pwm_bits)  # frequency of the sawtooth [Hz]
+        self.corner_hz = self.resistance / (2 * math.pi * motor.inductance)  # electrical corner R/(2 pi L) [Hz]
+        self.stall_current = drive.supply / self.resistance  # of one side of the supply at standstill [A]
+        # Largest change of the current within a tick [A]: full supply and back-EMF together on the winding.
+        self.current_per_tick = (drive.supply + self.volts_per_speed * spec.limits.speed) / motor.inductance * spec.tick
+        # Largest force at standstill [N]: that of the current limit, or of the stall current if that is less.
+        self.force_limit = min(spec.limits.effort, self.stall_current) * self.force_per_ampere
+        # What the largest force does against friction [m/s^2]; below 0 if it does not overcome it.
+        self.acceleration = (self.force_limit - self.coulomb) / self.mass
+        # Speed at which back-EMF and friction take all of the supply [m/s]; below 0 if friction alone does.
+        self.top_speed = (drive.supply - self.coulomb / self.force_per_ampere * self.resistance) / self.volts_per_speed
+        self._fill_motion(spec)
+        self._fill_loops(spec)
+
+    def _fill_motion(self, spec: PhaseServoSpec) -> None:
+        """What the counters make of speeds, and the end of a move."""
+        self.speed_per_count = spec.step / spec.sample_period  # one pulse per sample [m/s]
+        self.peak_speed = spec.peak_count * self.speed_per_count  # largest velocity of the table [m/s]
+        # Fastest motion to the right and to the left that the tracker follows [m/s] (3.4); guaranteed is the latter.
+        self.slew_forward = spec.step / spec.tick / (spec.detector.counts - 1)
+        self.slew_backward = spec.step / spec.tick / (spec.detector.counts + 1)
+        # Speed at the change of mode [m/s]: the entry before it, and half a count that the speed word cannot tell.
+        self.switch_speed = (spec.table_velocity(spec.method.threshold + 1) + 0.5) * self.speed_per_count
+        self.switch_distance = spec.method.threshold * spec.step  # way that is left then [m]
+        self.switch_deceleration = self.switch_speed**2 / (2 * self.switch_distance)  # even, to the target [m/s^2]
+        self.switch_time = 2 * self.switch_distance / self.switch_speed  # of that deceleration [s]
+
+    def _fill_loops(self, spec: PhaseServoSpec) -> None:
+        """Both loops, without the delay of the sample."""
+        (_, speed_k2, speed_k3), (k1, k2, k3) = spec.method.speed_gains, spec.method.position_gains
+        friction, window = spec.mechanics.friction, spec.sample_period
+        # Acceleration per count of the drive word [steps/s^2].
+        self.gain = self.volts_per_count / self.resistance * self.force_per_ampere / self.mass / spec.step
+        # Rate at which back-EMF and viscous friction alone bring the carriage to rest [1/s].
+        viscous = min(friction.right.viscous, friction.left.viscous)
+        self.decay = (self.force_per_ampere * self.volts_per_speed / self.resistance + viscous) / self.mass
+        self.velocity_loop = speed_k2 * speed_k3 * self.gain * window  # bandwidth in speed mode [rad/s]
+        self.position_loop = math.sqrt(k1 * k3 * self.gain)  # natural frequency in position mode [rad/s]
+        self.damping = (k2 * k3 * self.gain * window + self.decay) / (2 * self.position_loop)  # ratio in position mode
+        # Steps by which a running integral moves the carriage within 1 rad of the position loop.
+        self.integral_rate = spec.clock.oscillator / 2**spec.clock.integrate_tap / k1 / self.position_loop
 
     @property
-    def pwm_hz(self) -> float:
-        """Frequency of the sawtooth [Hz]."""
-        return self.spec.clock.oscillator / (1 << self.spec.drive.pwm_bits)
-
-    @property
-    def corner_hz(self) -> float:
-        """Electrical corner R/(2 pi L) [Hz]."""
-        return self.resistance / (2 * math.pi * self.spec.motor.inductance)
-
-    @property
-    def stall_current(self) -> float:
-        """Current of one side of the supply at standstill [A]."""
-        return self.spec.drive.supply / self.resistance
-
-    @property
-    def force_limit(self) -> float:
-        """Largest force at standstill [N]: that of the current limit, or of the stall current if that is less."""
-        return min(self.spec.limits.effort, self.stall_current) * self.force_per_ampere
-
-    @property
-    def current_per_tick(self) -> float:
-        """Largest change of the current within a tick [A]: full supply and back-EMF together on the winding."""
-        volts = self.spec.drive.supply + self.volts_per_speed * self.spec.limits.speed
-        return volts / self.spec.motor.inductance * self.spec.tick
-
-    @property
-    def speed_per_count(self) -> float:
-        """Speed of one pulse per sample [m/s]."""
-        return self.spec.step / self.spec.sample_period
-
-    @property
-    def peak_speed(self) -> float:
-        """Largest velocity of the table [m/s]."""
-        return self.spec.peak_count * self.speed_per_count
-
-    @property
-    def slew_forward(self) -> float:
-        """Fastest motion to the right that the tracker follows [m/s] (3.4)."""
-        return self.spec.step / self.spec.tick / (self.spec.detector.counts - 1)
-
-    @property
-    def slew_backward(self) -> float:
-        """Fastest motion to the left that the tracker follows [m/s]; guaranteed both ways."""
-        return self.spec.step / self.spec.tick / (self.spec.detector.counts + 1)
-
-    @cached_property
     def peak_distance(self) -> int:
         """Smallest distance at which the table is at its peak [steps]."""
-        low, high = 0, TABLE_ENTRIES - 1
-        while low < high:
-            middle = (low + high) // 2
-            low, high = (
-                (low, middle) if self.spec.table_velocity(middle) >= self.spec.peak_count else (middle + 1, high)
-            )
-        return low
-
-    @property
-    def acceleration(self) -> float:
-        """What the largest force does against friction [m/s^2]; below 0 if it does not overcome it."""
-        return (self.force_limit - self.coulomb) / self.mass
-
-    @property
-    def top_speed(self) -> float:
-        """Speed at which back-EMF and friction take all of the supply [m/s]; below 0 if friction alone does."""
-        left = self.spec.drive.supply - self.coulomb / self.force_per_ampere * self.resistance
-        return left / self.volts_per_speed
-
-    @property
-    def switch_speed(self) -> float:
-        """Speed at the change of mode [m/s]: the entry before it, and half a count that the speed word cannot tell."""
-        return (self.spec.table_velocity(self.spec.method.threshold + 1) + 0.5) * self.speed_per_count
-
-    @property
-    def switch_distance(self) -> float:
-        """Way that is left at the change of mode [m]."""
-        return self.spec.method.threshold * self.spec.step
-
-    @property
-    def switch_deceleration(self) -> float:
-        """Even deceleration from there to the target [m/s^2]."""
-        return self.switch_speed**2 / (2 * self.switch_distance)
-
-    @property
-    def switch_time(self) -> float:
-        """Time of that deceleration [s]."""
-        return 2 * self.switch_distance / self.switch_speed
-
-    @property
-    def gain(self) -> float:
-        """Acceleration per count of the drive word [steps/s^2]."""
-        return self.volts_per_count / self.resistance * self.force_per_ampere / self.mass / self.spec.step
-
-    @property
-    def decay(self) -> float:
-        """Rate at which back-EMF and viscous friction alone bring the carriage to rest [1/s]."""
-        friction = self.spec.mechanics.friction
-        viscous = min(friction.right.viscous, friction.left.viscous)
-        return (self.force_per_ampere * self.volts_per_speed / self.resistance + viscous) / self.mass
-
-    @property
-    def velocity_loop(self) -> float:
-        """Bandwidth in speed mode [rad/s], without the delay of the sample."""
-        _, k2, k3 = self.spec.method.speed_gains
-        return k2 * k3 * self.gain * self.spec.sample_period
-
-    @property
-    def position_loop(self) -> float:
-        """Natural frequency in position mode [rad/s], without the delay of the sample."""
-        k1, _, k3 = self.spec.method.position_gains
-        return math.sqrt(k1 * k3 * self.gain)
-
-    @property
-    def damping(self) -> float:
-        """Damping ratio in position mode, without the delay of the sample."""
-        _, k2, k3 = self.spec.method.position_gains
-        rate = k2 * k3 * self.gain * self.spec.sample_period + self.decay
-        return rate / (2 * self.position_loop)
+        return bisect_left(range(TABLE_ENTRIES - 1), self.spec.peak_count, key=self.spec.table_velocity)
 
     @cached_property
     def gain_margin(self) -> float:
@@ -165,22 +95,10 @@ class Machine:
         loop = SampledLoop(gain=gain, sample_period=window, scale=k2, position_gain=k1, tau_m=1 / self.decay)
         return loop.stability_limit() / gain
 
-    @property
-    def breakaway_counts(self) -> float:
-        """Drive word that breaks the carriage loose [counts]."""
-        return self.static / self.force_per_ampere * self.resistance / self.volts_per_count
-
-    @property
-    def integral_rate(self) -> float:
-        """Steps by which a running integral moves the carriage within 1 rad of the position loop."""
-        clock = self.spec.clock
-        per_second = clock.oscillator / 2**clock.integrate_tap
-        return per_second / self.spec.method.position_gains[0] / self.position_loop
-
 
 def derive(spec: PhaseServoSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = Machine(spec)
+    machine = PhaseFigures(spec)
     return (*_scales(machine), *_tracker(machine), *_table(machine), *_motor(machine), *_loops(machine))
 
 
@@ -189,7 +107,7 @@ def _speed(name: str, value: float, formula: str, step: float) -> Derived:
     return Derived(name, value, "m/s", text, formula)
 
 
-def _scales(machine: Machine) -> Iterator[Derived]:
+def _scales(machine: PhaseFigures) -> Iterator[Derived]:
     """Lengths, clocks, and what one count of each word is."""
     spec = machine.spec
     yield quantity_figure("pitch", spec.pitch, "m", "pulley circumference / pitches per revolution")
@@ -205,7 +123,7 @@ def _scales(machine: Machine) -> Iterator[Derived]:
     yield _speed("one count of the speed word", machine.speed_per_count, "step / Tv", spec.step)
 
 
-def _tracker(machine: Machine) -> Iterator[Derived]:
+def _tracker(machine: PhaseFigures) -> Iterator[Derived]:
     """How fast the carriage may be, and how far it may go."""
     spec = machine.spec
     yield _speed("slew limit, right", machine.slew_forward, "f / (N - 1) steps/s", spec.step)
@@ -222,7 +140,7 @@ def _tracker(machine: Machine) -> Iterator[Derived]:
     yield Derived("spurious pulses it stands", spare, "count", f"up to {spare} in a move", "below N/2 - threshold")
 
 
-def _table(machine: Machine) -> Iterator[Derived]:
+def _table(machine: PhaseFigures) -> Iterator[Derived]:
     """The velocity table and what happens at its end."""
     spec = machine.spec
     distance = machine.peak_distance
@@ -238,7 +156,7 @@ def _table(machine: Machine) -> Iterator[Derived]:
     yield quantity_figure("time from there", machine.switch_time, "s", f"2 x {way} / v, braking evenly")
 
 
-def _motor(machine: Machine) -> Iterator[Derived]:
+def _motor(machine: PhaseFigures) -> Iterator[Derived]:
     """Forces, voltages, and how fast things happen."""
     supply, resistance = machine.spec.drive.supply, machine.resistance
     yield quantity_figure("moving mass", machine.mass, "kg", "carriage + (rotor + pulley) / r^2")
@@ -255,7 +173,7 @@ def _motor(machine: Machine) -> Iterator[Derived]:
     yield Derived("PWM frequency", machine.pwm_hz, "Hz", text, formula)
 
 
-def _loops(machine: Machine) -> Iterator[Derived]:
+def _loops(machine: PhaseFigures) -> Iterator[Derived]:
     """Bandwidths and what friction is worth."""
     text = "{:.4g} rad/s"
     value = machine.velocity_loop

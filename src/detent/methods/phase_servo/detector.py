@@ -5,11 +5,8 @@ from dataclasses import dataclass
 
 from detent.methods.phase_servo.schema import PhaseServoSpec
 
-EDGE_LIMIT = 0.2
-"""Largest displacement of an edge [turn] (`sensing.phase_detector.JITTER_LIMIT`)."""
-
-JITTER_PEAK = 3
-"""Peak of the noise over its rms (`kernel.noise.bell`)."""
+EDGE_LIMIT = 0.2  # largest displacement of an edge [turn] (`sensing.phase_detector.JITTER_LIMIT`)
+JITTER_PEAK = 3  # peak of the noise over its rms (`kernel.noise.bell`)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.axisfile.tables import PushTable
-from detent.methods.phase_servo.derive import Machine as Figures
+from detent.methods.phase_servo.derive import PhaseFigures
 from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
@@ -24,26 +24,13 @@ from detent.page.words import GAP, length, number
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder
 
-PITCHES = 6
-"""The move before."""
-
-PUSH_AT = 30e-3
-"""When the push begins [s], if that is between the arrival and the stop; else halfway between the two."""
-
-PUSH_SHARE = 3.0
-"""The push over Coulomb friction: 3 N on the axis of specification 7."""
-
-PUSH_WITHOUT_FRICTION = 3.0
-"""The push on an axis without friction [N]."""
-
-AFTER_STOP = 0.16
-"""Time recorded after the stop [s]."""
-
-ROW_TIME = 50e-6
-"""Time between two rows [s]: a hundredth of a period of the limit cycle."""
-
-LAST = 0.1
-"""Stretch at the end of the record that the figures of a case are taken from [s]."""
+PITCHES = 6  # the move before
+PUSH_AT = 30e-3  # when the push begins [s], if that is between the arrival and the stop; else halfway between the two
+PUSH_SHARE = 3.0  # the push over Coulomb friction: 3 N on the axis of specification 7
+PUSH_WITHOUT_FRICTION = 3.0  # the push on an axis without friction [N]
+AFTER_STOP = 0.16  # time recorded after the stop [s]
+ROW_TIME = 50e-6  # time between two rows [s]: a hundredth of a period of the limit cycle
+LAST = 0.1  # stretch at the end of the record that the figures of a case are taken from [s]
 
 SIGNALS = ("plant.train.position", "controller.law.integral", "controller.law.word")
 
@@ -53,28 +40,14 @@ Whole = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HoldCase:
-    """One variant of the axis at its target.
+    """One variant of the axis at its target."""
 
-    Attributes
-    ----------
-    name : str
-        Such as "without integrator".
-    about : str
-        What is different in it, one sentence.
-    t : ndarray, shape (n,)
-        Time since power-on [s], from the beginning of position mode on.
-    displacement : ndarray, shape (n,)
-        Position less target [steps].
-    integral, word : ndarray, shape (n,)
-        Integral of the error, and drive word [count].
-    """
-
-    name: str
-    about: str
-    t: Numbers
-    displacement: Numbers
-    integral: Whole
-    word: Whole
+    name: str  #: such as "without integrator"
+    about: str  #: what is different in it, one sentence
+    t: Numbers  #: time since power-on [s], from the beginning of position mode on; shape (n,)
+    displacement: Numbers  #: position less target [steps]; shape (n,)
+    integral: Whole  #: integral of the error [count]; shape (n,)
+    word: Whole  #: drive word [count]; shape (n,)
 
     @property
     def _last(self) -> int:
@@ -106,28 +79,15 @@ class HoldCase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HoldComparison:
-    """Result of `compare_hold`.
+    """Result of `compare_hold`."""
 
-    Attributes
-    ----------
-    still : tuple of HoldCase
-        Without a push: settling for ever, as the file has it, and with the integrator but no dead band.
-    loaded : tuple of HoldCase
-        Under a push that stays: with the integrator, and without.
-    push : float
-        Force [N].
-    push_at, stop_at : float
-        When the push begins, and when the stop does in the variants that have one [s since power-on].
-    step : float
-        Travel per step [m].
-    """
-
+    #: without a push; settling for ever, as the file has it, and with the integrator but no dead band
     still: tuple[HoldCase, ...]
-    loaded: tuple[HoldCase, ...]
-    push: float
-    push_at: float
-    stop_at: float
-    step: float
+    loaded: tuple[HoldCase, ...]  #: under a push that stays, with the integrator and without
+    push: float  #: force [N]
+    push_at: float  #: when the push begins [s since power-on]
+    stop_at: float  #: when the stop does, in the variants that have one [s since power-on]
+    step: float  #: travel per step [m]
 
     @property
     def table(self) -> TextTable:
@@ -246,7 +206,7 @@ def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> H
 
 def push_force(spec: PhaseServoSpec) -> float:
     """Push that fits the axis [N]: three times its Coulomb friction, 3 N where it has none."""
-    coulomb = Figures(spec).coulomb
+    coulomb = PhaseFigures(spec).coulomb
     return PUSH_SHARE * coulomb if coulomb > 0 else PUSH_WITHOUT_FRICTION
 
 

@@ -14,8 +14,7 @@ from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
 
-ACQUISITION = 0.5
-"""Longest time that a phase servo may take to lock and settle after power-on [s]."""
+ACQUISITION = 0.5  # longest time that a phase servo may take to lock and settle after power-on [s]
 
 GRID_TOLERANCE = 0.05
 """How far a target may be from a positioning point, in pitches: what a decimal figure of a length misses."""

@@ -24,61 +24,38 @@ from detent.record.machine import Progress
 from detent.sensing.interference import ENTRIES
 from detent.units import format_quantity
 
-PULSES = (0, 1, 2, 5, 8, 12, 16, 20, 30)
-"""Numbers of spurious pulses of tests 25 and 26."""
-
-FIRST_PULSE = 5e-3
-"""When the first one comes [s]; the others follow 24 us apart."""
-
-SETTLING = 30e-3
-"""Time given to the integrator after the stop [s]."""
-
-LONGEST_STOP = 0.1
-"""A one-shot 109 that is longer is not waited for [s]: the carriage has come to rest long before."""
+PULSES = (0, 1, 2, 5, 8, 12, 16, 20, 30)  # numbers of spurious pulses of tests 25 and 26
+FIRST_PULSE = 5e-3  # when the first one comes [s]; the others follow 24 us apart
+SETTLING = 30e-3  # time given to the integrator after the stop [s]
+LONGEST_STOP = 0.1  # a one-shot 109 that is longer is not waited for [s]: the carriage has come to rest long before
 
 READINGS = 20
 READING = 0.5e-3
 """The rest point is the mean of so many readings so far apart [s]: more than a period of the limit cycle."""
 
-NOISE_BAND = 0.6
-"""How far off an absolute stop may be, whatever the noise (phase-servo test 25) [steps]."""
+NOISE_BAND = 0.6  # how far off an absolute stop may be, whatever the noise (phase-servo test 25) [steps]
 
 SIGNS = ("+", "-")
 DIRECTIONS = ("right", "left")
-MOST_STEPS = 65_535
-"""Longest move that the distance word can command [steps]."""
+MOST_STEPS = 65_535  # longest move that the distance word can command [steps]
 
 Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseComparison:
-    """Result of `compare_noise`.
+    """Result of `compare_noise`."""
 
-    Attributes
-    ----------
-    pulses : tuple of int
-        Numbers of spurious pulses in one move, rising.
-    absolute, incremental : ndarray, shape (len(pulses), 2, 2)
-        Rest point less target [steps], of this servo and of the one that stops by counted pulses; for + and for -
-        pulses, in moves to the right and to the left.
-    step : float
-        Travel per step [m].
-    counts : int
-        Steps per pitch, N.
-    margin : int
-        Pulses that the method bears, N/2 - threshold: with more the servo stops at another positioning point.
-    pitches : int
-        Length of the move.
-    """
-
-    pulses: tuple[int, ...]
+    pulses: tuple[int, ...]  #: numbers of spurious pulses in one move, rising
+    #: rest point of this servo less target [steps], for + and for - pulses, in moves to the right and to the left;
+    #: shape (len(pulses), 2, 2)
     absolute: Numbers
-    incremental: Numbers
-    step: float
-    counts: int
+    incremental: Numbers  #: the same of the servo that stops by counted pulses
+    step: float  #: travel per step [m]
+    counts: int  #: steps per pitch, N
+    #: pulses that the method bears, N/2 - threshold; with more the servo stops at another positioning point
     margin: int
-    pitches: int
+    pitches: int  #: length of the move
 
     @property
     def table(self) -> TextTable:

@@ -19,8 +19,7 @@ MODE, STOP = "controller.sequencer.mode", "controller.sequencer.stop"
 SETPOINT, SPEED = "controller.law.setpoint", "controller.speed.word"
 INTEGRAL, WORD = "controller.law.integral", "controller.law.word"
 
-PAGE_ROWS = 66
-"""Lines of text on a page of paper: 11 in of 1/6 in each."""
+PAGE_ROWS = 66  # lines of text on a page of paper: 11 in of 1/6 in each
 
 IN_THE_MOVE = (
     "Until shortly before the target the speed follows a table of the way still to go, counted in pulses; then "

@@ -14,14 +14,9 @@ from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_r
 from detent.record.machine import Machine
 from detent.record.recorder import Recorder
 
-START = 0.25e-3
-"""Time of the set strobe, as in the tests of specification 6 [s]."""
-
-ROOM = 8
-"""Pitches of free way on both sides of the move."""
-
-LOOK = 1e-3
-"""How often the bench looks whether position mode has been entered [s]."""
+START = 0.25e-3  # time of the set strobe, as in the tests of specification 6 [s]
+ROOM = 8  # pitches of free way on both sides of the move
+LOOK = 1e-3  # how often the bench looks whether position mode has been entered [s]
 
 UNDISTURBED = DisturbanceTable()
 

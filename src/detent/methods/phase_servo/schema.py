@@ -36,8 +36,7 @@ from detent.files.quantities import (
     Voltage,
 )
 
-TABLE_ENTRIES = 4096
-"""Entries of the velocity table at most (`control.phase_sequencer`)."""
+TABLE_ENTRIES = 4096  # entries of the velocity table at most (`control.phase_sequencer`)
 
 Gain = Annotated[int, Ge(1), Le(1000)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from detent.analysis.sampled_loop import SampledLoop
-from detent.methods.filtered_servo.derive import Machine, damping_of, derive
+from detent.methods.filtered_servo.derive import FilteredFigures, damping_of, derive
 
 FREE = tuple(f"mechanics.friction.{side}.{kind}=0 N" for side in ("right", "left") for kind in ("coulomb", "static"))
 EXACT = ("mechanics.moving_mass=0 kg", "motor.rotor_inertia=700 g*cm^2", *FREE)
@@ -77,7 +77,7 @@ def test_plant_b_has_a_time_constant_and_a_drive_error(load_text, good_text):
     assert rows["mechanical time constant"].value == pytest.approx(56e-3, rel=1e-6)
     # Test 16: 20 + v / (tau_m K) at 1000 pulses/s.
     assert rows["following error at limits.speed"].value == pytest.approx(23.35, abs=0.01)
-    loop = Machine(spec).loop
+    loop = FilteredFigures(spec).loop
     assert spec.following_error(5e-3) == pytest.approx(loop.steady_following_error(1000), rel=1e-12)
 
 
@@ -104,7 +104,7 @@ def test_a_filter_that_hardly_filters_has_no_corner(load_text, good_text):
 
 def test_an_axis_without_a_limit_of_stability_names_none(load_text, good_text):
     quick = (*PLANT_B, "motor.rotor_inertia=25 g*cm^2", "method.scale=1", "limits.speed=5 mm/s")
-    machine = Machine(load_text(good_text, *quick).spec)
+    machine = FilteredFigures(load_text(good_text, *quick).spec)
     assert machine.tau_m == pytest.approx(2e-3)
     assert machine.gain_margin == math.inf
     assert "stability limit" not in {row.name for row in derive(machine.spec)}
@@ -122,16 +122,16 @@ def test_the_largest_force_is_that_of_the_word_or_of_the_limit(load_text, good_t
 
 def test_top_speed_is_where_the_drive_is_used_up(load_text, good_text):
     # No-load speed of plant B: 127/128 of 12 V over 0.05 V s/rad, 2290 rpm less a 128th (7).
-    machine = Machine(load_text(good_text, *PLANT_B, "limits.effort=1e5 N").spec)
+    machine = FilteredFigures(load_text(good_text, *PLANT_B, "limits.effort=1e5 N").spec)
     assert machine.top_speed / 5e-3 * 60 == pytest.approx(2290 * 127 / 128, rel=1e-3)
-    assert Machine(load_text(good_text).spec).top_speed == math.inf
+    assert FilteredFigures(load_text(good_text).spec).top_speed == math.inf
     held = [f"mechanics.friction.{side}.coulomb=300 N" for side in ("right", "left")]
     still = [f"mechanics.friction.{side}.static=300 N" for side in ("right", "left")]
-    assert Machine(load_text(good_text, *held, *still).spec).top_speed == -math.inf
+    assert FilteredFigures(load_text(good_text, *held, *still).spec).top_speed == -math.inf
 
 
 def test_the_ramp_is_that_of_the_command(load_text, good_text):
-    machine = Machine(load_text(good_text).spec)
+    machine = FilteredFigures(load_text(good_text).spec)
     ramp = machine.ramp
     # 0.1 m/s at 1 m/s^2 are 20 windows of 5 ms; then the speed of 100 pulses a window.
     assert len(ramp.t) == 1 + 20 + 200
@@ -143,12 +143,12 @@ def test_the_ramp_is_that_of_the_command(load_text, good_text):
 
 
 def test_a_command_that_jumps_has_no_ramp(load_text, good_text):
-    machine = Machine(load_text(good_text, "method.command_acceleration=0 m/s^2").spec)
+    machine = FilteredFigures(load_text(good_text, "method.command_acceleration=0 m/s^2").spec)
     assert np.diff(machine.ramp.command) == pytest.approx(np.full(200, 100.0))
 
 
 def test_a_slow_ramp_is_computed_from_its_end(load_text, good_text):
-    machine = Machine(load_text(good_text, "method.command_acceleration=5 mm/s^2").spec)
+    machine = FilteredFigures(load_text(good_text, "method.command_acceleration=5 mm/s^2").spec)
     assert len(machine.ramp.t) == 1 + 2000 + 200
     assert np.diff(machine.ramp.command)[1999:] == pytest.approx(np.full(201, 100.0), abs=0.02)
 

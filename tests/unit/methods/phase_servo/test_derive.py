@@ -5,7 +5,7 @@ import math
 import pytest
 
 from detent.methods.phase_servo.build import velocity_table
-from detent.methods.phase_servo.derive import Machine, derive
+from detent.methods.phase_servo.derive import PhaseFigures, derive
 
 
 def derived(axis):
@@ -92,7 +92,7 @@ def test_every_figure_has_a_text_and_a_formula(figures):
 def test_the_peak_of_the_table_is_where_the_table_says(load_text, good_text, overrides):
     spec = load_text(good_text, *overrides).spec
     table = velocity_table(spec)
-    distance = Machine(spec).peak_distance
+    distance = PhaseFigures(spec).peak_distance
     assert table[distance] == spec.peak_count > table[distance - 1]
     assert table == [spec.table_velocity(n) for n in range(len(table))]
 
@@ -116,21 +116,21 @@ def test_a_weak_supply_limits_the_force(load_text, good_text):
 
 
 def test_the_gain_margin_is_that_of_the_loop_at_its_limit(load_text, good_text):
-    machine = Machine(load_text(good_text).spec)
+    machine = PhaseFigures(load_text(good_text).spec)
     more = f"drive.supply={24 * 0.99 * machine.gain_margin} V"
-    assert Machine(load_text(good_text, more).spec).gain_margin == pytest.approx(1 / 0.99, rel=1e-3)
+    assert PhaseFigures(load_text(good_text, more).spec).gain_margin == pytest.approx(1 / 0.99, rel=1e-3)
     # Where one step of error is worth a thousand steps in a sample there is nothing to compute.
     feather = (
         "mechanics.carriage_mass=1e-9 kg",
         "mechanics.pulley_inertia=0 kg*m^2",
         "motor.rotor_inertia=1e-4 g*cm^2",
     )
-    assert Machine(load_text(good_text, *feather, "motor.torque_constant=0.3 mN*m/A").spec).gain_margin == 0.0
+    assert PhaseFigures(load_text(good_text, *feather, "motor.torque_constant=0.3 mN*m/A").spec).gain_margin == 0.0
 
 
 def test_damping_counts_back_emf_and_viscous_friction(load_text, good_text):
-    machine = Machine(load_text(good_text).spec)
+    machine = PhaseFigures(load_text(good_text).spec)
     assert machine.decay == pytest.approx(1 / 56.17e-3, rel=2e-3)  # R J / (Kt Ke), J = 7.02e-5 kg m^2
     assert machine.damping == pytest.approx((668.4 + 17.8) / (2 * 571.3), rel=1e-3)
     sides = [f"mechanics.friction.{side}.viscous=10.74 N*s/m" for side in ("right", "left")]
-    assert Machine(load_text(good_text, *sides).spec).decay == pytest.approx(machine.decay + 10, rel=1e-3)
+    assert PhaseFigures(load_text(good_text, *sides).spec).decay == pytest.approx(machine.decay + 10, rel=1e-3)
