@@ -7,14 +7,15 @@ versions that shape the machine code: any such edit means another folder, and no
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 from functools import cache
 from pathlib import Path
 
-# What a step can be made of, beside the `SYSTEM` of each method; other rooms are not part of any compiled code.
+# What a step can be made of, beside the modules of methods that declare steps or registers; nothing else is compiled.
 STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "errors.py", "units.py")
-SYSTEM = "methods/*/system.py"  # the wiring and the tick of a method
+DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # a method's part of a step
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made
 
@@ -49,7 +50,8 @@ def step_sources() -> frozenset[Path]:
     """The files whose edits change the hash: only their functions may be cached."""
     rooms = [PACKAGE / room for room in STEP_ROOMS]
     found = [s for room in rooms for s in ([room] if room.is_file() else room.rglob("*.py"))]
-    return frozenset([*found, *PACKAGE.glob(SYSTEM)])
+    methods = [s for s in PACKAGE.glob("methods/*/*.py") if DECLARES.search(s.read_text("utf-8"))]
+    return frozenset([*found, *methods])
 
 
 @cache

@@ -1,6 +1,7 @@
 """The compiled cache, tried on a copy of the package that may be edited."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -213,6 +214,12 @@ def test_sources_of_the_hash_are_the_rooms_a_step_can_be_made_of():
     assert PACKAGE / "methods" / "cascade" / "system.py" in sources
     assert PACKAGE / "methods" / "cascade" / "page.py" not in sources
     assert Path(__file__) not in sources
+
+
+def test_every_module_that_declares_a_step_is_in_the_hash():
+    declared = {s for s in PACKAGE.rglob("*.py") if re.search(r"^@(hot_)?step$", s.read_text("utf-8"), re.MULTILINE)}
+    assert declared <= cache.step_sources()
+    assert PACKAGE / "methods" / "print_head" / "controller.py" in declared
 
 
 def test_only_the_youngest_folders_are_kept(tmp_path):
