@@ -28,6 +28,7 @@ POSITION_NUMBER = Naming(
     allowed="a position number from 0 to 127",
     example="1",
 )
+LARGEST_ERROR = 100.0  # largest deviation that protection.following_error may state [rad]
 
 
 class RotaryTableAxisTable(AxisTable, frozen=True):
@@ -194,7 +195,7 @@ class TableProtectionTable(TurnProtectionTable, frozen=True):
     reversed_time: Time = optional("how long the table may speed up against its effort", 0.05, ge=0.0, le=10.0)
     following_error: Angle = optional(
         "deviation dR that is a fault", math.nan, derived="twice that of limits.speed with the static friction",
-        gt=0.0, le=100.0,
+        gt=0.0, le=LARGEST_ERROR,
     )  # fmt: skip
     following_time: Time = optional("how long it may last", 0.06, ge=0.0, le=10.0)
 
@@ -319,5 +320,5 @@ def _filled_protection(spec: RotaryTableSpec) -> TableProtectionTable:
         changes["stuck_effort"] = breaking_effort(spec.mechanics.static, spec.stiffness * spec.drive.full_speed)
     if math.isnan(protection.following_error):
         speed = spec.limits.speed / (1 - spec.drive.droop) + spec.breaking_speed
-        changes["following_error"] = 2 * speed / spec.method.position_gain
+        changes["following_error"] = min(2 * speed / spec.method.position_gain, LARGEST_ERROR)
     return protection.model_copy(update=changes)
