@@ -27,26 +27,14 @@ class EffectiveRow:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class CheckReport:
-    """Everything `detent check` has to show.
+    """Everything `detent check` has to show."""
 
-    Attributes
-    ----------
-    file, name, method : str
-        The file as the user named it, the axis's name and its control method.
-    rows : tuple of EffectiveRow
-        Every value in effect, in the order of the schema.
-    derived : tuple of Derived
-        What follows from them.
-    warnings : tuple of Caution
-        What looks wrong; empty for a sound axis.
-    """
-
-    file: str
-    name: str
-    method: str
-    rows: tuple[EffectiveRow, ...]
-    derived: tuple[Derived, ...]
-    warnings: tuple[Caution, ...]
+    file: str  #: the file as the user named it
+    name: str  #: name of the axis
+    method: str  #: its control method
+    rows: tuple[EffectiveRow, ...]  #: every value in effect, in the order of the schema
+    derived: tuple[Derived, ...]  #: what follows from them
+    warnings: tuple[Caution, ...]  #: what looks wrong; empty for a sound axis
 
     def to_dict(self) -> dict[str, Any]:
         """Give the report as plain data for ``--json``."""

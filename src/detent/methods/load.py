@@ -231,7 +231,8 @@ def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: R
     problems: list[FileProblem] = []
     for contradiction in found:
         paths = contradiction.paths
-        if any(_overlap(path, doubtful) for path in paths for doubtful in layers.doubtful):
+        # One path is the other, or lies inside it.
+        if any(path[: len(other)] == other[: len(path)] for path in paths for other in layers.doubtful):
             continue
         # What the user changed last is to blame first.
         stated = [path for path in paths if path in layers.overrides] or [
@@ -254,12 +255,6 @@ def _allowed_at(blamed: Path, contradiction: Contradiction, reporter: Reporter) 
     return f"{contradiction.keys[0]} ({value}) {contradiction.allowed}"
 
 
-def _overlap(one: Path, other: Path) -> bool:
-    """True when one path is the other or lies inside it."""
-    length = min(len(one), len(other))
-    return one[:length] == other[:length]
-
-
 def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Table]) -> dict[str, Any]:
     """Copy of the tables in which keys with problems are left out or replaced by an allowed value."""
     patched = copy.deepcopy(tables)
@@ -272,7 +267,7 @@ def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Ta
         elif table_of(field_at(model, path)) is not None:
             put_value(patched, path, {})
         else:
-            put_value(patched, path, _example_value(example_of(field_at(model, path))))
+            put_value(patched, path, tomllib.loads(f"value = {example_of(field_at(model, path))}")["value"])
     return patched
 
 
@@ -288,11 +283,6 @@ def _value_at(tables: dict[str, Any], path: Path) -> object:
     for key in path[:-1]:
         tables = as_table(tables.get(key))
     return tables.get(path[-1])
-
-
-def _example_value(example: str) -> object:
-    """Value of an example, which is TOML."""
-    return tomllib.loads(f"value = {example}")["value"]
 
 
 def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, str], dict[str, str]]:

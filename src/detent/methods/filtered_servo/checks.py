@@ -5,7 +5,7 @@ brackets are those of the filtered-servo specification.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
@@ -42,7 +42,7 @@ FINE_RAMP = 20
 remedy = Remedies(FilteredServoSpec)
 
 
-# --------------------------------------------------------------------------------------------------- contradictions
+# ---- contradictions
 
 
 def _arithmetic(spec: FilteredServoSpec) -> Iterator[Contradiction]:
@@ -166,18 +166,11 @@ def _machine(spec: FilteredServoSpec) -> Iterator[Contradiction]:
     yield from common.burst(spec.disturbance.lines.burst, TICK)
 
 
-RULES: tuple[Callable[[FilteredServoSpec], Iterator[Contradiction]], ...] = (
-    _arithmetic,
-    _clocks,
-    _counters,
-    _command,
-    _gain,
-    _machine,
-)
-"""Contradictions are told in this order."""
+# Contradictions are told in this order.
+RULES = (_arithmetic, _clocks, _counters, _command, _gain, _machine)
 
 
-# --------------------------------------------------------------------------------------------------------- cautions
+# ---- cautions
 
 
 def find_cautions(spec: FilteredServoSpec) -> Iterator[Caution]:
@@ -194,7 +187,7 @@ def _loop(m: FilteredFigures) -> Iterator[Caution]:
     if margin < LEAST_GAIN_MARGIN:
         yield Caution(
             "stability of the loop",
-            f"gain margin {margin:.3g}, spectral radius {m.spectral_radius:.4f}",
+            f"gain margin {margin:.3g}, spectral radius {m.loop.spectral_radius():.4f}",
             f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1, and a radius of 1 or more, the loop is unstable",
             "the following error swings and grows until the drive word is clipped"
             if margin < 1

@@ -6,7 +6,7 @@ stop.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ from detent.page.figure import Figure
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, number
 from detent.record.machine import Machine, Progress
-from detent.record.recorder import Recorder, make_trace
+from detent.record.recorder import Recorder
 from detent.record.trace import Trace
 from detent.units import format_quantity
 
@@ -38,14 +38,11 @@ WINDOW = 20e-3
 
 STEADY_TIME = 8.0  # length of the run at constant rate [s]; figures are taken from its second half
 RAMP = 1.0  # the command is at its rate after this time at the latest [s], whatever its acceleration
-
 STOP_AFTER = 2.0  # when the command stops [s]
 STOP_TIME = 2.0  # how long the axis is watched after that [s]
 SHOWN = 10  # length of the curves, in windows B TS
 LONGEST = 50.0  # longest run, as a multiple of the times above
-
 MOST_ROWS = 400_000
-
 SETTLED = 4  # an axis has settled when its following error swings by no more pulses in the last quarter after a stop
 WIDE_COUNTER = 16  # width of the speed counter for the long window [bit]
 ENDLESS = 10**12  # pulses that no run gets to the end of
@@ -235,14 +232,17 @@ def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredSe
 
 def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) -> FeedbackCase:
     """One case: figures of a run at constant rate, of a stop, and of the model."""
-    trace = _run_steadily(spec, rate, STEADY_TIME * stretch)
+    seconds = STEADY_TIME * stretch
+    signals = ("controller.deviation.error", "controller.filter.output", "plant.train.current")
+    bench = _Bench(spec, rate, seconds, signals, max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS)))
+    done, trace = bench.run(seconds), bench.trace()
+    # The second half; no rows if the axis fails.
+    late = (trace.time >= seconds / 2) & done
+    t, (error, speed, current) = trace.time[late], (trace[name][late] for name in signals)
     overshoot = _stop(spec, rate, stretch)
-    failed = not len(trace) or math.isnan(overshoot)
     model = FilteredFigures(spec).loop
     limit = model.stability_limit()
-    error, speed = trace["controller.deviation.error"], trace["controller.filter.output"]
-    force = trace["plant.train.current"] * (spec.motor.torque_constant / spec.mechanics.radius)
-    shown = trace.time >= STEADY_TIME * stretch - SHOWN * WINDOW * stretch
+    shown = t >= seconds - SHOWN * WINDOW * stretch
     return FeedbackCase(
         name=name,
         sample_period=spec.method.sample_period,
@@ -251,13 +251,13 @@ def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) ->
         kv=model.velocity_error_constant,
         std_speed=_std(speed),
         std_error=_std(error),
-        force_ripple=_std(force),
+        force_ripple=_std(current * (spec.motor.torque_constant / spec.mechanics.radius)),
         error_range=(float(error.min()), float(error.max())) if len(error) else (math.nan, math.nan),
         stop_overshoot=overshoot,
-        stable=not failed,
+        stable=len(t) > 0 and not math.isnan(overshoot),
         gain_limit=limit,
         gain_margin=limit / spec.gain,
-        t=trace.time[shown],
+        t=t[shown],
         error=error[shown],
         speed_word=speed[shown],
     )
@@ -269,9 +269,11 @@ def _std(values: Numbers) -> float:
 
 
 class _Bench:
-    """An axis after reset, with way enough, commanded to a rate without end."""
+    """An axis after reset, with way enough, commanded to a rate without end; signals are recorded every n-th tick."""
 
-    def __init__(self, spec: FilteredServoSpec, rate: float, seconds: float, recorder: Recorder | None = None) -> None:
+    def __init__(
+        self, spec: FilteredServoSpec, rate: float, seconds: float, signals: Sequence[str], every: int
+    ) -> None:
         half = math.ceil(2 * rate * seconds) + 100_000  # pulses to either side, more than an unstable axis swings
         stated = spec.method.command_acceleration
         acceleration = max(stated, rate * spec.pulse / RAMP) if stated > 0 else 0.0  # 0 jumps to the rate
@@ -281,15 +283,11 @@ class _Bench:
             method={"command_acceleration": acceleration},
             disturbance=DisturbanceTable(),
         )
-        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(roomy, recorder)
+        self.recorder = Recorder(FilteredServo, signals, every=every, period=TICK)
+        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(roomy, self.recorder)
         self.controller = self.machine.state.controller
         self.machine.pass_ticks(1)  # leaves the reset
         go_to(self.controller, ENDLESS, round(rate * PER_PULSE))
-
-    def stop(self) -> None:
-        """The command stops where it is."""
-        g = self.controller.generator
-        go_to(self.controller, g.command, g.rate)
 
     def run(self, seconds: float) -> bool:
         """Let time pass, up to a fault; False when there was one."""
@@ -299,38 +297,21 @@ class _Bench:
             acknowledge(self.controller)
         return self.controller.deviation.state != FAULT
 
-
-def _run_steadily(spec: FilteredServoSpec, rate: float, seconds: float) -> Trace:
-    """Second half of a run at constant rate; no rows if the axis fails."""
-    blocks: list[NDArray[np.void]] = []
-
-    def keep(block: NDArray[np.void]) -> None:
-        late: Any = block["t"] >= seconds / 2
-        blocks.append(block[late])
-
-    every = max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS))
-    signals = ("controller.deviation.error", "controller.filter.output", "plant.train.current")
-    recorder = Recorder(FilteredServo, signals, every=every, period=TICK, sink=keep)
-    bench = _Bench(spec, rate, seconds, recorder)
-    done = bench.run(seconds)
-    bench.machine.close()
-    return make_trace(recorder, blocks if done else [], {})
+    def trace(self) -> Trace:
+        """What was recorded."""
+        self.machine.close()
+        return self.recorder.trace()
 
 
 def _stop(spec: FilteredServoSpec, rate: float, stretch: float) -> float:
     """Overshoot after a stop from constant rate [count]; NaN for an axis that does not settle."""
-    blocks: list[NDArray[np.void]] = []
-    every = max(1, math.ceil(stretch))
-    recorder = Recorder(
-        FilteredServo, ("controller.deviation.deviation",), every=every, period=TICK, sink=blocks.append
-    )
-    bench = _Bench(spec, rate, STOP_AFTER * stretch, recorder)
-    bench.run(STOP_AFTER * stretch)
-    bench.stop()
-    settled = bench.run(STOP_TIME * stretch)
-    bench.machine.close()
-    trace = make_trace(recorder, blocks, {})
-    after = trace["controller.deviation.deviation"][trace.time > STOP_AFTER * stretch]
+    deviation, moment = "controller.deviation.deviation", STOP_AFTER * stretch
+    bench = _Bench(spec, rate, moment, (deviation,), max(1, math.ceil(stretch)))
+    bench.run(moment)
+    generator = bench.controller.generator
+    go_to(bench.controller, generator.command, generator.rate)  # the command stops where it is
+    settled, trace = bench.run(STOP_TIME * stretch), bench.trace()
+    after = trace[deviation][trace.time > moment]
     if not settled or np.ptp(after[-len(after) // 4 :]) > SETTLED:
         return math.nan
     return float(max(0, -int(after.min())))

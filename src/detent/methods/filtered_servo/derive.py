@@ -34,44 +34,27 @@ class FilteredFigures:
         self.static = max(friction.right.static, friction.left.static)
         self.coulomb = max(friction.right.coulomb, friction.left.coulomb)
         self.rate = spec.limits.speed / spec.pulse
-
-    def loop_with(self, *, coefficient: float, scale: float, sample_period: float, more: float = 1.0) -> "SampledLoop":
-        """Model of the loop with another filter, scale and window, and with `more` times the gain."""
-        from detent.analysis.sampled_loop import SampledLoop
-
-        return SampledLoop(
-            gain=self.spec.gain * more,
-            sample_period=sample_period,
-            scale=scale,
-            coefficient=coefficient,
-            tau_m=self.tau_m,
-            position_gain=self.spec.method.position_gain,
-        )
+        self._loop_constants: dict[str, float] = {
+            "gain": spec.gain,
+            "sample_period": spec.method.sample_period,
+            "scale": spec.method.scale,
+            "coefficient": self.coefficient,
+            "position_gain": spec.method.position_gain,
+        }
 
     @cached_property
     def loop(self) -> "SampledLoop":
         """Exact model of the sampled loop (3.7)."""
-        method = self.spec.method
-        return self.loop_with(coefficient=self.coefficient, scale=method.scale, sample_period=method.sample_period)
+        from detent.analysis.sampled_loop import SampledLoop
+
+        return SampledLoop(tau_m=self.tau_m, **self._loop_constants)
 
     @cached_property
     def transfer(self) -> "ServoTransfer":
         """Transfer function in continuous time (3.6)."""
         from detent.analysis.transfer_function import ServoTransfer
 
-        method = self.spec.method
-        return ServoTransfer.of_window(
-            gain=self.spec.gain,
-            sample_period=method.sample_period,
-            scale=method.scale,
-            coefficient=self.coefficient,
-            position_gain=method.position_gain,
-        )
-
-    @cached_property
-    def spectral_radius(self) -> float:
-        """Largest factor by which a mode changes from sample to sample."""
-        return self.loop.spectral_radius()
+        return ServoTransfer.of_window(**self._loop_constants)
 
     @cached_property
     def gain_margin(self) -> float:
@@ -204,7 +187,7 @@ def _loop(machine: FilteredFigures) -> Iterator[Derived]:
     if math.isfinite(limit):
         text = f"K = {limit:.5g} 1/s^2, {margin:.3g} x the gain"
         yield Derived("stability limit", limit, "1/s^2", text, "lowest K with a spectral radius of 1 (3.7)")
-    radius = machine.spectral_radius
+    radius = machine.loop.spectral_radius()
     yield Derived("spectral radius", radius, "", f"{radius:.4f}", "largest mode from sample to sample (3.7)")
     yield Derived("damping of the loop", machine.damping, "", f"{machine.damping:.3g}", "least damped mode that swings")
     ratio = transfer.filter_ratio

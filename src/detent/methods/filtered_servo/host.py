@@ -3,13 +3,12 @@
 from detent.axisfile.protection import describe_fault
 from detent.control.deviation_counter import FAULT, GUARDED
 from detent.control.pulse_generator import PER_PULSE
-from detent.errors import SERVO_FAULT_TEXT, FileProblem
+from detent.errors import SERVO_FAULT_TEXT
 from detent.methods.filtered_servo import system as filtered_servo
 from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
 from detent.methods.filtered_servo.controller import acknowledge, arrive_within, go_to, set_period
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.host import Destination, Host, Problem
-from detent.methods.moves.job import Move
+from detent.methods.moves.host import Destination, Host, Wrong
 from detent.record.machine import AnyRecorder, Loop, Machine
 from detent.units import format_quantity
 
@@ -53,25 +52,20 @@ class FilteredHost(Host):
         acknowledge(self.controller)
         return arrived
 
-    def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
+    def problems(self, to: Destination, asked: float) -> Wrong:
         """Speed and sample period of a move against the limits of the counters."""
-        del to, asked
-        spec, found = self.spec, list[FileProblem]()
-        top = spec.limits.speed
+        del asked
+        move, spec, top = to.move, self.spec, self.spec.limits.speed
         if move.speed is not None and not 0 < move.speed <= top * (1 + 1e-9):
             allowed = f"up to limits.speed, {format_quantity(top, 'm/s')}"
-            came = format_quantity(move.speed, "m/s")
-            found.append(problem("speed", came, allowed, "lower it, or raise limits.speed"))
-        period = move.sample_period
-        if period is None:
-            return found
+            yield "speed", format_quantity(move.speed, "m/s"), allowed, "lower it, or raise limits.speed"
         most = (1 << (spec.method.counter_bits - 1)) - 2
         longest = most * spec.pulse / (move.speed or top)
-        if not 1e-4 <= period <= min(longest, 0.1):
+        period = move.sample_period
+        if period is not None and not 1e-4 <= period <= min(longest, 0.1):
             allowed = f"from 0.1 ms to {format_quantity(min(longest, 0.1), 's')}: the speed counter holds {most} pulses"
-            came = format_quantity(period, "s")
-            found.append(problem("sample_period", came, allowed, "shorten it, lower the speed, or widen the counter"))
-        return found
+            shorter = "shorten it, lower the speed, or widen the counter"
+            yield "sample_period", format_quantity(period, "s"), allowed, shorter
 
     @property
     def failure(self) -> str:

@@ -5,7 +5,7 @@ The place the axis stands at after power-on is known to the host (a home sensor 
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,8 @@ from detent.record.machine import Machine
 from detent.sensing.interference import Interference
 from detent.units import format_quantity
 
-Problem = Callable[[str, str, str, str], FileProblem]
-"""Makes a problem of the move from key, what came, what is allowed and what to do."""
+Wrong = Iterator[tuple[str, str, str, str]]
+"""Problems of a move: key, what came, what is allowed and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +46,10 @@ class Host(ABC):
         counts = round((position - self.home) / self.grid)
         return Destination(move, self.home + counts * self.grid, counts)
 
-    def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
-        """What this axis cannot do of a move, beside leaving its travel."""
-        del to, asked
-        return refused_words(move, problem, "this axis has one of its own")
+    def problems(self, to: Destination, asked: float) -> Wrong:
+        """What this axis cannot do of a move to `asked` [m], beside leaving its travel."""
+        del asked
+        return refused_words(to.move, "this axis has one of its own")
 
     @abstractmethod
     def command(self, to: Destination) -> None:
@@ -90,13 +90,11 @@ def line_faults(lines: Interference) -> dict[str, int]:
     return {{"lost": "lost samples"}.get(name, name): getattr(lines, name) for name in names}
 
 
-def refused_words(move: Move, problem: Problem, why: str) -> list[FileProblem]:
+def refused_words(move: Move, why: str) -> Wrong:
     """Problems of a move with a speed or a sample period, on an axis that takes neither."""
-    words = {"speed": move.speed, "sample_period": move.sample_period}
-    remedy = "leave it out, or change the axis file"
-    return [
-        problem(word, str(value), f"no {word}: {why}", remedy) for word, value in words.items() if value is not None
-    ]
+    for word, value in (("speed", move.speed), ("sample_period", move.sample_period)):
+        if value is not None:
+            yield word, str(value), f"no {word}: {why}", "leave it out, or change the axis file"
 
 
 def check_job(host: Host, job: MoveJob) -> list[Destination]:
@@ -107,7 +105,8 @@ def check_job(host: Host, job: MoveJob) -> list[Destination]:
     for move in job.moves:
         position = position + move.by if move.by is not None else float(move.target or 0.0)
         to = host.place(move, position)
-        problems += [p for p in _problems(host, job.name, to, position) if len(problems) < MOST_PROBLEMS]
+        told = (FileProblem(job.name, move.row, 1 if move.row else 0, *what) for what in _problems(host, to, position))
+        problems += [problem for problem in told if len(problems) < MOST_PROBLEMS]
         position = to.position
         found.append(to)
     if problems:
@@ -115,17 +114,10 @@ def check_job(host: Host, job: MoveJob) -> list[Destination]:
     return found
 
 
-def _problems(host: Host, name: str, to: Destination, asked: float) -> list[FileProblem]:
+def _problems(host: Host, to: Destination, asked: float) -> Wrong:
     """What is wrong with one move."""
-    move = to.move
-
-    def problem(key: str, came: str, allowed: str, remedy: str) -> FileProblem:
-        return FileProblem(name, move.row, 1 if move.row else 0, key, came, allowed, remedy)
-
-    found: list[FileProblem] = []
     travel = host.spec.limits.travel
     if not 0.0 <= asked <= travel:
-        key = "target" if move.by is None else "by"
         allowed = f"a position from 0 to limits.travel, {format_quantity(travel, 'm', 5)}"
-        found.append(problem(key, format_quantity(asked, "m", 6), allowed, "keep the move between the two ends"))
-    return found + host.problems(move, to, asked, problem)
+        yield to.move.place_key, format_quantity(asked, "m", 6), allowed, "keep the move between the two ends"
+    yield from host.problems(to, asked)

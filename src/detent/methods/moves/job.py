@@ -72,6 +72,11 @@ class Move:
     sample_period: float | None = None
     label: str = ""  #: what the move is for, in a text the character
 
+    @property
+    def place_key(self) -> str:
+        """The key that says where to."""
+        return "target" if self.by is None else "by"
+
     def __post_init__(self) -> None:
         """Refuse what no axis could do."""
         names = ("target", "by", "dwell", "speed", "sample_period")

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from detent.methods.moves.run import MoveRecord, MoveRun
-from detent.methods.moves.summary import MoveFigures, arrived, interference_text, settled
+from detent.methods.moves.summary import MoveFigures, arrived, interference_text, settled, whose
 from detent.page.chart import Band, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -170,7 +170,7 @@ def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
         ),
     ]
     if longest := figures.longest:
-        below = f"median; worst {milliseconds(longest.value)}, {_whose(longest.of)}"
+        below = f"median; worst {milliseconds(longest.value)}, {whose(longest.of)}"
         median = median_of(figures.went, lambda move: move.move_time)
         shown.append(card("Settled after", milliseconds(median), below))
     for title, found, limit in (
@@ -179,23 +179,19 @@ def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
     ):
         if found:
             allowed = f", allowed {length(limit)}" if math.isfinite(limit) else ""
-            below = f"{view.unit.counts(found.value)}, {_whose(found.of)}{allowed}"
+            below = f"{view.unit.counts(found.value)}, {whose(found.of)}{allowed}"
             shown.append(card(title, length(found.value), below, bad=found.value > limit))
     if fastest := figures.peak_speed:
-        below = f"{_whose(fastest.of)}, limit {number(view.max_speed * MM)}"
+        below = f"{whose(fastest.of)}, limit {number(view.max_speed * MM)}"
         shown.append(Card("Peak speed", number(fastest.value * MM), "mm/s", below))
     return shown
-
-
-def _whose(move: MoveRecord) -> str:
-    return f"move {count(move.number)}"
 
 
 def _notes(figures: MoveFigures) -> list[Note]:
     notes = warnings(figures.run.warnings)
     if early := figures.earliest:
         text = (
-            f"{_whose(early.of)}: the axis said that it had arrived {number(early.value * 1e3)} ms before it was "
+            f"{whose(early.of)}: the axis said that it had arrived {number(early.value * 1e3)} ms before it was "
             "within the tolerance for good; what the host does in that time is done beside the target"
         )
         notes.append(Note("warning", text))

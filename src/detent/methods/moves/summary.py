@@ -2,8 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 
 from detent.methods.moves.run import MoveRecord, MoveRun
 from detent.page.run_page import Worst, median_of, worst
@@ -37,66 +35,24 @@ def approach(move: MoveRecord) -> float:
     return math.nan if math.isnan(move.switched) else max(move.settled - move.switched, 0.0)
 
 
-@dataclass(frozen=True)
 class MoveFigures:
     """Extremes and medians of a run, done or not; None and NaN where no move has the figure."""
 
-    run: MoveRun
-
-    @property
-    def word(self) -> str:
-        """What is counted: each move of a text is a character."""
-        return "character" if self.run.job.kind == "text" else "move"
-
-    @property
-    def asked(self) -> int:
-        """Moves of the job."""
-        return len(self.run.job.moves)
-
-    @property
-    def seconds(self) -> float:
-        """From the first readiness to the end of the job [s]."""
-        return max(self.run.time_end - self.run.time_ready, 0.0) if self.run.moves else 0.0
-
-    @cached_property
-    def there(self) -> list[MoveRecord]:
-        """Moves that arrived."""
-        return [move for move in self.run.moves if arrived(self.run, move)]
-
-    @cached_property
-    def went(self) -> list[MoveRecord]:
-        """Those that went farther than the tolerance."""
-        return [move for move in self.there if abs(move.target - move.start) > self.run.tolerance]
-
-    @cached_property
-    def early(self) -> list[MoveRecord]:
-        """Those of which the axis said so before they were within the tolerance for good."""
-        return [move for move in self.there if move.settled - move.ready > SOONEST]
-
-    @property
-    def earliest(self) -> WorstMove:
-        """The one that said so earliest, and by how much [s]."""
-        return worst(self.early, lambda move: move.settled - move.ready)
-
-    @property
-    def longest(self) -> WorstMove:
-        """The longest time to settle [s]."""
-        return worst(self.went, lambda move: move.move_time)
-
-    @property
-    def overshoot(self) -> WorstMove:
-        """Farthest beyond a target [m]."""
-        return worst(self.run.moves, lambda move: move.overshoot)
-
-    @property
-    def error(self) -> WorstMove:
-        """Largest magnitude of the error at the end of a dwell [m]."""
-        return worst(self.run.moves, lambda move: abs(move.error))
-
-    @property
-    def peak_speed(self) -> WorstMove:
-        """Largest speed [m/s]."""
-        return worst(self.run.moves, lambda move: move.peak_speed)
+    def __init__(self, run: MoveRun) -> None:
+        self.run, moves = run, run.moves
+        self.word = "character" if run.job.kind == "text" else "move"  # what is counted
+        self.asked = len(run.job.moves)
+        # From the first readiness to the end of the job [s].
+        self.seconds = max(run.time_end - run.time_ready, 0.0) if moves else 0.0
+        self.there = [move for move in moves if arrived(run, move)]
+        self.went = [move for move in self.there if abs(move.target - move.start) > run.tolerance]  # and went anywhere
+        # Those of which the axis said so before they were within the tolerance for good, and the earliest of them [s].
+        self.early = [move for move in self.there if move.settled - move.ready > SOONEST]
+        self.earliest = worst(self.early, lambda move: move.settled - move.ready)
+        self.longest = worst(self.went, lambda move: move.move_time)  # time to settle [s]
+        self.overshoot = worst(moves, lambda move: move.overshoot)  # farthest beyond a target [m]
+        self.error = worst(moves, lambda move: abs(move.error))  # largest magnitude at the end of a dwell [m]
+        self.peak_speed = worst(moves, lambda move: move.peak_speed)  # [m/s]
 
 
 def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
@@ -114,9 +70,9 @@ def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
         ]
     if early := figures.earliest:
         moves = count(len(figures.early), "move")
-        rows.append(("ready too early", f"{moves}, by up to {milliseconds(early.value)} {_whose(early.of)}"))
+        rows.append(("ready too early", f"{moves}, by up to {milliseconds(early.value)} ({whose(early.of)})"))
     if fastest := figures.peak_speed:
-        rows.append(("peak speed", f"{number(fastest.value * 1e3)} mm/s {_whose(fastest.of)}"))
+        rows.append(("peak speed", f"{number(fastest.value * 1e3)} mm/s ({whose(fastest.of)})"))
     rows.append(("motor", f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J"))
     noise = interference_text(run)
     rows += [("interference", noise)] if noise else []
@@ -136,16 +92,17 @@ def _times(moves: list[MoveRecord], time: Callable[[MoveRecord], float], name: s
     longest = worst(moves, time)
     if longest is None:
         return []
-    text = f"median {milliseconds(median_of(moves, time))}, worst {milliseconds(longest.value)} {_whose(longest.of)}"
+    text = f"median {milliseconds(median_of(moves, time))}, worst {milliseconds(longest.value)} ({whose(longest.of)})"
     return [(name, f"{text}, {span}")]
 
 
 def _worst(found: WorstMove, name: str, unit: CountUnit) -> list[tuple[str, str]]:
-    return [(name, f"worst {length(found.value)}, {unit.counts(found.value)} {_whose(found.of)}")] if found else []
+    return [(name, f"worst {length(found.value)}, {unit.counts(found.value)} ({whose(found.of)})")] if found else []
 
 
-def _whose(move: MoveRecord) -> str:
-    return f"(move {count(move.number)})"
+def whose(move: MoveRecord) -> str:
+    """Which move it is: "move 3"."""
+    return f"move {count(move.number)}"
 
 
 def interference_text(run: MoveRun) -> str:

@@ -68,7 +68,7 @@ def _fill_detector(d: DetectorParams, spec: PhaseServoSpec) -> None:
     d.offset = -table.lag_counts * TURN // table.counts % TURN
     d.carrier_shift = 32 - (table.counts.bit_length() - 1)
     d.jitter = spec.edge_jitter * carrier * TURN
-    fill_errors(d, table.gain_error, table.quadrature_error, spec.offset_share)
+    fill_errors(d, table.gain_error, table.quadrature_error, table.offset_error / table.amplitude)
 
 
 def _fill_sequencer(s: SequencerParams, spec: PhaseServoSpec) -> None:

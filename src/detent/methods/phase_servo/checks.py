@@ -4,13 +4,12 @@ N is the number of steps per pitch; sections in brackets are those of the phase-
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies, at_most, put
-from detent.methods.phase_servo.derive import PhaseFigures
-from detent.methods.phase_servo.detector import JITTER_PEAK, edge_separation
+from detent.methods.phase_servo.derive import PhaseFigures, weakest_output
 from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
 from detent.units import format_quantity as text
 
@@ -23,7 +22,8 @@ OVERSHOOT = 4  # counts by which the speed may pass the velocity table after the
 CURRENT_STEP = 0.02  # share of the current limit by which the current may pass it before the comparator is asked again
 
 LEAST_GAIN_MARGIN = 1.5
-
+EDGE_LIMIT = 0.2  # largest displacement of an edge [turn of the carrier] (`sensing.phase_detector.JITTER_LIMIT`)
+JITTER_PEAK = 3  # peak of the noise over its rms (`kernel.noise.bell`)
 INTEGRAL_PACE = 1.5
 """Steps within 1 rad of the position loop above which the integral hunts: 1.3 with the literal clocks is quiet, 1.7
 with two taps less than the default is not (7)."""
@@ -34,7 +34,7 @@ QUIET = 0.25
 remedy = Remedies(PhaseServoSpec)
 
 
-# --------------------------------------------------------------------------------------------------- contradictions
+# ---- contradictions
 
 
 def _tracker(spec: PhaseServoSpec) -> Iterator[Contradiction]:
@@ -172,21 +172,27 @@ def _one_shots(spec: PhaseServoSpec) -> Iterator[Contradiction]:
 
 def _edges(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     """The faults of detector and comparator leave the two edges of a cycle apart."""
-    edges, offset = edge_separation(spec), spec.detector.offset_error
-    if edges.displaced > edges.limit:
-        nearer, largest = (remedy.least, -edges.largest_offset) if offset < 0 else (remedy.most, edges.largest_offset)
+    table, weakest = spec.detector, weakest_output(spec)
+    # By the offset, where the secondary is weakest [turn]; 0.5 where it does not reach the offset at all.
+    share = abs(table.offset_error) / weakest
+    displaced = math.asin(share) / (2 * math.pi) if share < 1 else 0.5
+    # Largest rms jitter that the offset leaves room for [s].
+    room = max(0.0, EDGE_LIMIT - displaced) * table.counts * spec.tick / JITTER_PEAK * table.amplitude
+    if displaced > EDGE_LIMIT:
+        largest = min(0.45, weakest * math.sin(2 * math.pi * EDGE_LIMIT))
+        nearer, largest = (remedy.least, -largest) if table.offset_error < 0 else (remedy.most, largest)
         yield wrong(
             "detector.offset_error detector.amplitude detector.gain_error detector.quadrature_error",
-            f"such that an edge is displaced by at most {edges.limit:g} turn, here {edges.displaced:.3g}: the two "
+            f"such that an edge is displaced by at most {EDGE_LIMIT:g} turn, here {displaced:.3g}: the two "
             "edges of a cycle would meet",
             nearer("detector.offset_error", largest),
         )
-    elif spec.detector.jitter > edges.largest_jitter:
+    elif table.jitter > room:
         yield wrong(
             "detector.jitter detector.amplitude clock.oscillator detector.counts detector.offset_error",
-            f"up to {text(edges.largest_jitter, 's')}: its peak of {JITTER_PEAK} times that and the offset "
-            f"displace an edge by at most {edges.limit:g} turn of the carrier",
-            remedy.most("detector.jitter", edges.largest_jitter),
+            f"up to {text(room, 's')}: its peak of {JITTER_PEAK} times that and the offset displace an edge by at most "
+            f"{EDGE_LIMIT:g} turn of the carrier",
+            remedy.most("detector.jitter", room),
         )
 
 
@@ -199,21 +205,11 @@ def _machine(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     yield from common.burst(spec.disturbance.lines.burst, spec.tick)
 
 
-RULES: tuple[Callable[[PhaseServoSpec], Iterator[Contradiction]], ...] = (
-    _tracker,
-    _speed_counted,
-    _approach,
-    _way,
-    _words,
-    _table,
-    _one_shots,
-    _edges,
-    _machine,
-)
-"""Contradictions are told in this order."""
+# Contradictions are told in this order.
+RULES = (_tracker, _speed_counted, _approach, _way, _words, _table, _one_shots, _edges, _machine)
 
 
-# --------------------------------------------------------------------------------------------------------- cautions
+# ---- cautions
 
 
 def find_cautions(spec: PhaseServoSpec) -> Iterator[Caution]:

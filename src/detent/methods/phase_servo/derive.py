@@ -96,6 +96,19 @@ class PhaseFigures:
         return loop.stability_limit() / gain
 
 
+def weakest_output(spec: PhaseServoSpec) -> float:
+    """Least amplitude of the detector's secondary over the electrical angle x, over its nominal.
+
+    It is ``hypot((1 + g) cos x - sin q sin x, cos q sin x)`` (gain error g, quadrature error q;
+    `sensing.phase_detector.fill_errors`), which is least at the smaller singular value of that matrix.
+    """
+    gain, q = 1 + spec.detector.gain_error, spec.detector.quadrature_error
+    # Singular values: squares add up to (1 + g)^2 + 1, their product is (1 + g) cos q.
+    total, product = gain**2 + 1, gain * math.cos(q)
+    least = math.sqrt(max(0.0, total - math.sqrt(max(0.0, total**2 - 4 * product**2))) / 2)
+    return least * spec.detector.amplitude
+
+
 def derive(spec: PhaseServoSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
     machine = PhaseFigures(spec)

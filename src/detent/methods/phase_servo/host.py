@@ -4,8 +4,8 @@ import math
 
 from detent.axisfile.protection import describe_fault
 from detent.control.guard import NO_ARRIVAL
-from detent.errors import AxisError, FileProblem
-from detent.methods.moves.host import Destination, Host, Problem, refused_words
+from detent.errors import AxisError
+from detent.methods.moves.host import Destination, Host, Wrong, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
@@ -73,16 +73,14 @@ class PhaseHost(Host):
         arrive_within(self.controller, 0)
         return ready
 
-    def problems(self, move: Move, to: Destination, asked: float, problem: Problem) -> list[FileProblem]:
+    def problems(self, to: Destination, asked: float) -> Wrong:
         """Targets off the positioning points, and words that this axis does not take."""
-        found: list[FileProblem] = []
         if abs(asked - to.position) > GRID_TOLERANCE * self.grid:
             low = to.position - self.grid if to.position > asked else to.position
             near = f"{format_quantity(low, 'm', 7)} or {format_quantity(low + self.grid, 'm', 7)}"
             grid = f"a multiple of the detector's pitch, {format_quantity(self.grid, 'm', 6)}"
-            key = "target" if move.by is None else "by"
-            found.append(problem(key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"))
-        return found + refused_words(move, problem, "this axis takes its speed from the velocity table")
+            yield to.move.place_key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"
+        yield from refused_words(to.move, "this axis takes its speed from the velocity table")
 
     @property
     def failure(self) -> str:

@@ -58,13 +58,10 @@ class PhaseBench:
         self.run_until(START)
         c = self.machine.state.controller
         command(c, abs(self.pitches) * self.spec.detector.counts, int(self.pitches < 0))
-        limit = self._time_limit()
+        way, a = abs(self.pitches) * self.spec.pitch, self.spec.method.table_acceleration
+        limit = START + 0.5 + 3 * (way / self.spec.limits.speed + 2 * math.sqrt(way / a))
         while self.machine.time < limit:
             self.run_until(self.machine.time + LOOK)
             if c.sequencer.mode == POSITION_MODE:
                 return c.sequencer.switched * self.machine.tick
         return math.nan
-
-    def _time_limit(self) -> float:
-        way, a = abs(self.pitches) * self.spec.pitch, self.spec.method.table_acceleration
-        return START + 0.5 + 3 * (way / self.spec.limits.speed + 2 * math.sqrt(way / a))

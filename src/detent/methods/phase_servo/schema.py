@@ -214,11 +214,6 @@ class PhaseServoSpec(AxisSpec, frozen=True):
         return self.mechanics.pulley_circumference / self.detector.pitches_per_revolution
 
     @property
-    def offset_share(self) -> float:
-        """Offset of the comparator over the true amplitude."""
-        return self.detector.offset_error / self.detector.amplitude
-
-    @property
     def edge_jitter(self) -> float:
         """Rms displacement of an edge by noise at the true amplitude [s]: the slope of the crossing goes with it."""
         return self.detector.jitter / self.detector.amplitude
@@ -227,13 +222,6 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     def step(self) -> float:
         """Travel per count [m]."""
         return self.pitch / self.detector.counts
-
-    @property
-    def stall_force(self) -> float:
-        """Force on the carriage at standstill with a full drive word [N]."""
-        resistance = self.motor.resistance + self.drive.bridge_resistance
-        current = min(self.drive.supply / resistance, self.limits.effort)
-        return current * self.motor.torque_constant * 2 * math.pi / self.mechanics.pulley_circumference
 
     @property
     def tick(self) -> float:
@@ -260,6 +248,9 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
     """Fill the defaults that depend on another key, as their `derived` texts say."""
     literal, travel = spec.clock.order == "literal", spec.limits.travel
     static = max(spec.mechanics.friction.right.static, spec.mechanics.friction.left.static)
+    # Force on the carriage at standstill with a full drive word [N].
+    current = min(spec.drive.supply / (spec.motor.resistance + spec.drive.bridge_resistance), spec.limits.effort)
+    stall = current * spec.motor.torque_constant * 2 * math.pi / spec.mechanics.pulley_circumference
     character = max(1, round(INCH / 10 / spec.pitch)) * spec.pitch
     return spec.filled(
         mechanics={"start_position": 0.1 * travel},
@@ -269,6 +260,6 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
             "speed_gains": [1, 1, 8] if literal else [1, 1, 16],
             "position_gains": [3, 6, 1] if literal else [4, 16, 1],
         },
-        protection={"stuck_effort": breaking_effort(static, spec.stall_force)},
+        protection={"stuck_effort": breaking_effort(static, stall)},
         printing={"left_margin": min(INCH, travel / 2), "character_pitch": character},
     )

@@ -7,7 +7,7 @@ import pytest
 from tests.bad_files import added, edit, given, params
 from tests.remedies import broken_rules, check_rule
 
-from detent.methods.phase_servo import detector
+from detent.methods.phase_servo import checks
 
 TRAVEL = 'travel = "14 in"'
 BURST = "disturbance.lines.burst"
@@ -91,6 +91,6 @@ def test_the_constants_are_those_of_the_blocks():
     from detent.kernel.noise import NoiseSource, bell
     from detent.sensing.phase_detector import JITTER_LIMIT
 
-    assert detector.EDGE_LIMIT == JITTER_LIMIT
+    assert checks.EDGE_LIMIT == JITTER_LIMIT
     source = NoiseSource(state=1)
-    assert max(abs(bell(source)) for _ in range(2000)) <= detector.JITTER_PEAK
+    assert max(abs(bell(source)) for _ in range(2000)) <= checks.JITTER_PEAK
