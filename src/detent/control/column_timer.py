@@ -6,7 +6,7 @@ error. Positions in 1/256 emitter, times in microseconds.
 """
 
 from detent.kernel.registers import Registers, i4, i4_array, i8, register, u1, u1_array
-from detent.kernel.step import step
+from detent.kernel.step import hot_step, step
 
 COLUMNS = 2048
 """Columns of the line buffer: 17 in at 120 per inch."""
@@ -82,7 +82,7 @@ def next_column(r: ColumnTimer, b: LineBuffer, direction: int) -> None:
         skip_white(r, b, direction)
 
 
-@step
+@hot_step
 def schedule(
     p: ColumnTimerParams, r: ColumnTimer, b: LineBuffer, emitter: int, direction: int, now: int, interval: int
 ) -> None:

@@ -267,7 +267,7 @@ def at_zero_speed(p: HeadParams, c: HeadComputer) -> None:
         finish(p, c, OK, turn)
 
 
-@step
+@hot_step
 def on_emitter(p: HeadParams, c: HeadComputer, when: int, change: int) -> None:
     """Emitter interrupt: `when` in microseconds, `change` 1 right or -1 left."""
     c.emitter += change

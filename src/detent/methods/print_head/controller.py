@@ -47,7 +47,7 @@ class PrintHeadLines(Registers):
     place: i2_array = register("which each was: its place in the line buffer", length=FIRES, by=CONTROLLER)
 
 
-@step
+@hot_step
 def take_emitter(p: HeadParams, c: PrintHeadController, cycle: int, when: int) -> None:
     """A new cycle of the decoder is an emitter interrupt; it also times the columns until the next one."""
     h = c.head
@@ -60,49 +60,39 @@ def take_emitter(p: HeadParams, c: PrintHeadController, cycle: int, when: int) -
         schedule(p.columns, h.columns, h.buffer, line_passed, change, when, h.interval_us)
 
 
-@step
-def take_reverse_edge(p: HeadParams, c: PrintHeadController) -> None:
-    """A quadrature edge against the motion: it may end a stop."""
-    on_reverse_edge(p, c.head)
-    c.head.wake_us = next_wake(p, c.head)
+@hot_step
+def fire_until(c: PrintHeadController, lines: PrintHeadLines, last: int) -> None:
+    """Fire the columns due up to `last` [us]."""
+    columns, begin = c.head.columns, c.head.now_us - PERIOD_US
+    while columns.fire_us <= last:
+        k = min(lines.fired, FIRES - 1)
+        lines.fired_us[k] = columns.fire_us - begin
+        lines.place[k] = columns.bank * COLUMNS + columns.column
+        lines.fired = k + 1
+        fired(columns, c.head.buffer, c.head.direction)
 
 
 @hot_step
 def take_edge(p: HeadParams, c: PrintHeadController, levels: int, when: int) -> None:
-    """New levels of the channels at `when` [us]."""
+    """New levels of the channels at `when` [us]: four are an emitter, and one against the motion may end a stop."""
     change = count_edge(c.quadrature, levels & 1, levels >> 1)
     cycle = c.quadrature.count >> 2
     if cycle != c.cycle:
         take_emitter(p, c, cycle, when)
     if change == -c.head.direction:
-        take_reverse_edge(p, c)
-
-
-@step
-def fire_column(c: PrintHeadController, lines: PrintHeadLines, within: int) -> None:
-    """Fire the due column, `within` microseconds after the period began."""
-    columns, k = c.head.columns, min(lines.fired, FIRES - 1)
-    lines.fired_us[k] = within
-    lines.place[k] = columns.bank * COLUMNS + columns.column
-    lines.fired = k + 1
-    fired(columns, c.head.buffer, c.head.direction)
+        on_reverse_edge(p, c.head)
+        c.head.wake_us = next_wake(p, c.head)
 
 
 @hot_step
 def take_events(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) -> None:
     """Edges and due columns of the last period, in order of time."""
-    h = c.head
-    begin, k = h.now_us - PERIOD_US, 0
     lines.fired = 0
-    while True:
-        due = h.columns.fire_us
-        if due < h.now_us and (k == lines.edges or due <= begin + lines.when_us[k]):
-            fire_column(c, lines, due - begin)
-        elif k == lines.edges:
-            break
-        else:
-            take_edge(p, c, lines.levels[k], begin + lines.when_us[k])
-            k += 1
+    for k in range(lines.edges):
+        when = c.head.now_us - PERIOD_US + lines.when_us[k]
+        fire_until(c, lines, when)
+        take_edge(p, c, lines.levels[k], when)
+    fire_until(c, lines, c.head.now_us - 1)
 
 
 @controls(HeadParams)
