@@ -17,8 +17,7 @@ from detent.record.capture import Stretch, capture
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves
 from detent.record.trace import Trace
-from detent.record.trace_files import load_trace, save_trace
-from detent.record.trace_store import TraceWriter
+from detent.record.trace_files import TraceWriter, load_trace, save_trace
 from detent.record.vcd_file import save_vcd
 from detent.record.waveforms import Waveforms
 
@@ -163,9 +162,7 @@ class Axis:
         if trace_file is None:
             result = method.run(loaded, recorder=recorder, progress=progress)
         else:
-            with TraceWriter(
-                trace_file, recorder.dtype, units=recorder.units, docs=recorder.docs, attributes=about
-            ) as writer:
+            with TraceWriter(trace_file, recorder.trace(**about)) as writer:
                 recorder.pass_on(writer.append, KEPT_ROWS)
                 result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, recorder.trace(**about))

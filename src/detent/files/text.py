@@ -1,13 +1,13 @@
-"""Bytes and text of files: read as far as their kind allows, or refused with the reason; short texts for messages."""
+"""Files read as far as their kind allows, written whole or not at all, or refused with the reason; short texts."""
 
 import gzip
+import os
 import zlib
 from collections.abc import Collection, Generator
-from contextlib import contextmanager
-from os import PathLike
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from detent.errors import FileProblem, InputError
+from detent.errors import DetentError, FileProblem, InputError
 
 MAX_SHOWN = 60  # characters of a value shown in a message
 
@@ -55,7 +55,7 @@ def read_head(file: Path, limit: int, allowed: str, remedy: str) -> bytes:
 # ---- jobs
 
 
-def read_text(path: str | PathLike[str], kinds: Collection[str], allowed: str) -> str:
+def read_text(path: str | os.PathLike[str], kinds: Collection[str], allowed: str) -> str:
     """Read a job file of UTF-8 text."""
     return decode_utf8(Path(path), read_data(Path(path), kinds, allowed))
 
@@ -130,3 +130,40 @@ def _check_size(path: Path, size: int, limit: int, allowed: str) -> None:
     if size > limit:
         most, remedy = f"{limit // 1_000_000} MB", "cut the recording into pieces, or save it as HDF5 or Parquet"
         raise InputError.of_file(str(path), f"more than {most}", f"up to {most}", remedy)
+
+
+# ---- what is written
+
+
+@contextmanager
+def write_errors(path: Path) -> Generator[None]:
+    """Turn the system's refusal to write into an error that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+
+
+@contextmanager
+def writing(path: Path) -> Generator[Path]:
+    """Give the place to write a file to: at the end it gets its name, after a failure nothing is left of it."""
+    part = path.with_name(path.name + ".part")
+    try:
+        with write_errors(path):
+            yield part
+            with part.open("rb+") as whole:
+                os.fsync(whole.fileno())
+            part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink()
+        raise
+
+
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a file of text; a file name in it need not be valid UTF-8, the file must be."""
+    path = Path(path)
+    with writing(path) as part:
+        part.write_text(text, encoding="utf-8", errors="replace", newline="\n")
+    return path

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
+from detent.files.text import write_text
 from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
@@ -16,7 +17,6 @@ from detent.identify.write.file_numbers import Contrast, contrasts
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
-from detent.record.trace_store import writing
 
 if TYPE_CHECKING:
     from detent.record.machine import Progress
@@ -191,11 +191,3 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
 
     found = identify(read, effort, method=method, report=report)
     return Identified(found, text, "" if axis is None else str(axis), reading)
-
-
-def write_text(path: str | Path, text: str) -> Path:
-    """Write a file."""
-    path = Path(path)
-    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
-        file.write(text)
-    return path

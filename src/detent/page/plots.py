@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
+from detent.files.text import writing
 from detent.page.chart import thin_indices
 from detent.record.trace import Trace
-from detent.record.trace_store import writing
 
 # matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
 Axes = Any
@@ -122,6 +122,7 @@ def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
         figure.set_layout_engine("none")
         for area in figure.axes:
             area.set_position(area.get_position().from_extents(area.get_position().extents.round(6)))
-        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix.lower())
-        with writing(path):
-            figure.savefig(path, metadata=metadata)
+        kind = path.suffix.lower().removeprefix(".")
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+        with writing(path) as part:
+            figure.savefig(part, format=kind, metadata=metadata)

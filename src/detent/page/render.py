@@ -14,10 +14,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from detent import __version__
+from detent.files.text import write_text
 from detent.page.figure import about
 from detent.page.frame import Page
 from detent.page.words import further
-from detent.record.trace_store import part_of, writing
 
 LEVELS = {"error": "Error", "warning": "Warning", "note": "Note"}  # of notes, in the order of the page
 SIGNS = {"good": "✔", "warn": "!", "bad": "✘"}
@@ -27,12 +27,7 @@ FOR_THE_PAGE = {"title", "about"}  # what is said of a chart outside the plot ar
 
 def write_page(path: str | Path, page: Page) -> None:
     """Write a page as one self-contained HTML file, in place of one that is there; DetentError if that fails."""
-    path = Path(path)
-    part = part_of(path)
-    with writing(path):
-        # A file name need not be valid UTF-8; the page must be.
-        part.write_text(render_page(page), encoding="utf-8", errors="replace")
-        part.replace(path)
+    write_text(path, render_page(page))
 
 
 def render_page(page: Page) -> str:

@@ -5,46 +5,177 @@
 | ``.h5`` / ``.hdf5`` | columns in their exact width, units, descriptions, attributes | - |
 | ``.csv`` | columns (every digit) and units; no descriptions or attributes | - |
 | ``.parquet`` | everything | the extra ``parquet`` |
-
-Every writer fills a ``.part`` file beside the target and renames it at the end: a file with the right name is whole.
 """
 
 import csv
 import importlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import TracebackType
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
-from detent.record.trace import TIME, Attribute, Column, Trace
-from detent.record.trace_store import FORMAT, GROUP, attributes_of, load_hdf5, open_store, part_of, save_hdf5, writing
+from detent.files.text import write_errors, writing
+from detent.record.trace import TIME, Attribute, Column, Trace, check_columns
 
+CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
-STORES = (".h5", ".hdf5")  # endings of the store's own files
 PARQUET_ROWS = 1 << 20  # rows of one Parquet row group
+STORES = (".h5", ".hdf5")  # endings of the store's own files
+GROUP = "trace"
+FORMAT = "detent trace 1"
 _HEADER = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
 
 
-def _write_csv(table: "_Table", path: Path) -> None:
-    """Write columns as CSV, piece by piece: a header row such as ``t [s],motor.current [A]``, then a row per moment.
+# ---- the store
+
+
+class TraceWriter:
+    """Write a trace to HDF5 piece by piece, in constant memory, for runs of any length.
+
+    Names and types of the columns, units, descriptions and attributes are those of `head`, its rows are not written.
+    The file appears under its name when the writer is closed. Leaving the ``with`` block by an exception closes it
+    too - what was recorded up to a failure is what one wants to look at - with the attribute ``complete`` = 0.
+
+    >>> import numpy as np, tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "run.h5"
+    >>> trace = Trace(columns={"t": np.array([0.0, 0.001]), "motor.current": np.array([0.0, 0.4])}, units={"t": "s"})
+    >>> with TraceWriter(path, trace) as writer:
+    ...     writer.append(trace.columns)
+    >>> len(load_trace(path))
+    2
+    """
+
+    def __init__(self, path: str | Path, head: Trace) -> None:
+        self.path = Path(path)
+        self.rows = 0
+        self._last_time = -np.inf
+        # A copy of a trace that broke off stays one that broke off.
+        self._whole = bool(head.attributes.get("complete", 1))
+        with ExitStack() as stack:
+            self._file: Any = _h5py().File(stack.enter_context(writing(self.path)), "w")
+            self._sets = self._write_head(head)
+            self._naming = stack.pop_all()
+
+    def _write_head(self, head: Trace) -> dict[str, Any]:
+        from detent import __version__
+
+        root = self._file.attrs
+        for name, value in {"detent_version": __version__, **head.attributes}.items():
+            # A file name need not be valid UTF-8; HDF5 text must be.
+            root[name] = value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
+        root["format"] = FORMAT
+        root["complete"] = 0
+        group = self._file.create_group(GROUP)
+        group.attrs["columns"] = list(head)  # HDF5 itself lists datasets by name, not in order
+        kept: dict[str, Any] = {"maxshape": (None,), "chunks": (CHUNK_ROWS,), "shuffle": True}
+        for name, column in head.columns.items():
+            dataset = group.create_dataset(name, (0,), column.dtype, compression="gzip", compression_opts=1, **kept)
+            dataset.attrs["unit"] = head.units.get(name, "")
+            dataset.attrs["doc"] = head.docs.get(name, "")
+        return {name: group[name] for name in head}
+
+    def append(self, rows: NDArray[np.void] | Mapping[str, Column]) -> None:
+        """Add rows, given as such or as columns."""
+        columns = rows if isinstance(rows, Mapping) else {name: rows[name] for name in (rows.dtype.names or ())}
+        if self._file is None:
+            raise DetentError(f"{self.path}: the trace is closed; append rows before close()")
+        if list(columns) != list(self._sets):
+            raise DetentError(f"{self.path}: got columns {list(columns)}, the file has {list(self._sets)}; send these")
+        check_columns(columns)
+        time = columns[TIME]
+        if not time.size:
+            return
+        if time[0] < self._last_time:
+            raise DetentError(
+                f"{self.path}: a block starts at {time[0]!s} s, before the last row at {self._last_time!s} s; "
+                "append blocks in order of time"
+            )
+        end = self.rows + time.size
+        with write_errors(self.path):
+            for name, values in columns.items():
+                self._sets[name].resize((end,))
+                self._sets[name][self.rows : end] = values
+        self.rows, self._last_time = end, time[-1]
+
+    def close(self, *, complete: bool = True) -> None:
+        """Finish the file and give it its name; a second call does nothing."""
+        if self._file is None:
+            return
+        with self._naming:
+            file, self._file = self._file, None
+            file.attrs["complete"] = int(complete and self._whole)
+            file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close(complete=kind is None)
+
+
+class _Table(NamedTuple):
+    """A trace in memory, or in an open HDF5 file: what it is written again from."""
+
+    columns: Mapping[str, Column]
+    units: Mapping[str, str]
+    docs: Mapping[str, str]
+    attributes: Mapping[str, Attribute]
+
+
+@contextmanager
+def _open_store(path: Path) -> Generator[_Table]:
+    """The trace in an HDF5 file; the file's format is its own affair."""
+    try:
+        file: Any = _h5py().File(path, "r")
+    except OSError as error:
+        came = " ".join(str(error).split())
+        raise InputError.of_file(str(path), came, "a trace in HDF5", "give a .h5 file that detent wrote") from error
+    with file:
+        if GROUP not in file or "columns" not in file[GROUP].attrs:
+            raise InputError.of_file(
+                str(path), f"HDF5 with {', '.join(file) or 'nothing'}", f"a group /{GROUP}", "give a trace of detent"
+            )
+        columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
+        units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
+        held: dict[str, Any] = {name: value for name, value in file.attrs.items() if name != "format"}
+        told = {name: value.item() if isinstance(value, np.generic) else value for name, value in held.items()}
+        yield _Table(columns, units, docs, told)
+
+
+def _load_hdf5(path: Path) -> Trace:
+    with _open_store(path) as held:
+        columns: Any = {name: values[()] for name, values in held.columns.items()}
+        return Trace(columns=columns, units={**held.units}, docs={**held.docs}, attributes={**held.attributes})
+
+
+def _h5py() -> Any:
+    return importlib.import_module("h5py")
+
+
+# ---- for other tools
+
+
+def write_csv(path: Path, columns: Mapping[str, Column]) -> None:
+    """Write columns as CSV, piece by piece: a row of their headings, then a row per moment.
 
     Floats carry every digit needed to read the same bits back (17 at most), integers stay integers, booleans
-    become 0 and 1. Descriptions and attributes are not in the file.
+    become 0 and 1.
     """
-    part, columns, units = part_of(path), table.columns, table.units
-    with writing(path):
-        with part.open("w", encoding="utf-8", newline="") as stream:
-            labels = [f"{name} [{units[name]}]" if units.get(name) else name for name in columns]
-            csv.writer(stream, lineterminator="\n").writerow(labels)
-            for first in range(0, len(columns[TIME]), CSV_ROWS):
-                texts = [_texts(values[first : first + CSV_ROWS]) for values in columns.values()]
-                # No cell needs quotes, so joining strings does what csv.writer does in half the time.
-                stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
-        part.replace(path)
+    with writing(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerow(columns)
+        for first in range(0, len(next(iter(columns.values()))), CSV_ROWS):
+            texts = [_texts(values[first : first + CSV_ROWS]) for values in columns.values()]
+            # No cell needs quotes, so joining strings does what csv.writer does in half the time.
+            stream.write("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
 
 
 def _texts(values: Column) -> list[str]:
@@ -54,32 +185,27 @@ def _texts(values: Column) -> list[str]:
     return list(map(repr, values.tolist()))
 
 
-def _write_parquet(table: "_Table", path: Path) -> None:
+def _write_parquet(table: _Table, path: Path) -> None:
     """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
     arrow, parquet = need_parquet()
     kinds = {name: arrow.from_numpy_dtype(values.dtype) for name, values in table.columns.items()}
     told = {name: {"unit": table.units.get(name, ""), "doc": table.docs.get(name, "")} for name in kinds}
     fields = [arrow.field(name, kind, metadata=told[name]) for name, kind in kinds.items()]
     schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **table.attributes})})
-    part = part_of(path)
-    with writing(path):
-        with parquet.ParquetWriter(part, schema) as writer:
-            for first in range(0, len(table.columns[TIME]), PARQUET_ROWS):
-                block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in table.columns.values()]
-                writer.write_table(arrow.table(block, schema=schema))
-        part.replace(path)
+    with writing(path) as part, parquet.ParquetWriter(part, schema) as writer:
+        for first in range(0, len(table.columns[TIME]), PARQUET_ROWS):
+            block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in table.columns.values()]
+            writer.write_table(arrow.table(block, schema=schema))
 
 
-class _Table(NamedTuple):
-    """What a writer takes of a trace, in memory or in an open HDF5 file."""
-
-    columns: Mapping[str, Column]
-    units: Mapping[str, str]
-    docs: Mapping[str, str]
-    attributes: Mapping[str, Attribute]
+def _write_table_csv(table: _Table, path: Path) -> None:
+    """A header row such as ``t [s],motor.current [A]``; descriptions and attributes are not in the file."""
+    units = table.units
+    labels = {name: f"{name} [{units[name]}]" if units.get(name) else name for name in table.columns}
+    write_csv(path, {labels[name]: values for name, values in table.columns.items()})
 
 
-_WRITERS: dict[str, Callable[[_Table, Path], None]] = {".csv": _write_csv, ".parquet": _write_parquet}
+_WRITERS: dict[str, Callable[[_Table, Path], None]] = {".csv": _write_table_csv, ".parquet": _write_parquet}
 
 
 def convert_trace(store: str | Path, path: str | Path) -> None:
@@ -87,17 +213,16 @@ def convert_trace(store: str | Path, path: str | Path) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
         raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use {' or '.join(_WRITERS)}")
-    with open_store(Path(store)) as file:
-        columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
-        units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
-        _WRITERS[suffix](_Table(columns, units, docs, attributes_of(file)), Path(path))
+    with _open_store(Path(store)) as table:
+        _WRITERS[suffix](table, Path(path))
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
     """Write a trace in the format its suffix names."""
     suffix = Path(path).suffix.lower()
     if suffix in STORES:
-        save_hdf5(trace, path)
+        with TraceWriter(path, trace) as writer:
+            writer.append(trace.columns)
     elif suffix in _WRITERS:
         _WRITERS[suffix](_Table(trace.columns, trace.units, trace.docs, trace.attributes), Path(path))
     else:
@@ -125,7 +250,7 @@ def load_trace(path: str | Path) -> Trace:
     """
     path = Path(path)
     readers: dict[str, Callable[[Path], Trace]] = {
-        ".h5": load_hdf5, ".hdf5": load_hdf5, ".csv": _load_csv, ".parquet": _load_parquet,
+        ".h5": _load_hdf5, ".hdf5": _load_hdf5, ".csv": _load_csv, ".parquet": _load_parquet,
     }  # fmt: skip
     suffix = path.suffix.lower()
     if suffix not in readers:

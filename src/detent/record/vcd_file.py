@@ -22,7 +22,7 @@ from vcd.common import Timescale, TimescaleUnit, VarType
 from vcd.writer import VCDWriter
 
 from detent.errors import DetentError
-from detent.record.trace_store import part_of, writing
+from detent.files.text import writing
 from detent.record.waveforms import Waveform, Waveforms
 
 _UNITS = ((10**6, TimescaleUnit.microsecond), (10**3, TimescaleUnit.nanosecond), (1, TimescaleUnit.picosecond))
@@ -40,11 +40,8 @@ def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
     path = Path(path)
     if not waveforms.signals:
         raise DetentError(f"{path}: there are no signals; allowed: one or more; name registers to record")
-    part = part_of(path)
-    with writing(path):
-        with part.open("w", encoding="ascii", newline="\n") as stream:
-            _write(waveforms, stream)
-        part.replace(path)
+    with writing(path) as part, part.open("w", encoding="ascii", newline="\n") as stream:
+        _write(waveforms, stream)
 
 
 def _write(waveforms: Waveforms, stream: Any) -> None:

@@ -4,7 +4,6 @@ The header's registers, numbers and words are those of the control unit and the 
 from the same declarations, so firmware and simulation cannot drift apart. Its text is step_rule.h.in.
 """
 
-import csv
 import ctypes
 import re
 from dataclasses import dataclass
@@ -22,16 +21,16 @@ from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
+from detent.files.text import write_text
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
-from detent.record.trace_store import part_of, writing
+from detent.record.trace_files import write_csv
 from detent.units import format_quantity
 
 Words = NDArray[np.int64]
 
-CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
 METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
@@ -87,8 +86,7 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
     that ramp and zone allow; `period` is what the timer loads for it, words rounded. A step that is not allowed (a
     sentinel) has index -1, and 0 for permissible and period.
     """
-    path = Path(path)
-    steps, part = np.arange(tables.steps), part_of(path)
+    steps = np.arange(tables.steps)
     position = tables.first_position + steps * tables.travel_per_step
     columns: dict[str, NDArray[Any]] = {"step": steps, "position [m]": np.round(position, METRE_DIGITS)}
     for name, table in (("up", tables.up), ("down", tables.down)):
@@ -96,14 +94,7 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
         columns[f"{name}.zone_limit [Hz]"] = table.zones.hz
         columns[f"{name}.permissible [Hz]"] = table.permissible_hz()
         columns[f"{name}.period [tick]"] = tables.periods(table)
-    with writing(path):
-        with part.open("w", encoding="utf-8", newline="") as stream:
-            out = csv.writer(stream, lineterminator="\n")
-            out.writerow(columns)
-            for first in range(0, tables.steps, CSV_ROWS):
-                rows = (values[first : first + CSV_ROWS].tolist() for values in columns.values())
-                out.writerows(zip(*rows, strict=True))
-        part.replace(path)
+    write_csv(Path(path), columns)
 
 
 # ---- C header
@@ -116,12 +107,7 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
     ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
     arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
     """
-    path = Path(path)
-    part = part_of(path)
-    with writing(path):
-        # A name need not be valid UTF-8; the header must be.
-        part.write_text(_header(tables), encoding="utf-8", errors="replace", newline="\n")
-        part.replace(path)
+    write_text(path, _header(tables))
 
 
 def _header(tables: EnvelopeTables) -> str:

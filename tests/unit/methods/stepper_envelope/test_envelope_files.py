@@ -8,13 +8,13 @@ import pytest
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, Rig, default_ramp, turn_envelopes
 
 from detent.errors import DetentError
-from detent.methods.stepper_envelope import envelope_files
 from detent.methods.stepper_envelope.envelope_files import (
     EnvelopeTables,
     write_envelope_csv,
     write_envelope_header,
 )
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
+from detent.record import trace_files
 
 STEP = 5e-6
 MEGAHERTZ = 1_000_000
@@ -101,7 +101,7 @@ def test_directions_may_have_their_own_zones(tmp_path):
 
 def test_rows_are_whole_beyond_a_piece_of_text(tmp_path, monkeypatch):
     write_envelope_csv(tables(), tmp_path / "one.csv")
-    monkeypatch.setattr(envelope_files, "CSV_ROWS", 7)
+    monkeypatch.setattr(trace_files, "CSV_ROWS", 7)
     write_envelope_csv(tables(), tmp_path / "many.csv")
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "many.csv").read_bytes()
 
