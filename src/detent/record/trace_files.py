@@ -146,9 +146,9 @@ def _open_store(path: Path) -> Generator[_Table]:
             )
         columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
         units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
-        held: dict[str, Any] = {name: value for name, value in file.attrs.items() if name != "format"}
-        told = {name: value.item() if isinstance(value, np.generic) else value for name, value in held.items()}
-        yield _Table(columns, units, docs, told)
+        attrs: dict[str, Any] = {name: value for name, value in file.attrs.items() if name != "format"}
+        about: Any = {name: value.item() if isinstance(value, np.generic) else value for name, value in attrs.items()}
+        yield _Table(columns, units, docs, about)
 
 
 def _load_hdf5(path: Path) -> Trace:
