@@ -146,9 +146,13 @@ def _open_store(path: Path) -> Generator[_Table]:
             )
         columns = {str(name): file[GROUP][name] for name in file[GROUP].attrs["columns"]}
         units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
-        attrs: dict[str, Any] = {name: value for name, value in file.attrs.items() if name != "format"}
-        about: Any = {name: value.item() if isinstance(value, np.generic) else value for name, value in attrs.items()}
-        yield _Table(columns, units, docs, about)
+        told = {name: value for name, value in file.attrs.items() if name != "format"}
+        yield _Table(columns, units, docs, {name: _plain(value) for name, value in told.items()})
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy's as one of Python's."""
+    return getattr(value, "item", lambda: value)()
 
 
 def _load_hdf5(path: Path) -> Trace:
