@@ -131,9 +131,10 @@ def spans_of(t: Numbers, on: Numbers) -> list[tuple[float, float]]:
     return [(float(t[a]), float(t[min(b, last)])) for a, b in edges.reshape(-1, 2).tolist()]
 
 
-def line_chart(panel: Panel, x: Numbers, label: str, *, digits: int = 4) -> Chart:
-    """Draw one plot area over any horizontal axis, every row of it."""
-    return _chart(panel, slice(None)) | {"x": rounded(x, digits), "xLabel": label}
+def line_chart(panel: Panel, x: Numbers, label: str, *, digits: int = 4, log: Literal["", "x", "xy"] = "") -> Chart:
+    """Draw one plot area over any horizontal axis, every row of it; `log` names the axes that are logarithmic."""
+    chart = _chart(panel, slice(None)) | {"x": rounded(x, digits), "xLabel": label}
+    return chart | ({"log": log} if log else {})
 
 
 def loop_chart(panel: Panel, x: Numbers, label: str, loops: Sequence[Loop], *, digits: int = 4) -> Chart:

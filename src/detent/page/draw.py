@@ -118,6 +118,9 @@ def draw_chart(area: Axes, chart: Chart) -> None:
     _draw_marks(area, chart)
     if len(x) > 1 and not any("bars" in series for series in chart["series"]):
         area.set_xlim(float(x[0]), float(x[-1]))
+    for axis in chart.get("log", ""):
+        area.set(**{f"{axis}scale": "log"})
+        getattr(area, f"{axis}axis").set_major_formatter("{x:g}")
     if "yRange" in chart:
         area.set_ylim(*chart["yRange"])
     if "title" in chart:

@@ -9,6 +9,7 @@ from tests.unit.page.samples import EVENTS, figures, heaps, lanes, loops, over_t
 
 from detent.errors import DetentError
 from detent.page import draw
+from detent.page.chart import Curve, Panel, line_chart
 from detent.page.draw import draw_chart, draw_figures
 from detent.page.figure import Figure
 
@@ -108,3 +109,11 @@ def test_the_suffix_chooses_the_kind_and_the_same_figures_give_the_same_file(suf
 def test_other_suffixes_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DetentError, match=r"cannot be saved as '.gif'"):
         draw_figures([Figure(title="a", table=table())], tmp_path / "a.gif")
+
+
+def test_axes_are_logarithmic_where_the_chart_says_so() -> None:
+    curve = Curve(label="c", colour="ink", y=np.array([1e-6, 1e-2]), digits=9)
+    chart = line_chart(Panel(name="p", label="y", curves=[curve]), np.array([1.0, 100.0]), "f [Hz]", log="xy")
+    area = drawn(chart)
+    assert (area.get_xscale(), area.get_yscale()) == ("log", "log")
+    np.testing.assert_allclose(area.lines[0].get_ydata(), [1e-6, 1e-2])

@@ -1,21 +1,17 @@
-"""Figure of the report of an identification: the frequency response, where the excitation tells one.
-
-Plots over the logarithm of the frequency are drawn as SVG, without a script.
-"""
+"""Figure of the report of an identification: the frequency response, where the excitation tells one."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import FrequencyResponse, response_of
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.identification import Identification
 from detent.identify.page.words import unit_text
-from detent.page.chart import Curve, Panel
+from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
 
@@ -24,103 +20,6 @@ FEWEST_LINES = 10  # coherent lines without which there is no Bode plot
 AGREEING = 0.9  # share of neighbouring lines whose accelerations are less than a factor of 2 apart, at least
 BROADEST = 3.0  # highest over lowest coherent frequency, at least
 MOST_LINES = 800  # frequencies drawn
-
-
-LEFT, RIGHT, TOP, FOOT, FULL = 74.0, 16.0, 10.0, 22.0, 1000.0
-
-
-def frequency_plots(f: Numbers, panels: Sequence[Panel], *, logarithmic: int = 0) -> Markup:
-    """Draw panels above one another over frequencies [Hz], the axis logarithmic, that of so many panels' values too."""
-    legend = " ".join(
-        f'<span class="nowrap"><svg width="26" height="10"><path d="M1 5h24" style="{_stroke(line, 2.5)}"/></svg> '
-        f"{escape(line.label)}</span>"
-        for line in panels[0].curves
-        if line.label
-    )
-    last = len(panels) - 1
-    drawn = "".join(_plot(panel, f, is_log=k < logarithmic, last=k == last) for k, panel in enumerate(panels))
-    return Markup(f'{drawn}<p class="hint">{legend}</p>')  # noqa: S704 - texts are escaped where they are put in
-
-
-def _stroke(line: Curve, width: float) -> str:
-    dash = ";stroke-dasharray:{} {}".format(*line.dash) if line.dash else ""
-    return f"fill:none;stroke:var(--{line.colour});stroke-width:{width}{dash}"
-
-
-def _plot(plot: Panel, f: Numbers, *, is_log: bool, last: bool) -> str:
-    """One panel; its values reach as far as the first curve does, with some room, unless it says how far."""
-    low, high = float(f.min()), float(f.max())
-    values = plot.curves[0].y[np.isfinite(plot.curves[0].y)]
-    bottom, top = float(values.min()), float(values.max())
-    room = max(0.1 * (top - bottom), 10.0)
-    bottom, top = plot.span or ((bottom / 2.0, top * 2.0) if is_log else (bottom - room, top + room))
-    inner = plot.height - TOP - FOOT
-
-    def right(f: Any) -> Any:
-        return LEFT + (FULL - LEFT - RIGHT) * np.log(f / low) / math.log(high / low)
-
-    def down(y: Any) -> Any:
-        share = np.log(y / bottom) / math.log(top / bottom) if is_log else (y - bottom) / (top - bottom)
-        return TOP + inner * (1.0 - share)
-
-    parts: list[str] = []
-    for tick, text in _decades(low, high):
-        at = right(tick)
-        parts.append(f'<path d="M{at:.1f} {TOP}V{plot.height - FOOT}" style="stroke:var(--grid)"/>')
-        if text:
-            parts.append(f'<text x="{at:.1f}" y="{plot.height - 6}" text-anchor="middle">{text}</text>')
-    for value, text in _powers(bottom, top) if is_log else _steps(bottom, top):
-        at = down(value)
-        parts.append(f'<path d="M{LEFT} {at:.1f}H{FULL - RIGHT}" style="stroke:var(--grid)"/>')
-        parts.append(f'<text x="{LEFT - 6}" y="{at + 4:.1f}" text-anchor="end">{text}</text>')
-    for level, _ in plot.levels:
-        parts.append(
-            f'<path d="M{LEFT} {down(level):.1f}H{FULL - RIGHT}" style="stroke:var(--soft);stroke-dasharray:3 3"/>'
-        )
-    wide = FULL - LEFT - RIGHT
-    clip = f'<svg x="{LEFT}" y="{TOP}" width="{wide}" height="{inner}" viewBox="{LEFT} {TOP} {wide} {inner}">'
-    curves = "".join(f'<path d="{_path(right(f), down(one.y))}" style="{_stroke(one, 1.8)}"/>' for one in plot.curves)
-    foot = f'<text x="{FULL / 2}" y="{plot.height + 14}" text-anchor="middle">frequency [Hz]</text>' if last else ""
-    height = plot.height + (18 if last else 0)
-    turned = f"translate(14 {TOP + inner / 2:.0f}) rotate(-90)"
-    side = f'<text transform="{turned}" text-anchor="middle">{escape(plot.label)}</text>'
-    return (
-        f'<svg viewBox="0 0 {FULL:.0f} {height}" role="img" aria-label="{escape(plot.label)} over the frequency" '
-        f'style="display:block;width:100%;height:auto;font:12px system-ui,sans-serif;fill:var(--soft)">'
-        f"{''.join(parts)}{clip}{curves}</svg>{side}{foot}</svg>"
-    )
-
-
-def _path(x: Numbers, y: Numbers) -> str:
-    """A line through points, broken where one is missing."""
-    known = np.isfinite(y)
-    pens = np.where(np.r_[False, known[:-1]], "L", "M")
-    return "".join(f"{pen}{a:.1f} {b:.1f}" for pen, a, b in zip(pens[known], x[known], y[known], strict=True))
-
-
-def _decades(low: float, high: float) -> list[tuple[float, str]]:
-    """Lines at 1 to 9 of each decade, figures at 1, 2 and 5, or at 1 alone of many decades."""
-    figures = (1, 2, 5) if high / low < 2e3 else (1,)
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    ticks = [(digit * 10.0**decade, digit) for decade in decades for digit in range(1, 10)]
-    return [(f, f"{f:g}" if digit in figures else "") for f, digit in ticks if low <= f <= high]
-
-
-def _powers(bottom: float, top: float) -> list[tuple[float, str]]:
-    """Powers of ten, every second or third of many."""
-    powers = range(math.ceil(math.log10(bottom)), math.floor(math.log10(top)) + 1)
-    every = max(1, math.ceil(len(powers) / 6))
-    raised = '10<tspan dy="-5" font-size="9">{}</tspan>'
-    return [(10.0**k, raised.format(str(k).replace("-", "\u2212"))) for k in powers if k % every == 0]
-
-
-def _steps(bottom: float, top: float) -> list[tuple[float, str]]:
-    """Round steps; of angles those of a quarter turn."""
-    wide = top - bottom
-    steps = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
-    step = next((one for one in steps if wide / one <= 6.0), wide / 5.0)
-    first, last = math.ceil(bottom / step - 1e-9), math.floor(top / step + 1e-9)
-    return [(k * step, f"{k * step:g}".replace("-", "\u2212")) for k in range(first, last + 1)]
 
 
 def response_figures(found: Identification, shown: int) -> list[Figure]:
@@ -133,7 +32,7 @@ def response_figures(found: Identification, shown: int) -> list[Figure]:
             "below. <b>Coherence</b> is the share of the position that the effort explains: below {} the curves above "
             "it are noise. Method: {}."
         ).format(COHERENT, response.method)
-        return [Figure(title="Bode plot", caption=caption, drawing=bode_plot(response, found.constants))]
+        return [Figure(title="Bode plot", caption=caption, charts=bode_charts(response, found.constants))]
     if found.verdict == "refused":
         return []
     missing = Markup(
@@ -172,25 +71,37 @@ def _tells(response: FrequencyResponse) -> bool:
     return bool(np.mean(apart < math.log(2.0)) > AGREEING)
 
 
-def bode_plot(r: FrequencyResponse, constants: Constants | None) -> Markup:
+def bode_charts(r: FrequencyResponse, constants: Constants | None) -> list[Chart]:
     """Magnitude, phase and coherence over the frequency, beside the rigid axis of the identified constants."""
     every = max(1, -(-len(r) // MOST_LINES))
     f, response, coherence = r.frequency[::every], r.response[::every], r.coherence[::every]
     model = respond(constants, f) if constants is not None else None
-    size = [Curve(label="recorded", colour="speed", y=np.abs(response))]
-    angle = [Curve(label="", colour="speed", y=_phase(response, model))]
+    size, phase = np.abs(response), _phase(response, model)
+    low, high = float(np.nanmin(phase)), float(np.nanmax(phase))
+    room = max(0.1 * (high - low), 10.0)
+    digits = 4 - math.floor(math.log10(float(size.min())))
+    sizes = [Curve(label="recorded", colour="speed", y=size, digits=digits)]
+    phases = [Curve(label="recorded", colour="speed", y=phase)]
     if model is not None:
-        turned = np.degrees(np.unwrap(np.angle(model)))
-        size.append(Curve(label="mass and viscous friction", colour="left", y=np.abs(model), dash=(6, 4)))
-        angle.append(Curve(label="", colour="left", y=turned, dash=(6, 4)))
-    explained = Curve(label="", colour="good", y=coherence)
+        look = Curve(label="mass and viscous friction", colour="left", y=np.abs(model), digits=digits, dash=(6, 4))
+        sizes.append(look)
+        phases.append(replace(look, y=np.degrees(np.unwrap(np.angle(model)))))
+    explained = Curve(label="coherence", colour="good", y=coherence)
     unit = f"{unit_text(r.output_unit) or '1'}/{unit_text(r.input_unit) or '1'}"
+    # As far as the recorded curve reaches, with some room.
     panels = [
-        Panel(name="", label=f"magnitude [{unit}]", curves=size, height=260),
-        Panel(name="", label="phase [deg]", curves=angle, height=180),
-        Panel(name="", label="coherence", curves=[explained], span=(0.0, 1.05), height=130, levels=[(COHERENT, "")]),
-    ]
-    return frequency_plots(f, panels, logarithmic=1)
+        Panel(
+            name="magnitude", label=f"magnitude [{unit}]", curves=sizes, height=260,
+            span=(float(size.min()) / 2.0, 2.0 * float(size.max())),
+        ),
+        Panel(name="phase", label="phase [deg]", curves=phases, height=180, span=(low - room, high + room)),
+        Panel(
+            name="coherence", label="coherence", curves=[explained], span=(0.0, 1.05), height=150,
+            levels=[(COHERENT, "")],
+        ),
+    ]  # fmt: skip
+    charts = [line_chart(panel, f, "frequency [Hz]", log="x" if k else "xy") for k, panel in enumerate(panels)]
+    return [chart | {"sync": "bode"} for chart in charts]
 
 
 def _phase(response: Numbers, model: Numbers | None) -> Numbers:

@@ -186,9 +186,10 @@
     u.ctx.restore();
   };
 
-  const seriesOf = (one) => {
+  const seriesOf = (one, log) => {
     const stroke = colour(one.colour);
     const series = { label: one.label, stroke, width: one.width || 1.5, dash: one.dash, points: { show: false } };
+    if (log) series.value = (u, value) => (value == null ? "\u2013" : written(value));
     if (one.step) series.paths = uPlot.paths.stepped({ align: 1 });
     if (one.fill) series.fill = stroke + "2b";
     if (one.bars !== undefined) {
@@ -205,11 +206,13 @@
   };
 
   const plain = new Intl.NumberFormat("en", { maximumFractionDigits: 6 });
-  const written = (value) => plain.format(value).replaceAll(",", "\u202f").replace("-", "\u2212");
+  const tiny = new Intl.NumberFormat("en", { notation: "scientific", maximumFractionDigits: 3 });
+  const written = (value) => (value !== 0 && Math.abs(value) < 1e-5 ? tiny : plain)
+    .format(value).replaceAll(",", "\u202f").replaceAll("-", "\u2212");
 
   const axisOf = (label, size, space) => ({
     label: label || undefined, labelSize: 20, labelFont: font, size, space, font, stroke: colour("soft"),
-    values: (u, ticks) => ticks.map(written),
+    values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : written(tick))),
     grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1, size: 4 },
   });
 
@@ -228,11 +231,23 @@
     label: " ", paths: () => null, points: { show: false }, value: (u, y, series, index) => barsAt(chart, chart.x[index]),
   });
 
+  /* Linear or logarithmic. */
+  const distrOf = (chart, axis) => ((chart.log || "").includes(axis) ? 3 : 1);
+
+  /* Phases in parts of a quarter turn. */
+  const valueAxisOf = (chart) => ({
+    ...axisOf(chart.yLabel, chart.log ? 64 : 54, 26),
+    ...(chart.log && /\[deg\]/.test(chart.yLabel) && { incrs: [1, 5, 15, 45, 90, 180, 360, 720, 1800, 3600] }),
+  });
+
   const optionsOf = (chart, holder) => ({
     width: holder.clientWidth, height: chart.height, padding: [10, 20, 0, 0],
-    scales: { x: { time: false }, y: chart.yRange ? { range: () => chart.yRange } : {} },
-    axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), chart.lanes ? laneAxisOf(chart) : axisOf(chart.yLabel, 54, 26)],
-    series: [{ label: (/\[(.*)\]/.exec(chart.xLabel) || ["", ""])[1] }].concat(chart.lanes ? laneSeriesOf(chart) : chart.series.map(seriesOf)),
+    scales: {
+      x: { time: false, distr: distrOf(chart, "x") },
+      y: { distr: distrOf(chart, "y"), ...(chart.yRange && { range: () => chart.yRange }) },
+    },
+    axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), chart.lanes ? laneAxisOf(chart) : valueAxisOf(chart)],
+    series: [{ label: (/\[(.*)\]/.exec(chart.xLabel) || ["", ""])[1] }].concat(chart.lanes ? laneSeriesOf(chart) : chart.series.map((one) => seriesOf(one, chart.log))),
     legend: { live: true, markers: { width: 0 } },
     cursor: {
       sync: chart.sync ? { key: chart.sync } : undefined, y: false, drag: { x: true, y: false },

@@ -8,7 +8,7 @@ from tests.synthetic_responses import within
 from tests.unit.identify.page.samples import constants, refused, rigid, trusted
 
 from detent.identify.page import response as response_module
-from detent.identify.page.response import bode_plot, respond, response_figures, told_response
+from detent.identify.page.response import bode_charts, respond, response_figures, told_response
 
 pytestmark = pytest.mark.compiled
 
@@ -51,11 +51,20 @@ def test_the_response_is_drawn_beside_the_rigid_axis_of_the_constants(monkeypatc
     monkeypatch.setattr(response_module, "response_of", lambda *_: rigid())
     (figure,) = response_figures(trusted(), 0)
     assert "mean of 5 &lt;periods&gt;" in figure.caption
-    assert figure.drawing is not None
-    assert figure.drawing.count("<svg viewBox") == 3
-    assert "magnitude [m/N]" in figure.drawing
-    assert "mass and viscous friction" in figure.drawing
-    assert "mass and viscous friction" not in bode_plot(rigid(), None)
+    magnitude, phase, coherence = figure.charts
+    assert magnitude["yLabel"] == "magnitude [m/N]"
+    assert [chart["log"] for chart in figure.charts] == ["xy", "x", "x"]
+    for chart in (magnitude, phase):
+        assert [one["label"] for one in chart["series"]] == ["recorded", "mass and viscous friction"]
+    assert coherence["levels"] == [{"y": 0.8, "label": ""}]
+
+
+def test_magnitudes_keep_their_digits_and_room_around_them() -> None:
+    (magnitude, *_) = bode_charts(rigid(), None)
+    (curve,) = magnitude["series"]
+    size = np.abs(rigid().response)
+    assert curve["y"] == pytest.approx(size.tolist(), rel=1e-3)
+    assert magnitude["yRange"] == pytest.approx([size.min() / 2, 2 * size.max()])
 
 
 def test_without_a_response_it_says_what_would_tell_one() -> None:
