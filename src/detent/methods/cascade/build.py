@@ -3,8 +3,7 @@
 import math
 from typing import Any
 
-from detent.axisfile.interference import fill_push
-from detent.axisfile.protection import fill_guard, samples
+from detent.axisfile.blocks import fill_guard, fill_push, samples
 from detent.control.cascade_law import FeedForwardParams
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.loop import machine_of

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
-from detent.axisfile.protection import describe_fault
+from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits

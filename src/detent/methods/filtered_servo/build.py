@@ -2,9 +2,7 @@
 
 import math
 
-from detent.axisfile.drive_train import fill_slide
-from detent.axisfile.interference import fill_interference, fill_push
-from detent.axisfile.protection import fill_guard
+from detent.axisfile.blocks import fill_guard, fill_interference, fill_push, fill_slide
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams

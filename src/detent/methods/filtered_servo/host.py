@@ -1,6 +1,6 @@
 """The host of a filtered servo: command pulses, in position, fault."""
 
-from detent.axisfile.protection import describe_fault
+from detent.axisfile.blocks import describe_fault
 from detent.control.deviation_counter import FAULT, GUARDED
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT

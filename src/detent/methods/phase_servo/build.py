@@ -2,9 +2,7 @@
 
 import math
 
-from detent.axisfile.drive_train import fill_drive_train
-from detent.axisfile.interference import fill_interference, fill_push
-from detent.axisfile.protection import fill_guard
+from detent.axisfile.blocks import fill_drive_train, fill_guard, fill_interference, fill_push
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN

@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.protection import describe_fault
+from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import AxisError
 from detent.methods.moves.host import Destination, Host, Wrong, refused_words

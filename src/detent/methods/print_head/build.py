@@ -3,7 +3,7 @@
 import math
 from typing import TypeVar
 
-from detent.axisfile.drive_train import fill_drive_train
+from detent.axisfile.blocks import fill_drive_train
 from detent.files.fields import Table
 from detent.methods.print_head.controller import PERIOD_US
 from detent.methods.print_head.plant import AVERAGED, SWITCH_LEVEL

@@ -2,7 +2,7 @@
 
 import math
 
-from detent.axisfile.protection import fill_guard, samples
+from detent.axisfile.blocks import fill_guard, samples
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
 from detent.control.table_positioner import ATOMIC, BY_ACTUAL, BY_THEORETICAL, FLAG_FIRST, REMAINING_FIRST

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
-from detent.axisfile.protection import describe_fault
+from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError

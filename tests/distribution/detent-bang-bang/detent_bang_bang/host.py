@@ -1,6 +1,6 @@
 """The axis at power-on, what commands it, and what it shows of a move."""
 
-from detent.axisfile.drive_train import fill_slide
+from detent.axisfile.blocks import fill_slide
 from detent.methods.moves.host import Host
 from detent.methods.moves.job import one_move
 from detent.methods.moves.page import MoveView

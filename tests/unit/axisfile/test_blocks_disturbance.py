@@ -3,7 +3,7 @@
 import pytest
 from tests.dump import dump_spec
 
-from detent.axisfile.interference import KINDS, fill_interference, fill_push
+from detent.axisfile.blocks import KINDS, fill_interference, fill_push
 from detent.axisfile.tables import BurstTable, InterferenceTable, PushTable
 from detent.plant.push import Push, push_force
 from detent.sensing.interference import ENTRIES, RATES, Interference, InterferenceParams, interfere, start_interference

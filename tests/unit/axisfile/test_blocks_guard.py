@@ -1,7 +1,7 @@
 import pytest
 from tests.difference import values_of
 
-from detent.axisfile.protection import describe_fault, fill_guard, samples
+from detent.axisfile.blocks import describe_fault, fill_guard, samples
 from detent.axisfile.tables import MotionProtectionTable, ProtectionTable, breaking_effort
 from detent.control.guard import FOLLOWING, TRAVEL, Guard, GuardParams
 
