@@ -1,35 +1,40 @@
-"""Checks that every closed form makes of the constants it is given."""
+"""The constants that closed forms are given: what each may be, and what it is."""
 
-from math import isfinite, isnan
+from collections.abc import Callable
+from math import inf
 
 from detent.errors import DetentError
 
+ALLOWED: dict[str, Callable[[float], bool]] = {
+    "above 0 and finite": lambda value: 0 < value < inf,
+    "above 0 or inf": lambda value: value > 0,
+    "0 or above, finite": lambda value: 0 <= value < inf,
+    "above 0, up to 1": lambda value: 0 < value <= 1,
+    "1 or more": lambda value: value >= 1,
+}
+CONSTANTS = {
+    "gain": ("above 0 and finite", "1/s^2", "K = K3*K4, drive word to acceleration"),
+    "position_gain": ("above 0 and finite", "", "K1"),
+    "speed_gain": ("above 0 and finite", "s", "K2 = B*TS"),
+    "sample_period": ("above 0 and finite", "s", "the sample period TS"),
+    "scale": ("above 0 and finite", "", "the scale B of the speed count"),
+    "coefficient": ("above 0, up to 1", "", "A = TS/Tf, 1 for no filter"),
+    "filter_time": ("0 or above, finite", "s", "the lag Tf, 0 for no filter"),
+    "tau_m": ("above 0 or inf", "s", "the mechanical time constant"),
+    "rate": ("above 0 and finite", "pulses/s", "the rate of the command pulses"),
+    "samples": ("1 or more", "", "how many values to compute"),
+    "points": ("1 or more", "", "how many instants of each window to compute"),
+}
+"""What each may be, its unit, and what to state."""
 
-def require_positive(name: str, value: float, unit: str, meaning: str, *, infinite: bool = False) -> None:
-    """Refuse a constant that is not above 0.
 
-    >>> require_positive("SampledLoop.gain", 4000.0, "1/s^2", "drive word to acceleration")
+def check_constants(place: str = "", **values: float) -> None:
+    """Refuse a constant that is not as its name allows; `DetentError` says so.
+
+    >>> check_constants("SampledLoop.", gain=4000.0, coefficient=1.0)
     """
-    if value > 0 and (infinite or isfinite(value)):
-        return
-    allowed = f"above 0{' or inf' if infinite else ' and finite'}"
-    raise DetentError(f"{name}: came {value:g} {unit}".rstrip() + f"; allowed: {allowed}; do: state {meaning}")
-
-
-def require_between(name: str, value: float, low: float, high: float, meaning: str) -> None:
-    """Refuse a pure number outside low < value <= high; `DetentError` says so."""
-    if isnan(value) or not low < value <= high:
-        raise DetentError(f"{name}: came {value:g}; allowed: above {low:g}, up to {high:g}; do: state {meaning}")
-
-
-def require_not_negative(name: str, value: float, unit: str, meaning: str) -> None:
-    """Refuse a constant below 0 or not finite; `DetentError` says so."""
-    if not (value >= 0 and isfinite(value)):
-        came = f"{value:g} {unit}".rstrip()
-        raise DetentError(f"{name}: came {came}; allowed: 0 or above, finite; do: state {meaning}")
-
-
-def require_count(name: str, value: int, least: int, meaning: str) -> None:
-    """Refuse a whole number below `least`; `DetentError` says so."""
-    if value < least:
-        raise DetentError(f"{name}: came {value}; allowed: {least} or more; do: state {meaning}")
+    for name, value in values.items():
+        allowed, unit, meaning = CONSTANTS[name]
+        if not ALLOWED[allowed](value):
+            came = f"{value:g} {unit}".rstrip()
+            raise DetentError(f"{place}{name}: came {came}; allowed: {allowed}; do: state {meaning}")

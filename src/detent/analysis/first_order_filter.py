@@ -12,7 +12,7 @@ from math import asin, inf, log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.analysis.arguments import require_between, require_count, require_positive
+from detent.analysis.arguments import check_constants
 
 
 def impulse_weights(coefficient: float, samples: int) -> NDArray[np.float64]:
@@ -25,8 +25,7 @@ def impulse_weights(coefficient: float, samples: int) -> NDArray[np.float64]:
     >>> impulse_weights(0.25, 3).tolist()
     [0.25, 0.1875, 0.140625]
     """
-    _check(coefficient)
-    require_count("samples", samples, 1, "how many weights to compute")
+    check_constants(coefficient=coefficient, samples=samples)
     return coefficient * (1.0 - coefficient) ** np.arange(samples, dtype=np.float64)
 
 
@@ -38,8 +37,7 @@ def filter_step(coefficient: float, samples: int) -> NDArray[np.float64]:
     >>> filter_step(0.25, 3).tolist()
     [0.25, 0.4375, 0.578125]
     """
-    _check(coefficient)
-    require_count("samples", samples, 1, "how many outputs to compute")
+    check_constants(coefficient=coefficient, samples=samples)
     return 1.0 - (1.0 - coefficient) ** np.arange(1, samples + 1, dtype=np.float64)
 
 
@@ -65,7 +63,7 @@ def nyquist_gain(coefficient: float) -> float:
     >>> nyquist_gain(0.25) * 7
     1.0
     """
-    _check(coefficient)
+    check_constants(coefficient=coefficient)
     return coefficient / (2.0 - coefficient)
 
 
@@ -79,7 +77,7 @@ def equivalent_time_constant(coefficient: float, sample_period: float) -> float:
     >>> round(equivalent_time_constant(0.25, 5e-3), 5)
     0.01738
     """
-    _check(coefficient, sample_period)
+    check_constants(coefficient=coefficient, sample_period=sample_period)
     return -sample_period / log(1.0 - coefficient) if coefficient < 1 else 0.0
 
 
@@ -95,11 +93,6 @@ def cutoff_hz(coefficient: float, sample_period: float) -> float:
     >>> round(cutoff_hz(0.25, 5e-3), 2)
     9.22
     """
-    _check(coefficient, sample_period)
+    check_constants(coefficient=coefficient, sample_period=sample_period)
     half_chord = coefficient / (2.0 * sqrt(1.0 - coefficient)) if coefficient < 1 else inf
     return asin(half_chord) / (pi * sample_period) if half_chord <= 1 else inf
-
-
-def _check(coefficient: float, sample_period: float = 1.0) -> None:
-    require_between("coefficient", coefficient, 0.0, 1.0, "A = TS/Tf, 1 for no filter")
-    require_positive("sample_period", sample_period, "s", "the sample period TS")

@@ -14,7 +14,7 @@ position error acts at once, the speed as the mean of the window that has just c
 by the matrix exponential, so that no step of time is approximated.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import import_module
 from math import asin, inf, log, pi, sqrt
 from typing import Any
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from detent.analysis.arguments import require_between, require_count, require_positive
+from detent.analysis.arguments import check_constants
 from detent.analysis.transfer_function import slowest_first
 from detent.errors import DetentError
 
@@ -84,12 +84,7 @@ class SampledLoop:
 
     def __post_init__(self) -> None:
         """Refuse constants that describe no loop."""
-        require_positive("SampledLoop.gain", self.gain, "1/s^2", "K = K3*K4, drive word to acceleration")
-        require_positive("SampledLoop.sample_period", self.sample_period, "s", "the sample period TS")
-        require_positive("SampledLoop.scale", self.scale, "", "the scale B of the speed count")
-        require_between("SampledLoop.coefficient", self.coefficient, 0.0, 1.0, "A = TS/Tf, 1 for no filter")
-        require_positive("SampledLoop.tau_m", self.tau_m, "s", "the mechanical time constant", infinite=True)
-        require_positive("SampledLoop.position_gain", self.position_gain, "", "K1")
+        check_constants("SampledLoop.", **asdict(self))
 
     # ------------------------------------------------------------------------------------------------ one window
 
@@ -221,7 +216,7 @@ class SampledLoop:
                 f"rates: came {rates!r:.60}; allowed: one finite number per window, at least one; "
                 "do: state the speed of the command in each window"
             )
-        require_count("points", points, 1, "how many instants of each window to compute")
+        check_constants(points=points)
         part, a = self._flow(1.0 / points), self.coefficient
         state = np.array([0.0, 0.0, 0.0, step, 0.0])
         rows = [state]

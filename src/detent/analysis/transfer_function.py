@@ -12,13 +12,13 @@ While Tf and the time the inertia takes are short against K2/K1, G is a first-or
 velocity-error constant. Windows and holds are not in it: `sampled_loop` has them.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from detent.analysis.arguments import require_between, require_not_negative, require_positive
+from detent.analysis.arguments import check_constants
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,10 +52,7 @@ class ServoTransfer:
 
     def __post_init__(self) -> None:
         """Refuse constants that describe no servo."""
-        require_positive("ServoTransfer.gain", self.gain, "1/s^2", "K = K3*K4, drive word to acceleration")
-        require_positive("ServoTransfer.speed_gain", self.speed_gain, "s", "K2 = B*TS")
-        require_not_negative("ServoTransfer.filter_time", self.filter_time, "s", "the lag Tf, 0 for no filter")
-        require_positive("ServoTransfer.position_gain", self.position_gain, "", "K1")
+        check_constants("ServoTransfer.", **asdict(self))
 
     @classmethod
     def of_window(
@@ -72,9 +69,7 @@ class ServoTransfer:
         >>> ServoTransfer.of_window(gain=4000, sample_period=5e-3, scale=4, coefficient=0.25).filter_ratio
         1.0
         """
-        require_positive("sample_period", sample_period, "s", "the sample period TS")
-        require_positive("scale", scale, "", "the scale B of the speed count")
-        require_between("coefficient", coefficient, 0.0, 1.0, "A = TS/Tf, 1 for no filter")
+        check_constants(sample_period=sample_period, scale=scale, coefficient=coefficient)
         lag = sample_period / coefficient if coefficient < 1 else 0.0
         return cls(gain=gain, speed_gain=scale * sample_period, filter_time=lag, position_gain=position_gain)
 

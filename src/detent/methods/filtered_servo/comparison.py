@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from detent.analysis.arguments import require_positive
+from detent.analysis.arguments import check_constants
 from detent.control.deviation_counter import FAULT
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.controller import acknowledge, go_to
@@ -204,7 +204,7 @@ def compare_feedback(
     spec: FilteredServoSpec, *, rate: float = RATE, progress: Progress | None = None
 ) -> FeedbackComparison:
     """Drive the axis at constant rate and stop it, with each way of feeding the counted speed back."""
-    require_positive("compare_feedback: rate", rate, "pulses/s", "the rate of the command pulses")
+    check_constants("compare_feedback: ", rate=rate)
     rate = min(rate, spec.limits.speed / spec.pulse)
     variants = list(feedback_variants(spec))
     stretch = min(max(1.0, spec.method.scale * spec.method.sample_period / WINDOW), LONGEST)
