@@ -81,13 +81,14 @@ _OUNCE_OR_POUND = re.compile(r"\b(oz|lb)\b")
 
 
 class QuantityError(ValueError):
-    """A text is not a quantity of the wanted kind."""
+    """A text is not a quantity of the kind that a unit measures."""
 
-    def __init__(self, reason: str, allowed: str, remedy: str) -> None:
-        super().__init__(f"{reason}; allowed: {allowed}; do: {remedy}")
+    def __init__(self, reason: str, unit: str, remedy: str = "") -> None:
+        kind, example = describe_kind(unit)
         self.reason = reason
-        self.allowed = allowed  # what would be accepted, with an example
-        self.remedy = remedy  # what to do about it
+        self.allowed = f'{kind} such as "{example}"'
+        self.remedy = remedy or f'write {kind} as "{example}"'
+        super().__init__(f"{reason}; allowed: {self.allowed}; do: {self.remedy}")
 
 
 def describe_kind(unit: str) -> tuple[str, str]:
@@ -103,21 +104,18 @@ def parse_quantity(text: str, unit: str) -> float:
     >>> parse_quantity("-2.5 %", "%")
     -0.025
     """
-    kind, example = describe_kind(unit)
-    allowed = f'{kind} such as "{example}"'
     match = _NUMBER_THEN_UNIT.fullmatch(text) if len(text) <= MAX_TEXT else None
     if match is None:
-        raise QuantityError(f'"{text[:MAX_TEXT]}" is not a number with a unit', allowed, f'write {kind} as "{example}"')
+        raise QuantityError(f'"{text[:MAX_TEXT]}" is not a number with a unit', unit)
     number, unit_text = match.group(1), match.group(2)
     if unit_text is None:
-        remedy = f'write the unit after the number, as in "{example}"'
-        raise QuantityError(f"the bare number {number}", allowed, remedy)
+        remedy = f'write the unit after the number, as in "{describe_kind(unit)[1]}"'
+        raise QuantityError(f"the bare number {number}", unit, remedy)
     value = Fraction(number) * _conversion_factor(unit_text.strip(), unit)
     try:
         return float(value)
     except OverflowError:
-        reason = f'"{text.strip()}" is beyond any number'
-        raise QuantityError(reason, allowed, f'write {kind} as "{example}"') from None
+        raise QuantityError(f'"{text.strip()}" is beyond any number', unit) from None
 
 
 def format_quantity(value: float, unit: str, digits: int = 4) -> str:
@@ -184,27 +182,26 @@ def _registry() -> Any:
 @cache
 def _conversion_factor(unit_text: str, unit: str) -> Fraction:
     """How many `unit` one `unit_text` is, exactly."""
-    kind, example = describe_kind(unit)
-    allowed = f'{kind} such as "{example}"'
     if unit == "%" or unit_text == "%":
         if unit == unit_text:
             return Fraction(1, 100)
-        raise QuantityError(f'the unit "{unit_text}"', allowed, f'write {kind} as "{example}"')
+        raise QuantityError(f'the unit "{unit_text}"', unit)
     common = Fraction(1) if unit == unit_text and unit in KINDS else COMMON_UNITS.get(unit, {}).get(unit_text)
     if common is not None:
         return common
     if "rad" in unit and re.search(r"[hH]z\b|[hH]ertz", unit_text):
         # Pint takes 1 Hz for 1 rad/s: silently wrong by 2 pi.
-        raise QuantityError(f'the ambiguous unit "{unit_text}"', allowed, "write rad/s, rpm or turn/s instead of Hz")
+        raise QuantityError(f'the ambiguous unit "{unit_text}"', unit, "write rad/s, rpm or turn/s instead of Hz")
     if unit == "Hz" and re.search(r"rad|deg|turn|rev|rpm|cycle", unit_text):
-        raise QuantityError(f'the ambiguous unit "{unit_text}"', allowed, "write Hz, kHz or MHz")
-    return _pint_factor(unit_text, unit, allowed)
+        raise QuantityError(f'the ambiguous unit "{unit_text}"', unit, "write Hz, kHz or MHz")
+    return _pint_factor(unit_text, unit)
 
 
-def _pint_factor(unit_text: str, unit: str, allowed: str) -> Fraction:
+def _pint_factor(unit_text: str, unit: str) -> Fraction:
     """Ask pint for the factor; every way it can fail becomes a `QuantityError`."""
     import pint
 
+    example = describe_kind(unit)[1]
     registry = _registry()
     spelled = re.sub(r"[·.]", "*", unit_text).replace("**", "^").replace("²", "^2")
     try:
@@ -212,13 +209,11 @@ def _pint_factor(unit_text: str, unit: str, allowed: str) -> Fraction:
             raise ValueError(unit_text)  # noqa: TRY301 - joins the failures of pint below
         factor = registry.Quantity(Fraction(1), registry.parse_units(spelled)).to(unit).magnitude
     except pint.DimensionalityError:
-        _, example = describe_kind(unit)
         remedy = f'use a unit of the same dimension as in "{example}"'
         if "N" in unit and _OUNCE_OR_POUND.search(spelled):
             remedy = "oz and lb are masses; write the forces as ozf and lbf"
-        raise QuantityError(f'the unit "{unit_text}", which measures something else', allowed, remedy) from None
+        raise QuantityError(f'the unit "{unit_text}", which measures something else', unit, remedy) from None
     except Exception as error:
         # Pint reports a malformed unit by half a dozen kinds of exception; to the user all mean the same.
-        reason = f'the unknown unit "{unit_text}"'
-        raise QuantityError(reason, allowed, f"use a unit as in {allowed.rpartition(' as ')[2]}") from error
+        raise QuantityError(f'the unknown unit "{unit_text}"', unit, f'use a unit as in "{example}"') from error
     return Fraction(factor)
