@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from detent.cli.app import NOT_DONE, Json, app
-from detent.cli.identify import Columns, Effort, Mapping
+from detent.cli.app import NOT_DONE, Columns, Json, Mapping, app
+from detent.cli.identify import Effort
 from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
 
 if TYPE_CHECKING:

@@ -77,22 +77,22 @@ Signals = Annotated[
     list[str] | None,
     typer.Option("--signals", metavar="NAMES", help="Registers, comma-separated; patterns such as 'head.*' too."),
 ]
-
-
-JOB_HELP = "What the axis does: a file of the kind that its method takes, see below."
-Job = Annotated[Path | None, typer.Option("--job", help=JOB_HELP)]
-
-
-def map_option(begin: str) -> Any:
-    """The option of a mapping file; `begin` begins its help."""
-    return typer.Option("--map", metavar="FILE", help=f"{begin} file (TOML): what the columns of a recording are.")
-
-
-def column_option(begin: str) -> Any:
-    """The option that says what a column is."""
-    roles = "time, position, reference, velocity, force, torque, current, voltage, command, position_load"
-    told = f"{begin} a column is, as in 'force=vir [35.15 N]'; repeat for more. Roles: {roles}; "
-    return typer.Option("--column", metavar="ROLE=COLUMN", help=f"{told}what is not said is guessed, and told.")
+Job = Annotated[
+    Path | None, typer.Option("--job", help="What the axis does: a file of the kind that its method takes, see below.")
+]
+Mapping = Annotated[
+    Path | None, typer.Option("--map", metavar="FILE", help="File (TOML) of what the columns of a recording are.")
+]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="ROLE=COLUMN",
+        help="What a column of a recording is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, "
+        "reference, velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, "
+        "and told.",
+    ),
+]
 
 
 def main() -> NoReturn:

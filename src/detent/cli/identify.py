@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from detent.cli.app import NOT_DONE, Json, app, column_option, map_option
+from detent.cli.app import NOT_DONE, Columns, Json, Mapping, app
 from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
 from detent.errors import DetentError
 
@@ -18,8 +18,6 @@ METHODS = {"regression": "regression", "output-error": "output error"}  # words 
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
-Mapping = Annotated[Path | None, map_option("Mapping")]
-Columns = Annotated[list[str] | None, column_option("What")]
 Effort = Annotated[
     str | None,
     typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import JOB_HELP, NOT_DONE, File, Json, ListsMethods, Set, app, column_option, map_option
+from detent.cli.app import NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app
 from detent.cli.terminal import folder_for, make_console, print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
 
@@ -23,8 +23,6 @@ Replay = Annotated[
         "simulation are compared.",
     ),
 ]
-Mapping = Annotated[Path | None, map_option("With --replay: mapping")]
-Columns = Annotated[list[str] | None, column_option("With --replay: what")]
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -66,7 +64,7 @@ Comparison = Annotated[
 @app.command(cls=ListsMethods)
 def run(
     file: File,
-    job: Annotated[Path | None, typer.Option("--job", help=JOB_HELP)] = None,
+    job: Job = None,
     replay: Replay = None,
     mapping: Mapping = None,
     columns: Columns = None,
