@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isnan
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -18,22 +18,7 @@ LONGEST = 30.0  # time that the figure of a whole job shows [s]: more than this 
 HAPPENED = 1e-6  # how much later than the end of a move an event may be noted [s]
 
 
-class Timed(Protocol):
-    """A record of a part of a run: a move, a step, a line."""
-
-    @property
-    def begin(self) -> float:
-        """When it began [s]."""
-        ...
-
-    @property
-    def end(self) -> float:
-        """When it ended [s]."""
-        ...
-
-
-T = TypeVar("T")
-R = TypeVar("R", bound=Timed)
+T = TypeVar("T", bound=Any)
 
 
 # ---- what came out
@@ -157,8 +142,8 @@ def stretch(trace: Trace | None, names: Iterable[str], begin: float, end: float 
     return Stretch(trace.time[rows] - begin, rows, trace)
 
 
-def recorded_whole(trace: Trace, records: Sequence[R]) -> list[R]:
-    """Records of which the trace has every row, and enough of them."""
+def recorded_whole(trace: Trace, records: Sequence[T]) -> list[T]:
+    """Records, each from its `begin` to its `end`, of which the trace has every row, and enough of them."""
     if len(trace) < 2:
         return []
     row = float(trace.time[1] - trace.time[0])

@@ -69,11 +69,17 @@ _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
     """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
     path = check_figure_path(path)
-    _check(waveforms, marks, path)
-    scale = _scale(waveforms)
+    count = len(waveforms.signals)
+    if not 1 <= count <= MAX_SIGNALS:
+        raise DetentError(
+            f"{path}: came {count or 'no'} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be read; name "
+            "those that matter, or look at all of them in a VCD file"
+        )
+    # The unit that gives the axis of time numbers from 2 to 2000.
+    unit_ps, unit = _unit_of((waveforms.end - waveforms.begin) / 2)
+    scale = _Scale(waveforms.begin, unit_ps, unit, (waveforms.end - waveforms.begin) / unit_ps)
     rows, headings, depth = _arrange(waveforms.signals)
-    ranks = _ranks([scale.of(time) / scale.span for time, _ in marks], [text for _, text in marks])
-    above = MARK_LINE * (max(ranks, default=-1) + 1)
+    above = MARK_LINE * len(marks)
     with new_figure(path, WIDTH, (depth + above) * ROW + (1.1 if waveforms.title else 0.75)) as figure:
         area: Axes = figure.subplots()
         if waveforms.title:
@@ -82,8 +88,8 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
         area.set_ylim(-depth, above + 0.1)
         _label_rows(area, rows, headings)
         _label_time(area, scale)
-        for (time, text), rank in zip(marks, ranks, strict=True):
-            _draw_mark(area, scale.of(time), text, rank, depth)
+        for line, (time, text) in enumerate(marks):
+            _draw_mark(area, scale.of(time), text, line, depth)
         for row in rows:
             if row.signal.is_float:
                 _draw_curve(area, row, scale)
@@ -97,30 +103,6 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
         for row in rows:
             if not row.signal.is_float and row.signal.bits > 1:
                 _write_values(area, row, _segments(row.signal, scale), per_inch)
-
-
-def _check(waveforms: Waveforms, marks: Sequence[tuple[int, str]], path: Path) -> None:
-    count = len(waveforms.signals)
-    if not count:
-        raise DetentError(f"{path}: there are no signals to draw; allowed: 1 to {MAX_SIGNALS}; name some to record")
-    if count > MAX_SIGNALS:
-        raise DetentError(
-            f"{path}: came {count} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be read; name those "
-            "that matter, or look at all of them in a VCD file"
-        )
-    for time, text in marks:
-        if not waveforms.begin <= time <= waveforms.end:
-            raise DetentError(
-                f"{path}: the mark {text!r} is at {time} ps; allowed: {waveforms.begin} ps to {waveforms.end} ps, the "
-                "window; move the mark or widen the window"
-            )
-
-
-def _scale(waveforms: Waveforms) -> _Scale:
-    """Choose the unit that gives the axis of time numbers from 2 to 2000."""
-    span = waveforms.end - waveforms.begin
-    unit_ps, unit = _unit_of(span / 2)
-    return _Scale(waveforms.begin, unit_ps, unit, span / unit_ps)
 
 
 def _unit_of(time: float) -> tuple[int, str]:
@@ -277,23 +259,9 @@ def _label_time(area: Axes, scale: _Scale) -> None:
         area.set_xlabel(f"t, time since power-on [{scale.unit}]")
 
 
-def _ranks(places: list[float], texts: list[str]) -> list[int]:
-    """Line above the diagram in which each mark's text stands, so that no text covers another.
-
-    Places are parts of the window, and its width is not known before the layout: two thirds of the page are assumed.
-    """
-    free: list[float] = []
-    ranks = [0] * len(places)
-    for index in sorted(range(len(places)), key=places.__getitem__):
-        half = _text_width(texts[index], 8) / (0.6 * WIDTH) / 2
-        rank = next((k for k, end in enumerate(free) if end <= places[index] - half), len(free))
-        free[rank : rank + 1] = [places[index] + half]
-        ranks[index] = rank
-    return ranks
-
-
-def _draw_mark(area: Axes, at: float, text: str, rank: int, depth: float) -> None:
-    top = 0.1 + MARK_LINE * rank
+def _draw_mark(area: Axes, at: float, text: str, line: int, depth: float) -> None:
+    """Write the text of a mark above the diagram, each in a line of its own."""
+    top = 0.1 + MARK_LINE * line
     area.plot(
         [at, at], [-depth, top], color=COLOURS[1], linewidth=1.0, linestyle=(0, (4, 2)), zorder=0.9, clip_on=False
     )
