@@ -7,7 +7,7 @@ from vcd.common import TimescaleUnit, VarType
 from vcd.reader import TokenKind, VarDecl, tokenize
 
 from detent.record.vcd_file import DEFAULT_TITLE
-from detent.record.waveforms import MAX_BITS, Waveform, Waveforms
+from detent.record.waveforms import Waveform, Waveforms
 
 UNIT_PS = {TimescaleUnit.picosecond: 1, TimescaleUnit.nanosecond: 10**3, TimescaleUnit.microsecond: 10**6}
 
@@ -45,7 +45,7 @@ def _waveform(name: str, var: VarDecl, changes: list[tuple[int, int | float]]) -
         values = [value - (1 << var.size) if value >> (var.size - 1) else value for value in values]
     return Waveform(
         name=name,
-        bits=MAX_BITS if is_float else var.size,
+        bits=64 if is_float else var.size,
         signed=is_float or signed,
         is_float=is_float,
         unit="",

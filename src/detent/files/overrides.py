@@ -1,6 +1,5 @@
 """Values of ``--set``: which key they are for, what they mean, and what is wrong with them."""
 
-import difflib
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, cast
@@ -11,6 +10,7 @@ from detent.errors import FileProblem
 from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_fields, named_as, options_of, unit_of
 from detent.files.locate import Path
 from detent.files.problems import dotted
+from detent.files.text import did_you_mean
 
 
 def apply_overrides(
@@ -26,8 +26,7 @@ def apply_overrides(
             remedy = f"write it as in --set '{_example_override(tables, known.items())}'"
             problems.append(FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", remedy))
         elif wanted is None:
-            near = difflib.get_close_matches(key, _keys_near(tables, known, path), n=1, cutoff=0.5)
-            remedy = f'did you mean "{near[0]}"?' if near else "`detent check` lists the keys"
+            remedy = did_you_mean(key, _keys_near(tables, known, path), "`detent check` lists the keys", 0.5)
             came, allowed = f'the unknown key "{key}"', "a key of the axis file"
             problems.append(FileProblem("--set", 0, 0, key, came, allowed, remedy))
         else:

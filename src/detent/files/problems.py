@@ -1,6 +1,5 @@
 """What validation found, told to a person: from pydantic's errors to `FileProblem`."""
 
-import difflib
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any, cast
@@ -28,7 +27,7 @@ from detent.files.fields import (
     unit_of,
 )
 from detent.files.locate import Index, Path, Place, find_place
-from detent.files.text import MAX_SHOWN
+from detent.files.text import MAX_SHOWN, nearest
 from detent.units import format_quantity
 
 MAX_ELEMENTS = 3  # wrong numbers of a list shown in a message
@@ -169,9 +168,7 @@ class Reporter:
             allowed = str(error["ctx"].get("allowed", allowed)) if error["type"] == "refused" else allowed
             remedy = str(error["ctx"].get("remedy", remedy))
         elif options_of(field):
-            options = options_of(field)
-            near = difflib.get_close_matches(str(error["input"]).lower(), options, n=1, cutoff=0.0)
-            remedy = f'write "{(near or options)[0]}"'
+            remedy = f'write "{nearest(str(error["input"]), options_of(field), 0.0) or options_of(field)[0]}"'
         elif error["type"].endswith("_type"):
             remedy = _type_remedy(path[-1], field, error["input"])
         return self.problem(path, came, allowed, remedy)
@@ -230,8 +227,7 @@ def known_keys(root: type[Table], path: Path) -> list[str]:
 
 def nearest_key(root: type[Table], path: Path) -> str:
     """Known key that an unknown one was probably meant to be; empty when none is near."""
-    near = difflib.get_close_matches(path[-1].lower(), known_keys(root, path[:-1]), n=1, cutoff=0.6)
-    return near[0] if near else ""
+    return nearest(path[-1], known_keys(root, path[:-1]))
 
 
 def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[tuple[Path, FieldInfo]]:

@@ -5,7 +5,6 @@ says nothing. Separators are commas, or semicolons if the header has one; then n
 """
 
 import csv
-import difflib
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from detent.files.fields import describe_allowed, keys_of, type_of, unit_of
 from detent.files.locate import Path, Place
 from detent.files.problems import Reporter
 from detent.files.read import Row, refuse, told_errors
-from detent.files.text import short
+from detent.files.text import did_you_mean, short
 from detent.units import QuantityError, describe_kind, parse_quantity
 
 AnyRow = TypeVar("AnyRow", bound=Row)
@@ -104,8 +103,7 @@ class CsvRows(Generic[AnyRow]):
         name, unit = split_heading(cell)
         if name in self.fields:
             return self.column_of(index, name, unit)
-        near = difflib.get_close_matches(name.lower(), self.fields, n=1, cutoff=0.6)
-        remedy = f'did you mean "{near[0]}"?' if near else "remove the column"
+        remedy = did_you_mean(name, self.fields, "remove the column")
         return self.refuse_heading(index, f'the unknown column "{short(cell)}"', self._headings(), remedy)
 
     def column_of(self, index: int, key: str, unit: str | None) -> Column:

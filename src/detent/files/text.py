@@ -3,8 +3,9 @@
 import gzip
 import os
 import zlib
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Iterable
 from contextlib import contextmanager, suppress
+from difflib import get_close_matches
 from pathlib import Path
 
 from detent.errors import DetentError, FileProblem, InputError
@@ -24,6 +25,18 @@ def short(text: str) -> str:
     """Text as it fits into a message."""
     shown = "".join(char if char.isprintable() else "\N{REPLACEMENT CHARACTER}" for char in text[: MAX_SHOWN + 1])
     return shown if len(shown) <= MAX_SHOWN else f"{shown[:MAX_SHOWN]}..."
+
+
+def nearest(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """The known word that another was probably meant to be; empty when none is near."""
+    words = {word.lower(): word for word in known}
+    return "".join(words[near] for near in get_close_matches(name.lower(), words, n=1, cutoff=cutoff))
+
+
+def did_you_mean(name: str, known: Iterable[str], otherwise: str, cutoff: float = 0.6) -> str:
+    """The remedy for a word that is not known."""
+    near = nearest(name, known, cutoff)
+    return f'did you mean "{near}"?' if near else otherwise
 
 
 @contextmanager

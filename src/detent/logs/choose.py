@@ -1,12 +1,11 @@
 """Which column is which signal, and in which unit: as the user says, otherwise guessed by name, unit and numbers."""
 
-import difflib
 from itertools import product
 
 import numpy as np
 
 from detent.errors import FileProblem, InputError
-from detent.files.text import short
+from detent.files.text import did_you_mean, short
 from detent.logs.draft import Draft
 from detent.logs.log import Action, Kind, Severity, Source, Values
 from detent.logs.log_units import Conversion, bits_of, find_conversion, split_heading
@@ -38,9 +37,8 @@ def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
         if name is not None:
             chosen[role] = name
         elif role not in silent:
-            plain = [_plain(name) for name in table.columns]
-            near = difflib.get_close_matches(choice.column.casefold(), plain, n=1, cutoff=0.6)
-            remedy = f'did you mean "{near[0]}"?' if near else "name one of these, or its number from 1"
+            names = [split_heading(name)[0] for name in table.columns]
+            remedy = did_you_mean(choice.column, names, "name one of these, or its number from 1")
             came = f'the column "{short(choice.column)}"'
             problems.append(FileProblem(table.file, 0, 0, role, came, held, remedy))
     if problems:

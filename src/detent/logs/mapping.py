@@ -21,7 +21,6 @@ A mapping file is TOML::
 A signal is ``(sign * factor * number + offset)`` in the unit. The unit may carry a number, for columns of counts.
 """
 
-import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -37,7 +36,7 @@ from detent.files.fields import Table, optional, required
 from detent.files.quantities import Time
 from detent.files.read import read_tables
 from detent.files.source import Source, parse_source
-from detent.files.text import decode_utf8, read_bytes, short
+from detent.files.text import decode_utf8, did_you_mean, read_bytes, short
 from detent.logs.csv_layout import SEPARATORS, FileOptions
 from detent.logs.log_units import find_conversion
 from detent.logs.roles import ROLES
@@ -223,8 +222,7 @@ def _read_option(option: str) -> ColumnMapping:
     key, value = match[1], match[2].strip()
     if key not in ROLES and key not in LogTable.model_fields:
         known = (*ROLES, *LogTable.model_fields)
-        near = difflib.get_close_matches(key.lower(), known, n=1, cutoff=0.6)
-        remedy = f'did you mean "{near[0]}"?' if near else "remove it"
+        remedy = did_you_mean(key, known, "remove it")
         raise InputError.of_file("option", f'the unknown key "{short(key)}"', ", ".join(known), remedy)
     is_number = key == "header" and value.isascii() and value.isdigit() and len(value) < 9
     tables = {"columns" if key in ROLES else "log": {key: int(value) if is_number else value}}

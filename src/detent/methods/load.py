@@ -1,7 +1,6 @@
 """From an axis file to a checked specification: `load_spec`, or `read_axis` where the origin of each value matters."""
 
 import copy
-import difflib
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,6 +28,7 @@ from detent.files.overrides import apply_overrides, as_table, put_value
 from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path
 from detent.files.read import told_errors
 from detent.files.source import Source, read_source
+from detent.files.text import did_you_mean
 from detent.methods.method import Method
 from detent.methods.registry import METHODS
 from detent.units import QuantityError, parse_quantity
@@ -99,8 +99,7 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
         method = METHODS[name]
         turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
         return method.turned() if turns else method
-    near = difflib.get_close_matches(name.lower().replace("-", "_").replace(" ", "_"), METHODS, n=1)
-    remedy = f'did you mean "{near[0]}"?' if near else "write one of these"
+    remedy = did_you_mean(name.replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
     reporter = Reporter(source.file, source.places, overridden, Table)
     # Nothing else can be said: another method would have other keys.
@@ -160,10 +159,8 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
     constants = catalogue.constants(name)
     if constants is None:
         names = list(catalogue.entries())
-        near = difflib.get_close_matches(name.lower(), {known.lower(): known for known in names}, n=1, cutoff=0.4)
-        nearest = next((known for known in names if near and known.lower() == near[0]), None)
-        constants_there = f"choose one of these, or state the constants in [{dotted(around)}]"
-        remedy = f'did you mean "{nearest}"?' if nearest else constants_there
+        otherwise = f"choose one of these, or state the constants in [{dotted(around)}]"
+        remedy = did_you_mean(name, names, otherwise, 0.4)
         layers.problems.append(
             reporter.problem(path, reporter.came(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
         )

@@ -1,7 +1,6 @@
 """Records registers while an axis advances, into memory or into a file of any length."""
 
 from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -9,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.files.text import nearest
 from detent.kernel.registers import Leaf, Registers
-from detent.record.trace import Attribute, Trace
+from detent.record.trace import Trace
 
 ROWS = 16384  # rows between two flushes
 Sink = Callable[[NDArray[np.void]], None]
@@ -36,8 +36,8 @@ def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -
             f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
             "leave it out"
         )
-    near = get_close_matches(name, [path for path, leaf in leaves.items() if not leaf.length], 1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
+    near = nearest(name, [path for path, leaf in leaves.items() if not leaf.length])
+    hint = f"did you mean {near!r}? " if near else ""
     return DetentError(
         f"signal {name!r}: no such register of {registers.__name__}; {hint}`detent registers` lists them all, "
         "'all' records every one"
@@ -60,10 +60,7 @@ class Recorder:
         picked = choose_leaves(registers, ["tick", *names])
         self.leaves, self.picks = picked[1:], byte_places(picked)
         self.every, self.period = every, period
-        # Of the rows handed to the sink: their type, and unit and meaning per column.
         self.dtype: Any = np.dtype([("t", "<f8"), *((leaf.path, "<" + leaf.width.code) for leaf in self.leaves)])
-        self.units = {"t": "s"} | {leaf.path: leaf.unit for leaf in self.leaves}
-        self.docs = {"t": "simulated time since power-on"} | {leaf.path: leaf.doc for leaf in self.leaves}
         self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
         self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
         self._blocks: list[NDArray[np.void]] = []
@@ -99,11 +96,10 @@ class Recorder:
 
     def trace(self, **attributes: str | float) -> Trace:
         """What is in memory, as a trace."""
-        return make_trace(self, self._blocks, dict(attributes))
-
-
-def make_trace(recorder: Recorder, blocks: Sequence[NDArray[np.void]], attributes: dict[str, Attribute]) -> Trace:
-    """Blocks that a recorder handed to its sink, as one trace."""
-    whole: Any = np.concatenate(blocks) if blocks else np.empty(0, recorder.dtype)
-    columns = {str(name): np.ascontiguousarray(whole[name]) for name in recorder.dtype.names}
-    return Trace(columns=columns, units=recorder.units, docs=recorder.docs, attributes=attributes)
+        whole: Any = np.concatenate(self._blocks) if self._blocks else np.empty(0, self.dtype)
+        return Trace(
+            columns={str(name): np.ascontiguousarray(whole[name]) for name in self.dtype.names},
+            units={"t": "s"} | {leaf.path: leaf.unit for leaf in self.leaves},
+            docs={"t": "simulated time since power-on"} | {leaf.path: leaf.doc for leaf in self.leaves},
+            attributes={**attributes},
+        )

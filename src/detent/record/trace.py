@@ -3,7 +3,6 @@
 Columns are called by the dotted path of the register they came from (``motor.current``). The first is always ``t`` [s].
 """
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.files.text import nearest
 
 Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats or booleans
 Attribute = str | float | int  # what is known about a trace as a whole: the axis, the job, the seed
@@ -107,8 +107,8 @@ class Trace:
 
 def unknown_column(name: str, known: Sequence[str]) -> DetentError:
     """Make the error for a column that is not there."""
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest(name, known, 0.5)
+    hint = f"; did you mean {near!r}?" if near else ""
     return DetentError(f"trace: no signal {name!r}{hint}; it holds: {', '.join(known) or 'none'}")
 
 

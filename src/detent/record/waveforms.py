@@ -6,7 +6,6 @@ that moment is its `Phase`. Time is a whole number of picoseconds since power-on
 """
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,8 +19,6 @@ from detent.kernel.registers import Leaf
 Times = NDArray[np.int64]  # moments since power-on [ps]
 Values = NDArray[Any]  # one value per moment: integers, or floats
 PICOSECONDS = 1e12  # picoseconds in a second
-MAX_BITS = 64  # widest register
-_NAME = re.compile(r"[!-~]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +45,6 @@ class Phase:
 @dataclass(frozen=True, slots=True, eq=False)
 class Waveform:
     """One signal over time: each value holds from its moment to the next.
-
-    A `DetentError` tells where times and values do not fit together, or a value does not fit the width.
 
     Parameters
     ----------
@@ -80,40 +75,6 @@ class Waveform:
     times: Times
     values: Values
 
-    def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name) or "" in self.name.split("."):
-            raise DetentError(
-                f"waveform: the name is {self.name!r}; allowed: printable ASCII without spaces, parts joined by single "
-                "dots, such as 'tracker.reference'; rename it"
-            )
-        if self.times.dtype != np.int64 or self.times.ndim != 1 or not self.times.size:
-            raise self._refusal(f"times have type {self.times.dtype} and shape {self.times.shape}", "int64, shape (n,)")
-        if self.values.shape != self.times.shape:
-            raise self._refusal(f"values have shape {self.values.shape}", f"{self.times.shape}, as times have")
-        late = np.flatnonzero(np.diff(self.times) <= 0)
-        if late.size:
-            first = int(late[0])
-            came = f"the time {self.times[first]} ps is followed by {self.times[first + 1]} ps"
-            raise self._refusal(came, "each moment after the one before")
-        self._check_values()
-
-    def _check_values(self) -> None:
-        if self.values.dtype.kind not in ("f" if self.is_float else "biu"):
-            raise self._refusal(f"values of {self.values.dtype}", "floats" if self.is_float else "integers")
-        if not 1 <= self.bits <= MAX_BITS or (self.is_float and self.bits != MAX_BITS):
-            allowed = f"{MAX_BITS} for a float" if self.is_float else f"1 to {MAX_BITS}"
-            raise self._refusal(f"{self.bits} bits", allowed)
-        if self.is_float:
-            return
-        low = -(1 << (self.bits - 1)) if self.signed else 0
-        high = low + (1 << self.bits) - 1
-        least, most = int(self.values.min()), int(self.values.max())
-        if least < low or most > high:
-            raise self._refusal(f"values from {least} to {most}", f"{low} to {high} in {self.bits} bits")
-
-    def _refusal(self, came: str, allowed: str) -> DetentError:
-        return DetentError(f"waveform {self.name!r}: {came}; allowed: {allowed}; correct what is recorded")
-
     @property
     def block(self) -> str:
         """Path of the block that the signal belongs to; "" at the top."""
@@ -122,7 +83,7 @@ class Waveform:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waveforms:
-    """Signals over one stretch of time; a `DetentError` tells where it is empty, or a signal does not fit it.
+    """Signals over one stretch of time.
 
     Parameters
     ----------
@@ -138,22 +99,6 @@ class Waveforms:
     end: int
     signals: tuple[Waveform, ...]
     title: str = ""
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.begin < self.end:
-            came = f"the window is {self.begin} ps to {self.end} ps"
-            raise DetentError(f"waveforms: {came}; allowed: 0 <= begin < end; choose at least one tick")
-        names: set[str] = set()
-        for signal in self.signals:
-            if signal.name in names:
-                raise DetentError(f"waveforms: two signals {signal.name!r}; allowed: one of each name; rename one")
-            names.add(signal.name)
-            first, last = int(signal.times[0]), int(signal.times[-1])
-            if first != self.begin or last >= self.end:
-                raise DetentError(
-                    f"waveforms: {signal.name!r} runs from {first} ps to a change at {last} ps; allowed: from "
-                    f"{self.begin} ps, with changes before {self.end} ps; cut it with window()"
-                )
 
     def __getitem__(self, name: str) -> Waveform:
         """Give one signal by its name; without it a `DetentError` lists those that exist."""

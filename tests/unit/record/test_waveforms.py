@@ -194,59 +194,7 @@ def test_two_phase_clocks_lie_in_the_same_ticks_as_the_rows():
     assert replace(shown, signals=(ck1, ck2, *shown.signals))["clocks.ck2"] is ck2
 
 
-# -- what waveforms must be -------------------------------------------------------------------------------------------
-GOOD: dict[str, Any] = {
-    "name": "tracker.reference", "bits": 4, "signed": False, "is_float": False, "unit": "count", "doc": "",
-    "times": np.array([0, 10]), "values": np.array([3, 15]),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"name": ""}, "the name is ''"),
-        ({"name": "tracker..ref"}, "single dots"),
-        ({"name": "a b"}, "without spaces"),
-        ({"times": np.array([0.0, 10.0])}, "times have type float64"),
-        ({"times": np.array([], dtype=np.int64), "values": np.array([], dtype=int)}, r"shape \(0,\)"),
-        ({"times": np.array([0, 0])}, "the time 0 ps is followed by 0 ps"),
-        ({"values": np.array([1])}, r"values have shape \(1,\)"),
-        ({"values": np.array([0.5, 1.5])}, "values of float64; allowed: integers"),
-        ({"is_float": True, "bits": 64}, "values of int64; allowed: floats"),
-        ({"is_float": True, "bits": 32, "values": np.array([0.5, 1.5])}, "32 bits; allowed: 64 for a float"),
-        ({"bits": 0}, "0 bits; allowed: 1 to 64"),
-        ({"bits": 65}, "65 bits"),
-        ({"values": np.array([3, 16])}, "values from 3 to 16; allowed: 0 to 15 in 4 bits"),
-        ({"values": np.array([-1, 3])}, "allowed: 0 to 15"),
-        ({"signed": True, "values": np.array([-8, 8])}, "allowed: -8 to 7"),
-    ],
-)
-def test_a_waveform_that_cannot_be_is_refused(wrong, message):
-    with pytest.raises(DetentError, match=message):
-        Waveform(**(GOOD | wrong))
-
-
-def test_a_waveform_takes_every_value_of_its_width():
-    assert Waveform(**GOOD).values.max() == 15
-    widest = np.array([-(2**63), 2**63 - 1])
-    assert Waveform(**(GOOD | {"bits": 64, "signed": True, "values": widest})).values.min() == -(2**63)
-
-
-@pytest.mark.parametrize(
-    ("begin", "end", "signals", "message"),
-    [
-        (0, 0, (), "0 <= begin < end"),
-        (-1, 5, (), "0 <= begin < end"),
-        (0, 20, (flag("a", [5], [0]),), "'a' runs from 5 ps"),
-        (0, 20, (flag("a", [0, 20], [0, 1]),), "a change at 20 ps"),
-        (0, 20, (flag("a", [0], [0]), flag("a", [0], [1])), "two signals 'a'"),
-    ],
-)
-def test_waveforms_that_do_not_fit_together_are_refused(begin, end, signals, message):
-    with pytest.raises(DetentError, match=message):
-        Waveforms(begin, end, signals)
-
-
+# -- the whole --------------------------------------------------------------------------------------------------------
 def test_an_unknown_signal_is_answered_with_those_there_are():
     with pytest.raises(DetentError, match=r"no signal 'c'; allowed: a, b"):
         Waveforms(0, 5, (flag("a", [0], [0]), flag("b", [0], [0])))["c"]
