@@ -6,8 +6,7 @@ import numpy as np
 from vcd.common import TimescaleUnit, VarType
 from vcd.reader import TokenKind, VarDecl, tokenize
 
-from detent.record.vcd_file import DEFAULT_TITLE
-from detent.record.waveforms import Waveform, Waveforms
+from detent.record.waveforms import DEFAULT_TITLE, Waveform, Waveforms
 
 UNIT_PS = {TimescaleUnit.picosecond: 1, TimescaleUnit.nanosecond: 10**3, TimescaleUnit.microsecond: 10**6}
 

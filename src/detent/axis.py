@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,12 @@ from detent.methods.load import AxisFile, read_axis
 from detent.methods.method import Job, Method, Result, Shown, Simulated
 from detent.methods.registry import METHODS, bringing
 from detent.page.frame import Comparison
-from detent.record.capture import Stretch, capture
+from detent.record.capture import capture
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves
 from detent.record.trace import Trace
 from detent.record.trace_files import TraceWriter, load_trace, save_trace
-from detent.record.vcd_file import save_vcd
-from detent.record.waveforms import Waveforms
+from detent.record.waveforms import Waveforms, save_vcd
 
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
 
@@ -214,12 +213,14 @@ class Axis:
         """
         method = self.simulated
         loaded = method.sample_job() if job is None else self._job(job)
-        stretch = Stretch(at, duration, tuple(method.timing if signals is None else signals), self.name)
 
-        def run(recorder: Any) -> Result:
-            return method.run(loaded, recorder=recorder, progress=progress)
-
-        return Timing(capture(method.registers, method.clocking, method.tick, run, stretch))
+        run = partial(method.run, loaded, progress=progress)
+        chosen = method.timing if signals is None else signals
+        waveforms = capture(
+            method.registers, method.clocking, method.tick, run, at=at, duration=duration, signals=chosen,
+            title=self.name,
+        )  # fmt: skip
+        return Timing(waveforms)
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,6 @@ def impulse_weights(coefficient: float, samples: int) -> NDArray[np.float64]:
 
     The sum over all k is 1, so that a constant passes unchanged.
 
-    Examples
-    --------
     >>> impulse_weights(0.25, 3).tolist()
     [0.25, 0.1875, 0.140625]
     """
@@ -32,8 +30,6 @@ def impulse_weights(coefficient: float, samples: int) -> NDArray[np.float64]:
 def filter_step(coefficient: float, samples: int) -> NDArray[np.float64]:
     """Output after 1, 2, ... samples, at least one, of a unit step: 1 - (1 - A)^k, shape (samples,).
 
-    Examples
-    --------
     >>> filter_step(0.25, 3).tolist()
     [0.25, 0.4375, 0.578125]
     """
@@ -47,8 +43,6 @@ def noise_gain(coefficient: float) -> float:
     It is the root of the sum of the squared impulse weights. Count errors of neighbouring windows are not quite
     independent (what one window misses the next one counts), so that the loop does better than this.
 
-    Examples
-    --------
     >>> round(noise_gain(0.25), 3)
     0.378
     """
@@ -58,8 +52,6 @@ def noise_gain(coefficient: float) -> float:
 def nyquist_gain(coefficient: float) -> float:
     """Gain for an input that alternates at each sample, the highest frequency there is: A/(2 - A).
 
-    Examples
-    --------
     >>> nyquist_gain(0.25) * 7
     1.0
     """
@@ -72,8 +64,6 @@ def equivalent_time_constant(coefficient: float, sample_period: float) -> float:
 
     Not Tf = TS/A, which is what A makes of it only for A << 1; 0 for A = 1, where nothing is left after a sample.
 
-    Examples
-    --------
     >>> round(equivalent_time_constant(0.25, 5e-3), 5)
     0.01738
     """
@@ -88,8 +78,6 @@ def cutoff_hz(coefficient: float, sample_period: float) -> float:
     Nyquist frequency 1/(2·TS), and is infinite where even that passes with more than 1/sqrt(2), which it does from
     A = 0.828 on.
 
-    Examples
-    --------
     >>> round(cutoff_hz(0.25, 5e-3), 2)
     9.22
     """

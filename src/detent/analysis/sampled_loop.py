@@ -68,8 +68,6 @@ class SampledLoop:
     position_gain : float
         K1.
 
-    Examples
-    --------
     >>> loop = SampledLoop(gain=4000, sample_period=5e-3, scale=4, coefficient=0.25)
     >>> loop.is_stable, round(loop.stability_limit()), loop.steady_following_error(1000)
     (True, 10216, 20.0)
@@ -120,8 +118,6 @@ class SampledLoop:
 
         A mode that changes its sign at each sample has the imaginary part pi/TS and no partner.
 
-        Examples
-        --------
         >>> loop = SampledLoop(gain=4000, sample_period=5e-3, scale=4, coefficient=0.25)
         >>> loop.poles().round(1).tolist()
         [(-8.2+88.8j), (-8.2-88.8j), (-28.3+0j)]
@@ -203,8 +199,6 @@ class SampledLoop:
         [count]; `points` says how many instants of each window are computed, evenly spaced, 1 for the sample instants
         alone. Columns have the shape (n·points + 1,), from the beginning to the end of the last window.
 
-        Examples
-        --------
         >>> loop = SampledLoop(gain=4000, sample_period=5e-3, scale=4)
         >>> moving_then_stopped = loop.respond([1000.0] * 100 + [0.0] * 40)
         >>> moving_then_stopped.following_error[[100, 140]].round(2).tolist()

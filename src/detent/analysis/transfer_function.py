@@ -38,8 +38,6 @@ class ServoTransfer:
     position_gain : float
         K1.
 
-    Examples
-    --------
     >>> servo = ServoTransfer(gain=1e6, speed_gain=0.02, filter_time=1e-3)
     >>> round(float(servo.poles()[0].real), 2), servo.first_order_pole, round(servo.next_order_pole, 2)
     (-47.72, -50.0, -47.62)
@@ -64,8 +62,6 @@ class ServoTransfer:
         0 < A <= 1, and 1 is no filter and gives Tf = 0. K2 and Tf are proportional to the sample period, so that
         Tf/(K2/K1) = K1/(A·B) does not depend on it.
 
-        Examples
-        --------
         >>> ServoTransfer.of_window(gain=4000, sample_period=5e-3, scale=4, coefficient=0.25).filter_ratio
         1.0
         """

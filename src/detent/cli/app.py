@@ -13,6 +13,7 @@ from detent.cli.terminal import discard_output
 from detent.errors import DetentError
 
 DONE, NOT_DONE = 0, 1
+LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
 
 
 class Commands(TyperGroup):
@@ -67,32 +68,24 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+
+def option(names: str, metavar: str, about: str, **more: Any) -> Any:
+    """An option: its names with spaces between them, what stands for its value in the help, and what it does."""
+    return typer.Option(*names.split(), metavar=metavar or None, help=about, **more)
+
+
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace or add a value of the file; repeat for more."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print machine-readable JSON instead of text.")]
-Signals = Annotated[
-    list[str] | None,
-    typer.Option("--signals", metavar="NAMES", help="Registers, comma-separated; patterns such as 'head.*' too."),
-]
+Set = Annotated[list[str] | None, option("--set", "KEY=VALUE", "Replace or add a value of the file; repeat for more.")]
+Json = Annotated[bool, option("--json", "", "Print machine-readable JSON instead of text.")]
 Job = Annotated[
-    Path | None, typer.Option("--job", help="What the axis does: a file of the kind that its method takes, see below.")
+    Path | None, option("--job", "", "What the axis does: a file of the kind that its method takes, see below.")
 ]
-Mapping = Annotated[
-    Path | None, typer.Option("--map", metavar="FILE", help="File (TOML) of what the columns of a recording are.")
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--column",
-        metavar="ROLE=COLUMN",
-        help="What a column of a recording is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, "
-        "reference, velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, "
-        "and told.",
-    ),
-]
+Mapping = Annotated[Path | None, option("--map", "FILE", "File (TOML) of what the columns of a recording are.")]
+COLUMNS = (
+    "What a column of a recording is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, reference, "
+    "velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, and told."
+)
+Columns = Annotated[list[str] | None, option("--column", "ROLE=COLUMN", COLUMNS)]
 
 
 def main() -> NoReturn:
@@ -113,8 +106,6 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def common(
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
-    ] = False,
+    version: Annotated[bool, option("--version", "", "Print the version.", callback=_version, is_eager=True)] = False,
 ) -> None:
     """Options before the verb."""

@@ -3,13 +3,15 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from detent.cli.app import File, Json, Set, app
+from detent.cli.app import File, Json, Set, app, option
 from detent.cli.terminal import folder_for, make_console, print_json, print_table, progress_bar, say_if_cold
 from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")  # of the files with the tables of a motor
+FIGURE = (
+    "A page (.html) of all comparisons, or a picture: PNG, SVG or PDF; the picture of a second comparison gets a 2 in "
+    "its name."
+)
 
 
 @app.command()
@@ -37,25 +39,18 @@ def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
 def compare(
     file: File,
     overrides: Set = None,
-    figure: Annotated[
-        Path,
-        typer.Option(
-            "--figure",
-            help="A page (.html) of all comparisons, or a picture: PNG, SVG or PDF; the picture of a second comparison "
-            "gets a 2 in its name.",
-        ),
-    ] = Path("comparison.html"),
+    figure: Annotated[Path, option("--figure", "", FIGURE)] = Path("comparison.html"),
     *,
     as_json: Json = False,
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
+    from detent.files.text import FIGURES, check_target
     from detent.page.draw import draw_figures
     from detent.page.frame import comparison_page
-    from detent.page.plots import SUFFIXES, check_figure_path
     from detent.page.render import write_page
 
-    check_figure_path(figure, (".html", *SUFFIXES))
+    check_target(figure, (".html", *FIGURES))
     axis = load(file, overrides or [])
     say_if_cold()
     with progress_bar(quiet=as_json) as progress:
@@ -83,12 +78,8 @@ def compare(
 def envelope(
     file: File,
     overrides: Set = None,
-    motor: Annotated[
-        str, typer.Option("--motor", metavar="NAME", help="Only this motor of the file. Default: every one.")
-    ] = "",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Where the files go. Default: envelope/FILE")
-    ] = None,
+    motor: Annotated[str, option("--motor", "NAME", "Only this motor of the file. Default: every one.")] = "",
+    output: Annotated[Path | None, option("--output -o", "FOLDER", "Where they go. Default: envelope/FILE")] = None,
     *,
     as_json: Json = False,
 ) -> None:

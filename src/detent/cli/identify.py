@@ -1,4 +1,4 @@
-"""`detent identify`: from recordings to constants with limits, and a verdict."""
+"""`detent identify`: from recordings to constants with limits, and a verdict. `detent analyse`: single questions."""
 
 import shlex
 from pathlib import Path
@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from detent.cli.app import NOT_DONE, Columns, Json, Mapping, app
+from detent.cli.app import LOGS, NOT_DONE, Columns, Json, Mapping, app, option
 from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
+    from detent.identify.analyse.analyses import Analysis
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
 
@@ -18,62 +19,31 @@ METHODS = {"regression": "regression", "output-error": "output error"}  # words 
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
-Effort = Annotated[
-    str | None,
-    typer.Option(
-        "--effort",
-        metavar="ROLE",
-        help="What drives the axis: force, torque, current, voltage or command. Default: the first that a log holds.",
-    ),
-]
-How = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        metavar="WORD",
-        help="regression: equations of motion, in a second; output-error: the simulation fitted to the recording too.",
-    ),
-]
-AxisOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--axis",
-        metavar="FILE",
-        help="Cascade axis file: constants it states outside of the intervals are named, --write puts the identified "
-        "ones into it, --job keeps its limits.",
-    ),
-]
-Write = Annotated[
-    Path | None,
-    typer.Option("--write", metavar="FILE", help="Write an axis file (TOML): a new one, or that of --axis, changed."),
-]
-JobFile = Annotated[
-    Path | None,
-    typer.Option("--job", metavar="FILE", help="Write a list of moves (TOML) that shows what the logs do not."),
-]
-ReportFile = Annotated[
-    Path | None, typer.Option("--report", metavar="FILE", help="Write the report, one self-contained HTML file.")
-]
+EFFORT = "What drives the axis: force, torque, current, voltage or command. Default: the first that a log holds."
+METHOD = "regression: equations of motion, in a second; output-error: the simulation fitted to the recording too."
+AXIS = (
+    "Cascade axis file: constants it states outside of the intervals are named, --write puts the identified ones into "
+    "it, --job keeps its limits."
+)
+WRITE = "Write an axis file (TOML): a new one, or that of --axis, changed."
+REPORT = "Write the report, one self-contained HTML file."
+JOB = "Write a list of moves (TOML) that shows what the logs do not."
+Effort = Annotated[str | None, option("--effort", "ROLE", EFFORT)]
 
 
 @app.command()
 def identify(
     logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG...",
-            help="Recordings of one axis (.csv, .h5, .parquet, .mat, .npz, .jsonl).",
-            show_default=False,
-        ),
+        list[Path], typer.Argument(metavar="LOG...", help=f"Recordings of one axis {LOGS}.", show_default=False)
     ],
     mapping: Mapping = None,
     columns: Columns = None,
     effort: Effort = None,
-    method: How = "regression",
-    axis: AxisOption = None,
-    write: Write = None,
-    job: JobFile = None,
-    report: ReportFile = None,
+    method: Annotated[str, option("--method", "WORD", METHOD)] = "regression",
+    axis: Annotated[Path | None, option("--axis", "FILE", AXIS)] = None,
+    write: Annotated[Path | None, option("--write", "FILE", WRITE)] = None,
+    job: Annotated[Path | None, option("--job", "FILE", JOB)] = None,
+    report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
     as_json: Json = False,
 ) -> None:
@@ -118,16 +88,11 @@ def identify(
 
 def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
     """Refuse what could not be written, before the work is done."""
-    endings = {"--write": ".toml", "--job": ".toml", "--report": ".html"}
-    for (option, ending), path in zip(endings.items(), targets, strict=True):
-        if path is None:
-            continue
-        if path.suffix.lower() != ending:
-            raise DetentError(f"{option} {path}: came another ending; allowed: {ending}; name the file so")
-        if not path.parent.is_dir():
-            raise DetentError(f"{option} {path}: there is no folder {path.parent}; make it first, or choose another")
-        if path.is_dir():
-            raise DetentError(f"{option} {path}: came a folder; allowed: a file; choose another name")
+    from detent.files.text import check_target
+
+    for path, ending, what in zip(targets, (".toml", ".toml", ".html"), ("an axis", "a job", "a report"), strict=True):
+        if path is not None:
+            check_target(path, (ending,), what)
     write, job, _ = targets
     if job is not None and job in (write, axis):
         raise DetentError(f"--job {job}: came the name of the axis file; allowed: a file of its own; choose another")
@@ -264,3 +229,66 @@ def _print_horizons(found: Any) -> None:
     if loop is not None:
         told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"
         make_console().print(f"The same under the loops that the log shows: {told}", soft_wrap=True)
+
+
+# ---- single questions, each answered by its own method
+
+WHAT = "two-speeds, friction-map, winding, frequency, steps or sensors; repeat for more. Default: all."
+What = Annotated[list[str] | None, option("--what", "WORD", WHAT)]
+Mass = Annotated[
+    float, option("--mass", "NUMBER", "Effort per acceleration in SI units, for the friction map.", min=0.0)
+]
+
+
+@app.command()
+def analyse(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help=f"Recording {LOGS}.", show_default=False)],
+    what: What = None,
+    mapping: Mapping = None,
+    columns: Columns = None,
+    effort: Effort = None,
+    mass: Mass = 0.0,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Ask a recording single questions: friction, winding, resonances, steps, encoder; each answer has its limits.
+
+    Exit status: 0 every question asked for has an answer, 1 some have none (the output says what is missing), 2 the
+    input cannot be read.
+    """
+    from detent.identify.analyse.analyses import ANALYSES, analyse, check_names
+    from detent.logs.read_log import read_log
+
+    names = list(dict.fromkeys(what or ANALYSES))
+    check_names(names)
+    say_if_cold()
+    found: list[Analysis] = []
+    with progress_bar(quiet=as_json) as progress:
+        read = read_log(log, mapping, columns or [])
+        for k, name in enumerate(names):
+            progress(k / len(names), name)
+            found.append(analyse(read, name, effort or "", mass))
+    if as_json:
+        print_json({"log": read.to_dict(), "analyses": [one.to_dict() for one in found]})
+    else:
+        _print_answers(found, [str(finding) for finding in read.findings])
+    asked = found if what else [one for one in found if one.estimates]
+    if not asked or any(one.reason for one in asked):
+        raise typer.Exit(NOT_DONE)
+
+
+def _print_answers(found: "list[Analysis]", findings: list[str]) -> None:
+    """Answers first, then what has none and why."""
+    console = make_console()
+    for finding in findings:
+        console.print(f"  {finding}", style="yellow", soft_wrap=True)
+    for one in (one for one in found if one.estimates):
+        rows = [(e.name, f"{e.value:.5g}", f"{e.low:.5g} to {e.high:.5g}", e.unit) for e in one.estimates]
+        print_table(f"{one.title[0].upper()}{one.title[1:]} ({one.name})", ("", "value", "95 % interval", "unit"), rows)
+        for note in dict.fromkeys(one.notes):
+            console.print(f"  {note}", style="dim", soft_wrap=True)
+        if one.reason:
+            console.print(f"  not trusted: {one.reason}", style="bold yellow", soft_wrap=True)
+        console.print()
+    for one in (one for one in found if not one.estimates):
+        console.print(f"{one.name}: no answer: {one.reason}", soft_wrap=True)

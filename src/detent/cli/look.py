@@ -1,39 +1,40 @@
-"""`detent plot` and `detent timing`: signals as pictures."""
+"""What there is to look at: signals as pictures, what can be recorded, files to start from."""
 
 import math
+import shlex
+import shutil
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import File, Job, Json, ListsMethods, Set, Signals, app
-from detent.cli.terminal import print_json, progress_bar, say_if_cold, split_names
+from detent import examples
+from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option
+from detent.cli.terminal import folder_for, print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
+
+TIMING = "Registers in place of the usual ones, comma-separated."
+SIGNALS = "Registers, comma-separated; patterns such as 'head.*' too."
 
 
 @app.command(cls=ListsMethods)
 def timing(
     file: File,
-    at: Annotated[str, typer.Option("--at", metavar="TIME", help="Where to look, since power-on, such as '21.5 ms'.")],
-    duration: Annotated[
-        str | None, typer.Option("--for", metavar="TIME", help="How long. Default: 80 base ticks.")
-    ] = None,
+    at: Annotated[str, option("--at", "TIME", "Where to look, since power-on, such as '21.5 ms'.")],
+    duration: Annotated[str | None, option("--for", "TIME", "How long. Default: 80 base ticks.")] = None,
     job: Job = None,
-    signals: Annotated[
-        list[str] | None,
-        typer.Option("--signals", metavar="NAMES", help="Registers in place of the usual ones, comma-separated."),
-    ] = None,
+    signals: Annotated[list[str] | None, option("--signals", "NAMES", TIMING)] = None,
     overrides: Set = None,
-    figure: Annotated[Path, typer.Option("--figure", help="PNG, SVG or PDF.")] = Path("timing.png"),
-    vcd: Annotated[Path, typer.Option("--vcd", help="VCD file for GTKWave or Surfer.")] = Path("timing.vcd"),
+    figure: Annotated[Path, option("--figure", "", "PNG, SVG or PDF.")] = Path("timing.png"),
+    vcd: Annotated[Path, option("--vcd", "", "VCD file for GTKWave or Surfer.")] = Path("timing.vcd"),
     *,
     as_json: Json = False,
 ) -> None:
     """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
     from detent.axis import load
-    from detent.page.plots import check_figure_path
+    from detent.files.text import check_target
 
-    check_figure_path(figure)
+    check_target(figure)
     axis = load(file, overrides or [])
     begin = _time("--at", at)
     length = _time("--for", duration) if duration is not None else 80 * axis.simulated.tick
@@ -67,10 +68,10 @@ def _time(option: str, text: str) -> float:
 @app.command()
 def plot(
     trace: Annotated[Path, typer.Argument(help="Trace: .h5, .csv or .parquet.", show_default=False)],
-    signals: Signals = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="PNG, SVG or PDF.")] = Path("plot.png"),
-    start: Annotated[float | None, typer.Option("--from", metavar="SECONDS", help="First moment.")] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="SECONDS", help="Last moment.")] = None,
+    signals: Annotated[list[str] | None, option("--signals", "NAMES", SIGNALS)] = None,
+    output: Annotated[Path, option("--output -o", "FILE", "PNG, SVG or PDF.")] = Path("plot.png"),
+    start: Annotated[float | None, option("--from", "SECONDS", "First moment.")] = None,
+    stop: Annotated[float | None, option("--to", "SECONDS", "Last moment.")] = None,
     *,
     as_json: Json = False,
 ) -> None:
@@ -95,3 +96,71 @@ def plot(
         print_json({"files": [str(output)]})
     else:
         print(f"figure: {output}")
+
+
+@app.command("examples")
+def examples_command(
+    copy: Annotated[Path | None, option("--copy", "FOLDER", "Copy all examples into this folder.")] = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """List the packaged example files, or copy them to start from."""
+    found = examples()
+    if copy is not None:
+        with folder_for("--copy", copy):
+            existing = [path.name for path in found if (copy / path.name).exists()]
+            if existing:
+                told = f"it holds {', '.join(existing)} already; nothing was copied; choose another folder"
+                raise DetentError(f"--copy {copy}: {told}")
+            found = [Path(shutil.copyfile(path, copy / path.name)) for path in found]
+    if as_json:
+        print_json([{"name": path.name, "path": str(path), "about": _about(path)} for path in found])
+        return
+    for path in found:
+        print(f"{path.name:<20} {_about(path)}")
+    if copy is None:
+        print("\nCopy them with: detent examples --copy FOLDER")
+    else:
+        axis, job = (shlex.quote(str(copy / name)) for name in ("print_head.toml", "letter.txt"))
+        print(f"\nCopied to {copy}. Try: detent run {axis} --job {job}")
+
+
+def _about(path: Path) -> str:
+    """First comment line of an axis file or a list of moves; what kind of job the others are."""
+    if path.suffix in {".toml", ".csv"}:
+        return path.read_text(encoding="utf-8").splitlines()[0].lstrip("# ")
+    return "print job, Diablo 630 stream" if path.suffix == ".prn" else "print job, plain text"
+
+
+@app.command("registers")
+def registers_command(
+    method: Annotated[str, typer.Argument(help="Control method, or an axis file of it.")] = "print_head",
+    *,
+    as_json: Json = False,
+) -> None:
+    """List every register of an axis: what --signals can record."""
+    rows = [
+        {"name": leaf.path, "width": leaf.width.code, "unit": leaf.unit, "doc": leaf.doc, "by": leaf.by}
+        for leaf in _registers_of(method).leaves()
+        if not leaf.length
+    ]
+    if as_json:
+        print_json(rows)
+        return
+    for row in rows:
+        writer = f" (written by the {row['by']})" if row["by"] else ""
+        print(f"{row['name']:<36} {row['width']:<3} {row['unit']:<14} {row['doc']}{writer}")
+
+
+def _registers_of(method: str) -> Any:
+    """Class of the state of a method, named itself or by an axis file."""
+    from detent.methods.registry import METHODS
+
+    if method in METHODS:
+        return METHODS[method].registers()
+    if not Path(method).exists():
+        allowed = ", ".join(METHODS)
+        raise DetentError(f"registers: came {method!r}; allowed: {allowed}, or an axis file; name one of these")
+    from detent.axis import load
+
+    return load(method).simulated.registers

@@ -7,73 +7,38 @@ from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app
+from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
 from detent.cli.terminal import folder_for, make_console, print_json, progress_bar, say_if_cold, split_names
 from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
 
-Replay = Annotated[
-    Path | None,
-    typer.Option(
-        "--replay",
-        metavar="LOG",
-        help="In place of a job: a recording of the machine (.csv, .h5, .parquet, .mat, .npz, .jsonl), of axes whose "
-        "loops follow any reference. Its reference is followed, or its effort drives the axis; recording and "
-        "simulation are compared.",
-    ),
-]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FOLDER",
-        help="Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB",
-    ),
-]
-MoreSignals = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--signals",
-        metavar="NAMES",
-        help="Registers to record beside the usual, comma-separated; "
-        "patterns such as 'head.*' or 'all' too. `detent registers` lists them.",
-    ),
-]
-Every = Annotated[
-    int | None,
-    typer.Option(
-        "--every",
-        min=0,
-        max=10_000_000,
-        help="Record every n-th base tick; 0 records nothing. Tick and default of each method: below.",
-    ),
-]
-TraceKinds = Annotated[
-    str, typer.Option("--trace", metavar="KINDS", help="Trace files: h5, csv, parquet, comma-separated.")
-]
-Comparison = Annotated[
-    bool,
-    typer.Option(
-        "--compare/--no-compare", help="Show the comparison with other methods in the report, where its page has one."
-    ),
-]
+REPLAY = (
+    f"In place of a job: a recording of the machine {LOGS}, of axes whose loops follow any reference. Its reference is "
+    "followed, or its effort drives the axis; recording and simulation are compared."
+)
+OUTPUT = "Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB"
+SIGNALS = (
+    "Registers to record beside the usual, comma-separated; patterns such as 'head.*' or 'all' too. `detent registers` "
+    "lists them."
+)
+EVERY = "Record every n-th base tick; 0 records nothing. Tick and default of each method: below."
+COMPARE = "Show the comparison with other methods in the report, where its page has one."
 
 
 @app.command(cls=ListsMethods)
 def run(
     file: File,
     job: Job = None,
-    replay: Replay = None,
+    replay: Annotated[Path | None, option("--replay", "LOG", REPLAY)] = None,
     mapping: Mapping = None,
     columns: Columns = None,
-    output: Output = None,
+    output: Annotated[Path | None, option("--output -o", "FOLDER", OUTPUT)] = None,
     overrides: Set = None,
-    signals: MoreSignals = None,
-    every: Every = None,
-    formats: TraceKinds = "h5,csv",
-    comparison: Comparison = True,
+    signals: Annotated[list[str] | None, option("--signals", "NAMES", SIGNALS)] = None,
+    every: Annotated[int | None, option("--every", "", EVERY, min=0, max=10_000_000)] = None,
+    formats: Annotated[str, option("--trace", "KINDS", "Trace files: h5, csv, parquet, comma-separated.")] = "h5,csv",
+    comparison: Annotated[bool, option("--compare/--no-compare", "", COMPARE)] = True,
     *,
     as_json: Json = False,
 ) -> None:

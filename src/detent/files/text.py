@@ -16,6 +16,7 @@ MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
 """Largest job read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly
 than it is written by hand; a list so long comes from a program, which can write CSV."""
 
+FIGURES = (".png", ".svg", ".pdf")  # endings of pictures
 PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
 _CHECK_JOB = "check the name after --job"
 _CHECK_LOG = "check the name of the recording"
@@ -146,6 +147,17 @@ def _check_size(path: Path, size: int, limit: int, allowed: str) -> None:
 
 
 # ---- what is written
+
+
+def check_target(path: str | Path, suffixes: Collection[str] = FIGURES, what: str = "a figure") -> Path:
+    """Refuse a place that cannot take a file, before any work is done."""
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise DetentError(f"{path}: {what} cannot be saved as {path.suffix!r}; use one of {', '.join(suffixes)}")
+    if not path.parent.is_dir() or path.is_dir():
+        reason = "it is a folder" if path.is_dir() else f"no folder {path.parent}"
+        raise DetentError(f"{path}: cannot be written ({reason}); make it, or choose another place")
+    return path
 
 
 @contextmanager

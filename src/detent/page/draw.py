@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from detent.files.text import check_target
 from detent.page.chart import Chart
 from detent.page.figure import Figure
-from detent.page.plots import ABOVE, Axes, check_figure_path, new_figure
+from detent.page.plots import ABOVE, Axes, new_figure
 from detent.page.table import Table
 from detent.page.words import GAP
 
@@ -35,7 +36,7 @@ Part = tuple[float, Callable[[Any, Any], None]]  # height [in], and what draws i
 
 def draw_figures(figures: Sequence[Figure], path: str | Path) -> None:
     """Draw figures above one another into a file; DetentError if its suffix or place will not do."""
-    path = check_figure_path(path)
+    path = check_target(path)
     parts = [part for figure in figures if figure for part in _parts(figure)]
     heights = [height for height, _ in parts]
     with new_figure(path, WIDTH, sum(heights) + 0.3) as canvas:

@@ -1,21 +1,16 @@
 """A printed page as data for template/paper.js: every character where it landed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 
-from detent.errors import DetentError
 from detent.page.chart import rounded
 from detent.page.figure import Figure
 from detent.page.parts import INCH, Numbers
 
 MARKS = 100_000  # characters that a report draws, a megabyte; beyond them it leaves whole pages out, and says so
-
-
-def _no_numbers() -> Numbers:
-    return np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,21 +21,15 @@ class Marks:
     page, and `strikes` above 1 are bold. Pages and lines count from 1; directions are +1 and -1.
     """
 
-    characters: Sequence[str] = ()
-    page: Numbers = field(default_factory=_no_numbers)
-    line: Numbers = field(default_factory=_no_numbers)
-    baseline: Numbers = field(default_factory=_no_numbers)
-    column: Numbers = field(default_factory=_no_numbers)
-    landed: Numbers = field(default_factory=_no_numbers)
-    width: Numbers = field(default_factory=_no_numbers)
-    direction: Numbers = field(default_factory=_no_numbers)
-    strikes: Numbers = field(default_factory=_no_numbers)
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            given, struck = len(getattr(self, name)), len(self)
-            if given != struck:
-                raise DetentError(f"report: {struck} characters but {given} values of {name!r}; give one per character")
+    characters: Sequence[str]
+    page: Numbers
+    line: Numbers
+    baseline: Numbers
+    column: Numbers
+    landed: Numbers
+    width: Numbers
+    direction: Numbers
+    strikes: Numbers
 
     def __len__(self) -> int:
         return len(self.characters)

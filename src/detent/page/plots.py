@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.files.text import writing
+from detent.files.text import check_target, writing
 from detent.page.chart import thin_indices
 from detent.record.trace import Trace
 
 # matplotlib's stubs leave every **kwargs untyped, so that strict checking would refuse each call.
 Axes = Any
 Figure = Any
-
-SUFFIXES = (".png", ".svg", ".pdf")
 
 POINTS = 8000  # points of one curve: more than a printed page resolves
 
@@ -53,7 +51,7 @@ def plot_signals(
     trace: Trace, signals: Sequence[str], path: str | Path, t_range: tuple[float, float] | None = None
 ) -> None:
     """Draw signals over time, one plot area per unit, above one another."""
-    path = check_figure_path(path)
+    path = check_target(path)
     names = trace.match(signals)
     if not names:
         raise DetentError(f"{path}: no signal was asked for; name one of: {', '.join(trace.signals)}")
@@ -95,16 +93,6 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
         area.legend(**ABOVE, ncols=3, fontsize=9)
     if all(trace[name].dtype.kind == "b" for name in names):
         area.set_yticks([0, 1], ["off", "on"])
-
-
-def check_figure_path(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> Path:
-    """Refuse a target that cannot take a figure, before any work is done."""
-    path = Path(path)
-    if path.suffix.lower() not in suffixes:
-        raise DetentError(f"{path}: a figure cannot be saved as {path.suffix!r}; use one of {', '.join(suffixes)}")
-    if not path.parent.is_dir():
-        raise DetentError(f"{path}: cannot be written (no folder {path.parent}); make it, or choose another place")
-    return path
 
 
 @contextmanager

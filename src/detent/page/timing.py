@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
+from detent.files.text import check_target
 from detent.page.chart import thin_indices
-from detent.page.plots import COLOURS, Axes, check_figure_path, new_figure
+from detent.page.plots import COLOURS, Axes, new_figure
 from detent.record.waveforms import Waveform, Waveforms
 
 MAX_SIGNALS = 40  # more rows than these do not fit a page that can be read
@@ -68,7 +69,7 @@ _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 
 def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
     """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
-    path = check_figure_path(path)
+    path = check_target(path)
     count = len(waveforms.signals)
     if not 1 <= count <= MAX_SIGNALS:
         raise DetentError(

@@ -75,34 +75,32 @@ class Capture:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """What a timing diagram shows."""
-
-    at: float  # and duration: begin, since power-on, and length [s]
-    duration: float  # [s]
-    signals: tuple[str, ...]  # registers, or patterns
-    title: str = ""  # as of `Waveforms`
-
-
-def capture(
-    registers: type[Registers], clocking: Clocking, tick: float, run: Callable[[Any], Any], stretch: Stretch
+def capture(  # noqa: PLR0913 - what runs, and what is shown of it
+    registers: type[Registers],
+    clocking: Clocking,
+    tick: float,
+    run: Callable[[Any], Any],
+    *,
+    at: float,
+    duration: float,
+    signals: Sequence[str],
+    title: str = "",
 ) -> Waveforms:
-    """Run an axis until a moment and record every clock of a stretch from there."""
-    begin, ticks = round(stretch.at / tick), max(1, round(stretch.duration / tick))
-    if stretch.at < 0 or stretch.duration <= 0 or ticks > MOST_TICKS:
+    """Run an axis until a moment and record every clock of a stretch from there [s]."""
+    begin, ticks = round(at / tick), max(1, round(duration / tick))
+    if at < 0 or duration <= 0 or ticks > MOST_TICKS:
         longest = format_quantity(MOST_TICKS * tick, "s")
         raise DetentError(
-            f"timing: came {stretch.at:g} s for {stretch.duration:g} s; allowed: a moment from 0 s and up to {longest} "
+            f"timing: came {at:g} s for {duration:g} s; allowed: a moment from 0 s and up to {longest} "
             "from there; choose a shorter stretch, or record a trace with `detent run --every`"
         )
-    shown = choose_leaves(registers, stretch.signals)
+    shown = choose_leaves(registers, signals)
     needed = choose_leaves(registers, ["tick", *(leaf.path for leaf in shown), *clocking.needs])
     recorder = Capture(needed, begin, begin + ticks, clocking.rows_per_tick)
     try:
         run(recorder)
     except CaptureDoneError:
-        return _waveforms(recorder, shown, clocking, tick, stretch.title)
+        return _waveforms(recorder, shown, clocking, tick, title)
     raise DetentError(
         f"timing: the run ends before {format_quantity((begin + ticks) * tick, 's', 7)}; choose an earlier --at, a "
         "shorter --for, or a longer job"

@@ -1,7 +1,6 @@
 """An axis in simulated time: parameters, state, recorder, and the passing of time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -18,23 +17,25 @@ P = TypeVar("P", bound=Registers)
 S = TypeVar("S", bound=Registers)
 
 
-@dataclass(frozen=True, slots=True)
-class Loop:
-    """The compiled loop of an axis."""
-
-    tick: float  # base tick [s]
-    # ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its host
-    advance: Callable[..., int] = advance
-    # ``by_clocks(params, state, ticks, trace, picks)``: the same, recording every clock inside a tick
-    by_clocks: Callable[..., int] | None = None
-
-
 class Machine(Generic[P, S]):
-    """A simulated axis."""
+    """A simulated axis whose base tick lasts `tick` [s].
 
-    def __init__(self, params: P, state: S, loop: Loop, recorder: AnyRecorder | None = None) -> None:
-        self.params, self.state, self.tick, self.recorder = params, state, loop.tick, recorder
-        self._loop = loop
+    ``advance(params, state, ticks, trace, picks, every)`` gives the ticks run: fewer when the axis waits for its host;
+    ``by_clocks(params, state, ticks, trace, picks)`` is the same, recording every clock inside a tick.
+    """
+
+    def __init__(  # noqa: PLR0913 - an axis, its clock, what records it, and how it runs
+        self,
+        params: P,
+        state: S,
+        tick: float,
+        recorder: AnyRecorder | None = None,
+        *,
+        advance: Callable[..., int] = advance,
+        by_clocks: Callable[..., int] | None = None,
+    ) -> None:
+        self.params, self.state, self.tick, self.recorder = params, state, tick, recorder
+        self._advance, self._by_clocks = advance, by_clocks
         self._clock: Any = state  # every axis's state has a field `tick`, which the base class cannot name
         self._no_rows = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64))
 
@@ -61,12 +62,12 @@ class Machine(Generic[P, S]):
     def _run(self, ticks: int) -> int:
         r, now = self.recorder, self._clock.tick
         if r is None:
-            return self._loop.advance(self.params, self.state, ticks, *self._no_rows, 0)
+            return self._advance(self.params, self.state, ticks, *self._no_rows, 0)
         ticks = min(ticks, r.room(now))
-        if isinstance(r, Capture) and r.fine and self._loop.by_clocks is not None:
-            done = self._loop.by_clocks(self.params, self.state, ticks, r.rows, r.picks)
+        if isinstance(r, Capture) and r.fine and self._by_clocks is not None:
+            done = self._by_clocks(self.params, self.state, ticks, r.rows, r.picks)
         else:
-            done = self._loop.advance(self.params, self.state, ticks, r.rows, r.picks, r.every)
+            done = self._advance(self.params, self.state, ticks, r.rows, r.picks, r.every)
         if r.room(now + done) <= 0:
             r.flush(now + done)
         return done

@@ -186,9 +186,9 @@ def test_a_log_that_is_none_is_status_2(name: str, content: bytes | None, words:
         (("--axis", "absent.toml"), "no such file"),
         (("--axis", STAGE), "allowed: cascade"),
         (("--axis", "log.csv"), "log.csv:1"),
-        (("--write", "axis.txt"), "allowed: .toml"),
-        (("--report", "report.toml"), "allowed: .html"),
-        (("--job", "absent/job.toml"), "there is no folder absent"),
+        (("--write", "axis.txt"), "use one of .toml"),
+        (("--report", "report.toml"), "use one of .html"),
+        (("--job", "absent/job.toml"), "no folder absent"),
         (("--write", "same.toml", "--job", "same.toml"), "a file of its own"),
     ],
 )
@@ -203,7 +203,7 @@ def test_a_file_that_cannot_be_written_is_status_2_beside_what_was_found() -> No
     Path("folder.toml").mkdir()
     answer = call("identify", write_log(Path("log.csv")), "--job", "folder.toml")
     assert answer.status == 2
-    assert "came a folder" in answer.err
+    assert "it is a folder" in answer.err
 
 
 def test_an_axis_of_another_motion_is_status_2() -> None:

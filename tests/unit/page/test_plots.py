@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from detent.errors import DetentError
-from detent.page.plots import check_figure_path, plot_signals
+from detent.files.text import check_target
+from detent.page.plots import plot_signals
 from detent.record.trace import Trace
 
 
@@ -109,6 +110,6 @@ def test_an_empty_trace_cannot_be_drawn(tmp_path: Path) -> None:
     ("name", "says"), [("a.txt", r"cannot be saved as '\.txt'"), ("no/a.png", "no folder .*no.; make it")]
 )
 def test_a_target_can_be_refused_before_any_work(tmp_path: Path, name: str, says: str) -> None:
-    assert check_figure_path(tmp_path / "a.PNG") == tmp_path / "a.PNG"
+    assert check_target(tmp_path / "a.PNG") == tmp_path / "a.PNG"
     with pytest.raises(DetentError, match=says):
-        check_figure_path(tmp_path / name)
+        check_target(tmp_path / name)

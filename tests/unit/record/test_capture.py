@@ -8,8 +8,8 @@ import detent
 from detent.errors import DetentError
 from detent.methods.load import load_spec
 from detent.methods.registry import METHODS
-from detent.record.capture import Stretch, capture
-from detent.record.vcd_file import save_vcd
+from detent.record.capture import capture
+from detent.record.waveforms import save_vcd
 
 pytestmark = pytest.mark.compiled
 
@@ -24,15 +24,16 @@ def captured(name, at=None, duration=None, signals=None, overrides=()):
     spec = load_spec(detent.example(name), overrides)
     method = METHODS[spec.axis.method].simulated(spec)
     begin, length = STRETCHES[name]
-    stretch = Stretch(
-        begin if at is None else at,
-        length if duration is None else duration,
-        tuple(signals or method.timing),
-        spec.axis.name,
-    )
     job = method.sample_job()
     return capture(
-        method.registers, method.clocking, method.tick, lambda recorder: method.run(job, recorder=recorder), stretch
+        method.registers,
+        method.clocking,
+        method.tick,
+        lambda recorder: method.run(job, recorder=recorder),
+        at=begin if at is None else at,
+        duration=length if duration is None else duration,
+        signals=signals or method.timing,
+        title=spec.axis.name,
     )
 
 

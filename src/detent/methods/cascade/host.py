@@ -16,7 +16,7 @@ from detent.methods.cascade.build import build_cascade
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import Cascade, CascadeParams, Feed, along, driven, switch_on
 from detent.planning.profile import Profile
-from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.record.machine import AnyRecorder, Machine
 
 Numbers = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ class CascadeHost:
         self.tick: float = self.params.plant.machine.period
         self.sample_ticks: int = self.params.controller.sample_ticks
         self.machine: Machine[CascadeParams, Cascade] = Machine(
-            self.params, self.state, Loop(self.tick, self._advance), recorder
+            self.params, self.state, self.tick, recorder, advance=self._advance
         )
         self.feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
         self._seen: Bytes | None = None

@@ -9,7 +9,7 @@ from detent.methods.filtered_servo.build import build_filtered_servo, sample_mic
 from detent.methods.filtered_servo.controller import acknowledge, arrive_within, go_to, set_period
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.moves.host import Destination, Host, Wrong
-from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.record.machine import AnyRecorder, Machine
 from detent.units import format_quantity
 
 
@@ -19,8 +19,7 @@ def filtered_servo_machine(
     """Filtered servo at power-on."""
     p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
     filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
-    loop = Loop(filtered_servo.TICK, by_clocks=filtered_servo.advance_by_clocks)
-    return Machine(p, r, loop, recorder)
+    return Machine(p, r, filtered_servo.TICK, recorder, by_clocks=filtered_servo.advance_by_clocks)
 
 
 class FilteredHost(Host):

@@ -11,7 +11,7 @@ from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
 from detent.methods.phase_servo.controller import arrive_within, command, take_ready
 from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.record.machine import AnyRecorder, Machine
 from detent.units import format_quantity
 
 ACQUISITION = 0.5  # longest time that a phase servo may take to lock and settle after power-on [s]
@@ -26,7 +26,7 @@ def phase_servo_machine(
     """Phase servo at power-on."""
     p, r = build_phase_servo(spec), phase_servo.PhaseServo()
     phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
-    return Machine(p, r, Loop(spec.tick), recorder)
+    return Machine(p, r, spec.tick, recorder)
 
 
 class PhaseHost(Host):

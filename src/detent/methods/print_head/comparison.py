@@ -25,7 +25,7 @@ from detent.methods.print_head.system import TICK, PrintHead, switch_on
 from detent.page.chart import Chart, Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
-from detent.record.machine import Loop, Machine
+from detent.record.machine import Machine
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
@@ -347,7 +347,7 @@ class MeasuringBench:
         head.emitter, head.width, head.homed, head.state = begin, BENCH_EMITTERS, 1, IDLE
         head.right.slope, head.right.friction = way.slope_right, way.friction_right
         head.left.slope, head.left.friction = way.slope_left, way.friction_left
-        machine = Machine(p, r, Loop(TICK, advance))
+        machine = Machine(p, r, TICK)
         supervisor = Supervisor(r.controller, machine.pass_time, lambda _: None, self.spec.method.ack_last)
         supervisor.send(set_speed(speed_value(speed)))
         supervisor.finish()

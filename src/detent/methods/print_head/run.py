@@ -18,7 +18,6 @@ from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
-from detent.kernel.loop import advance
 from detent.methods.print_head import system as print_head
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.controller import load_line
@@ -27,7 +26,7 @@ from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
-from detent.record.machine import AnyRecorder, Loop, Machine, Progress
+from detent.record.machine import AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 
 NOT_FIRED = -(1 << 31)
@@ -40,7 +39,7 @@ def print_head_machine(
     """Print head at power-on."""
     p, r = build_print_head(spec), print_head.PrintHead()
     print_head.switch_on(p, r, spec.mechanics.start_position, spec.encoder.seed)
-    return Machine(p, r, Loop(print_head.TICK, advance), recorder)
+    return Machine(p, r, print_head.TICK, recorder)
 
 
 @dataclass(frozen=True, slots=True)

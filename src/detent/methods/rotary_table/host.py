@@ -15,14 +15,13 @@ from detent.control.guard import NO_ARRIVAL
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import BARELY, at_least, at_most
-from detent.kernel.loop import advance
 from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_file import find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
 from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
-from detent.record.machine import AnyRecorder, Loop, Machine
+from detent.record.machine import AnyRecorder, Machine
 from detent.units import format_quantity
 
 MARGIN = 0.5  # what a step may take longer than twice the time of its way [s]
@@ -35,7 +34,7 @@ def rotary_table_machine(
     """Rotary table at power-on."""
     p, r = build_rotary_table(spec), RotaryTable()
     switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
-    return Machine(p, r, Loop(TICK, advance), recorder)
+    return Machine(p, r, TICK, recorder)
 
 
 class TableHost:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.files.text import check_target
 from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
 from detent.page.parts import Numbers
-from detent.page.plots import COLOURS, check_figure_path, new_figure
+from detent.page.plots import COLOURS, new_figure
 from detent.planning.step_envelope import StepEnvelope
 from detent.units import format_quantity
 
@@ -34,7 +35,7 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
     The run between a direction's extremes is filled; outside of them a dashed line shows what the table allows there.
     What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and above.
     """
-    path = check_figure_path(path)
+    path = check_target(path)
     top = HEADROOM * max(tables.up.zones.limits)
     with new_figure(path, 9.0, 5.4) as figure:
         area = figure.subplots()

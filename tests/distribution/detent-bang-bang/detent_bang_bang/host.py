@@ -9,7 +9,7 @@ from detent.page.chart import Curve, Panel
 from detent.page.frame import TableComparison
 from detent.page.table import TextTable
 from detent.page.words import length, milliseconds
-from detent.record.machine import Loop, Machine
+from detent.record.machine import Machine
 from detent.sensing.encoder import stand_at
 from detent.sensing.quadrature import preset
 from detent_bang_bang.schema import TICK, BangBangSpec
@@ -32,7 +32,7 @@ class BangBangHost(Host):
         r.plant.train.position = home
         stand_at(p.plant.encoder, r.plant.encoder, home, spec.encoder.seed)
         preset(r.controller.decoder, r.plant.encoder.channel_a, r.plant.encoder.channel_b)
-        machine, tolerance = Machine(p, r, Loop(TICK), recorder), (spec.method.dead_band + 1) * spec.pulse
+        machine, tolerance = Machine(p, r, TICK, recorder), (spec.method.dead_band + 1) * spec.pulse
         super().__init__(spec, machine, grid=spec.pulse, tolerance=tolerance, home=home)
 
     def command(self, to):
