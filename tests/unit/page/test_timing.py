@@ -146,14 +146,14 @@ def test_segments_are_the_stretches_of_equal_value(shown):
     assert segments == [(0.0, 2.5, 0), (2.5, 5.0, 1), (5.0, 10.0, 0)]
 
 
-def test_changes_too_close_to_be_seen_become_one_stretch_without_value(shown):
+def test_changes_too_close_to_be_seen_become_one_stretch_without_value():
     times = np.array([BEGIN, BEGIN + 5000, BEGIN + 10_000, BEGIN + 15_000, BEGIN + 20 * TICK])
     signal = Waveform("a", 8, False, False, "", "", times, np.array([1, 2, 3, 4, 5]))
     segments = timing._segments(signal, SCALE)
     assert segments == [(0.0, 0.015, None), (0.015, 5.0, 4), (5.0, 10.0, 5)]
 
 
-def test_a_single_pulse_is_drawn_however_short(shown):
+def test_a_single_pulse_is_drawn_however_short():
     times = np.array([BEGIN, BEGIN + 10 * TICK, BEGIN + 10 * TICK + 1])
     signal = Waveform("a", 1, False, False, "", "", times, np.array([0, 1, 0]))
     assert [value for _, _, value in timing._segments(signal, SCALE)] == [0, 1, 0]
