@@ -82,9 +82,14 @@ def burst(table: BurstTable | None, tick: float) -> Iterator[Contradiction]:
     """A burst is given by its first moment or by its ticks; `tick` is the base tick [s]."""
     if table is None:
         return
-    if table.ticks:
-        yield from _listed(table)
-    elif table.at is None:
+    ticks, spacing = table.ticks, BurstTable.model_fields["spacing"].default
+    stated = [k for k, default in (("at", None), ("count", 1), ("spacing", spacing)) if getattr(table, k) != default]
+    if ticks and stated:
+        name, allowed = stated[0], f"left out where ticks are listed, {len(ticks)} of them here"
+        yield wrong(f"{BURST}.{name} {BURST}.ticks", allowed, f"remove {name}, or remove ticks")
+    elif ticks != sorted(set(ticks)):
+        yield wrong(f"{BURST}.ticks", "whole numbers that rise, each once", put(f"{BURST}.ticks", sorted(set(ticks))))
+    elif table.at is None and not ticks:
         keys = f"{BURST}.at {BURST}.ticks"
         yield wrong(keys, "the first moment, or ticks in its place", 'add at = "5 ms", or ticks')
     if table.at is not None and table.count > 1 and table.spacing < tick:
@@ -93,18 +98,6 @@ def burst(table: BurstTable | None, tick: float) -> Iterator[Contradiction]:
             f"at least one base tick, {text(tick, 's')}: a line carries one pulse at a time",
             put(f"{BURST}.spacing", at_least(tick, "s")),
         )
-
-
-def _listed(table: BurstTable) -> Iterator[Contradiction]:
-    """Ticks of a burst rise and stand alone."""
-    for name, default in (("at", None), ("count", 1), ("spacing", BurstTable.model_fields["spacing"].default)):
-        if getattr(table, name) != default:
-            allowed = f"left out where ticks are listed, {len(table.ticks)} of them here"
-            yield wrong(f"{BURST}.{name} {BURST}.ticks", allowed, f"remove {name}, or remove ticks")
-            return
-    rising = sorted(set(table.ticks))
-    if rising != table.ticks:
-        yield wrong(f"{BURST}.ticks", "whole numbers that rise, each once", put(f"{BURST}.ticks", rising))
 
 
 def idle_effort(remedy: Remedies, effort: float, most: float, unit: str, giver: str) -> Iterator[Caution]:

@@ -1,7 +1,7 @@
 """`detent check`, `compare` and `envelope`: what an axis file says without a job."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from detent.cli.app import File, Json, Set, app, option
 from detent.cli.terminal import folder_for, make_console, print_json, print_table, progress_bar, say_if_cold
@@ -97,17 +97,16 @@ def envelope(
     if as_json:
         print_json({name: chosen[name].to_dict() | {"files": [str(f) for f in written[name]]} for name in chosen})
         return
-    print_table(axis.name, ("motor", "travel", "ramp", "run-up", "memory"), [_row(e) for e in chosen.values()])
+    rows = [
+        (
+            told["motor"],
+            f"{told['steps']} steps",
+            f"{told['ramp']} entries, {told['start_hz']:.4g} to {told['top_hz']:.4g} Hz",
+            f"{told['run_up'] * 1e3:.4g} ms",
+            f"{told['bytes']} bytes",
+        )
+        for told in (one.to_dict() for one in chosen.values())
+    ]
+    print_table(axis.name, ("motor", "travel", "ramp", "run-up", "memory"), rows)
     for path in (path for paths in written.values() for path in paths):
         print(f"{'figure' if path.suffix == '.png' else path.suffix[1:]:<6} {path}")
-
-
-def _row(found: Any) -> tuple[str, ...]:
-    about = found.to_dict()
-    return (
-        about["motor"],
-        f"{about['steps']} steps",
-        f"{about['ramp']} entries, {about['start_hz']:.4g} to {about['top_hz']:.4g} Hz",
-        f"{about['run_up'] * 1e3:.4g} ms",
-        f"{about['bytes']} bytes",
-    )

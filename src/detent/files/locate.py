@@ -39,7 +39,10 @@ def locate_keys(text: str) -> dict[Path, Place]:
     source = text.encode()
     places: dict[Path, Place] = {}
     for path, key, value in _walk(_parser().parse(source).root_node, ()):
-        places.setdefault(path, _place(source, key, value))
+        line_start = source.rfind(b"\n", 0, key.start_byte) + 1
+        column = len(source[line_start : key.start_byte].decode(errors="replace"))  # in characters
+        place = Place(key.start_point[0] + 1, column + 1, (value.text or b"").decode(errors="replace"))
+        places.setdefault(path, place)
     return places
 
 
@@ -120,11 +123,3 @@ def _key_parts(key: "Node") -> Path:
         except tomllib.TOMLDecodeError:
             return (text,)
     return (text,)
-
-
-def _place(source: bytes, key: "Node", value: "Node") -> Place:
-    """Line and column of a key, in characters, with the value's first line."""
-    row = key.start_point[0]
-    line_start = source.rfind(b"\n", 0, key.start_byte) + 1
-    column = len(source[line_start : key.start_byte].decode(errors="replace"))
-    return Place(row + 1, column + 1, (value.text or b"").decode(errors="replace"))

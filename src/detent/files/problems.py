@@ -106,12 +106,6 @@ class Reporter:
         inside = path[:-1] if isinstance(path[-1], Index) else path
         return f"[[{dotted(inside)}]]" if is_rows(field_at(self._root, inside)) else f"[{dotted(inside)}]"
 
-    def _no_rows(self, path: Path, value: object) -> FileProblem:
-        """Something else where a list of tables must stand."""
-        came = "a single table" if isinstance(value, dict) else self.came(path, value)
-        remedy = f"write {self._header(path)}, with two brackets, before the keys of each"
-        return self.problem(path, came, f"tables {self._header(path)}", remedy)
-
     def _axis(self, text: str) -> str:
         """What is said of axis files only."""
         return text if "axis" in self._root.model_fields else ""
@@ -122,14 +116,12 @@ class Reporter:
         return self.problem(path, f'the name "{path[-1]}"', extra_of(field, "allowed"), remedy)
 
     def _wrong_number(self, path: Path, field: FieldInfo, came: int) -> FileProblem:
-        """Too few or too many tables that the user names."""
         least, most = bounds_of_length(field)
         table = dotted((*path, example_of(field)))
         remedy = f"add [{table}] ({field.description})" if came < least else "remove some"
         return self.problem(path, f"{came} tables", f"{least} to {most} tables such as [{table}]", remedy)
 
     def _missing(self, path: Path, field: FieldInfo) -> FileProblem:
-        """Missing key or table: say what to add, and where."""
         table = table_of(field)
         if is_named(field):
             return self._wrong_number(path, field, 0)
@@ -144,12 +136,14 @@ class Reporter:
         return self.problem(path, "nothing", describe_allowed(field), remedy)
 
     def _not_a_table(self, path: Path, value: object) -> FileProblem:
-        """Report a value where a table must stand, or several tables where there is one."""
-        if is_rows(field_at(self._root, path)):
-            return self._no_rows(path, value)
+        field = field_at(self._root, path)
+        if is_rows(field):
+            came, header = "a single table" if isinstance(value, dict) else self.came(path, value), self._header(path)
+            remedy = f"write {header}, with two brackets, before the keys of each"
+            return self.problem(path, came, f"tables {header}", remedy)
         keys = ", ".join(known_keys(self._root, path))
-        if is_named(field_at(self._root, path)):
-            table = dotted((*path, example_of(field_at(self._root, path))))
+        if is_named(field):
+            table = dotted((*path, example_of(field)))
             came = "a list" if isinstance(value, list) else self.came(path, value)
             remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
             return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
@@ -160,7 +154,6 @@ class Reporter:
         return self.problem(path, self.came(path, value), f"the table [{dotted(path)}] with {keys}", remedy)
 
     def _bad_value(self, path: Path, field: FieldInfo, error: dict[str, Any]) -> FileProblem:
-        """Report a value of the wrong kind or outside its range."""
         came = self.came(path, error["input"])
         allowed = describe_allowed(field)
         remedy = f"give {path[-1]} a value in this range ({field.description})"
@@ -174,7 +167,6 @@ class Reporter:
         return self.problem(path, came, allowed, remedy)
 
     def _bad_list(self, path: Path, field: FieldInfo, errors: Sequence[dict[str, Any]]) -> FileProblem:
-        """Report what is no list, a list of the wrong length, or wrong numbers in a list."""
         kinds = {error["type"] for error in errors}
         example = f"{path[-1]} = {list_example(field)}"
         remedy = f"give every number of {path[-1]} a value in this range ({field.description})"
@@ -268,7 +260,6 @@ def _written(value: object) -> str:
 
 
 def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Tell which elements of a list are wrong, the first of them in full."""
     for error in errors[:MAX_ELEMENTS]:
         value = error["input"]
         text = str(value).lower() if isinstance(value, bool) else f'"{value}"' if isinstance(value, str) else str(value)
@@ -279,7 +270,6 @@ def _wrong_elements(errors: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 
 def _type_remedy(key: str, field: FieldInfo, value: object) -> str:
-    """What to do about a value of the wrong type."""
     if type_of(field) is bool:
         return f"write {key} = true or {key} = false, without quotes"
     if type_of(field) is str:

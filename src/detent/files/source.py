@@ -16,6 +16,7 @@ MAX_BYTES = 1_000_000  # largest axis file read; a real one has a few thousand b
 MAX_SYNTAX_PROBLEMS = 20  # syntax errors reported at most: a file of another kind would have one in each line
 _POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _ASSIGNMENT = re.compile(r"\s*[\w.\"' -]+=")
+_BEFORE_COMMENT = re.compile(r'(?:[^"#]|"[^"]*"?)*')
 _UNQUOTED_QUANTITY = re.compile(r"[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?\s*[A-Za-z%µΩ][^\"']*")
 _UNQUOTED_WORD = re.compile(r"[A-Za-z_][\w -]*")
 
@@ -88,20 +89,10 @@ def _line_with_most(chars: str, lines: list[str]) -> int:
 
 def _syntax_problem(file: str, row: int, column: int, reason: str, line: str) -> FileProblem:
     """Say what is wrong with a line of TOML, with the usual cause named."""
-    bare = _without_comment(line).strip()
+    bare = str(_BEFORE_COMMENT.findall(line)[0]).strip()
     shown = f"`{bare[:60]}{'...' if len(bare) > 60 else ''}`" if bare else "the end of the file"
     key, remedy = next(_usual_causes(bare, reason), ("", f"correct the line ({reason[:1].lower()}{reason[1:]})"))
     return FileProblem(file, row, column, key, shown, 'TOML: `key = value`, text and quantities in "quotes"', remedy)
-
-
-def _without_comment(line: str) -> str:
-    """Line up to its comment, if it has one outside quotes."""
-    parts = line.split("#")
-    for count in range(1, len(parts)):
-        before = "#".join(parts[:count])
-        if before.count('"') % 2 == 0:
-            return before
-    return line
 
 
 def _usual_causes(line: str, reason: str) -> Iterator[tuple[str, str]]:

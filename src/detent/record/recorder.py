@@ -24,24 +24,20 @@ def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf
     for name in names:
         pattern = "*" if name == "all" else name
         found = [leaf for leaf in single if fnmatchcase(leaf.path, pattern)]
+        if not found and name in leaves:
+            raise DetentError(
+                f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
+                "leave it out"
+            )
         if not found:
-            raise _no_signal(name, registers, leaves)
+            near = nearest(name, [leaf.path for leaf in single])
+            hint = f"did you mean {near!r}? " if near else ""
+            raise DetentError(
+                f"signal {name!r}: no such register of {registers.__name__}; {hint}`detent registers` lists them all, "
+                "'all' records every one"
+            )
         chosen.update((leaf.path, leaf) for leaf in found)
     return list(chosen.values())
-
-
-def _no_signal(name: str, registers: type[Registers], leaves: dict[str, Leaf]) -> DetentError:
-    if name in leaves:
-        return DetentError(
-            f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
-            "leave it out"
-        )
-    near = nearest(name, [path for path, leaf in leaves.items() if not leaf.length])
-    hint = f"did you mean {near!r}? " if near else ""
-    return DetentError(
-        f"signal {name!r}: no such register of {registers.__name__}; {hint}`detent registers` lists them all, "
-        "'all' records every one"
-    )
 
 
 def byte_places(leaves: Iterable[Leaf]) -> NDArray[np.int64]:

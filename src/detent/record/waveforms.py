@@ -272,10 +272,13 @@ def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
 
 
 def _write(waveforms: Waveforms, stream: Any) -> None:
-    scale, timescale = _coarsest(waveforms)
+    common = math.gcd(waveforms.begin, waveforms.end, *(int(np.gcd.reduce(s.times)) for s in waveforms.signals))
+    scale, timescale = next((length, scale) for length, scale in SCALES if common % length == 0)
     # An empty date is left out; the default would be the time of day.
     writer = VCDWriter(stream, timescale, date="", init_timestamp=waveforms.begin // scale)
-    top = _scope_name(waveforms.title)
+    # A name that every viewer takes: letters, digits and underscores, no digit first.
+    name = re.sub(r"[^A-Za-z0-9_]+", "_", waveforms.title).strip("_") or DEFAULT_TITLE
+    top = "_" + name if name[0].isdigit() else name
     variables: list[Any] = []
     for signal in waveforms.signals:
         *blocks, name = signal.name.split(".")
@@ -296,15 +299,3 @@ def _merged(signals: tuple[Waveform, ...]) -> Iterable[tuple[int, int, int | flo
     values = [value for signal in signals for value in signal.values[1:].tolist()]
     for row in np.argsort(times, kind="stable").tolist():
         yield int(times[row]), int(owner[row]), values[row]
-
-
-def _coarsest(waveforms: Waveforms) -> tuple[int, Timescale]:
-    """Coarsest timescale that divides every moment, with its length [ps]."""
-    common = math.gcd(waveforms.begin, waveforms.end, *(int(np.gcd.reduce(s.times)) for s in waveforms.signals))
-    return next((length, scale) for length, scale in SCALES if common % length == 0)
-
-
-def _scope_name(title: str) -> str:
-    """Turn a title into a name that every viewer takes: letters, digits and underscores."""
-    name = re.sub(r"[^A-Za-z0-9_]+", "_", title).strip("_") or DEFAULT_TITLE
-    return "_" + name if name[0].isdigit() else name
