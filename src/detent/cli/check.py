@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from detent.cli.app import File, Json, Set, app, option
-from detent.cli.terminal import folder_for, make_console, print_json, print_table, progress_bar, say_if_cold
+from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say, say_if_cold
 from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")  # of the files with the tables of a motor
@@ -28,11 +28,10 @@ def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
     print_table(f"{report.name}: every value in effect", ("key", "value", "origin"), rows)
     figures = [(figure.name, figure.text, figure.formula) for figure in report.derived]
     print_table("What follows from them", ("figure", "value", "from"), figures)
-    console = make_console()
     for caution in report.warnings:
-        console.print(f"warning: {caution}", style="yellow", soft_wrap=True)
+        say(f"warning: {caution}", "yellow")
     number = len(report.warnings)
-    console.print(f"{number} warning{'s' if number > 1 else ''}" if number else "no warnings")
+    say(f"{number} warning{'s' if number > 1 else ''}" if number else "no warnings")
 
 
 @app.command()

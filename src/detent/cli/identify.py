@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from detent.cli.app import LOGS, NOT_DONE, Columns, Json, Mapping, app, option
-from detent.cli.terminal import make_console, print_json, print_table, progress_bar, say_if_cold
+from detent.cli.terminal import print_json, print_table, progress_bar, say, say_if_cold
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
@@ -74,14 +74,13 @@ def identify(
         names, reasons = [str(path) for path in written], [str(error) for error in errors]
         print_json(done.to_dict() | {"files": names, "not_written": reasons})
     else:
-        console = make_console()
-        _print(console, done, [str(one) for one in outside])
+        _print(done, [str(one) for one in outside])
         for error in errors:
-            console.print(f"not written: {error}", style="bold red", soft_wrap=True)
+            say(f"not written: {error}", "bold red")
         for path in written:
-            console.print(f"written: {path}", soft_wrap=True)
+            say(f"written: {path}")
         if done.refusals and job is None:
-            console.print("--job FILE writes moves that show what is missing", soft_wrap=True)
+            say("--job FILE writes moves that show what is missing")
     if done.verdict != "trusted" or errors:
         raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in errors)]))
 
@@ -117,14 +116,14 @@ def _write(
 # ---- what a person reads
 
 
-def _print(console: Any, done: "Identified", outside: list[str]) -> None:
+def _print(done: "Identified", outside: list[str]) -> None:
     found = done.found
-    console.print(_verdict_line(done), style=COLOURS[done.verdict], soft_wrap=True)
-    _print_refusals(console, done)
+    say(_verdict_line(done), COLOURS[done.verdict])
+    _print_refusals(done)
     for text in outside:
-        console.print(f"  not as the axis file: {text}", style="yellow", soft_wrap=True)
-    console.print()
-    _print_logs(console, found)
+        say(f"  not as the axis file: {text}", "yellow")
+    print()
+    _print_logs(found)
     if found.estimates:
         _print_constants(done)
         _print_ladder(found)
@@ -147,7 +146,7 @@ def _verdict_line(done: "Identified") -> str:
     return f"Partly trusted: {number - len(names)} of {number} constants of {logs}; {', '.join(names)} {are} not."
 
 
-def _print_refusals(console: Any, done: "Identified") -> None:
+def _print_refusals(done: "Identified") -> None:
     """What is wrong and what to do about it, the same advice once; what concerns everything comes first."""
     ordered = sorted(done.refusals, key=lambda refusal: bool(refusal.constants))
     if any(not refusal.constants for refusal in ordered):
@@ -157,32 +156,32 @@ def _print_refusals(console: Any, done: "Identified") -> None:
         advice.setdefault(refusal.record, []).append(f"{refusal.subject}: {refusal.text}")
     for record, texts in list(advice.items())[:MOST_LINES]:
         for text in dict.fromkeys(texts):
-            console.print(f"  {text}", soft_wrap=True)
-        console.print(f"    -> {record}", style="bold", soft_wrap=True)
+            say(f"  {text}")
+        say(f"    -> {record}", "bold")
     left = len(advice) - MOST_LINES
     if left > 0:
-        console.print(f"  {left} more; --json shows them all")
+        say(f"  {left} more; --json shows them all")
 
 
-def _print_logs(console: Any, found: Any) -> None:
+def _print_logs(found: Any) -> None:
     """What each log holds, what was wrong with it, what was guessed."""
     from detent.page.words import count, duration, number
 
     for log, run in zip(found.logs[:MOST_LINES], found.runs, strict=False):
         held = f"{count(len(log), 'sample')}, {duration(float(log.t[-1] - log.t[0]))} at {number(1 / run.step, 3)} Hz"
-        console.print(f"{log.name}: {held}; driven by its {run.effort_name} [{run.effort_unit}]", soft_wrap=True)
+        say(f"{log.name}: {held}; driven by its {run.effort_name} [{run.effort_unit}]")
         for finding in log.findings[:MOST_LINES]:
             style = None if finding.severity == "note" else "yellow"
-            console.print(f"  {finding}", style=style, soft_wrap=True)
+            say(f"  {finding}", style)
         if len(log.findings) > MOST_LINES:
-            console.print(f"  {len(log.findings) - MOST_LINES} more findings; --json shows them all")
+            say(f"  {len(log.findings) - MOST_LINES} more findings; --json shows them all")
         if log.guesses:
-            console.print(f"  guessed: {'; '.join(log.guesses)}", style="dim", soft_wrap=True)
+            say(f"  guessed: {'; '.join(log.guesses)}", "dim")
     if len(found.logs) > MOST_LINES:
-        console.print(f"{len(found.logs) - MOST_LINES} more logs; --json shows them all")
+        say(f"{len(found.logs) - MOST_LINES} more logs; --json shows them all")
     if found.notes:
-        console.print(f"  {'; '.join(found.notes)}", style="dim", soft_wrap=True)
-    console.print()
+        say(f"  {'; '.join(found.notes)}", "dim")
+    print()
 
 
 def _print_constants(done: "Identified") -> None:
@@ -228,7 +227,7 @@ def _print_horizons(found: Any) -> None:
     loop = found.closed_loop
     if loop is not None:
         told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"
-        make_console().print(f"The same under the loops that the log shows: {told}", soft_wrap=True)
+        say(f"The same under the loops that the log shows: {told}")
 
 
 # ---- single questions, each answered by its own method
@@ -279,16 +278,15 @@ def analyse(
 
 def _print_answers(found: "list[Analysis]", findings: list[str]) -> None:
     """Answers first, then what has none and why."""
-    console = make_console()
     for finding in findings:
-        console.print(f"  {finding}", style="yellow", soft_wrap=True)
+        say(f"  {finding}", "yellow")
     for one in (one for one in found if one.estimates):
         rows = [(e.name, f"{e.value:.5g}", f"{e.low:.5g} to {e.high:.5g}", e.unit) for e in one.estimates]
         print_table(f"{one.title[0].upper()}{one.title[1:]} ({one.name})", ("", "value", "95 % interval", "unit"), rows)
         for note in dict.fromkeys(one.notes):
-            console.print(f"  {note}", style="dim", soft_wrap=True)
+            say(f"  {note}", "dim")
         if one.reason:
-            console.print(f"  not trusted: {one.reason}", style="bold yellow", soft_wrap=True)
-        console.print()
+            say(f"  not trusted: {one.reason}", "bold yellow")
+        print()
     for one in (one for one in found if not one.estimates):
-        console.print(f"{one.name}: no answer: {one.reason}", soft_wrap=True)
+        say(f"{one.name}: no answer: {one.reason}")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
-from detent.cli.terminal import folder_for, make_console, print_json, progress_bar, say_if_cold, split_names
+from detent.cli.terminal import folder_for, print_json, progress_bar, say, say_if_cold, split_names
 from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
@@ -114,17 +114,16 @@ def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
 
 
 def _print_run(done: Any, written: list[Path]) -> None:
-    console = make_console()
     result = done.result
-    console.print(done.verdict, style="bold green" if done.done else "bold red", soft_wrap=True)
+    say(done.verdict, "bold green" if done.done else "bold red")
     for name, text in done.summary():
-        console.print(f"  {name:<20} {text}", soft_wrap=True)
+        say(f"  {name:<20} {text}")
     for text in result.warnings:
-        console.print(f"  warning: {text}", style="yellow", soft_wrap=True)
+        say(f"  warning: {text}", "yellow")
     notes = getattr(result.job, "notes", ())
     for note in notes[:5]:
-        console.print(f"  note: {note}", soft_wrap=True)
+        say(f"  note: {note}")
     if len(notes) > 5:
-        console.print(f"  {len(notes) - 5} more notes; --json shows them all")
+        say(f"  {len(notes) - 5} more notes; --json shows them all")
     for path in written:
-        console.print(f"  {path.stem if path.stem == 'report' else 'trace':<20} {path}", soft_wrap=True)
+        say(f"  {path.stem if path.stem == 'report' else 'trace':<20} {path}")

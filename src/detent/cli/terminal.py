@@ -47,6 +47,11 @@ def make_console(*, stderr: bool = False) -> Any:
     return console
 
 
+def say(text: str, style: str | None = None) -> None:
+    """A line of any length, taken as it is."""
+    make_console().print(text, style=style, soft_wrap=True)
+
+
 def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]], *, right: bool = False) -> None:
     """A table whose cells are taken as they are; `right` aligns all but the first column to the right."""
     from rich.table import Table
