@@ -12,16 +12,7 @@ from pydantic import ValidationError
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
 from detent.errors import FileProblem, InputError
-from detent.files.fields import (
-    AnyName,
-    Table,
-    example_of,
-    held_leaves,
-    is_named,
-    leaf_fields,
-    table_of,
-    unit_of,
-)
+from detent.files.fields import AnyName, Table, example_of, held_leaves, is_named, leaf_fields, table_of, unit_of
 from detent.files.findings import Contradiction
 from detent.files.locate import Path
 from detent.files.overrides import apply_overrides, as_table, put_value
