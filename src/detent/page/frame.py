@@ -57,10 +57,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
-    """Everything a page is made of, from top to bottom.
-
-    `settings` is the small print at its end; `version` that of detent, the package's own if empty.
-    """
+    """Everything a page is made of, from top to bottom; `settings` is the small print at its end."""
 
     title: str
     headline: Headline
@@ -68,7 +65,6 @@ class Page:
     notes: Sequence[Note] = ()
     sections: Sequence[Section] = ()
     settings: Mapping[str, str] = field(default_factory=dict[str, str])
-    version: str = ""
 
     def __post_init__(self) -> None:
         twice = [name for name, times in Counter(chart["id"] for chart in self.charts).items() if times > 1]

@@ -37,7 +37,7 @@ def render_page(page: Page) -> str:
         page=page,
         notes=sorted(page.notes, key=lambda note: order.index(note.level)),
         charts=[{key: value for key, value in chart.items() if key not in FOR_THE_PAGE} for chart in page.charts],
-        version=page.version or __version__,
+        version=__version__,
         signs=SIGNS,
         levels=LEVELS,
         asset=_asset,

@@ -13,7 +13,6 @@ from detent.kernel.registers import Leaf, Registers
 from detent.record.trace import Trace
 
 ROWS = 16384  # rows between two flushes
-Sink = Callable[[NDArray[np.void]], None]
 
 
 def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf]:
@@ -48,9 +47,7 @@ def byte_places(leaves: Iterable[Leaf]) -> NDArray[np.int64]:
 class Recorder:
     """Rows of chosen registers at every n-th tick."""
 
-    def __init__(
-        self, registers: type[Registers], names: Sequence[str], *, every: int, period: float, sink: Sink | None = None
-    ) -> None:
+    def __init__(self, registers: type[Registers], names: Sequence[str], *, every: int, period: float) -> None:
         if every < 1:
             raise DetentError(f"recording: came every {every} ticks; allowed: 1 or more; choose how often to record")
         picked = choose_leaves(registers, ["tick", *names])
@@ -60,7 +57,8 @@ class Recorder:
         self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
         self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
         self._blocks: list[NDArray[np.void]] = []
-        self._sink = sink or self._blocks.append
+        self._sink: Callable[[NDArray[np.void]], object] | None = None
+        self._most = 0  # rows kept beside the sink
         self._next_row = 1
 
     def room(self, tick: int) -> int:
@@ -68,7 +66,7 @@ class Recorder:
         return (self._next_row + ROWS - 1) * self.every - tick
 
     def flush(self, tick: int) -> None:
-        """Hand the rows complete by `tick` to the sink."""
+        """Take the rows complete by `tick`."""
         last = tick // self.every
         if last < self._next_row:
             return
@@ -78,17 +76,15 @@ class Recorder:
         block["t"] = raw["tick"] * self.period
         for leaf in self.leaves:
             block[leaf.path] = raw[leaf.path]
-        self._sink(block)
+        if self._sink is not None:
+            self._sink(block)
+            block = block[: max(self._most - sum(map(len, self._blocks)), 0)]
+        self._blocks.append(block)
         self._next_row = last + 1
 
-    def pass_on(self, sink: Sink, most: int) -> None:
+    def pass_on(self, sink: Callable[[NDArray[np.void]], object], most: int) -> None:
         """Hand rows to a sink too, and keep no more than the first so many in memory."""
-
-        def take(block: NDArray[np.void]) -> None:
-            sink(block)
-            self._blocks.append(block[: max(most - sum(map(len, self._blocks)), 0)])
-
-        self._sink = take
+        self._sink, self._most = sink, most
 
     def trace(self, **attributes: str | float) -> Trace:
         """What is in memory, as a trace."""

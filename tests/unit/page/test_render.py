@@ -85,10 +85,9 @@ def test_paper_and_what_draws_it_are_there_only_for_what_was_printed() -> None:
 
 
 def test_the_page_names_the_version_that_wrote_it() -> None:
-    assert f"Written by detent {detent.__version__}." in render_page(page())
-    other = render_page(replace(page(), version="9.<9>"))
-    assert 'content="detent 9.&lt;9&gt;"' in other
-    assert "Written by detent 9.&lt;9&gt;." in other
+    html = render_page(page())
+    assert f"Written by detent {detent.__version__}." in html
+    assert f'content="detent {detent.__version__}"' in html
 
 
 def test_the_page_fetches_nothing_and_forbids_it() -> None:

@@ -104,7 +104,8 @@ def test_the_declaration_gives_units_and_meanings() -> None:
 def test_blocks_go_to_the_sink_and_not_into_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder_module, "ROWS", 16)
     blocks: list[Any] = []
-    recorder = Recorder(Bench, ["speed"], every=1, period=1e-3, sink=blocks.append)
+    recorder = Recorder(Bench, ["speed"], every=1, period=1e-3)
+    recorder.pass_on(blocks.append, 0)
     play(recorder, 50)
     assert sum(len(found) for found in blocks) == 50
     assert max(len(found) for found in blocks) <= 16

@@ -79,9 +79,8 @@ def test_the_same_axis_gives_the_same_bytes_recorded_or_not():
 
     def recorded():
         blocks = []
-        recorder = Recorder(
-            cascade_registers(spec), CASCADE_SIGNALS, every=3, period=spec.method.sample_period, sink=blocks.append
-        )
+        recorder = Recorder(cascade_registers(spec), CASCADE_SIGNALS, every=3, period=spec.method.sample_period)
+        recorder.pass_on(blocks.append, 0)
         run = run_cascade_moves(spec, THERE_AND_BACK, recorder=recorder)
         return run.to_dict(), np.concatenate(blocks).tobytes()
 

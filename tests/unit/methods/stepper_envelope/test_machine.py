@@ -76,7 +76,8 @@ def test_a_motor_runs_as_if_it_were_alone(spec):
 
 def recorded(spec, every: int, rooms: int) -> np.ndarray:
     blocks: list[np.ndarray] = []
-    recorder = Recorder(stage_registers(spec), SIGNALS, every=every, period=instant(spec), sink=blocks.append)
+    recorder = Recorder(stage_registers(spec), SIGNALS, every=every, period=instant(spec))
+    recorder.pass_on(blocks.append, 0)
     stage = Stage(spec, recorder)
     short_moves(stage)
     stage.wait_for(stage.motors, 5.0)
