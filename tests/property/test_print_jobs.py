@@ -1,5 +1,6 @@
 """For every job: reading is total, every byte is accounted for, and every plan obeys the axis's rules."""
 
+from dataclasses import astuple
 from itertools import pairwise, product
 
 import pytest
@@ -8,9 +9,9 @@ from hypothesis import strategies as st
 
 from detent.errors import InputError
 from detent.methods.print_head import line_plan
-from detent.methods.print_head.diablo630_codes import CONTROL, ESCAPE
+from detent.methods.print_head.diablo630 import CONTROL, ESCAPE, parse_diablo
 from detent.methods.print_head.line_plan import Geometry, estimated_time, motion_time, plan_lines, run_speed
-from detent.methods.print_head.print_job import load_job, parse_diablo, parse_text
+from detent.methods.print_head.print_job import load_job, parse_text
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintLine
 
 codes = st.sampled_from(
@@ -24,7 +25,7 @@ streams = st.one_of(
 
 
 def assert_well_formed(job, length):
-    assert job.length_bytes == job.account.total == length
+    assert job.length_bytes == sum(astuple(job.account)) == length
     assert [line.number for line in job.lines] == list(range(1, len(job.lines) + 1))
     places = [(line.page, line.baseline) for line in job.lines]
     assert places == sorted(set(places))
@@ -47,7 +48,7 @@ def test_reading_a_stream_is_total_and_accounts_for_every_byte(data):
     assert_well_formed(job, len(data))
     assert bool(job.lines) == (job.account.printed > 0)
     assert job.account.noted == 0 or job.notes
-    assert sum(accepted.count for accepted in job.accepted) <= job.account.accepted
+    assert sum(job.accepted.values()) <= job.account.accepted
     # What is on paper was struck: one strike at least per printed code, and those of bold, shadow and accents.
     strikes = sum(c.strike for line in job.lines for c in line.characters)
     assert strikes >= job.account.printed / 3  # ESC Y and its byte of hammer force are three bytes

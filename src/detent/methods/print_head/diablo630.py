@@ -3,21 +3,158 @@
 The stream is motion as the word processor meant it: spacing changed within a line, lines sent backwards, bold by
 striking again 1/120 inch further. What counts for the axis is where the ink is; in which direction a line is
 finally printed is the supervisor's choice (`line_plan`). Reading is total: any bytes give a job, and what could not
-be carried out stands in its notes.
+be carried out stands in its notes. `diablo630_printer` is the mechanism.
 
-Three files share the work: `diablo630_codes` is the table of codes, `diablo630_printer` the mechanism, and here
-each code of the table is given its action.
+The codes are those which the makers of compatible printers publish, in agreement: AMT Datasouth, Accel-5350 and
+Accel-6300 user's guides, tables D-2 and D-3 (the motion indices and absolute moves "n minus one", what a carriage
+return ends, Diablo graphics, program mode, offset); Brother HL series technical reference, chapter 4 (half feeds,
+1/120 inch backspace to the right in backward printing); Tandy LP 990, "Diablo 630/630 ECS" (the list of codes).
 """
 
-from __future__ import annotations
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
 
-from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
-
-from detent.methods.print_head.diablo630_codes import CONTROL, ESC, ESCAPE, SUB, WHEEL_CHARACTERS, ControlCode, Handling
 from detent.methods.print_head.diablo630_printer import Printer
-from detent.methods.print_head.printed_page import AcceptedCode, ByteAccount, JobNote, PrintJob
+from detent.methods.print_head.printed_page import WHEEL_PITCH, PrintJob, Reading
+
+
+class Ignored(Enum):
+    """Why a code is not carried out."""
+
+    ACCEPTED = "accepted"  # understood; changes neither where nor what is printed
+    NOT_SUPPORTED = "not supported"  # noted with its offset
+
+
+Action = Callable[[Printer, int], str | None]
+"""Carries out a code with the parameter `n`; gives what went wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlCode:
+    """One control code."""
+
+    name: str  # as the manuals write it: "ESC US n"
+    meaning: str  # what the printer does; for a code that is not supported, also what happens instead
+    action: Action | Ignored
+    parameters: int  # bytes that follow the code and belong to it
+
+
+ESC: Final = 0x1B
+SUB: Final = 0x1A
+
+_LOW = "NUL SOH STX ETX EOT ENQ ACK BEL BS HT LF VT FF CR SO SI"
+_HIGH = "DLE DC1 DC2 DC3 DC4 NAK SYN ETB CAN EM SUB ESC FS GS RS US"
+_BYTES = {name: byte for byte, name in enumerate(f"{_LOW} {_HIGH}".split())} | {"DEL": 0x7F}
+
+
+def _codes(prefix: str, table: Mapping[str, tuple[str, Action | Ignored]]) -> dict[int, ControlCode]:
+    """Codes by the byte of which the manuals give the letter, or the name in ASCII."""
+    codes: dict[int, ControlCode] = {}
+    for name, (meaning, action) in table.items():
+        word = name.removesuffix(" n")
+        byte = _BYTES[word] if word in _BYTES else ord(word)
+        codes[byte] = ControlCode(prefix + name, meaning, action, parameters=int(name != word))
+    return codes
+
+
+def _less_one(what: str, action: Action) -> Action:
+    """The parameter is sent with one added, so that none is a NUL."""
+    return lambda p, n: action(p, n - 1) if n else f"{what} below zero; ignored"
+
+
+def _only(letter: str, action: Action) -> Action:
+    """The parameter chooses among functions, of which there is one."""
+    return lambda p, n: action(p, n) if n == ord(letter) else f"function {n:02X} hex is not supported; ignored"
+
+
+CONTROL: Final = _codes("", {
+    "NUL": ("filler", Ignored.ACCEPTED),
+    "ETX": ("end of a block, answered by ACK on a serial line", Ignored.ACCEPTED),
+    "BEL": ("bell", Ignored.ACCEPTED),
+    "BS": ("carriage back by one motion index", lambda p, _: p.move(-(2 if p.modes.graphics else p.hmi))),
+    "HT": ("carriage to the next tab stop", lambda p, _: p.next_tab()),
+    "LF": ("paper up by one line", lambda p, _: p.feed(2)),
+    "VT": ("paper up to the next vertical tab stop", lambda p, _: p.next_vertical_tab()),
+    "FF": ("paper up to the next page", lambda p, _: p.paper.form_feed()),
+    "CR": ("carriage to the left margin; ends the modes of the line", lambda p, _: p.carriage_return()),
+    "DC1": ("transmission on", Ignored.ACCEPTED),
+    "DC3": ("transmission off", Ignored.ACCEPTED),
+    "DEL": ("filler", Ignored.ACCEPTED),
+})  # fmt: skip
+"""Codes of one byte. SUB and ESC are taken up before this table is asked."""
+
+ESCAPE: Final = _codes("ESC ", {
+    # -- places and distances
+    "US n": ("horizontal motion index n-1 [1/120 in]", _less_one("motion index", lambda p, n: p.put(hmi=n))),
+    "RS n": ("vertical motion index n-1 [1/48 in]", _less_one("motion index", lambda p, n: p.put(vmi=n))),
+    "HT n": ("carriage to print position n-1, counted in motion indices",
+             _less_one("print position", lambda p, n: p.put(column=n * p.hmi))),
+    "VT n": ("paper to line n-1 of the page", _less_one("line", lambda p, n: p.line_at(n * 2 * p.vmi))),
+    "FF n": ("n lines per page; the page begins here", lambda p, n: p.set_page(n)),
+    "DC1 n": ("offset added to the advance of every character", lambda p, n: p.set_offset(n)),
+    "S": ("motion index back to the spacing switch, ten characters per inch", lambda p, _: p.put(hmi=WHEEL_PITCH)),
+    # -- margins and tab stops
+    "9": ("left margin here", lambda p, _: p.put(left_margin=p.column)),
+    "0": ("right margin here; it bounds only justified and centred text", Ignored.ACCEPTED),
+    "T": ("top margin here", lambda p, _: p.set_top_margin()),
+    "L": ("bottom margin here", lambda p, _: p.set_bottom_margin()),
+    "C": ("top and bottom margins cleared", lambda p, _: p.paper.clear_margins()),
+    "1": ("tab stop here", lambda p, _: p.tab_stops.add(p.column)),
+    "8": ("tab stop here cleared", lambda p, _: p.tab_stops.discard(p.column)),
+    "-": ("vertical tab stop here", lambda p, _: p.vertical_stops.add(p.paper.from_top)),
+    "2": ("all tab stops cleared", lambda p, _: p.put(tab_stops=set[int](), vertical_stops=set[int]())),
+    # -- single motions
+    "BS": ("carriage back by 1/120 inch", lambda p, _: p.move(-1)),
+    "LF": ("paper down by one line", lambda p, _: p.feed(-2)),
+    "U": ("paper up by half a line", lambda p, _: p.feed(1)),
+    "D": ("paper down by half a line", lambda p, _: p.feed(-1)),
+    # -- direction of printing
+    "5": ("forward printing", lambda p, _: p.put_modes(backward=False)),
+    "6": ("backward printing: the carriage moves left after every character", lambda p, _: p.put_modes(backward=True)),
+    "/": ("the printer chooses the direction of each line", Ignored.ACCEPTED),
+    "\\": ("every line is printed to the right", Ignored.ACCEPTED),
+    "<": ("reverse printing; the lines are printed as they come", Ignored.NOT_SUPPORTED),
+    ">": ("reverse printing off", Ignored.ACCEPTED),
+    "?": ("new line of itself at the right end of the print line", lambda p, _: p.put(auto_return=True)),
+    "!": ("no new line of itself", lambda p, _: p.put(auto_return=False)),
+    # -- what a character looks like
+    "O": ("bold: every character struck twice", lambda p, _: p.put_modes(bold=True)),
+    "W": ("shadow: every character struck again 1/120 inch to the right", lambda p, _: p.put_modes(shadow=True)),
+    "&": ("bold and shadow off", lambda p, _: p.put_modes(bold=False, shadow=False)),
+    "E": ("underscore on", lambda p, _: p.put_modes(underscore=True)),
+    "R": ("underscore off", lambda p, _: p.put_modes(underscore=False)),
+    "A": ("secondary ribbon colour", lambda p, _: p.put(red=True)),
+    "B": ("primary ribbon colour", lambda p, _: p.put(red=False)),
+    "7": ("characters to the end of the line move the carriage and print nothing",
+          lambda p, _: p.put_modes(suppressed=True)),
+    "P": ("proportional spacing; its widths belong to a wheel, the motion index stays in force", Ignored.NOT_SUPPORTED),
+    "Q": ("proportional spacing off", Ignored.ACCEPTED),
+    # -- modes of text and graphics
+    "3": ("graphics: blanks of 1/60 inch, lines of 1/48 inch, characters do not advance",
+          lambda p, _: p.put_modes(graphics=True)),
+    "4": ("graphics off", lambda p, _: p.put_modes(graphics=False)),
+    "X": ("bold, shadow, underscore, offset and program mode off", lambda p, _: p.end_word_processing()),
+    "=": ("centring; the line is printed where it comes", Ignored.NOT_SUPPORTED),
+    "M": ("justification; the line is printed where it comes", Ignored.NOT_SUPPORTED),
+    "%": ("longer time for the carriage to settle", Ignored.ACCEPTED),
+    "N": ("usual time for the carriage to settle", Ignored.ACCEPTED),
+    "G": ("vector graphics; what follows is printed as characters", Ignored.NOT_SUPPORTED),
+    # -- codes that select among functions by the byte that follows
+    "CR n": ("reset, for n = P", _only("P", lambda p, _: p.reset())),
+    "SUB n": ("reset, for n = I; otherwise remote diagnosis", _only("I", lambda p, _: p.reset())),
+    "SO n": ("program mode, for n = M: a byte of hammer force after each character",
+             _only("M", lambda p, _: p.put(program_mode=True))),
+    "EM n": ("sheet feeder; the paper is left where it is", Ignored.NOT_SUPPORTED),
+    "SYN n": ("download; ignored", Ignored.NOT_SUPPORTED),
+    "CAN n": ("special function; ignored", Ignored.NOT_SUPPORTED),
+    "GS n": ("special function; ignored", Ignored.NOT_SUPPORTED),
+})  # fmt: skip
+"""Codes that begin with ESC, by the byte after it."""
+
+WHEEL_CHARACTERS: Final[dict[int, str]] = {ord("Y"): "\N{CENT SIGN}", ord("Z"): "\N{NOT SIGN}"}
+"""Characters of the wheel under codes 20 and 7F hex, which mean a blank and a filler; ESC Y and ESC Z print them."""
 
 
 def parse_diablo(data: bytes, name: str = "job") -> PrintJob:
@@ -30,29 +167,16 @@ def parse_diablo(data: bytes, name: str = "job") -> PrintJob:
     reader = _Reader(data)
     while reader.at < len(data):
         reader.read_code()
-    lines = reader.printer.sheet.lines()
-    return PrintJob(
-        name=name,
-        kind="diablo630",
-        lines=lines,
-        pages=lines[-1].page if lines else 0,
-        notes=tuple(reader.notes),
-        accepted=tuple(AcceptedCode(c.name, c.meaning, n) for c, n in reader.accepted.items()),
-        length_bytes=len(data),
-        account=ByteAccount(**reader.account),
-    )
+    return reader.job(name, "diablo630")
 
 
-@dataclass(slots=True)
-class _Reader:
-    """Where the reading of `data` stands, and what became of the bytes so far."""
+class _Reader(Reading):
+    """Reads `data` code by code; what reads one gives what its bytes count as."""
 
-    data: bytes
-    at: int = 0  # next byte
-    printer: Printer = field(default_factory=Printer)
-    notes: list[JobNote] = field(default_factory=list[JobNote])
-    accepted: Counter[ControlCode] = field(default_factory=Counter[ControlCode])
-    account: Counter[str] = field(default_factory=Counter[str])
+    def __init__(self, data: bytes) -> None:
+        super().__init__()
+        self.data = data
+        self.printer = Printer(self.paper)
 
     def read_code(self) -> None:
         """Read one character or one control code with its parameters, and account for its bytes."""
@@ -66,15 +190,10 @@ class _Reader:
         elif 0x20 <= byte < 0x7F:
             kind = self._read_character(chr(byte), start)
         elif byte in CONTROL:
-            kind = self._obey(CONTROL[byte], 0, start)
+            kind = self._obey(CONTROL[byte], start)
         else:
             kind = self.note(start, f"{byte:02X} hex", "no such character or code; ignored")
         self.account[kind] += self.at - start
-
-    def note(self, offset: int, code: str, text: str) -> str:
-        """Note what could not be carried out; gives the kind of its bytes."""
-        self.notes.append(JobNote(offset, code, text))
-        return "noted"
 
     def _read_end(self, start: int) -> str:
         rest = self.data[start:]
@@ -101,68 +220,20 @@ class _Reader:
         self.at += 1
         if byte in WHEEL_CHARACTERS:
             return self._read_character(WHEEL_CHARACTERS[byte], start)
-        code = ESCAPE.get(byte)
-        if code is None:
+        if byte not in ESCAPE:
             shown = chr(byte) if 0x20 < byte < 0x7F else f"{byte:02X} hex"
             return self.note(start, f"ESC {shown}", "unknown control code; ignored")
+        code = ESCAPE[byte]
         if self.at + code.parameters > len(self.data):
             return self.note(start, code.name, "the job ends inside this control code; ignored")
         self.at += code.parameters
-        return self._obey(code, self.data[self.at - 1], start)
+        return self._obey(code, start)
 
-    def _obey(self, code: ControlCode, parameter: int, start: int) -> str:
-        if code.handling is Handling.ACCEPTED:
-            self.accepted[code] += 1
+    def _obey(self, code: ControlCode, start: int) -> str:
+        if code.action is Ignored.ACCEPTED:
+            self.accepted[code.name] += 1
             return "accepted"
-        if code.handling is Handling.NOT_SUPPORTED:
+        if code.action is Ignored.NOT_SUPPORTED:
             return self.note(start, code.name, f"not supported: {code.meaning}")
-        trouble = ACTIONS[code.name](self.printer, parameter)
+        trouble = code.action(self.printer, self.data[self.at - 1])
         return self.note(start, code.name, trouble) if trouble else "interpreted"
-
-
-ACTIONS: dict[str, Callable[[Printer, int], str]] = {
-    "BS": lambda p, _: p.move(-(2 if p.modes.graphics else p.hmi)),
-    "HT": lambda p, _: p.next_tab(),
-    "LF": lambda p, _: p.feed(2),
-    "VT": lambda p, _: p.next_vertical_tab(),
-    "FF": lambda p, _: p.form_feed(),
-    "CR": lambda p, _: p.carriage_return(),
-    "ESC US n": lambda p, n: p.set_hmi(n),
-    "ESC RS n": lambda p, n: p.set_vmi(n),
-    "ESC HT n": lambda p, n: p.tab_to(n),
-    "ESC VT n": lambda p, n: p.line_at((n - 1) * 2 * p.vmi) if n else "line below zero; ignored",
-    "ESC FF n": lambda p, n: p.set_page(n),
-    "ESC DC1 n": lambda p, n: p.set_offset(n),
-    "ESC S": lambda p, _: p.restore_hmi(),
-    "ESC 9": lambda p, _: p.set_left_margin(),
-    "ESC T": lambda p, _: p.set_top_margin(),
-    "ESC L": lambda p, _: p.set_bottom_margin(),
-    "ESC C": lambda p, _: p.clear_margins(),
-    "ESC 1": lambda p, _: p.set_tab(),
-    "ESC 8": lambda p, _: p.clear_tab(),
-    "ESC -": lambda p, _: p.set_vertical_tab(),
-    "ESC 2": lambda p, _: p.clear_all_tabs(),
-    "ESC BS": lambda p, _: p.move(-1),
-    "ESC LF": lambda p, _: p.feed(-2),
-    "ESC U": lambda p, _: p.feed(1),
-    "ESC D": lambda p, _: p.feed(-1),
-    "ESC 5": lambda p, _: p.set_mode("backward", on=False),
-    "ESC 6": lambda p, _: p.set_mode("backward", on=True),
-    "ESC ?": lambda p, _: p.set_auto_return(on=True),
-    "ESC !": lambda p, _: p.set_auto_return(on=False),
-    "ESC O": lambda p, _: p.set_mode("bold", on=True),
-    "ESC W": lambda p, _: p.set_mode("shadow", on=True),
-    "ESC &": lambda p, _: p.off_bold_and_shadow(),
-    "ESC E": lambda p, _: p.set_mode("underscore", on=True),
-    "ESC R": lambda p, _: p.set_mode("underscore", on=False),
-    "ESC A": lambda p, _: p.set_colour(red=True),
-    "ESC B": lambda p, _: p.set_colour(red=False),
-    "ESC 7": lambda p, _: p.set_mode("suppressed", on=True),
-    "ESC 3": lambda p, _: p.set_mode("graphics", on=True),
-    "ESC 4": lambda p, _: p.set_mode("graphics", on=False),
-    "ESC X": lambda p, _: p.end_word_processing(),
-    "ESC CR n": lambda p, n: p.select(n, "P", p.reset),
-    "ESC SUB n": lambda p, n: p.select(n, "I", p.reset),
-    "ESC SO n": lambda p, n: p.select(n, "M", p.start_program_mode),
-}
-"""What carries out each code of the tables, by its name; gives what went wrong, or nothing."""

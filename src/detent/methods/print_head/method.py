@@ -8,7 +8,7 @@ from detent.methods.method import Method, Shown, Simulated
 from detent.methods.print_head.schema import PrintHeadSpec
 
 if TYPE_CHECKING:
-    from detent.methods.print_head.print_job import PrintJob
+    from detent.methods.print_head.printed_page import PrintJob
     from detent.page.frame import Comparison, Page
     from detent.record.machine import Progress
 

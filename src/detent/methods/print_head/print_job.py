@@ -4,42 +4,17 @@ Two kinds of job are read: plain text (ten characters and six lines per inch), a
 daisy-wheel printer (`diablo630`). The content decides, not the name of the file.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
-from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
 from detent.errors import InputError
+from detent.files.text import reading
 from detent.methods.print_head.diablo630 import parse_diablo
-from detent.methods.print_head.paper import LINE, Paper
-from detent.methods.print_head.printed_page import (
-    WHEEL_PITCH,
-    AcceptedCode,
-    ByteAccount,
-    JobNote,
-    PrintedCharacter,
-    PrintJob,
-    PrintLine,
-    Sheet,
-)
+from detent.methods.print_head.printed_page import LINE, WHEEL_PITCH, PrintedCharacter, PrintJob, Reading
 
-__all__ = [
-    "AcceptedCode",
-    "ByteAccount",
-    "JobNote",
-    "PrintJob",
-    "PrintLine",
-    "PrintedCharacter",
-    "load_job",
-    "parse_diablo",
-    "parse_text",
-]
-
-TAB_WIDTH = 8
-"""Characters between the tab stops of plain text."""
+TAB_WIDTH = 8  # characters between the tab stops of plain text
 
 # Tab, line feed, form feed and carriage return occur in text; a CP/M text ends in SUB. Anything else is a code.
 _CONTROL_BYTE = re.compile(rb"[\x00-\x08\x0b\x0e-\x1f]")
@@ -53,16 +28,16 @@ _WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
 def load_job(path: str | PathLike[str]) -> PrintJob:
     """Read a print job."""
     file = Path(path)
-    try:
+    with reading(file, _WHAT_A_JOB_IS, "check the name after --job"):
         data = file.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError.of_file(str(path), reason, _WHAT_A_JOB_IS, "check the name after --job") from None
     if _CONTROL_BYTE.search(data.rstrip(b"\x1a")):
         job = parse_diablo(data, file.name)
         _refuse_rubbish(job, data, str(path))
     else:
-        job = _parse_text_bytes(data, file.name)
+        try:
+            job = parse_text(data.decode("utf-8"), file.name)
+        except UnicodeDecodeError:
+            job = parse_text(data.decode("latin-1"), file.name, encoding="latin-1")
     if not job.lines:
         came = "an empty file" if not data else f"{len(data)} bytes that print nothing"
         raise InputError.of_file(
@@ -88,13 +63,6 @@ def _refuse_rubbish(job: PrintJob, data: bytes, file: str) -> None:
     )
 
 
-def _parse_text_bytes(data: bytes, name: str) -> PrintJob:
-    try:
-        return parse_text(data.decode("utf-8"), name)
-    except UnicodeDecodeError:
-        return parse_text(data.decode("latin-1"), name, encoding="latin-1")
-
-
 def parse_text(text: str, name: str = "job", *, encoding: str = "utf-8") -> PrintJob:
     r"""Lay out plain text at ten characters and six lines per inch on eleven-inch pages.
 
@@ -107,68 +75,42 @@ def parse_text(text: str, name: str = "job", *, encoding: str = "utf-8") -> Prin
     """
     typist = _Typist()
     for char in text:
-        length = 1 if char < "\x80" else len(char.encode(encoding, errors="replace"))
-        kind = typist.type(char)
-        typist.account[kind] = typist.account.get(kind, 0) + length
-        typist.offset += length
-    lines = typist.sheet.lines()
-    return PrintJob(
-        name=name,
-        kind="text",
-        lines=lines,
-        pages=lines[-1].page if lines else 0,
-        notes=tuple(typist.notes),
-        accepted=(),
-        length_bytes=typist.offset,
-        account=ByteAccount(**typist.account),
-    )
+        length = len(char.encode(encoding, errors="replace"))
+        typist.account[typist.type(char)] += length
+        typist.at += length
+    return typist.job(name, "text")
 
 
-@dataclass(slots=True)
-class _Typist:
-    """Types text onto a sheet, character by character."""
+class _Typist(Reading):
+    """Types text onto paper, character by character."""
 
-    offset: int = 0  # [byte]
-    column: int = 0  # [1/120 in]
-    paper: Paper = field(default_factory=Paper)
-    sheet: Sheet = field(default_factory=Sheet)
-    notes: list[JobNote] = field(default_factory=list[JobNote])
-    account: dict[str, int] = field(default_factory=dict[str, int])
+    column = 0  # [1/120 in]
 
     def type(self, char: str) -> str:
         """Type one character; gives what its bytes count as."""
         if unicodedata.combining(char):
-            self._strike(char, max(0, self.column - WHEEL_PITCH))
+            self.paper.strike(PrintedCharacter(char, max(0, self.column - WHEEL_PITCH), WHEEL_PITCH))
             return "printed"
         if char.isprintable() and char != " ":
-            self._strike(char, self.column)
+            self.paper.strike(PrintedCharacter(char, self.column, WHEEL_PITCH))
             self.column += WHEEL_PITCH
             return "printed"
         return self._move(char)
 
-    def _strike(self, char: str, column: int) -> None:
-        self.sheet.strike(self.paper.page, self.paper.baseline, PrintedCharacter(char, column, WHEEL_PITCH))
-
     def _move(self, char: str) -> str:
-        if char == "\n":
+        if char in "\n\r\f":
             self.column = 0
-            self.paper.feed(LINE)
-        elif char == "\r":
-            self.column = 0
-        elif char == "\f":
-            self.column = 0
-            self.paper.form_feed()
+            if char == "\n":
+                self.paper.feed(LINE)
+            elif char == "\f":
+                self.paper.form_feed()
         elif char == "\t":
             tab = TAB_WIDTH * WHEEL_PITCH
             self.column = (self.column // tab + 1) * tab
         elif unicodedata.category(char) == "Zs":
             self.column += WHEEL_PITCH
         else:
-            self.notes.append(JobNote(self.offset, _name(char), "not a printable character; ignored"))
-            return "noted"
+            # A control code is named by its byte, another character by its code point.
+            code = f"{ord(char):02X} hex" if ord(char) < 0x100 else f"U+{ord(char):04X}"
+            return self.note(self.at, code, "not a printable character; ignored")
         return "interpreted"
-
-
-def _name(char: str) -> str:
-    """Name a character that cannot be shown: a control code by its byte, another by its code point."""
-    return f"{ord(char):02X} hex" if ord(char) < 0x100 else f"U+{ord(char):04X}"

@@ -2,12 +2,15 @@
 
 Horizontal places are counted in columns of 1/120 inch from the left edge of the print line, vertical
 places in 1/48 inch from the top of the first page: the two motion indices of the daisy-wheel printers,
-and 2.5 emitters of the carriage encoder per column (300 emitters per inch, spec print-head 2.1).
+and 2.5 emitters of the carriage encoder per column (300 emitters per inch, spec print-head 2.1). The paper
+itself moves by 1/96 inch, so that half of any line spacing is a whole number and two half feeds are one line.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 WHEEL_PITCH = 12
@@ -15,6 +18,15 @@ WHEEL_PITCH = 12
 
 NARROWEST_PITCH = 6
 """Columns of the narrowest pitch, twenty characters per inch."""
+
+LINE = 16
+"""Height of a line at six lines per inch [1/96 in]."""
+
+PAGE = 66 * LINE
+"""Length of an eleven-inch page [1/96 in]."""
+
+OPEN_LINES = 200
+"""Lines that can be struck again without being taken apart first: more than reverse feeds reach on a page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +47,16 @@ class PrintedCharacter:
         Word processors hold the carriage (HMI 0) for bold and stretch it to justify a line; the glyph
         on the wheel stays as wide as it is.
         """
-        if NARROWEST_PITCH <= self.width_columns <= WHEEL_PITCH:
-            return self.width_columns
-        return WHEEL_PITCH
+        return self.width_columns if NARROWEST_PITCH <= self.width_columns <= WHEEL_PITCH else WHEEL_PITCH
+
+    def over(self, before: PrintedCharacter) -> PrintedCharacter:
+        """The same glyph, struck over one that is there."""
+        return replace(
+            self,
+            width_columns=max(before.width_columns, self.width_columns),
+            strike=before.strike + self.strike,
+            underline=before.underline or self.underline,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,15 +109,6 @@ class JobNote:
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptedCode:
-    """A code that was understood but changes neither where nor what is printed, with its count."""
-
-    code: str
-    text: str
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
 class ByteAccount:
     """Where every byte of the file went; the four add up to the length of the file."""
 
@@ -106,11 +116,6 @@ class ByteAccount:
     interpreted: int = 0  # bytes of blanks and of control codes that were carried out
     accepted: int = 0  # bytes of codes without effect on ink or motion
     noted: int = 0  # bytes covered by a `JobNote`
-
-    @property
-    def total(self) -> int:
-        """All bytes accounted for."""
-        return self.printed + self.interpreted + self.accepted + self.noted
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +127,7 @@ class PrintJob:
     lines: tuple[PrintLine, ...]  # only lines with ink, from the top down
     pages: int  # pages up to the last ink; 0 for a job without ink
     notes: tuple[JobNote, ...]  # what could not be carried out, in the order of the file
-    accepted: tuple[AcceptedCode, ...]  # codes without effect on ink or motion
+    accepted: dict[str, int]  # codes understood that change neither where nor what is printed, and how often
     length_bytes: int  # length of the file [byte]
     account: ByteAccount  # where the bytes went
 
@@ -133,40 +138,89 @@ class PrintJob:
 
 
 @dataclass(slots=True)
-class _Glyph:
-    """Strikes of one glyph at one place, while the job is still being read."""
+class Paper:
+    """Where the paper stands, where its pages begin, and the ink on it.
 
-    width_columns: int = 0
-    strike: int = 0
-    underline: bool = False
-
-
-OPEN_LINES = 200
-"""Lines that can be struck again without being taken apart first: more than reverse feeds reach on a page."""
-
-
-@dataclass(slots=True)
-class Sheet:
-    """Collects strikes in any order and hands them back as lines.
-
-    Overstrikes of the same glyph at the same place become one character with a higher `strike`. Lines left behind are
-    settled into characters at once, and equal characters are one object, so that a job of any length stays small.
+    Strikes come in any order; those of one glyph at one place become one character with a higher `strike`. Lines left
+    behind are settled at once, and equal characters are one object, so that a job of any length stays small.
     """
 
-    _open: dict[tuple[int, int], dict[tuple[int, str, bool], _Glyph]] = field(
-        default_factory=dict[tuple[int, int], dict[tuple[int, str, bool], _Glyph]]
+    place: int = 0  # print line below the top of the first page [1/96 in], never negative
+    page_length: int = PAGE  # length of the pages to come [1/96 in]
+    tops: list[int] = field(default_factory=lambda: [0])  # where each page reached so far begins [1/96 in], rising
+    # top_margin, bottom_margin: first and last printable place of a page, from its top [1/96 in]; None while not set
+    top_margin: int | None = None
+    bottom_margin: int | None = None  # [1/96 in]
+    # By page and baseline; the characters of a line still open by column, glyph and ribbon.
+    _open: dict[tuple[int, int], dict[tuple[int, str, bool], PrintedCharacter]] = field(
+        default_factory=dict[tuple[int, int], dict[tuple[int, str, bool], PrintedCharacter]]
     )
     _settled: dict[tuple[int, int], tuple[PrintedCharacter, ...]] = field(
         default_factory=dict[tuple[int, int], tuple[PrintedCharacter, ...]]
     )
     _known: dict[PrintedCharacter, PrintedCharacter] = field(default_factory=dict[PrintedCharacter, PrintedCharacter])
 
-    def strike(self, page: int, baseline: int, hit: PrintedCharacter) -> None:
-        """Put one hit on paper: `baseline` [1/48 in] from the top of the first page, on page `page`."""
-        line = self._open.get((page, baseline))
-        if line is None:
-            line = self._begin((page, baseline))
-        _strike(line, hit)
+    @property
+    def page(self) -> int:
+        """Page under the head, 1 for the first."""
+        return bisect_right(self.tops, self.place)
+
+    @property
+    def baseline(self) -> int:
+        """Print line below the top of the first page [1/48 in]; an odd half feed is rounded up the page."""
+        return self.place // 2
+
+    @property
+    def from_top(self) -> int:
+        """Print line below the top of its own page [1/96 in]."""
+        return self.place - self.tops[self.page - 1]
+
+    def feed(self, distance: int) -> bool:
+        """Advance the paper by `distance` [1/96 in]; negative pulls it back."""
+        self.place += distance
+        if self.place < 0:
+            self.place = 0
+            return False
+        while self.place >= self.tops[-1] + self.page_length:
+            self.tops.append(self.tops[-1] + self.page_length)
+        if distance > 0 and self.bottom_margin is not None and self.from_top > self.bottom_margin:
+            self.form_feed()
+        return True
+
+    def form_feed(self) -> None:
+        """Advance to the top of the next page, below its top margin."""
+        page = self.page
+        if page == len(self.tops):
+            self.tops.append(self.tops[-1] + self.page_length)
+        self.place = self.tops[page] + (self.top_margin or 0)
+
+    def move_to(self, from_top: int) -> bool:
+        """Move to a place on this page [1/96 in from its top]; False, and no motion, if it is below the page."""
+        if from_top >= self.page_length:
+            return False
+        self.place = self.tops[self.page - 1] + from_top
+        return True
+
+    def set_form(self, page_length: int) -> None:
+        """Begin a form of `page_length` [1/96 in] here; margins are cleared."""
+        self.tops = [top for top in self.tops if top < self.place] + [self.place]
+        self.page_length = page_length
+        self.clear_margins()
+
+    def clear_margins(self) -> None:
+        """Print from the top of the page to its end."""
+        self.top_margin = self.bottom_margin = None
+
+    def strike(self, hit: PrintedCharacter) -> None:
+        """Put one hit on the print line."""
+        place, glyph = (self.page, self.baseline), (hit.column, hit.char, hit.red)
+        if place not in self._open:
+            if len(self._open) >= OPEN_LINES:
+                self._settle(next(iter(self._open)))  # opened longest ago
+            before = self._settled.pop(place, ())
+            self._open[place] = {(one.column, one.char, one.red): one for one in before}
+        line = self._open[place]
+        line[glyph] = hit.over(line[glyph]) if glyph in line else hit
 
     def lines(self) -> tuple[PrintLine, ...]:
         """Give all lines with ink, from the top down, numbered from 1."""
@@ -177,28 +231,37 @@ class Sheet:
             for number, (page, baseline) in enumerate(sorted(self._settled), start=1)
         )
 
-    def _begin(self, place: tuple[int, int]) -> dict[tuple[int, str, bool], _Glyph]:
-        """Open a line, with what was struck on it before; the one opened longest ago makes room."""
-        if len(self._open) >= OPEN_LINES:
-            self._settle(next(iter(self._open)))
-        line: dict[tuple[int, str, bool], _Glyph] = {}
-        for character in self._settled.pop(place, ()):
-            _strike(line, character)
-        self._open[place] = line
-        return line
-
     def _settle(self, place: tuple[int, int]) -> None:
-        """Turn the strikes of one line into characters, sorted by column."""
+        """Close one line, its characters sorted by column."""
         line = self._open.pop(place)
-        found = [
-            PrintedCharacter(char, column, glyph.width_columns, glyph.strike, red, glyph.underline)
-            for (column, char, red), glyph in sorted(line.items(), key=lambda item: item[0])
-        ]
-        self._settled[place] = tuple(self._known.setdefault(character, character) for character in found)
+        self._settled[place] = tuple(self._known.setdefault(line[glyph], line[glyph]) for glyph in sorted(line))
 
 
-def _strike(line: dict[tuple[int, str, bool], _Glyph], hit: PrintedCharacter) -> None:
-    glyph = line.setdefault((hit.column, hit.char, hit.red), _Glyph())
-    glyph.strike += hit.strike
-    glyph.width_columns = max(glyph.width_columns, hit.width_columns)
-    glyph.underline |= hit.underline
+class Reading:
+    """A job while it is read: its paper, and what became of its bytes."""
+
+    def __init__(self) -> None:
+        self.at = 0  # bytes read so far
+        self.paper = Paper()
+        self.notes: list[JobNote] = []
+        self.accepted: Counter[str] = Counter()
+        self.account: Counter[str] = Counter()
+
+    def note(self, offset: int, code: str, text: str) -> str:
+        """Note what could not be carried out; gives what its bytes count as."""
+        self.notes.append(JobNote(offset, code, text))
+        return "noted"
+
+    def job(self, name: str, kind: str) -> PrintJob:
+        """The job, read to its end."""
+        lines = self.paper.lines()
+        return PrintJob(
+            name=name,
+            kind=kind,
+            lines=lines,
+            pages=lines[-1].page if lines else 0,
+            notes=tuple(self.notes),
+            accepted=dict(self.accepted),
+            length_bytes=self.at,
+            account=ByteAccount(**self.account),
+        )

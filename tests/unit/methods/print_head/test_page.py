@@ -19,8 +19,9 @@ import detent
 from detent.files.quantities import INCH
 from detent.methods.load import load_spec
 from detent.methods.print_head.detail import SIGNALS
+from detent.methods.print_head.diablo630 import parse_diablo
 from detent.methods.print_head.page import COLUMN_LIMIT, beyond, error_chart, marks_of, print_page
-from detent.methods.print_head.print_job import load_job, parse_diablo, parse_text
+from detent.methods.print_head.print_job import load_job, parse_text
 from detent.methods.print_head.run import (
     ERROR_BIN,
     ERROR_BINS,

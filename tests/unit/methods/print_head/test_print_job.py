@@ -1,5 +1,6 @@
 """Reading jobs: what a file is, where plain text stands, and what is refused."""
 
+from dataclasses import astuple
 from importlib.resources import files
 from itertools import pairwise
 
@@ -23,7 +24,7 @@ def refusal(path):
         load_job(path)
     assert caught.value.exit_status == 2
     (problem,) = caught.value.problems
-    assert problem.file == str(path)
+    assert problem.file in (str(path), repr(str(path)))
     assert problem.allowed
     assert problem.remedy
     return problem
@@ -137,7 +138,7 @@ def test_text_that_is_not_utf_8_is_latin_1(tmp_path):
 
 
 def test_refuses_a_missing_file(tmp_path):
-    assert "No such file" in refusal(tmp_path / "absent.txt").came
+    assert refusal(tmp_path / "absent.txt").came == "no such file"
 
 
 def test_refuses_a_folder(tmp_path):
@@ -145,7 +146,7 @@ def test_refuses_a_folder(tmp_path):
 
 
 def test_refuses_a_name_that_no_file_can_have():
-    assert "null" in refusal("a\0b").came
+    assert refusal("a\0b").came == "a name no file can have"
 
 
 @pytest.mark.parametrize(("data", "came"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes that print nothing")])
@@ -204,7 +205,7 @@ def test_a_real_word_star_stream_is_understood_whole():
     (end,) = job.notes
     assert (end.code, end.offset) == ("SUB", 8888)
     assert (job.kind, len(job.lines), job.pages, job.characters) == ("diablo630", 76, 2, 2926)
-    assert job.account.total == job.length_bytes == 8960
+    assert sum(astuple(job.account)) == job.length_bytes == 8960
     assert (job.account.printed, job.account.noted) == (3162, 72)
     assert job.lines[3].text == "WordStar is a powerful word processing system designed to meet"
     assert job.lines[4].text == "text preparation requirements for all levels of users:"  # sent backwards

@@ -11,7 +11,8 @@ import detent
 from detent.errors import InputError
 from detent.files.quantities import INCH
 from detent.methods.load import load_spec
-from detent.methods.print_head.print_job import PrintJob, load_job, parse_text
+from detent.methods.print_head.print_job import load_job, parse_text
+from detent.methods.print_head.printed_page import PrintJob
 from detent.methods.print_head.run import (
     ERROR_BIN,
     ERROR_BINS,
