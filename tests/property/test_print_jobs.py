@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from detent.control.speed_selection import select_speed
 from detent.errors import InputError
 from detent.methods.print_head import line_plan
 from detent.methods.print_head.diablo630 import CONTROL, ESCAPE, parse_diablo
-from detent.methods.print_head.line_plan import Geometry, estimated_time, motion_time, plan_lines, run_speed
+from detent.methods.print_head.line_plan import RESERVE, STOP_TOLERANCE, Geometry, motion_time, plan_lines
 from detent.methods.print_head.print_job import load_job, parse_text
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintLine
 
@@ -107,7 +108,7 @@ def geometries(draw):
 @st.composite
 def pages(draw, geometry, max_lines=12):
     """Lines that lie between the frames with at least the room that the lowest speed needs."""
-    right = int((geometry.width_emitters - 24 - geometry.column0_emitters) / geometry.emitters_per_column)
+    right = int((geometry.width_emitters - 24 - geometry.column0_emitters) / 2.5)
     lines = []
     for number in range(1, draw(st.integers(1, max_lines)) + 1):
         first = draw(st.integers(5, right - 12))
@@ -121,6 +122,10 @@ jobs = geometries().flatmap(lambda geometry: st.tuples(st.just(geometry), pages(
 small_jobs = geometries().flatmap(lambda geometry: st.tuples(st.just(geometry), pages(geometry, max_lines=4)))
 
 
+def estimated_time(plans):
+    return sum(plan.seconds for plan in plans)
+
+
 def assert_obeys_the_axis(plan, geometry):
     d, s = plan.direction, plan.speed
     ends = [geometry.emitter(plan.line.first_column), geometry.emitter(plan.line.last_column)]
@@ -130,11 +135,11 @@ def assert_obeys_the_axis(plan, geometry):
     assert d * (begin - plan.start) >= 1.05 * s * s / 144  # the run-up
     assert 288 * d * (plan.stop - plan.start) > 5 * s * s  # the axis keeps the speed
     assert abs(plan.stop - (plan.print_to + d * s * s / 144)) < 1
-    assert geometry.reserve <= plan.stop <= geometry.width_emitters - geometry.reserve
+    assert RESERVE <= plan.stop <= geometry.width_emitters - RESERVE
     assert 18 <= s <= geometry.max_speed
     if plan.run_to is not None:
         assert plan.run_to == plan.start
-        assert geometry.reserve <= plan.run_to <= geometry.width_emitters - geometry.reserve
+        assert RESERVE <= plan.run_to <= geometry.width_emitters - RESERVE
 
 
 @given(jobs, st.booleans())
@@ -156,12 +161,11 @@ def test_every_plan_obeys_the_axis(job, bidirectional):
 def test_even_a_stop_that_misses_its_place_leaves_the_run_up_and_the_frames(job):
     geometry, lines = job
     plans = plan_lines(lines, geometry)
-    miss = geometry.stop_tolerance
     for before, after in pairwise(plans):
-        assert miss < before.stop < geometry.width_emitters - miss
+        assert STOP_TOLERANCE < before.stop < geometry.width_emitters - STOP_TOLERANCE
         d, s = after.direction, after.speed
-        assert d * (after.print_from / 256 - after.start) - miss >= 1.05 * s * s / 144 - 1 / 256
-        assert 288 * (d * (after.stop - after.start) - miss) > 5 * s * s
+        assert d * (after.print_from / 256 - after.start) - STOP_TOLERANCE >= 1.05 * s * s / 144 - 1 / 256
+        assert 288 * (d * (after.stop - after.start) - STOP_TOLERANCE) > 5 * s * s
 
 
 @given(jobs)
@@ -173,7 +177,7 @@ def test_times_are_those_of_the_motions(job):
         run = 0.0
         if plan.run_to is not None:
             way = abs(plan.run_to - place)
-            run = motion_time(way, run_speed(way, geometry.max_speed)) + 5e-3
+            run = motion_time(way, select_speed(way, geometry.max_speed)) + 5e-3
         assert plan.seconds == pytest.approx(motion_time(abs(plan.stop - plan.start), plan.speed) + run + pause)
         place = plan.stop
 
@@ -212,9 +216,8 @@ def test_one_more_step_of_speed_would_not_fit(job):
         ends = [geometry.emitter(plan.line.first_column), geometry.emitter(plan.line.last_column)]
         if plan.direction < 0:
             ends = [geometry.width_emitters - end for end in reversed(ends)]
-        room_before = ends[0] - geometry.reserve - 1
-        room_after = geometry.width_emitters - geometry.reserve - ends[1] - 1
-        tolerance = geometry.stop_tolerance
-        way = geometry.width_emitters - 2 * geometry.reserve - 2 * tolerance - 2
-        fits = room_before >= 1.05 * s * s / 144 + tolerance + 1 and room_after >= s * s / 144 + 1
+        room_before = ends[0] - RESERVE - 1
+        room_after = geometry.width_emitters - RESERVE - ends[1] - 1
+        way = geometry.width_emitters - 2 * RESERVE - 2 * STOP_TOLERANCE - 2
+        fits = room_before >= 1.05 * s * s / 144 + STOP_TOLERANCE + 1 and room_after >= s * s / 144 + 1
         assert not (fits and 288 * way > 5 * s * s)

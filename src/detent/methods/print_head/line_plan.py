@@ -17,20 +17,20 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, floor
 
+from detent.control import feed_forward
+from detent.control.feed_forward import stop_distance_up
+from detent.control.head_commands import FASTEST, SLOWEST
+from detent.control.speed_selection import HIGH_SPEED, select_speed
 from detent.errors import FileProblem, InputError
 from detent.methods.print_head.printed_page import PrintLine
 
-MIN_SPEED = 18
-"""Lowest speed value, 3 in/s [1/6 in/s]."""
+EMITTERS_PER_COLUMN = 2.5  # columns of 1/120 in
 
-MAX_SPEED = 240
-"""Highest speed value, 40 in/s [1/6 in/s]."""
+RESERVE = 12
+"""Way that stays free at each frame [emitter]."""
 
-HIGH_SPEED = 60
-"""From 10 in/s on the axis ramps, and can turn around [1/6 in/s]."""
-
-LOWEST_TRIAL_SPEED = 30
-"""Where the axis stops halving its trial speed, 5 in/s [1/6 in/s]."""
+STOP_TOLERANCE = 8
+"""How far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)."""
 
 _ACCELERATION = 3600  # speed values per second: 600 in/s^2
 _RATE = 50  # emitters per second and speed value
@@ -43,21 +43,11 @@ class Geometry:
 
     width_emitters: int  # way between the two frames [emitter = 1/300 in]
     column0_emitters: float  # carriage position at column 0 of the paper [emitter]
-    emitters_per_column: float = 2.5  # 2.5 for columns of 1/120 in
-    max_speed: int = MAX_SPEED  # highest speed value to use, 18..240 [1/6 in/s]
-    reserve: int = 12  # way that stays free at each frame [emitter]
-    # how far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)
-    stop_tolerance: int = 8
-
-    def __post_init__(self) -> None:
-        if not MIN_SPEED <= self.max_speed <= MAX_SPEED:
-            raise ValueError(f"max_speed is {self.max_speed}/6 in/s, must be {MIN_SPEED}..{MAX_SPEED} (3..40 in/s)")
-        if self.emitters_per_column <= 0:
-            raise ValueError(f"emitters_per_column is {self.emitters_per_column}, must be above 0")
+    max_speed: int = FASTEST  # highest speed value to use, 18..240 [1/6 in/s]
 
     def emitter(self, column: float) -> float:
         """Carriage position [emitter] at a column of the paper [1/120 in]."""
-        return self.column0_emitters + column * self.emitters_per_column
+        return self.column0_emitters + column * EMITTERS_PER_COLUMN
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,40 +68,20 @@ class LinePlan:
     seconds: float  # estimated time from rest to rest, with the RUN before it [s]
 
 
-def stop_distance(s: int) -> float:
-    """Way from steady speed to rest [emitter]: s x s/144, equation (7)."""
-    return s * s / 144
+def run_up(s: int) -> int:
+    """Way from rest to the first printed place [emitter], with room for a missed stop."""
+    return feed_forward.run_up(s) + STOP_TOLERANCE
 
 
-def run_up(s: int, tolerance: int = 0) -> int:
-    """Way from rest to the first printed place [emitter]: the stop distance and 5 %, with room for a missed stop."""
-    return -(-21 * s * s // 2880) + tolerance  # 1.05/144 = 21/2880, rounded up
-
-
-def shortest_way(s: int, tolerance: int = 0) -> int:
+def shortest_way(s: int) -> int:
     """Shortest way from rest to rest for which the axis keeps speed s [emitter]: above 2.5 stop distances."""
     # 5 s^2 < 288 D; both ends of the way may miss their place.
-    return 5 * s * s // 288 + 1 + 2 * tolerance
-
-
-def run_speed(distance: float, maximum: int = MAX_SPEED) -> int:
-    """Speed value the axis takes for a way [emitter]: the maximum, halved until 2.5 stop distances fit (spec 3.4)."""
-    s = maximum
-    while 5 * s * s >= 288 * distance:
-        s //= 2
-        if s <= LOWEST_TRIAL_SPEED:
-            return min(LOWEST_TRIAL_SPEED, maximum)
-    return s
+    return 5 * s * s // 288 + 1 + 2 * STOP_TOLERANCE
 
 
 def motion_time(distance: float, s: int) -> float:
     """Time from rest to rest over a distance [emitter] at speed s, ramps of 600 in/s^2 [s]."""
-    return 2 * s / _ACCELERATION + max(0.0, distance - 2 * stop_distance(s)) / (_RATE * s)
-
-
-def estimated_time(plans: Sequence[LinePlan]) -> float:
-    """Time to print all lines, with the RUNs between them [s]."""
-    return sum(plan.seconds for plan in plans)
+    return 2 * s / _ACCELERATION + max(0.0, distance - 2 * (s * s / 144)) / (_RATE * s)
 
 
 def plan_lines(
@@ -152,52 +122,34 @@ class _Pass:
             return self.end
         return max(self.end, -following.start)
 
-    def time(self, start: int, end: int) -> float:
-        """Time from rest to rest between two places along d [s]."""
-        return motion_time(end - start, self.s)
-
 
 def _passes(line: PrintLine, geometry: Geometry, directions: tuple[int, ...]) -> tuple[_Pass, ...]:
     """Give the line in each direction in which it fits, at the highest speed that does."""
-    left = geometry.emitter(line.first_column)
-    right = geometry.emitter(line.last_column)
+    left, right = geometry.emitter(line.first_column), geometry.emitter(line.last_column)
     found = [_fastest(left, right, d, geometry) for d in directions]
     return tuple(each for each in found if each is not None)
 
 
 @lru_cache(maxsize=4096)
 def _fastest(left: float, right: float, d: int, geometry: Geometry) -> _Pass | None:
-    """Find the highest speed at which ink from `left` to `right` [emitter] fits; speeds below it fit too."""
-    ink, end = (left, right) if d > 0 else (-right, -left)
-    low, high = MIN_SPEED - 1, geometry.max_speed
-    best: _Pass | None = None
-    while low < high:
-        s = (low + high + 1) // 2
-        fitting = _fit(ink, end, d, s, geometry)
-        if fitting is None:
-            high = s - 1
-        else:
-            low, best = s, fitting
-    return best
-
-
-def _fit(ink: float, ink_end: float, d: int, s: int, geometry: Geometry) -> _Pass | None:
-    """Place the turning points of one pass at speed s, or None if they do not lie between the frames."""
-    inside = (geometry.reserve, geometry.width_emitters - geometry.reserve)
+    """Place the turning points of ink from `left` to `right` [emitter] at the highest speed that fits."""
+    ink, ink_end = (left, right) if d > 0 else (-right, -left)
+    inside = (RESERVE, geometry.width_emitters - RESERVE)
     first, last = inside if d > 0 else (-inside[1], -inside[0])
-    start = floor(ink) - run_up(s, geometry.stop_tolerance)
-    end = ceil(ink_end) + ceil(stop_distance(s))
-    # A short line needs a longer way for its speed: take it before the line, and after it what does not fit there.
-    start = max(min(start, end - shortest_way(s, geometry.stop_tolerance)), min(start, first))
-    end = max(end, start + shortest_way(s, geometry.stop_tolerance))
-    return _Pass(d, s, ink, start, end) if first <= start and end <= last else None
+    for s in range(geometry.max_speed, SLOWEST - 1, -1):
+        start, end = floor(ink) - run_up(s), ceil(ink_end) + stop_distance_up(s)
+        # A short line needs a longer way for its speed: take it before the line, and after it what does not fit there.
+        start = max(min(start, end - shortest_way(s)), min(start, first))
+        end = max(end, start + shortest_way(s))
+        if first <= start and end <= last:
+            return _Pass(d, s, ink, start, end)
+    return None
 
 
 def _misfit(line: PrintLine, geometry: Geometry, job_name: str) -> FileProblem:
     """Say of a line that fits at no speed how wide it is and what would fit."""
-    per_inch = 120 * geometry.emitters_per_column
-    nearest = geometry.reserve + run_up(MIN_SPEED, geometry.stop_tolerance)
-    farthest = geometry.width_emitters - geometry.reserve - ceil(stop_distance(MIN_SPEED))
+    per_inch = 120 * EMITTERS_PER_COLUMN
+    nearest, farthest = RESERVE + run_up(SLOWEST), geometry.width_emitters - RESERVE - stop_distance_up(SLOWEST)
     first = max(0.0, nearest - geometry.column0_emitters) / per_inch
     last = (farthest - geometry.column0_emitters) / per_inch
     return FileProblem(
@@ -211,19 +163,16 @@ def _misfit(line: PrintLine, geometry: Geometry, job_name: str) -> FileProblem:
     )
 
 
-def _needs_run(before: _Pass | None, following: _Pass, place: int) -> bool:
-    """Whether the head, at `place`, stands too near the line to start it; after a turn it never does."""
-    if before is not None and before.d != following.d:
-        return False
-    return following.d * place > following.start
-
-
 def _transition(before: _Pass | None, following: _Pass, place: int, max_speed: int) -> tuple[int, float]:
-    """Where `following` starts, along its d, when the head rests at `place`, and the time to get there [s]."""
-    if not _needs_run(before, following, place):
+    """Where `following` starts, along its d, when the head rests at `place`, and the time to get there [s].
+
+    It runs back first where it stands too near the line, which it never does after a turn.
+    """
+    turned = before is not None and before.d != following.d
+    if turned or following.d * place <= following.start:
         return following.d * place, 0.0
     way = abs(following.d * following.start - place)
-    return following.start, motion_time(way, run_speed(way, max_speed)) + _ZERO_SPEED_TIMEOUT
+    return following.start, motion_time(way, select_speed(way, max_speed)) + _ZERO_SPEED_TIMEOUT
 
 
 def _turns_around(before: _Pass | None, following: _Pass) -> bool:
@@ -264,7 +213,7 @@ def _pair_cost(before: _Pass | None, following: _Pass, head: int, max_speed: int
         place = before.d * end
         cost = (end - before.end) / (_RATE * before.s)
     start, run = _transition(before, following, place, max_speed)
-    cost += run + following.time(start, following.end)
+    cost += run + motion_time(following.end - start, following.s)
     return cost if _turns_around(before, following) else cost + _ZERO_SPEED_TIMEOUT
 
 
@@ -283,13 +232,13 @@ def _plans(lines: Sequence[PrintLine], chosen: Sequence[_Pass], head: int, max_s
                 line=line,
                 direction=this.d,
                 speed=this.s,
-                run_to=this.d * start if _needs_run(before, this, place) else None,
+                run_to=this.d * start if start != this.d * place else None,
                 start=this.d * start,
                 print_from=round(256 * this.d * this.ink),
-                print_to=this.d * (end - ceil(stop_distance(this.s))),
+                print_to=this.d * (end - stop_distance_up(this.s)),
                 stop=this.d * end,
                 turn_around=_turns_around(before, this),
-                seconds=run + this.time(start, end) + pause,
+                seconds=run + motion_time(end - start, this.s) + pause,
             )
         )
         before, place = this, this.d * end

@@ -30,7 +30,6 @@ from detent.record.machine import AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 
 NOT_FIRED = -(1 << 31)
-EMITTERS_PER_COLUMN = 2.5
 
 
 def print_head_machine(
@@ -234,7 +233,6 @@ class _Runner:
         geometry = Geometry(
             width_emitters=head.width,
             column0_emitters=self.machine.params.controller.columns.column_zero / 256,
-            emitters_per_column=EMITTERS_PER_COLUMN,
             max_speed=head.maximum,
         )
         self.plans = plan_lines(self.job.lines, geometry, head=int(head.emitter), job_name=self.job.name)
