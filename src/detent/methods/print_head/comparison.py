@@ -15,17 +15,17 @@ from detent.control.head_computer import HIGH_STEADY, IDLE, OK
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
 from detent.files.quantities import INCH
-from detent.kernel.loop import advance
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.derive import Machine as Figures
 from detent.methods.print_head.run import print_head_machine
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, controlled_run_to, set_speed
 from detent.methods.print_head.system import TICK, PrintHead, switch_on
-from detent.page.chart import Chart, Curve, Panel, Timeline, line_chart, time_charts
+from detent.page.chart import Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
 from detent.record.machine import Machine
+from detent.record.recorder import Recorder
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
@@ -53,19 +53,17 @@ BAND = 0.01
 COLOURS = ("muted", "left", "right")
 """Of the ways, in their order."""
 
-CALCULATION_TIME = 120.0
-
 Numbers = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class DriveConstants:
-    """Constants the axis computer works with."""
+    """Constants the axis computer works with: slope K [1/256 count per speed value], friction drive Vf [count]."""
 
-    slope_right: int  # and slope_left: slope K [1/256 count per speed value]
-    slope_left: int  # [1/256 count per speed value]
-    friction_right: int  # and friction_left: friction-equivalent drive Vf [count]
-    friction_left: int  # [count]
+    slope_right: int
+    slope_left: int
+    friction_right: int
+    friction_left: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +72,6 @@ class DriveStart:
 
     t: Numbers  # and velocity: time since the move began [s] and carriage speed [m/s]
     velocity: Numbers
-    steady_from: float  # when the acceleration ramp ended [s]
     mean_error: float  # speed error over the first 0.30 s of steady motion, as a fraction of the commanded speed
     # from the end of the ramp until the speed first is within 1 % of the commanded one [s]; infinite if it never is
     time_to_band: float
@@ -138,15 +135,13 @@ class DriveComparison:
             "methods": [
                 {
                     "method": method,
-                    "constants": asdict(constants),
-                    "errors_right": errors[:, 0].tolist(),
-                    "errors_left": errors[:, 1].tolist(),
-                    "mean_error": start.mean_error,
-                    "time_to_band": start.time_to_band if isfinite(start.time_to_band) else None,
+                    "constants": asdict(self.constants[k]),
+                    "errors_right": self.errors[k, :, 0].tolist(),
+                    "errors_left": self.errors[k, :, 1].tolist(),
+                    "mean_error": self.starts[k].mean_error,
+                    "time_to_band": self.starts[k].time_to_band if isfinite(self.starts[k].time_to_band) else None,
                 }
-                for method, constants, errors, start in zip(
-                    self.methods, self.constants, self.errors, self.starts, strict=True
-                )
+                for k, method in enumerate(self.methods)
             ],
         }
 
@@ -157,12 +152,6 @@ def _error_figure(found: DriveComparison) -> Figure:
         "the axis assumes at power-on, the nominal table what a conventional printer would hold, computed from the "
         "nameplate. Look for: circles on the line; below it the head is too slow, at −100 % it does not move."
     )
-    title = "How far off speed is the head with each way of choosing the drive?"
-    return Figure(title=title, caption=caption, charts=[_error_chart(found)], table=found.table.on_page)
-
-
-def _error_chart(found: DriveComparison) -> Chart:
-    """Steady speed error over the commanded speed, to the left negative."""
     speeds, order = np.sort(found.speeds) / INCH, np.argsort(found.speeds)
     # A circle needs room at either end.
     x = np.concatenate(([-1.1 * speeds[-1]], -speeds[::-1], speeds, [1.1 * speeds[-1]]))
@@ -174,7 +163,9 @@ def _error_chart(found: DriveComparison) -> Chart:
     room = 0.12 * max(high - low, 1.0)
     span = (round(low - room, 2), round(high + room, 2))
     panel = Panel(name="drives", label="speed error [%]", height=260, zero=True, span=span, curves=curves)
-    return line_chart(panel, x, "\u2190 to the left   commanded speed [in/s]   to the right \u2192")
+    chart = line_chart(panel, x, "\u2190 to the left   commanded speed [in/s]   to the right \u2192")
+    title = "How far off speed is the head with each way of choosing the drive?"
+    return Figure(title=title, caption=caption, charts=[chart], table=found.table.on_page)
 
 
 def _start_figure(found: DriveComparison) -> Figure:
@@ -253,13 +244,8 @@ def drift_text(spec: PrintHeadSpec) -> str:
 
 def default_constants(spec: PrintHeadSpec) -> DriveConstants:
     """What the axis computer assumes at power-on, both directions."""
-    m = spec.method
-    return DriveConstants(
-        slope_right=m.default_slope,
-        slope_left=m.default_slope,
-        friction_right=m.default_friction_counts,
-        friction_left=m.default_friction_counts,
-    )
+    slope, friction = spec.method.default_slope, spec.method.default_friction_counts
+    return DriveConstants(slope, slope, friction, friction)
 
 
 def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
@@ -268,30 +254,20 @@ def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
         update={"motor_constant": 0.0, "friction_right": 0.0, "friction_left": 0.0, "supply": spec.drive.supply}
     )
     figures = Figures(spec.model_copy(update={"disturbance": nameplate}))
-    return DriveConstants(
-        slope_right=round(figures.slope["right"]),
-        slope_left=round(figures.slope["left"]),
-        friction_right=round(figures.coulomb_counts["right"]),
-        friction_left=round(figures.coulomb_counts["left"]),
-    )
+    return DriveConstants(*map(round, (*figures.slope.values(), *figures.coulomb_counts.values())))
 
 
 def identified_constants(spec: PrintHeadSpec) -> DriveConstants:
     """Run CALCULATE PARAMETERS on the machine of `spec` and read what it found."""
     machine, answers = print_head_machine(spec), list[Answer]()
-    c, ack_last = machine.state.controller, spec.method.ack_last
-    supervisor = Supervisor(c, machine.pass_time, answers.append, ack_last, CALCULATION_TIME)
+    c = machine.state.controller
+    supervisor = Supervisor(c, machine.pass_time, answers.append, spec.method.ack_last)
     supervisor.send(calculate_parameters())
     supervisor.finish()
     if answers[0].byte != OK:
         raise AxisError(f"comparison of drives: CALCULATE PARAMETERS failed: {describe_sb1(answers[0].byte)}")
-    head = c.head
-    return DriveConstants(
-        slope_right=head.right.slope,
-        slope_left=head.left.slope,
-        friction_right=head.right.friction,
-        friction_left=head.left.friction,
-    )
+    right, left = c.head.right, c.head.left
+    return DriveConstants(right.slope, left.slope, right.friction, left.friction)
 
 
 class MeasuringBench:
@@ -302,41 +278,32 @@ class MeasuringBench:
         disturbance = spec.disturbance.model_copy(update={"obstacle": None, "push": None})
         self.spec = spec.model_copy(update={"limits": limits, "disturbance": disturbance})
         self.params = build_print_head(self.spec)
-        leaves = {leaf.path: leaf for leaf in PrintHead.leaves()}
-        picked = [leaves["plant.train.velocity"], leaves["controller.head.state"]]
-        self._picks = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in picked]).astype(np.int64)
-        self._row: Any = np.dtype([("velocity", "<f8"), ("state", "<u1")])
 
     def open_loop_error(self, constants: DriveConstants, speed: float, direction: int) -> float:
         """Error of the steady speed without trim, as a fraction of `speed` [m/s]; -1 if the head does not move."""
         seconds = min(0.2 + SETTLING * Figures(self.spec).mechanical_time_constant, 4.0)
-        rows = self._run(constants, speed, direction, seconds, trim=False)
-        if len(rows) < round(seconds / TICK):
+        velocity, _ = self._run(constants, speed, direction, seconds, trim=False)
+        if len(velocity) < round(seconds / TICK):
             return -1.0
-        reading = rows["velocity"][-round(READING / TICK) :]
-        return float(np.mean(reading)) * direction / speed - 1.0
+        return float(np.mean(velocity[-round(READING / TICK) :])) * direction / speed - 1.0
 
     def start(self, constants: DriveConstants, speed: float) -> DriveStart:
         """A start to the right at `speed` [m/s] with the trim running."""
-        rows = self._run(constants, speed, 1, START_TIME, trim=True)
-        t = np.arange(1, len(rows) + 1, dtype=np.float64) * TICK
-        velocity = rows["velocity"].copy()
-        steady = np.flatnonzero(rows["state"] == HIGH_STEADY)
-        if len(steady) == 0:
-            return DriveStart(t=t, velocity=velocity, steady_from=inf, mean_error=-1.0, time_to_band=inf)
-        first = int(steady[0])
-        error = velocity[first:] / speed - 1.0
+        velocity, state = self._run(constants, speed, 1, START_TIME, trim=True)
+        t = np.arange(1, len(velocity) + 1, dtype=np.float64) * TICK
+        error = velocity[state.tolist().index(HIGH_STEADY) :] / speed - 1.0 if HIGH_STEADY in state else np.empty(0)
         good = np.flatnonzero(np.abs(error) <= BAND)
         return DriveStart(
             t=t,
             velocity=velocity,
-            steady_from=float(t[first]),
-            mean_error=float(np.mean(error[: round(FIRST_LINE / TICK)])),
+            mean_error=float(np.mean(error[: round(FIRST_LINE / TICK)])) if len(error) else -1.0,
             time_to_band=float(good[0] * TICK) if len(good) else inf,
         )
 
-    def _run(self, way: DriveConstants, speed: float, direction: int, seconds: float, *, trim: bool) -> NDArray[Any]:
-        """Rows of a move from its first tick on; fewer than `seconds` of them if the axis gave up."""
+    def _run(
+        self, way: DriveConstants, speed: float, direction: int, seconds: float, *, trim: bool
+    ) -> tuple[Numbers, NDArray[np.uint8]]:
+        """Velocity and state in a move, tick by tick from its first; fewer than `seconds` if the axis gave up."""
         p, r = self.params, PrintHead()
         p.controller.trim = trim
         begin, target = FROM_FRAME, BENCH_EMITTERS - FROM_FRAME
@@ -347,13 +314,14 @@ class MeasuringBench:
         head.emitter, head.width, head.homed, head.state = begin, BENCH_EMITTERS, 1, IDLE
         head.right.slope, head.right.friction = way.slope_right, way.friction_right
         head.left.slope, head.left.friction = way.slope_left, way.friction_left
-        machine = Machine(p, r, TICK)
+        recorder = Recorder(PrintHead, ("plant.train.velocity", "controller.head.state"), every=1, period=TICK)
+        machine = Machine(p, r, TICK, recorder)
         supervisor = Supervisor(r.controller, machine.pass_time, lambda _: None, self.spec.method.ack_last)
         supervisor.send(set_speed(speed_value(speed)))
         supervisor.finish()
         supervisor.send(controlled_run_to(target))
-        ticks, before = round(seconds / TICK), r.tick
-        rows = np.zeros((ticks, len(self._picks)), np.uint8)
-        done = advance(p, r, ticks, rows, self._picks, 1)
-        order = np.arange(before + 1, before + done + 1) % ticks
-        return rows[order].view(self._row)[:, 0]
+        before = r.tick
+        machine.pass_ticks(round(seconds / TICK))
+        machine.close()
+        _, velocity, state = recorder.trace().columns.values()
+        return velocity[before:], state[before:]
