@@ -14,7 +14,7 @@ from detent.errors import DetentError, InputError
 from detent.methods.moves.move_file import load_moves
 from detent.methods.print_head.page import print_page
 from detent.methods.print_head.print_job import load_job
-from detent.methods.print_head.run import default_signals
+from detent.methods.print_head.run import SIGNALS
 from detent.record.recorder import ROWS
 
 pytestmark = pytest.mark.compiled
@@ -112,7 +112,7 @@ def test_a_run_tells_what_happened(run: detent.Run) -> None:
 
 def test_a_run_records_what_the_report_needs_every_tenth_tick(run: detent.Run) -> None:
     assert run.trace is not None
-    assert run.trace.signals == tuple(default_signals())
+    assert run.trace.signals == SIGNALS
     np.testing.assert_allclose(np.diff(run.trace.time), 0.4e-3, rtol=1e-9)
     assert run.trace.time[-1] == pytest.approx(run.result.time_end, abs=0.4e-3)
     assert run.trace.units["plant.train.current"] == "A"

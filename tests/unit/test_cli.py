@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 import detent
 from detent.cli import app
-from detent.methods.print_head.run import default_signals
+from detent.methods.print_head.run import SIGNALS
 from detent.page.words import GAP
 from detent.record.trace_files import load_trace
 
@@ -139,8 +139,8 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "run: no job": (["run", AXIS], "--job"),
         "run: missing file": (["run", missing, *job], "missing.toml: came no such file"),
         "run: directory": (["run", folder, *job], "folder"),
-        "run: missing job": (["run", AXIS, "--job", "no.txt"], "no.txt: came No such file"),
-        "run: a directory as job": (["run", AXIS, "--job", folder], "folder: came Is a directory"),
+        "run: missing job": (["run", AXIS, "--job", "no.txt"], "no.txt: came no such file"),
+        "run: a directory as job": (["run", AXIS, "--job", folder], "folder: came a file that cannot be read"),
         "run: a binary job": (["run", AXIS, "--job", binary], "binary.prn: .*mean nothing to a printer"),
         "run: an empty job": (["run", AXIS, "--job", "empty.txt"], "empty.txt: came an empty file"),
         "run: a line too wide": (["run", AXIS, "--job", "wide.txt"], "wide.txt printed line 1: came ink from"),
@@ -300,7 +300,7 @@ def test_check_as_json_has_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     ).items()
     assert set(data["derived"][0]) == {"name", "value", "unit", "text", "formula"}
     assert [set(warning) for warning in data["warnings"]] == [{"name", "value", "limit", "consequence", "remedy"}]
-    monkeypatch.setattr("detent.methods.print_head.derive.Machine.acceleration", float("inf"))
+    monkeypatch.setattr("detent.methods.print_head.derive.Machine.current", lambda _machine, _counts: float("inf"))
     assert None in [row["value"] for row in call("check", AXIS, "--json").data["derived"]]  # not Infinity
 
 
@@ -339,7 +339,7 @@ def test_every_kind_of_trace_holds_the_same_with_units(tmp_path: Path) -> None:
     assert call("run", AXIS, "--job", LETTER, "-o", "out", "--trace", "parquet, h5,csv").status == 0
     traces = [load_trace(tmp_path / "out" / f"trace.{kind}") for kind in ("h5", "csv", "parquet")]
     for trace in traces:
-        assert trace.signals == tuple(default_signals())
+        assert trace.signals == SIGNALS
         assert (trace.units["t"], trace.units["plant.train.current"], trace.units["plant.train.energy"]) == (
             "s",
             "A",
@@ -387,7 +387,7 @@ def test_signals_come_beside_the_usual_ones(tmp_path: Path) -> None:
     assert call("run", AXIS, "--job", LETTER, "-o", "out", *words).status == 0
     trace = load_trace(tmp_path / "out" / "trace.h5")
     assert set(trace.signals) >= {
-        *default_signals(),
+        *SIGNALS,
         "controller.head.right.slope",
         "plant.encoder.edge",
         "controller.head.queue.waiting",
@@ -519,9 +519,9 @@ def test_plot_without_signals_lists_them(trace: Path) -> None:
     answer = call("plot", trace)
     assert answer.status == 0
     assert re.search(r"^plant\.train\.current +A +\S", answer.out, flags=re.MULTILINE)
-    assert [line.split()[0] for line in answer.out.splitlines()] == list(default_signals())
+    assert [line.split()[0] for line in answer.out.splitlines()] == list(SIGNALS)
     rows = call("plot", trace, "--json").data
-    assert [row["name"] for row in rows] == list(default_signals())
+    assert [row["name"] for row in rows] == list(SIGNALS)
     assert set(rows[0]) == {"name", "unit", "doc"}
 
 
@@ -554,7 +554,7 @@ def test_registers_lists_what_can_be_recorded() -> None:
     answer = call("registers")
     assert answer.status == 0
     names = [line.split()[0] for line in answer.out.splitlines()]
-    assert set(default_signals()) <= set(names)
+    assert set(SIGNALS) <= set(names)
     rows = call("registers", "--json").data
     assert [row["name"] for row in rows] == names
     assert {"name": "plant.train.current", "width": "f8", "unit": "A"}.items() <= next(

@@ -24,7 +24,7 @@ from detent.methods.print_head.system import TICK, PrintHead, switch_on
 from detent.page.chart import Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.table import TextTable
-from detent.record.machine import Machine
+from detent.record.machine import Machine, Progress
 from detent.record.recorder import Recorder
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
@@ -204,7 +204,9 @@ def _filled(values: Numbers, rows: int) -> Numbers:
     return np.concatenate((values, np.full(rows - len(values), np.nan)))
 
 
-def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> DriveComparison:
+def compare_drives(
+    spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS, progress: Progress | None = None
+) -> DriveComparison:
     """Compare the power-on default, the nominal table and the identified drive on the machine of `spec`."""
     chosen = tuple(v for v in speeds if v <= spec.limits.speed * (1 + 1e-9))
     low = [v for v in chosen if speed_value(v) < HIGH_SPEED]
@@ -219,14 +221,18 @@ def compare_drives(spec: PrintHeadSpec, speeds: tuple[float, ...] = SPEEDS) -> D
         "nominal table": nominal_constants(spec),
         "identified": identified_constants(spec),
     }
-    bench = MeasuringBench(spec)
-    errors = [[[bench.open_loop_error(way, v, d) for d in (1, -1)] for v in chosen] for way in ways.values()]
+    bench, errors, starts = MeasuringBench(spec), list[Any](), list[DriveStart]()
+    for name, way in ways.items():
+        if progress:
+            progress(len(starts) / len(ways), name)
+        errors.append([[bench.open_loop_error(way, v, d) for d in (1, -1)] for v in chosen])
+        starts.append(bench.start(way, spec.limits.speed))
     return DriveComparison(
         methods=tuple(ways),
         constants=tuple(ways.values()),
         speeds=chosen,
         errors=np.array(errors),
-        starts=tuple(bench.start(way, spec.limits.speed) for way in ways.values()),
+        starts=tuple(starts),
         target=spec.limits.speed,
         machine=drift_text(spec),
     )

@@ -43,21 +43,23 @@ class Machine:
         self.max_counts = FULL_DRIVE_COUNTS * min(1.0, spec.limits.effort / spec.drive.supply)
         self.top_speed = speed_value(spec.limits.speed)
         # Friction drifts as the drive that overcomes it, so its force drifts with the motor constant as well.
-        tables = {
-            "right": (friction.right, (1 + drift.friction_right) * gain - 1),
-            "left": (friction.left, (1 + drift.friction_left) * gain - 1),
-        }
+        changes = {"right": drift.friction_right, "left": drift.friction_left}
+        tables = {d: (getattr(friction, d), (1 + change) * gain - 1) for d, change in changes.items()}
         volts_per_newton = self.resistance / self.force_per_ampere
         counts_per_newton = volts_per_newton * self.counts_per_volt
         self.coulomb_counts = {d: (1 + change) * t.coulomb * counts_per_newton for d, (t, change) in tables.items()}
         self.static_counts = {d: (1 + change) * t.static * counts_per_newton for d, (t, change) in tables.items()}
+        per_volt = 256 * SPEED_STEP * self.counts_per_volt
         self.slope = {
-            d: 256
-            * SPEED_STEP
-            * self.counts_per_volt
-            * (self.volts_per_speed + (1 + change) * t.viscous * volts_per_newton)
+            d: per_volt * (self.volts_per_speed + (1 + change) * t.viscous * volts_per_newton)
             for d, (t, change) in tables.items()
         }
+        # Acceleration that the IR counts give [m/s^2]; way from top speed to standstill [emitter] (eq. 7).
+        self.acceleration = self.current(spec.method.ir_counts) * self.force_per_ampere / self.mass
+        self.stop_distance = self.top_speed**2 / 144
+        self.electrical_time_constant = motor.inductance / self.resistance  # [s]
+        # Of the speed after a step of voltage [s].
+        self.mechanical_time_constant = self.mass * self.resistance / (self.force_per_ampere * self.volts_per_speed)
 
     def steady_counts(self, speed: int, direction: str) -> float:
         """Drive that holds a speed value (eq. 9 with the true constants)."""
@@ -72,21 +74,6 @@ class Machine:
         return counts / self.counts_per_volt / self.resistance
 
     @property
-    def acceleration(self) -> float:
-        """Acceleration [m/s^2] that the IR counts give."""
-        return self.current(self.spec.method.ir_counts) * self.force_per_ampere / self.mass
-
-    @property
-    def electrical_time_constant(self) -> float:
-        """L / R [s]."""
-        return self.spec.motor.inductance / self.resistance
-
-    @property
-    def mechanical_time_constant(self) -> float:
-        """Time constant of speed after a step of voltage [s]."""
-        return self.mass * self.resistance / (self.force_per_ampere * self.volts_per_speed)
-
-    @property
     def ramp_interval(self) -> float:
         """Interval per count of the ramp at top speed [s] (eq. 10), after a perfect identification."""
         spans = [math.floor(self.slope[d] * self.top_speed / 256) for d in DIRECTIONS]
@@ -94,84 +81,56 @@ class Machine:
             spans = [span + round(self.coulomb_counts[d]) for span, d in zip(spans, DIRECTIONS, strict=True)]
         return TURN_AROUND_TIME * self.top_speed / 240 / max(1, sum(spans))
 
-    @property
-    def stop_distance(self) -> float:
-        """Emitters from top speed to standstill (eq. 7)."""
-        return self.top_speed**2 / 144
-
-    @property
-    def line_length(self) -> float:
-        """Longest line [m] printed at top speed in both directions."""
-        emitters = self.spec.limits.travel / EMITTER - 2 * (RUN_UP_RESERVE * self.stop_distance + FRAME_RESERVE)
-        return emitters * EMITTER
-
 
 def derive(spec: PrintHeadSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
     machine = Machine(spec)
-    return (*_scales(machine), *_line(machine), *_dynamics(machine), *_limits(machine))
+    return (*_line(machine), *_dynamics(machine), *_limits(machine))
 
 
-def _scales(machine: Machine) -> Iterator[Derived]:
-    """Units the axis computer thinks in."""
-    yield count_figure("drive counts per volt", machine.counts_per_volt, "300 / supply", "count/V")
-    yield Derived(
-        "top speed value",
-        machine.top_speed,
-        "1/6 in/s",
-        f"{machine.top_speed} ({machine.top_speed / 6:.4g} in/s)",
-        "limits.speed in 1/6 in/s, rounded down",
-    )
-
-
-def _line(machine: Machine) -> Iterator[Derived]:
-    """The voltage/speed line that identification should find."""
-    for direction in DIRECTIONS:
+def _line(m: Machine) -> Iterator[Derived]:
+    """Units the axis computer thinks in, and the voltage/speed line that identification should find."""
+    yield count_figure("drive counts per volt", m.counts_per_volt, "300 / supply", "count/V")
+    text = f"{m.top_speed} ({m.top_speed / 6:.4g} in/s)"
+    yield Derived("top speed value", m.top_speed, "1/6 in/s", text, "limits.speed in 1/6 in/s, rounded down")
+    for direction, slope in m.slope.items():
         formula = "256 x (Ke/r + viscous x R x r/Kt) x 1/6 in/s x counts per volt"
-        slope = machine.slope[direction]
         yield Derived(f"slope K, {direction}", slope, "1/256 count per 1/6 in/s", f"{slope:.4g}/256", formula)
-        yield count_figure(
-            f"friction, {direction}", machine.coulomb_counts[direction], "coulomb x r/Kt x R x counts per volt"
-        )
-    ir_counts = machine.spec.method.ir_counts
-    formula = f"{ir_counts} counts / R = {format_quantity(machine.current(ir_counts), 'A')}, x Kt/(r m)"
-    acceleration = machine.acceleration
-    yield Derived(
-        "acceleration from the IR counts",
-        acceleration,
-        "m/s^2",
-        f"{acceleration:.4g} m/s^2 ({acceleration / INCH:.4g} in/s^2)",
-        formula,
-    )
+        formula = "coulomb x r/Kt x R x counts per volt"
+        yield count_figure(f"friction, {direction}", m.coulomb_counts[direction], formula)
+    ir_counts, text = m.spec.method.ir_counts, f"{m.acceleration:.4g} m/s^2 ({m.acceleration / INCH:.4g} in/s^2)"
+    formula = f"{ir_counts} counts / R = {format_quantity(m.current(ir_counts), 'A')}, x Kt/(r m)"
+    yield Derived("acceleration from the IR counts", m.acceleration, "m/s^2", text, formula)
 
 
-def _dynamics(machine: Machine) -> Iterator[Derived]:
+def _dynamics(m: Machine) -> Iterator[Derived]:
     """How fast things happen."""
-    yield quantity_figure("moving mass", machine.mass, "kg", "carriage + belt + rotor inertia / r^2")
-    yield quantity_figure("electrical time constant", machine.electrical_time_constant, "s", "L / R")
-    yield quantity_figure("mechanical time constant", machine.mechanical_time_constant, "s", "m R / (Kt/r x Ke/r)")
-    formula = f"0.133 s x s/240 / (VC right + VC left), span = {machine.spec.method.span}"
-    yield quantity_figure("ramp interval at top speed", machine.ramp_interval, "s", formula)
-    distance = machine.stop_distance
+    yield quantity_figure("moving mass", m.mass, "kg", "carriage + belt + rotor inertia / r^2")
+    yield quantity_figure("electrical time constant", m.electrical_time_constant, "s", "L / R")
+    yield quantity_figure("mechanical time constant", m.mechanical_time_constant, "s", "m R / (Kt/r x Ke/r)")
+    formula = f"0.133 s x s/240 / (VC right + VC left), span = {m.spec.method.span}"
+    yield quantity_figure("ramp interval at top speed", m.ramp_interval, "s", formula)
+    distance = m.stop_distance
     text = f"{distance:.4g} emitters ({format_quantity(distance * EMITTER, 'm')})"
     yield Derived("stop distance at top speed", distance, "emitter", text, "s^2 / 144")
+    emitters = m.spec.limits.travel / EMITTER - 2 * (RUN_UP_RESERVE * distance + FRAME_RESERVE)
     formula = "travel - 2 x (1.05 D + 12 emitters)"
-    yield quantity_figure("print line at top speed", machine.line_length, "m", formula)
+    yield quantity_figure("print line at top speed", emitters * EMITTER, "m", formula)
 
 
-def _limits(machine: Machine) -> Iterator[Derived]:
+def _limits(m: Machine) -> Iterator[Derived]:
     """How far the axis is from what it cannot do."""
-    ir_counts, top = machine.spec.method.ir_counts, machine.top_speed
+    ir_counts, top = m.spec.method.ir_counts, m.top_speed
     for direction in DIRECTIONS:
-        steady = machine.steady_counts(top, direction)
-        left_over = machine.max_counts - steady - ir_counts
-        text = f"{left_over:.4g} of {machine.max_counts:.4g} counts ({steady:.4g} + {ir_counts} used)"
+        steady = m.steady_counts(top, direction)
+        left_over = m.max_counts - steady - ir_counts
+        text = f"{left_over:.4g} of {m.max_counts:.4g} counts ({steady:.4g} + {ir_counts} used)"
         formula = "drive at limits.effort - (K s/256 + friction) - IR counts"
         yield Derived(f"headroom at top speed, {direction}", left_over, "count", text, formula)
     for direction in DIRECTIONS:
-        peak = machine.open_loop_speed(machine.max_counts, direction) * SPEED_STEP
+        peak = m.open_loop_speed(m.max_counts, direction) * SPEED_STEP
         text = f"{format_quantity(peak, 'm/s')} ({peak / INCH:.4g} in/s)"
         yield Derived(f"peak speed, {direction}", peak, "m/s", text, "(drive at limits.effort - friction) / K")
-    yield quantity_figure("stall current", machine.current(machine.max_counts), "A", "limits.effort / R")
-    homing = machine.current(machine.spec.homing.drive_limit_counts)
+    yield quantity_figure("stall current", m.current(m.max_counts), "A", "limits.effort / R")
+    homing = m.current(m.spec.homing.drive_limit_counts)
     yield quantity_figure("stall current while homing", homing, "A", "homing.drive_limit_counts / counts per volt / R")

@@ -5,7 +5,7 @@ next line while the present one prints.
 """
 
 import math
-from collections.abc import Sequence
+from collections import Counter
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -30,6 +30,15 @@ from detent.record.machine import AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 
 NOT_FIRED = -(1 << 31)
+
+
+SIGNALS = (
+    "plant.train.position", "plant.train.velocity", "plant.train.current", "plant.train.voltage", "plant.train.energy",
+    "controller.head.state", "controller.head.drive_cmd", "lines.transition", "lines.right_left",
+    "controller.head.emitter", "controller.head.speed", "controller.head.direction", "controller.head.columns.active",
+    "controller.head.columns.fired",
+)  # fmt: skip
+"""Registers a run records unless told otherwise: enough for the report's figures and most questions."""
 
 
 def print_head_machine(
@@ -158,19 +167,17 @@ class PrintRun(RunRecord[PrintJob]):
     @property
     def speeds(self) -> dict[int, int]:
         """Lines printed per speed value [1/6 in/s]."""
-        found: dict[int, int] = {}
-        for line in self.lines:
-            found[line.speed_value] = found.get(line.speed_value, 0) + 1
-        return dict(sorted(found.items(), reverse=True))
+        return dict(sorted(Counter(line.speed_value for line in self.lines).items(), reverse=True))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        found = super().to_dict() | {"pages": self.job.pages}
-        found["speeds"] = {str(s): n for s, n in self.speeds.items()}
-        found["identified"] = {side: asdict(line) for side, line in self.identified.items()}
-        found["lines"] = [asdict(line) for line in self.lines]
-        found["notes"] = [asdict(note) for note in self.job.notes]
-        return found
+        return super().to_dict() | {
+            "pages": self.job.pages,
+            "speeds": {str(s): n for s, n in self.speeds.items()},
+            "identified": {side: asdict(line) for side, line in self.identified.items()},
+            "lines": [asdict(line) for line in self.lines],
+            "notes": [asdict(note) for note in self.job.notes],
+        }
 
 
 ERROR_BIN = 1e-7
@@ -213,8 +220,10 @@ class _Runner:
         self.head = self.state.controller.head
         buffer: Any = self.head.buffer  # ctypes gives the elements of an array no type
         paper: Any = self.state.plant.paper
-        self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(buffer.ink)
-        self.landed: NDArray[np.int32] = np.ctypeslib.as_array(paper.landed)
+        self.buffer = buffer
+        # By bank of the line buffer: banks alternate with every PRINT, the first is bank 1.
+        self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(buffer.ink).reshape(2, COLUMNS)
+        self.landed: NDArray[np.int32] = np.ctypeslib.as_array(paper.landed).reshape(2, COLUMNS)
         self.plans: tuple[LinePlan, ...] = ()
         self.sum_squares = 0.0
         self.began = 0.0
@@ -227,14 +236,11 @@ class _Runner:
         head = self.head
         self.result.time_ready = self.began = self.machine.time
         self.result.width = head.width * EMITTER
-        self.result.identified = {"right": self._direction("right"), "left": self._direction("left")}
+        self.result.identified = {side: self._direction(side) for side in ("right", "left")}
         if self.result.failure:
             return
-        geometry = Geometry(
-            width_emitters=head.width,
-            column0_emitters=self.machine.params.controller.columns.column_zero / 256,
-            max_speed=head.maximum,
-        )
+        column0 = self.machine.params.controller.columns.column_zero / 256
+        geometry = Geometry(head.width, column0, max_speed=head.maximum)
         self.plans = plan_lines(self.job.lines, geometry, head=int(head.emitter), job_name=self.job.name)
 
     def print_all(self) -> None:
@@ -245,7 +251,9 @@ class _Runner:
                 self.supervisor.await_answer()
             if self.result.failure:
                 return
-            self.load_line(index, plan.line)
+            bank = (index + 1) & 1
+            self.landed[bank] = NOT_FIRED
+            load_line(self.state.controller, bank, [range(*_ink_span(one)) for one in plan.line.characters])
             if plan.speed != preselected:
                 self.supervisor.send(set_speed(plan.speed))
                 preselected = plan.speed
@@ -253,11 +261,6 @@ class _Runner:
                 self.supervisor.send(run_to(plan.run_to))
             self.supervisor.send(print_from(plan.print_from, plan.print_to, tag=index))
         self.supervisor.finish()
-
-    def load_line(self, index: int, line: PrintLine) -> None:
-        """Fill the bank that this line will print from; banks alternate with every PRINT, the first is bank 1."""
-        self.landed[self._bank(index)] = NOT_FIRED
-        load_line(self.state.controller, (index + 1) & 1, [range(*_ink_span(one)) for one in line.characters])
 
     def on_answer(self, answer: Answer) -> None:
         """Book the end of a command."""
@@ -275,43 +278,40 @@ class _Runner:
         head = self.head
         if not code & OBSTRUCTION or head.width <= 0:
             return ""
-        expected = self.machine.params.controller.expected_width
-        if head.width < expected - self.machine.params.controller.width_tolerance:
-            return f" (the way found is {_both(head.width)}, limits.travel is {_both(expected)})"
+        p = self.machine.params.controller
+        if head.width < p.expected_width - p.width_tolerance:
+            return f" (the way found is {_both(head.width)}, limits.travel is {_both(p.expected_width)})"
         return f" (the head stopped {_both(head.emitter)} from the left frame)"
 
     def book_line(self, index: int) -> None:
         """Read what a finished line left in its bank."""
-        line, bank, result = self.plans[index].line, self._bank(index), self.result
-        inked = self.ink[bank] != 0
-        landed = self.landed[bank]
-        buffer: Any = self.head.buffer
+        line, result, bank = self.plans[index].line, self.result, (index + 1) & 1
+        inked, landed = self.ink[bank] != 0, self.landed[bank]
         fired = inked & (landed != NOT_FIRED)
         errors: NDArray[np.float64] = landed[fired].astype(np.float64) * 1e-9
         squares = float(errors @ errors)
         worst = float(np.max(np.abs(errors), initial=0.0))
-        number = bank.start // COLUMNS
-        counted = result.errors_right if buffer.direction[number] > 0 else result.errors_left
+        direction, columns, missed = int(self.buffer.direction[bank]), int(fired.sum()), int((inked & ~fired).sum())
+        counted = result.errors_right if direction > 0 else result.errors_left
         counted += count_errors(errors)
-        count, missed = int(fired.sum()), int(inked.sum() - fired.sum())
         result.lines.append(
             LineRecord(
                 number=line.number,
-                direction=int(buffer.direction[number]),
-                speed_value=int(buffer.speed[number]),
-                turn_around=bool(buffer.turned[number]),
+                direction=direction,
+                speed_value=int(self.buffer.speed[bank]),
+                turn_around=bool(self.buffer.turned[bank]),
                 start=self.began,
                 stop=self.machine.time,
                 characters=len(line.characters),
-                columns=count,
+                columns=columns,
                 missed=missed,
                 worst_error=worst,
-                rms_error=math.sqrt(squares / count) if count else math.nan,
+                rms_error=math.sqrt(squares / columns) if columns else math.nan,
             )
         )
         self._book_strikes(line, landed)
         result.characters += len(line.characters)
-        result.columns += count
+        result.columns += columns
         result.missed += missed
         result.worst_error = max(result.worst_error, worst)
         self.sum_squares += squares
@@ -332,25 +332,17 @@ class _Runner:
         result.done = not result.failure and len(result.lines) == len(self.job.lines)
         return result
 
-    def _bank(self, index: int) -> slice:
-        start = COLUMNS * ((index + 1) & 1)
-        return slice(start, start + COLUMNS)
-
     def _book_strikes(self, line: PrintLine, landed: NDArray[np.int32]) -> None:
         if len(self.result.strikes) + len(line.characters) > MOST_STRIKES:
             return
         for character in line.characters:
             first, last = _ink_span(character)
-            found = landed[first:last]
-            found = found[found != NOT_FIRED]
+            found = landed[first:last][landed[first:last] != NOT_FIRED]
             offset = float(found.mean()) * 1e-9 if found.size else math.nan
             self.result.strikes.append(Strike(character, line.number, offset))
 
     def _direction(self, side: str) -> Direction:
-        line = getattr(self.head, side)
-        p = self.machine.params.controller
-        true = TrueMachine(self.spec)
-
+        line, p, true = getattr(self.head, side), self.machine.params.controller, TrueMachine(self.spec)
         return Direction(
             slope=line.slope,
             friction=line.friction,
@@ -380,13 +372,3 @@ def _ink_span(character: PrintedCharacter) -> tuple[int, int]:
     """Columns of a character that carry ink: its cell less a blank column at each side, first and one past the last."""
     first = min(character.column + 1, COLUMNS - 1)
     return first, min(max(first + 1, character.column + character.ink_columns - 1), COLUMNS)
-
-
-def default_signals() -> Sequence[str]:
-    """Registers a run records unless told otherwise: enough for the report's figures and most questions."""
-    return (
-        "plant.train.position", "plant.train.velocity", "plant.train.current", "plant.train.voltage",
-        "plant.train.energy", "controller.head.state", "controller.head.drive_cmd", "lines.transition",
-        "lines.right_left", "controller.head.emitter", "controller.head.speed", "controller.head.direction",
-        "controller.head.columns.active", "controller.head.columns.fired",
-    )  # fmt: skip

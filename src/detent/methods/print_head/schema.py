@@ -5,7 +5,7 @@ overrides, by `load`, which also fills the defaults that depend on another table
 """
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -33,9 +33,12 @@ SPEED_STEP = INCH / 6
 FULL_DRIVE_COUNTS = 300
 """Drive value that gives the full supply voltage (2.1)."""
 
-SPEED_RANGE = "a velocity from 3 in/s to 40 in/s (76.2 mm/s to 1.016 m/s)"
-MIN_SPEED = 3 * INCH
-MAX_SPEED = 40 * INCH
+SPEED_RANGE: Any = {
+    "allowed": "a velocity from 3 in/s to 40 in/s (76.2 mm/s to 1.016 m/s)", "ge": 3 * INCH, "le": 40 * INCH,
+}  # fmt: skip
+HOMING_RANGE: Any = {
+    "allowed": "a velocity from 3 in/s to 10 in/s (76.2 mm/s to 254 mm/s)", "ge": 3 * INCH, "le": 10 * INCH,
+}  # fmt: skip
 
 
 def speed_value(velocity: float) -> int:
@@ -64,11 +67,7 @@ class LimitsTable(Table, frozen=True):
 
     travel: Length = required("free way of the head between the two side frames", '"14.5 in"', gt=0.0, le=10.0)
     speed: Velocity = required(
-        "highest head speed ever commanded; rounded down to 1/6 in/s",
-        '"40 in/s"',
-        allowed=SPEED_RANGE,
-        ge=MIN_SPEED,
-        le=MAX_SPEED,
+        "highest head speed ever commanded; rounded down to 1/6 in/s", '"40 in/s"', **SPEED_RANGE
     )
     effort: Voltage = required("largest average motor voltage", '"38 V"', gt=0.0, le=1000.0)
 
@@ -117,25 +116,14 @@ class MethodTable(Table, frozen=True):
         "time without an emitter that counts as standstill (4.1)", 5e-3, ge=1.2e-3, le=0.1
     )
     max_print_speed: Velocity = optional(
-        "speed preselected for printing; rounded down to 1/6 in/s",
-        math.nan,
-        derived="limits.speed",
-        allowed=SPEED_RANGE,
-        ge=MIN_SPEED,
-        le=MAX_SPEED,
+        "speed preselected for printing; rounded down to 1/6 in/s", math.nan, derived="limits.speed", **SPEED_RANGE
     )
 
 
 class HomingTable(Table, frozen=True):
     """Search for the two side frames."""
 
-    speed: Velocity = optional(
-        "speed of both passes",
-        0.127,
-        allowed="a velocity from 3 in/s to 10 in/s (76.2 mm/s to 254 mm/s)",
-        ge=MIN_SPEED,
-        le=10 * INCH,
-    )
+    speed: Velocity = optional("speed of both passes", 0.127, **HOMING_RANGE)
     drive_limit_counts: int = optional("largest drive value while homing (3.2)", 110, ge=1, le=FULL_DRIVE_COUNTS)
     contact_timeout: Time = optional("time without an emitter that counts as contact (3.2)", 50e-3, ge=5e-3, le=1.0)
     width_tolerance: Length = optional("how much narrower than limits.travel the way may be found", 0.00127, ge=0.0)
@@ -176,13 +164,13 @@ class PrintHeadSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: PrintHeadSpec) -> PrintHeadSpec:
     """Fill the defaults that depend on another table, as their `derived` texts say."""
-    tables: dict[str, tuple[str, str, float]] = {
-        "start_position": ("mechanics", "start_position", 0.25 * spec.limits.travel),
-        "max_print_speed": ("method", "max_print_speed", spec.limits.speed),
-        "supply": ("disturbance", "supply", spec.drive.supply),
+    defaults = {
+        "mechanics": ("start_position", 0.25 * spec.limits.travel),
+        "method": ("max_print_speed", spec.limits.speed),
+        "disturbance": ("supply", spec.drive.supply),
     }
     updates: dict[str, Table] = {}
-    for table, key, value in tables.values():
+    for table, (key, value) in defaults.items():
         held: Table = getattr(spec, table)
         if math.isnan(getattr(held, key)):
             updates[table] = held.model_copy(update={key: value})

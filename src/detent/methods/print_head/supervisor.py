@@ -20,12 +20,15 @@ MOST_TRIES = 1000
 """Stretches of time in which the axis must take a byte; a computer that works takes it in the first."""
 
 
+MOTIONS = (0x8D, 0x92, 0xA2)
+"""First bytes of the commands that move the head to a position; only one such command may wait."""
+
+
 @dataclass(frozen=True)
 class Command:
     """One command as its bytes."""
 
     data: bytes  # first byte and data bytes
-    motion: bool  # True if it moves the head to a position; only one such command may wait
     text: str  # for messages
     tag: int = -1  # the caller's own number, returned with the answer
     returns_data: bool = False  # True if the answer is a data byte instead of SB1
@@ -41,38 +44,28 @@ class Answer:
 
 def calculate_parameters() -> Command:
     """CALCULATE PARAMETERS: home and identify."""
-    return Command(bytes([0x01]), motion=False, text="CALCULATE PARAMETERS")
+    return Command(bytes([0x01]), "CALCULATE PARAMETERS")
 
 
 def set_speed(s: int) -> Command:
     """SET SPEED to the speed value `s` [1/6 in/s]."""
-    return Command(bytes([0x99, s]), motion=False, text=f"SET SPEED {s}")
+    return Command(bytes([0x99, s]), f"SET SPEED {s}")
 
 
 def run_to(emitter: int, tag: int = -1) -> Command:
     """RUN TILL a position [emitter]."""
-    return Command(bytes([0x92, emitter >> 8, emitter & 0xFF]), motion=True, text=f"RUN TILL {emitter}", tag=tag)
+    return Command(bytes([0x92, emitter >> 8, emitter & 0xFF]), f"RUN TILL {emitter}", tag)
 
 
 def controlled_run_to(emitter: int) -> Command:
     """CONTROLLED RUN TILL a position [emitter]: no faster than the preselected speed."""
-    return Command(bytes([0xA2, emitter >> 8, emitter & 0xFF]), motion=True, text=f"CONTROLLED RUN TILL {emitter}")
+    return Command(bytes([0xA2, emitter >> 8, emitter & 0xFF]), f"CONTROLLED RUN TILL {emitter}")
 
 
 def print_from(start: int, end: int, tag: int = -1) -> Command:
     """PRINT FROM `start` [1/256 emitter] TO `end` [emitter]."""
-    data = bytes([0x8D, start >> 16, (start >> 8) & 0xFF, start & 0xFF, end >> 8, end & 0xFF])
-    return Command(data, motion=True, text=f"PRINT FROM {start / 256:.2f} TO {end}", tag=tag)
-
-
-def position_high() -> Command:
-    """Upper half of the position; latches both halves."""
-    return Command(bytes([0x40]), motion=False, text="POSITION HIGH BYTE", returns_data=True)
-
-
-def position_low() -> Command:
-    """Lower half of the latched position."""
-    return Command(bytes([0x41]), motion=False, text="POSITION LOW BYTE", returns_data=True)
+    data = bytes([0x8D, *start.to_bytes(3), *end.to_bytes(2)])
+    return Command(data, f"PRINT FROM {start / 256:.2f} TO {end}", tag)
 
 
 @dataclass
@@ -89,7 +82,7 @@ class Supervisor:
 
     def send(self, command: Command) -> None:
         """Send a command as soon as the axis may take it; answers that come meanwhile go to `on_answer`."""
-        while len(self.outstanding) >= MOST_OUTSTANDING or (command.motion and self.waiting_motions() > 1):
+        while len(self.outstanding) >= MOST_OUTSTANDING or (command.data[0] in MOTIONS and self.waiting_motions() > 1):
             self.await_answer()
         for k, byte in enumerate(command.data):
             self._await_free_latch(command)
@@ -101,7 +94,7 @@ class Supervisor:
 
     def waiting_motions(self) -> int:
         """Unanswered motion commands."""
-        return sum(command.motion for command in self.outstanding)
+        return sum(command.data[0] in MOTIONS for command in self.outstanding)
 
     def await_answer(self) -> None:
         """Wait for the answer of the oldest outstanding command."""

@@ -20,7 +20,7 @@ from detent.files.quantities import INCH
 from detent.methods.load import load_spec
 from detent.methods.print_head.detail import SIGNALS
 from detent.methods.print_head.diablo630 import parse_diablo
-from detent.methods.print_head.page import COLUMN_LIMIT, beyond, error_chart, marks_of, print_page
+from detent.methods.print_head.page import COLUMN_LIMIT, beyond, error_chart, marks_of, print_page, summary_rows
 from detent.methods.print_head.print_job import load_job, parse_text
 from detent.methods.print_head.run import (
     ERROR_BIN,
@@ -28,8 +28,10 @@ from detent.methods.print_head.run import (
     LineRecord,
     PrintRun,
     count_errors,
-    default_signals,
     print_job,
+)
+from detent.methods.print_head.run import (
+    SIGNALS as RECORDED,
 )
 from detent.methods.print_head.schema import COLUMN, PrintHeadSpec
 from detent.methods.print_head.system import PrintHead
@@ -53,7 +55,7 @@ def play(*overrides: str, text: str | None = None, every: int = 10) -> Played:
     spec = load_spec(EXAMPLE, overrides)
     assert isinstance(spec, PrintHeadSpec)
     job = load_job(detent.example("letter.txt")) if text is None else parse_text(text)
-    recorder = Recorder(PrintHead, default_signals(), every=every, period=TICK)
+    recorder = Recorder(PrintHead, RECORDED, every=every, period=TICK)
     run = print_job(spec, job, recorder=recorder)
     return spec, run, recorder.trace()
 
@@ -109,14 +111,18 @@ def with_errors(run: PrintRun, *errors: float) -> PrintRun:
 
 
 def test_what_is_drawn_is_what_is_recorded() -> None:
-    assert set(SIGNALS) <= set(default_signals())
+    assert set(SIGNALS) <= set(RECORDED)
 
 
 def test_every_figure_of_a_run_that_printed(letter: Played, page: Page) -> None:
     spec, run, _ = letter
     assert ids(page) == ["histogram", *OVER_TIME, *IDENTIFIED]
     assert len(page.sections) == 5
-    assert (page.headline.level, page.headline.name, page.settings) == ("good", "letter.txt", {"seed": "1"})
+    assert (page.headline.level, page.headline.name, page.settings) == (
+        "good",
+        "letter.txt",
+        {"fidelity": "averaged", "seed": "1"},
+    )
     assert spec.axis.name in page.headline.kicker
     assert page.paper
     assert sum(len(line["text"]) for line in page.paper["pages"][0]["lines"]) == len(run.strikes)
@@ -514,3 +520,42 @@ def test_a_page_loads_no_plotting_library() -> None:
         [sys.executable, "-c", code], env={"PYTHONPATH": str(source)}, capture_output=True, check=True
     )
     assert done.stdout.strip() == b"[]"
+
+
+# -- for the terminal ---------------------------------------------------------------------------------------
+
+
+def rows_of(text: str, *overrides: str) -> tuple[PrintRun, dict[str, str]]:
+    spec = load_spec(EXAMPLE, overrides)
+    run = print_job(spec, parse_text(text))
+    return run, dict(summary_rows(spec, run))
+
+
+def test_a_printed_job_shows_every_figure_with_its_unit() -> None:
+    run, rows = rows_of("word\n" + " " * 120 + "edge\n")
+    assert list(rows) == [
+        "lines", "characters", "time", "speeds", "turn-arounds", "column error", "identified, right",
+        "identified, left", "motor",
+    ]  # fmt: skip
+    assert rows["lines"] == "2 of 2, on 1 page"
+    assert rows["characters"] == f"8, {8 / run.print_time:.0f} per second"
+    assert rows["time"] == f"{run.print_time:.2f} s, after {run.time_ready:.2f} s of homing and identification"
+    slower = min(run.speeds)
+    assert rows["speeds"] == f"40 in/s (1 line), {slower / 6:.4g} in/s (1 line)"
+    assert rows["column error"] == f"worst {run.worst_error * 1e6:.1f} µm, rms {run.rms_error * 1e6:.1f} µm"
+    assert rows["identified, left"].startswith(
+        f"slope K {run.identified['left'].slope} (true 170.0), friction 28 counts"
+    )
+    assert rows["motor"] == f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J"
+
+
+def test_thousands_are_grouped_with_plain_spaces() -> None:
+    _, rows = rows_of(("x" * 70 + "\n") * 20)
+    assert rows["characters"].startswith("1 400, ")
+
+
+@pytest.mark.parametrize("place", ["7 in", "2 in"])
+def test_of_a_run_that_came_to_nothing_only_what_happened_is_shown(place: str) -> None:
+    _, rows = rows_of("word\n", f"disturbance.obstacle.position={place}")
+    assert list(rows) == ["lines", "motor"]
+    assert rows["lines"] == "0 of 1, on 1 page"

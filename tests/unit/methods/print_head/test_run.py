@@ -16,10 +16,10 @@ from detent.methods.print_head.printed_page import PrintJob
 from detent.methods.print_head.run import (
     ERROR_BIN,
     ERROR_BINS,
+    SIGNALS,
     PrintRun,
     _Runner,
     count_errors,
-    default_signals,
     print_job,
 )
 from detent.methods.print_head.schema import EMITTER
@@ -43,7 +43,7 @@ def play(job: PrintJob | str, *overrides: str) -> PrintRun:
 
 
 def play_recorded(job: PrintJob | str, *overrides: str, every: int = 5) -> tuple[PrintRun, Trace, bytes]:
-    recorder = Recorder(PrintHead, default_signals(), every=every, period=TICK)
+    recorder = Recorder(PrintHead, SIGNALS, every=every, period=TICK)
     runner = _Runner(
         load_spec(EXAMPLE, overrides), job if isinstance(job, PrintJob) else parse_text(job), recorder, untold
     )
