@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 from detent.axisfile.tables import (
+    EncoderTable,
     FrictionTables,
     InterferenceTable,
     MotionProtectionTable,
@@ -21,6 +22,7 @@ from detent.control.guard import Guard, GuardParams
 from detent.errors import GUARD_TEXT
 from detent.plant.drive_train import DriveTrainParams, fill_period
 from detent.plant.push import Push
+from detent.sensing.encoder import EncoderParams
 from detent.sensing.interference import CORRUPT, INSERT_MINUS, INSERT_PLUS, LOSE_SAMPLE, REMOVE, InterferenceParams
 from detent.units import format_quantity
 
@@ -56,15 +58,19 @@ def fill_drive_train(  # noqa: PLR0913 - what a drive train is made of
     fill_period(t)
 
 
+def fill_encoder(p: EncoderParams, table: EncoderTable, pulse: float) -> None:
+    """An encoder with an edge every `pulse` [m]; zero lies between two: on one, rounding alone would make a pulse."""
+    p.edge_pitch, p.origin = pulse, -pulse / 2
+    p.jitter, p.missing = table.jitter / (math.pi / 2), table.missing_edges
+
+
 def fill_slide(p: Any, spec: Any, period: float, bridge_resistance: float = 0.0) -> None:
     """Blocks `train` and `encoder` of a slide on a screw, with its encoder on the motor; `period` is the base tick [s].
 
     `spec` has the tables [motor], [mechanics] (`ScrewTable`), [encoder] and limits.travel, and the way of a `pulse`.
     """
     screw: ScrewTable = spec.mechanics
-    # Zero lies between two edges: on one, rounding alone would make a pulse.
-    p.encoder.edge_pitch, p.encoder.origin = spec.pulse, -spec.pulse / 2
-    p.encoder.jitter, p.encoder.missing = spec.encoder.jitter / (math.pi / 2), spec.encoder.missing_edges
+    fill_encoder(p.encoder, spec.encoder, spec.pulse)
     fill_drive_train(
         p.train, spec.motor, screw.friction, radius=screw.radius, mass=screw.mass(spec.motor),
         travel=spec.limits.travel, period=period, bridge_resistance=bridge_resistance,

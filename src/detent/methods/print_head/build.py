@@ -3,31 +3,22 @@
 import math
 from typing import TypeVar
 
-from detent.axisfile.blocks import fill_drive_train
+from detent.axisfile.blocks import fill_drive_train, fill_encoder
 from detent.files.fields import Table
 from detent.methods.print_head.controller import PERIOD_US
 from detent.methods.print_head.plant import AVERAGED, SWITCH_LEVEL
-from detent.methods.print_head.schema import (
-    COLUMN,
-    EMITTER,
-    FULL_DRIVE_COUNTS,
-    SPEED_STEP,
-    PrintHeadSpec,
-    speed_value,
-)
+from detent.methods.print_head.schema import COLUMN, EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.methods.print_head.system import PrintHeadParams
 from detent.plant.drive_train import DriveTrainParams
 from detent.plant.switched_motor import fill_pulse_table
 
+# Emitters between a frame and the stop target of an identification pass: the stop distance of 40 in/s again, so that a
+# machine a third faster than its nameplate still stops before the frame.
 CALIBRATION_MARGIN = 400
-"""Emitters between a frame and the stop target of an identification pass: the stop distance of 40 in/s again, so that a
-machine a third faster than its nameplate still stops before the frame."""
 
+# Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
+# speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit.
 SLOW_PASS = 60
-"""Speed value of the slow identification pass, 10 in/s. A third of the way to the fast one must show in the measured
-speeds: 60 speed values at 40 in/s, as in the specification (3.3), less for an axis with a lower limit."""
-
-FRICTION = ("coulomb", "static", "viscous")
 
 TableT = TypeVar("TableT", bound=Table)
 
@@ -40,11 +31,10 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
     plant.supply = spec.disturbance.supply
     _fill_drive_train(plant.train, spec)
     fill_pulse_table(plant.train, plant.switched)
-    plant.encoder.edge_pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
+    pitch = spec.mechanics.pulley_circumference / (4 * spec.encoder.cycles_per_revolution)
+    fill_encoder(plant.encoder, spec.encoder, pitch)
     # The left frame lies halfway between two emitters: on one, any error of its edge would move the zero by an emitter.
     plant.encoder.origin = -EMITTER / 2
-    plant.encoder.jitter = spec.encoder.jitter / (math.pi / 2)
-    plant.encoder.missing = spec.encoder.missing_edges
     _fill_options(p, spec)
     _fill_limits(p, spec)
     _fill_columns(p, spec)
@@ -60,10 +50,10 @@ def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
     mechanics, friction = spec.mechanics, spec.mechanics.friction
     radius, drift = mechanics.pulley_circumference / (2 * math.pi), 1 + spec.disturbance.motor_constant
     # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
-    right = _times(friction.right, FRICTION, 1 + spec.disturbance.friction_right, drift)
-    left = _times(friction.left, FRICTION, 1 + spec.disturbance.friction_left, drift)
-    start, end = 0.0, spec.limits.travel
-    obstacle = spec.disturbance.obstacle
+    kinds = ("coulomb", "static", "viscous")
+    right = _times(friction.right, kinds, 1 + spec.disturbance.friction_right, drift)
+    left = _times(friction.left, kinds, 1 + spec.disturbance.friction_left, drift)
+    start, end, obstacle = 0.0, spec.limits.travel, spec.disturbance.obstacle
     if obstacle is not None and mechanics.start_position < obstacle.position:
         end = obstacle.position
     elif obstacle is not None:
@@ -94,9 +84,8 @@ def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
 
 def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     h = p.controller
-    h.drive_limit = min(
-        FULL_DRIVE_COUNTS, math.floor(spec.limits.effort / spec.drive.supply * FULL_DRIVE_COUNTS + 1e-9)
-    )
+    share = spec.limits.effort / spec.drive.supply
+    h.drive_limit = min(FULL_DRIVE_COUNTS, math.floor(share * FULL_DRIVE_COUNTS + 1e-9))
     h.zero_speed_us = round(spec.method.zero_speed_timeout * 1e6)
     h.contact_us = round(spec.homing.contact_timeout * 1e6)
     h.homing_speed = speed_value(spec.homing.speed)

@@ -14,37 +14,20 @@ from detent.methods.print_head.derive import DIRECTIONS, Machine
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
 from detent.units import format_quantity as text
 
-MAX_EMITTERS = 65535
-"""Largest position the axis computer can hold (16 bits, 3.1)."""
-
-MIN_TRAVEL = 1200 * EMITTER
-"""Shortest way in which the calibration passes at 40 in/s can start, be measured and stop [m] (3.3)."""
-
-FASTEST = 1e9
-"""Largest sum of the machine's rates [1/s]: a PWM period then takes 160 000 steps of the power series to prepare."""
-
-PULLEY_TOLERANCE = 1e-3
-"""How far one encoder cycle may be from 1/300 in, relative."""
-
-PWM_PERIOD = 40e-6
-"""One PWM period [s] (2.3)."""
-
-ASSUMED_ACCELERATION = 600 * INCH
-"""Acceleration the method's equations assume [m/s^2] (eq. 6)."""
-
-RAMP_INTERVAL_RANGE = (350e-6, 450e-6)
-"""Usual ramp interval [s] (3.10)."""
-
-LOWEST_FAST_PASS = 84
-"""Speed value from which a fast calibration pass lies far enough from the slow one [1/6 in/s], 14 in/s."""
-
-STANDSTILL_SPEED = 4
-"""Speed value at which the zero-speed detector calls the head standing (4.1: 0.67 in/s)."""
+MAX_EMITTERS = 65535  # largest position the axis computer can hold (16 bits, 3.1)
+MIN_TRAVEL = 1200 * EMITTER  # shortest way on which calibration passes at 40 in/s start, are measured and stop (3.3)
+FASTEST = 1e9  # largest sum of the machine's rates [1/s]: a PWM period then takes 160 000 steps to prepare
+PULLEY_TOLERANCE = 1e-3  # how far one encoder cycle may be from 1/300 in, relative
+PWM_PERIOD = 40e-6  # one PWM period [s] (2.3)
+ASSUMED_ACCELERATION = 600 * INCH  # acceleration the method's equations assume [m/s^2] (eq. 6)
+RAMP_INTERVAL_RANGE = (350e-6, 450e-6)  # usual ramp interval [s] (3.10)
+LOWEST_FAST_PASS = 84  # speed value, 14 in/s, from which a fast calibration pass lies far enough from the slow one
+STANDSTILL_SPEED = 4  # speed value at which the zero-speed detector calls the head standing (4.1: 0.67 in/s)
 
 remedy = Remedies(PrintHeadSpec)
 
 
-# --------------------------------------------------------------------------------------------------- contradictions
+# ---- contradictions
 
 
 def _machine(spec: PrintHeadSpec) -> Iterator[Contradiction]:
@@ -78,10 +61,8 @@ def _machine(spec: PrintHeadSpec) -> Iterator[Contradiction]:
 def _inside_limits(spec: PrintHeadSpec) -> Iterator[Contradiction]:
     """Speeds and places are within the limits."""
     limit, travel, obstacle = spec.limits.speed, spec.limits.travel, spec.disturbance.obstacle
-    for key, speed in (
-        ("method.max_print_speed", spec.method.max_print_speed),
-        ("homing.speed", spec.homing.speed),
-    ):
+    speeds = {"method.max_print_speed": spec.method.max_print_speed, "homing.speed": spec.homing.speed}
+    for key, speed in speeds.items():
         if speed > limit:
             allowed = f"up to limits.speed, {text(limit, 'm/s')} ({limit / INCH:.4g} in/s)"
             yield wrong(f"{key} limits.speed", allowed, f"lower {key} or raise limits.speed")
@@ -103,11 +84,8 @@ def _identified(spec: PrintHeadSpec) -> Iterator[Contradiction]:
     method, low, high = spec.method, spec.method.slope_min, spec.method.slope_max
     friction, most = method.default_friction_counts, method.friction_max_counts
     if low >= high:
-        yield wrong(
-            "method.slope_min method.slope_max",
-            f"below method.slope_max, {high}",
-            "lower method.slope_min or raise method.slope_max",
-        )
+        allowed = f"below method.slope_max, {high}"
+        yield wrong("method.slope_min method.slope_max", allowed, "lower method.slope_min or raise method.slope_max")
     elif not low <= method.default_slope <= high:
         yield wrong(
             "method.default_slope method.slope_min method.slope_max",
@@ -149,17 +127,12 @@ def _simulated(spec: PrintHeadSpec) -> Iterator[Contradiction]:
     yield from common.time_constants(plant, spec.mechanics.friction, FASTEST)
 
 
-RULES: tuple[Callable[[PrintHeadSpec], Iterator[Contradiction]], ...] = (
-    _machine,
-    _inside_limits,
-    _identified,
-    _homing,
-    _simulated,
-)
+Rule = Callable[[PrintHeadSpec], Iterator[Contradiction]]
+RULES: tuple[Rule, ...] = (_machine, _inside_limits, _identified, _homing, _simulated)
 """Contradictions are told in this order."""
 
 
-# --------------------------------------------------------------------------------------------------------- cautions
+# ---- cautions
 
 
 def find_cautions(spec: PrintHeadSpec) -> Iterator[Caution]:

@@ -29,29 +29,14 @@ from detent.record.recorder import Recorder
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
 
-BENCH_EMITTERS = 65_535
-"""Length of the line the machine is measured on: the longest the protocol can count, so that every start has room."""
-
-FROM_FRAME = 200
-"""Emitters between a frame and the start or the target of a measuring run."""
-
-SETTLING = 15
-"""Mechanical time constants until a speed counts as steady: what is left is below 1e-6."""
-
-READING = 0.05
-"""Length of the speed reading at the end of an open-loop run [s]."""
-
-START_TIME = 1.2
-"""Recorded length of a start [s]."""
-
-FIRST_LINE = 0.30
-"""What a line of 13.2 in lasts at 40 in/s, a little less [s]: the mean error over it says how the first line prints."""
-
-BAND = 0.01
-"""Half-width of the band of good speed, as a fraction of the commanded one."""
-
-COLOURS = ("muted", "left", "right")
-"""Of the ways, in their order."""
+BENCH_EMITTERS = 65_535  # length of the line the machine is measured on: the longest the protocol can count
+FROM_FRAME = 200  # emitters between a frame and the start or the target of a measuring run
+SETTLING = 15  # mechanical time constants until a speed counts as steady: what is left is below 1e-6
+READING = 0.05  # length of the speed reading at the end of an open-loop run [s]
+START_TIME = 1.2  # recorded length of a start [s]
+FIRST_LINE = 0.30  # what a line of 13.2 in lasts at 40 in/s, a little less [s]: the mean error is taken over it
+BAND = 0.01  # half-width of the band of good speed, as a fraction of the commanded one
+COLOURS = ("muted", "left", "right")  # of the ways, in their order
 
 Numbers = NDArray[np.float64]
 

@@ -15,14 +15,9 @@ from detent.units import format_quantity
 
 DIRECTIONS = ("right", "left")
 
-TURN_AROUND_TIME = 0.133
-"""Turn-around at 40 in/s the ramp is made for [s] (3.10)."""
-
-RUN_UP_RESERVE = 1.05
-"""Run-up before a print line, in stop distances (3.4)."""
-
-FRAME_RESERVE = 12
-"""Emitters a turning point keeps away from a frame."""
+TURN_AROUND_TIME = 0.133  # turn-around at 40 in/s the ramp is made for [s] (3.10)
+RUN_UP_RESERVE = 1.05  # run-up before a print line, in stop distances (3.4)
+FRAME_RESERVE = 12  # emitters a turning point keeps away from a frame
 
 
 class Machine:

@@ -47,11 +47,8 @@ STATE_EVENTS = {
     (LOW_STOP, IDLE): "zero speed: drive off",
 }
 
-BEFORE_STOP, AFTER_RAMP = 10e-3, 20e-3
-"""Shown of the steady speeds on both sides of a turn-around [s]."""
-
-TOP_SPEED = 240
-"""End of the axis of speed, 40 in/s [1/6 in/s]."""
+BEFORE_STOP, AFTER_RAMP = 10e-3, 20e-3  # shown of the steady speeds on both sides of a turn-around [s]
+TOP_SPEED = 240  # end of the axis of speed, 40 in/s [1/6 in/s]
 
 IN_THE_LINE = (
     "Above: the speed. Below: the drive value the axis computer sent, 300 counts being the full supply. The drive is a "
@@ -68,11 +65,10 @@ IN_THE_TURN = (
 
 def how_figures(run: PrintRun, trace: Trace | None) -> list[Figure]:
     """Those over time for which enough was recorded, and what was identified."""
-    shown: list[Figure | None] = []
+    shown = [_identified_figure(run), _constants_figure(run)]
     if trace is not None and has(trace, SIGNALS):
         lines = recorded_whole(trace, run.lines)
-        shown = [_line_figure(lines, trace), _turn_figure(lines, trace)]
-    shown += [_identified_figure(run), _constants_figure(run)]
+        shown = [_line_figure(lines, trace), _turn_figure(lines, trace), *shown]
     return [figure for figure in shown if figure]
 
 
@@ -91,9 +87,8 @@ def _line_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     # After the stop the computer already demands the speed of the next line.
     demand = np.where(rows.t <= line.stop - line.start, _demanded(rows), np.nan)
     demanded = Curve(label="demanded", colour="muted", dash=(6, 4), y=demand, thin=0)
-    drive = Curve(
-        label="drive value", colour="drive", width=2, step=True, y=rows["controller.head.drive_cmd"], digits=1
-    )
+    value = rows["controller.head.drive_cmd"]
+    drive = Curve(label="drive value", colour="drive", width=2, step=True, y=value, digits=1)
     fired = np.flatnonzero(np.diff(rows["controller.head.columns.fired"]))
     spans = [(float(rows.t[fired[0]]), float(rows.t[fired[-1] + 1]))] if fired.size else []
     bands, events = [Band(label="printing", colour="good", spans=spans), _transition(rows)], _events(rows)
@@ -112,14 +107,13 @@ def _turn_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     if not pairs:
         return None
     before, after = max(pairs, key=lambda pair: pair[1].speed_value)
-    rows = _turn(before, after, trace)
+    both = stretch(trace, SIGNALS, before.start, after.stop)
+    rows = _turn(before, both) if both else None
     if rows is None:
         return None
     current = Curve(label="motor current", colour="current", y=rows["plant.train.current"], digits=4)
-    events = _events(rows)
-    timeline = Timeline(
-        name="turn", t=rows.t, label="time since the stop began", bands=[_transition(rows)], events=events
-    )
+    bands, events = [_transition(rows)], _events(rows)
+    timeline = Timeline(name="turn", t=rows.t, label="time since the stop began", bands=bands, events=events)
     charts = time_charts(timeline, [
         Panel(name="turn-current", label="current [A]", zero=True, curves=[current]),
         Panel(name="turn-speed", label="speed [in/s]", zero=True, curves=[_true_speed(rows, POINTS // 4)], height=160),
@@ -128,11 +122,8 @@ def _turn_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     return Figure(title=title, caption=IN_THE_TURN, charts=charts, events=events)
 
 
-def _turn(before: LineRecord, after: LineRecord, trace: Trace) -> Stretch | None:
-    """Rows of a turn-around, on a clock that starts when the stop begins."""
-    rows = stretch(trace, SIGNALS, before.start, after.stop)
-    if rows is None:
-        return None
+def _turn(before: LineRecord, rows: Stretch) -> Stretch | None:
+    """Rows of a turn-around after a line, on a clock that starts when the stop begins."""
     was, becomes, t = rows["controller.head.state"][:-1], rows["controller.head.state"][1:], rows.t[1:]
     zero_speed = before.stop - before.start
     stops = t[(was == HIGH_STEADY) & (becomes != HIGH_STEADY) & (t < zero_speed)]
@@ -147,9 +138,8 @@ def _turn(before: LineRecord, after: LineRecord, trace: Trace) -> Stretch | None
 def _demanded(rows: Stretch) -> Numbers:
     """Commanded speed [in/s] where one is demanded: from the start of the move to its stop."""
     moving = np.isin(rows["controller.head.state"], (HIGH_ACCEL, HIGH_STEADY, LOW_START, LOW_STEADY))
-    return np.where(
-        moving, rows["controller.head.speed"] * rows["controller.head.direction"] * (SPEED_STEP / INCH), np.nan
-    )
+    speed = rows["controller.head.speed"] * rows["controller.head.direction"]
+    return np.where(moving, speed * (SPEED_STEP / INCH), np.nan)
 
 
 def _true_speed(rows: Stretch, thin: int) -> Curve:
@@ -164,12 +154,8 @@ def _transition(rows: Stretch) -> Band:
 def _events(rows: Stretch) -> list[Event]:
     """Changes of the computer's state, each with the drive value right after it."""
     state, drive = rows["controller.head.state"], rows["controller.head.drive_cmd"]
-    changes = [(k, int(state[k - 1]), int(state[k])) for k in (np.flatnonzero(np.diff(state)) + 1).tolist()]
-    return [
-        Event(float(rows.t[k]), STATE_EVENTS[was, becomes], int(drive[k]))
-        for k, was, becomes in changes
-        if (was, becomes) in STATE_EVENTS
-    ]
+    changes = ((k, (int(state[k - 1]), int(state[k]))) for k in (np.flatnonzero(np.diff(state)) + 1).tolist())
+    return [Event(float(rows.t[k]), STATE_EVENTS[c], int(drive[k])) for k, c in changes if c in STATE_EVENTS]
 
 
 # ---- what the axis knows of itself
@@ -204,16 +190,16 @@ def identified_chart(side: str, found: Direction) -> Chart:
     points = _measured(found)
     speeds = np.array(sorted({0, TOP_SPEED, *points}), dtype=float)
 
-    def drive(slope: float, friction: float) -> Numbers:
-        return slope / 256 * speeds + friction
-
-    default = drive(found.default_slope, found.default_friction)
+    lines: list[tuple[str, str, tuple[int, int] | None, float, float]] = [
+        ("power-on default", "muted", (2, 4), found.default_slope, found.default_friction),
+        ("identified", side, None, found.slope, found.friction),
+        ("true machine", "ink", (8, 6), found.true_slope, found.true_friction),
+    ]
     curves = [
-        Curve(label="power-on default", colour="muted", dash=(2, 4), y=default, digits=2),
-        Curve(label="identified", colour=side, width=3, y=drive(found.slope, found.friction), digits=2),
         Curve(
-            label="true machine", colour="ink", dash=(8, 6), y=drive(found.true_slope, found.true_friction), digits=2
-        ),
+            label=label, colour=colour, dash=dash, width=None if dash else 3, digits=2, y=slope / 256 * speeds + offset
+        )
+        for label, colour, dash, slope, offset in lines
     ]
     if points:
         measured = np.array([points.get(speed, np.nan) for speed in speeds.tolist()])
@@ -233,11 +219,11 @@ def identified_chart(side: str, found: Direction) -> Chart:
 
 def _constants_figure(run: PrintRun) -> Figure | None:
     rows: list[list[str | Cell]] = []
+    of_slope = "drive per speed: the motor's back-EMF in counts"
+    of_friction = f"drive that just keeps the head moving; {FULL_DRIVE_COUNTS} counts are the whole supply"
     for side, found in run.identified.items():
-        unit, meaning = "1/256 count per 1/6 in/s", "drive per speed: the motor's back-EMF in counts"
-        rows.append(_constant(f"slope K, {side}", meaning, unit, found.slope, found.true_slope))
-        meaning = f"drive that just keeps the head moving; {FULL_DRIVE_COUNTS} counts are the whole supply"
-        rows.append(_constant(f"friction Vf, {side}", meaning, "count", found.friction, found.true_friction))
+        rows.append(_constant(f"slope K, {side}", of_slope, "1/256 count per 1/6 in/s", found.slope, found.true_slope))
+        rows.append(_constant(f"friction Vf, {side}", of_friction, "count", found.friction, found.true_friction))
     if run.width:
         rows.append(_constant("width between the frames", "found while homing", "mm", run.width * 1e3, None))
     if not rows:
@@ -249,12 +235,10 @@ def _constants_figure(run: PrintRun) -> Figure | None:
 
 def _constant(name: str, meaning: str, unit: str, identified: float, true: float | None) -> list[str | Cell]:
     named = Markup('{}<br><span class="kicker">{}</span>').format(name, meaning)
-    return [named, number(identified, 4), number(true, 4), _difference(identified, true), unit]
-
-
-def _difference(identified: float, true: float | None) -> str:
-    if true is None:
-        return "\u2013"
-    difference = identified - true
-    text = ("+" if difference > 0 else "") + number(difference, 2)
-    return f"{text} ({100 * difference / abs(true):+.1f}{GAP}%)".replace("-", "\u2212") if true else text
+    difference = "\u2013"
+    if true is not None:
+        off = identified - true
+        difference = ("+" if off > 0 else "") + number(off, 2)
+        if true:
+            difference = f"{difference} ({100 * off / abs(true):+.1f}{GAP}%)".replace("-", "\u2212")
+    return [named, number(identified, 4), number(true, 4), difference, unit]

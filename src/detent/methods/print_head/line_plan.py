@@ -26,11 +26,8 @@ from detent.methods.print_head.printed_page import PrintLine
 
 EMITTERS_PER_COLUMN = 2.5  # columns of 1/120 in
 
-RESERVE = 12
-"""Way that stays free at each frame [emitter]."""
-
-STOP_TOLERANCE = 8
-"""How far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)."""
+RESERVE = 12  # way that stays free at each frame [emitter]
+STOP_TOLERANCE = 8  # how far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)
 
 _ACCELERATION = 3600  # speed values per second: 600 in/s^2
 _RATE = 50  # emitters per second and speed value

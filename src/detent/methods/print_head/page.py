@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from detent.files.quantities import INCH
 from detent.methods.print_head.detail import SIGNALS, how_figures
-from detent.methods.print_head.printed_page import PrintJob
+from detent.methods.print_head.printed_page import PAGE, PrintJob
 from detent.methods.print_head.run import ERROR_BIN, ERROR_BINS, LineRecord, PrintRun
 from detent.methods.print_head.schema import COLUMN, PrintHeadSpec
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
@@ -31,17 +31,12 @@ from detent.page.table import Cell, bar_cell, left_out, long_table
 from detent.page.words import GAP, arrow, count, duration, further, inches_per_second, length, number
 from detent.record.trace import Trace
 
-COLUMN_LIMIT = COLUMN / 2
-"""Largest column error to be called good [m]."""
+COLUMN_LIMIT = COLUMN / 2  # largest column error to be called good [m]
 
 ERROR_PLACES = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN
 """Middle of each bin of the column errors [m], right of the place positive."""
 
-PAGE = 528
-"""Eleven inches in 1/48 in: the usual page of continuous paper."""
-
-MOST_NOTES = 20
-"""Notes about the job on the page: more than anybody reads."""
+MOST_NOTES = 20  # notes about the job on the page: more than anybody reads
 
 UM = 1e6
 
@@ -185,7 +180,7 @@ def _page_tops(job: PrintJob) -> dict[int, int]:
     """Top of each page [1/48 in]: eleven inches each; on shorter forms the first line of a page is its top."""
     tops: dict[int, int] = {}
     for line in job.lines:
-        tops.setdefault(line.page, min(PAGE * (line.page - 1), line.baseline))
+        tops.setdefault(line.page, min(PAGE // 2 * (line.page - 1), line.baseline))
     return tops
 
 

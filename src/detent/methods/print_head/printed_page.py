@@ -13,20 +13,11 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-WHEEL_PITCH = 12
-"""Columns of a glyph on a ten-pitch wheel: the ink width where the spacing says nothing about the glyph."""
-
-NARROWEST_PITCH = 6
-"""Columns of the narrowest pitch, twenty characters per inch."""
-
-LINE = 16
-"""Height of a line at six lines per inch [1/96 in]."""
-
-PAGE = 66 * LINE
-"""Length of an eleven-inch page [1/96 in]."""
-
-OPEN_LINES = 200
-"""Lines that can be struck again without being taken apart first: more than reverse feeds reach on a page."""
+WHEEL_PITCH = 12  # columns of a glyph on a ten-pitch wheel: its ink where the spacing says nothing about the glyph
+NARROWEST_PITCH = 6  # columns of the narrowest pitch, twenty characters per inch
+LINE = 16  # height of a line at six lines per inch [1/96 in]
+PAGE = 66 * LINE  # length of an eleven-inch page [1/96 in]
+OPEN_LINES = 200  # lines that can be struck again at once: more than reverse feeds reach on a page
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +128,10 @@ class PrintJob:
         return sum(len(line.characters) for line in self.lines)
 
 
+_Place = tuple[int, int]  # of a line: page and baseline
+_Ink = dict[tuple[int, str, bool], PrintedCharacter]  # of a line that is open, by column, glyph and ribbon
+
+
 @dataclass(slots=True)
 class Paper:
     """Where the paper stands, where its pages begin, and the ink on it.
@@ -151,12 +146,9 @@ class Paper:
     # top_margin, bottom_margin: first and last printable place of a page, from its top [1/96 in]; None while not set
     top_margin: int | None = None
     bottom_margin: int | None = None  # [1/96 in]
-    # By page and baseline; the characters of a line still open by column, glyph and ribbon.
-    _open: dict[tuple[int, int], dict[tuple[int, str, bool], PrintedCharacter]] = field(
-        default_factory=dict[tuple[int, int], dict[tuple[int, str, bool], PrintedCharacter]]
-    )
-    _settled: dict[tuple[int, int], tuple[PrintedCharacter, ...]] = field(
-        default_factory=dict[tuple[int, int], tuple[PrintedCharacter, ...]]
+    _open: dict[_Place, _Ink] = field(default_factory=dict[_Place, _Ink])
+    _settled: dict[_Place, tuple[PrintedCharacter, ...]] = field(
+        default_factory=dict[_Place, tuple[PrintedCharacter, ...]]
     )
     _known: dict[PrintedCharacter, PrintedCharacter] = field(default_factory=dict[PrintedCharacter, PrintedCharacter])
 

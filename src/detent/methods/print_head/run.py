@@ -180,14 +180,9 @@ class PrintRun(RunRecord[PrintJob]):
         }
 
 
-ERROR_BIN = 1e-7
-"""Width of a bin of the column errors [m]."""
-
-ERROR_BINS = 6001
-"""Bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins."""
-
-MOST_STRIKES = 20_000
-"""Characters kept one by one for the picture of the pages; the figures count all."""
+ERROR_BIN = 1e-7  # width of a bin of the column errors [m]
+ERROR_BINS = 6001  # bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins
+MOST_STRIKES = 20_000  # characters kept one by one for the picture of the pages; the figures count all
 
 
 def print_job(

@@ -21,17 +21,10 @@ from detent.axisfile.tables import (
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import INCH, Length, Mass, Percentage, Resistance, Time, Velocity, Voltage
 
-EMITTER = INCH / 300
-"""Head travel per encoder cycle the method assumes [m] (2.1)."""
-
-COLUMN = INCH / 120
-"""Distance of two print columns [m]: the finest step of a daisy-wheel stream."""
-
-SPEED_STEP = INCH / 6
-"""Velocity of one speed value [m/s] (2.1)."""
-
-FULL_DRIVE_COUNTS = 300
-"""Drive value that gives the full supply voltage (2.1)."""
+EMITTER = INCH / 300  # head travel per encoder cycle the method assumes [m] (2.1)
+COLUMN = INCH / 120  # distance of two print columns [m]: the finest step of a daisy-wheel stream
+SPEED_STEP = INCH / 6  # velocity of one speed value [m/s] (2.1)
+FULL_DRIVE_COUNTS = 300  # drive value that gives the full supply voltage (2.1)
 
 SPEED_RANGE: Any = {
     "allowed": "a velocity from 3 in/s to 40 in/s (76.2 mm/s to 1.016 m/s)", "ge": 3 * INCH, "le": 40 * INCH,

@@ -13,11 +13,8 @@ from detent.control.head_computer import STATE_NAMES
 from detent.errors import AxisError, describe_sb1
 from detent.methods.print_head.controller import PrintHeadController, read_status, write_command
 
-MOST_OUTSTANDING = 3
-"""Unanswered commands: the running one, and a speed or a motion behind it."""
-
-MOST_TRIES = 1000
-"""Stretches of time in which the axis must take a byte; a computer that works takes it in the first."""
+MOST_OUTSTANDING = 3  # unanswered commands: the running one, and a speed or a motion behind it
+MOST_TRIES = 1000  # stretches of time in which the axis must take a byte; a computer that works takes it in the first
 
 
 MOTIONS = (0x8D, 0x92, 0xA2)
