@@ -35,9 +35,7 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
     fill_encoder(plant.encoder, spec.encoder, pitch)
     # The left frame lies halfway between two emitters: on one, any error of its edge would move the zero by an emitter.
     plant.encoder.origin = -EMITTER / 2
-    _fill_options(p, spec)
-    _fill_limits(p, spec)
-    _fill_columns(p, spec)
+    _fill_controller(p, spec)
     push = spec.disturbance.push
     if push is not None:
         plant.push.force = push.force
@@ -71,7 +69,7 @@ def _times(table: TableT, keys: tuple[str, ...], *factors: float) -> TableT:
     return table.model_copy(update={key: math.prod((getattr(table, key), *factors)) for key in keys})
 
 
-def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
+def _fill_controller(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     h, m = p.controller, spec.method
     h.span_steady = m.span == "steady"
     h.plausible.literal_intercept = m.intercept == "literal"
@@ -80,25 +78,18 @@ def _fill_options(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     h.slope_default, h.friction_default, h.ir = m.default_slope, m.default_friction_counts, m.ir_counts
     for option in ("ack_last", "transition", "friction_jump", "trim", "overspeed_test", "memory"):
         setattr(h, option, getattr(m, option))
-
-
-def _fill_limits(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
-    h = p.controller
     share = spec.limits.effort / spec.drive.supply
     h.drive_limit = min(FULL_DRIVE_COUNTS, math.floor(share * FULL_DRIVE_COUNTS + 1e-9))
-    h.zero_speed_us = round(spec.method.zero_speed_timeout * 1e6)
+    h.zero_speed_us = round(m.zero_speed_timeout * 1e6)
     h.contact_us = round(spec.homing.contact_timeout * 1e6)
     h.homing_speed = speed_value(spec.homing.speed)
     h.homing_limit = min(spec.homing.drive_limit_counts, h.drive_limit)
     h.run_speed = speed_value(spec.limits.speed)
-    h.print_speed = min(speed_value(spec.method.max_print_speed), h.run_speed)
+    h.print_speed = min(speed_value(m.max_print_speed), h.run_speed)
     h.expected_width = round(spec.limits.travel / EMITTER)
     h.width_tolerance = round(spec.homing.width_tolerance / EMITTER)
     h.calibration_margin = CALIBRATION_MARGIN
     h.plausible.rise_min = (h.run_speed - SLOW_PASS) // 3
-
-
-def _fill_columns(p: PrintHeadParams, spec: PrintHeadSpec) -> None:
     c, paper = p.controller.columns, p.plant.paper
     c.column_zero = paper.column_zero = round(spec.printing.left_margin / EMITTER * 256)
     c.column_pitch = paper.column_pitch = round(COLUMN / EMITTER * 256)

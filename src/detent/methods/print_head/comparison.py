@@ -28,7 +28,6 @@ from detent.record.machine import Machine, Progress
 from detent.record.recorder import Recorder
 
 SPEEDS = (40 * INCH, 20 * INCH, 10 * INCH)
-
 BENCH_EMITTERS = 65_535  # length of the line the machine is measured on: the longest the protocol can count
 FROM_FRAME = 200  # emitters between a frame and the start or the target of a measuring run
 SETTLING = 15  # mechanical time constants until a speed counts as steady: what is left is below 1e-6
@@ -161,10 +160,10 @@ def _start_figure(found: DriveComparison) -> Figure:
         "late for a line of 13 in at 40 in/s."
     )
     longest = max((start.t for start in found.starts), key=len)
-    curves = [
-        Curve(label=method, colour=colour, width=2, y=_filled(start.velocity / INCH, len(longest)))
-        for method, colour, start in zip(found.methods, COLOURS, found.starts, strict=True)
-    ]
+    curves: list[Curve] = []
+    for method, colour, start in zip(found.methods, COLOURS, found.starts, strict=True):
+        gap = np.full(len(longest) - len(start.t), np.nan)  # to the end, of an axis that gave up
+        curves.append(Curve(label=method, colour=colour, width=2, y=np.append(start.velocity / INCH, gap)))
     levels = [(round(target * (1 + sign * BAND), 3), f"{text}{100 * BAND:g} %") for sign, text in ((1, "+"), (-1, "−"))]
     near = (round(0.95 * target, 3), round(1.03 * target, 3))
     timeline = Timeline(name="drive-starts", t=longest, label="time since the move began", unit="s")
@@ -182,11 +181,6 @@ def _start_figure(found: DriveComparison) -> Figure:
     ]  # fmt: skip
     title = f"How soon is it within {band} of {target:.4g} in/s for good?"
     return Figure(title=title, caption=caption, charts=charts, table=TextTable(title, heads, rows).on_page)
-
-
-def _filled(values: Numbers, rows: int) -> Numbers:
-    """Values of an axis that gave up, with a gap to the end."""
-    return np.concatenate((values, np.full(rows - len(values), np.nan)))
 
 
 def compare_drives(

@@ -21,7 +21,7 @@ from detent.methods.print_head.run import Direction, LineRecord, PrintRun
 from detent.methods.print_head.schema import FULL_DRIVE_COUNTS, SPEED_STEP
 from detent.page.chart import POINTS, Band, Chart, Curve, Panel, Timeline, line_chart, spans_of, time_charts
 from detent.page.figure import Figure
-from detent.page.parts import Event, Numbers
+from detent.page.parts import Event
 from detent.page.run_page import Stretch, has, recorded_whole, stretch
 from detent.page.table import Cell, Table
 from detent.page.words import GAP, number
@@ -85,7 +85,9 @@ def _line_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     if rows is None:
         return None
     # After the stop the computer already demands the speed of the next line.
-    demand = np.where(rows.t <= line.stop - line.start, _demanded(rows), np.nan)
+    moving = np.isin(rows["controller.head.state"], (HIGH_ACCEL, HIGH_STEADY, LOW_START, LOW_STEADY))
+    speed = rows["controller.head.speed"] * rows["controller.head.direction"] * (SPEED_STEP / INCH)
+    demand = np.where(moving & (rows.t <= line.stop - line.start), speed, np.nan)
     demanded = Curve(label="demanded", colour="muted", dash=(6, 4), y=demand, thin=0)
     value = rows["controller.head.drive_cmd"]
     drive = Curve(label="drive value", colour="drive", width=2, step=True, y=value, digits=1)
@@ -133,13 +135,6 @@ def _turn(before: LineRecord, rows: Stretch) -> Stretch | None:
     begin = float(stops[-1])
     part = rows.between(begin - BEFORE_STOP, float(ramps[0]) + AFTER_RAMP)
     return replace(part, t=part.t - begin)
-
-
-def _demanded(rows: Stretch) -> Numbers:
-    """Commanded speed [in/s] where one is demanded: from the start of the move to its stop."""
-    moving = np.isin(rows["controller.head.state"], (HIGH_ACCEL, HIGH_STEADY, LOW_START, LOW_STEADY))
-    speed = rows["controller.head.speed"] * rows["controller.head.direction"]
-    return np.where(moving, speed * (SPEED_STEP / INCH), np.nan)
 
 
 def _true_speed(rows: Stretch, thin: int) -> Curve:

@@ -22,6 +22,12 @@ from detent.methods.print_head.printed_page import LINE, WHEEL_PITCH, Paper, Pri
 LINE_END = 1584  # right end of the print line [1/120 in]: 13.2 inches
 
 
+def put(of: Any, **settings: Any) -> None:
+    """Change settings of the printer, of its modes or of its paper."""
+    for name, value in settings.items():
+        setattr(of, name, value)
+
+
 # ---- the mechanism: a carriage with a hammer, paper, and modes
 
 
@@ -94,28 +100,18 @@ class Printer:
 
     def end_word_processing(self) -> None:
         """End the modes that change what a character looks like; direction and graphics stay."""
-        self.put(program_mode=False)
-        self.put_modes(bold=False, shadow=False, underscore=False, offset=0)
+        put(self, program_mode=False)
+        put(self.modes, bold=False, shadow=False, underscore=False, offset=0)
 
     def reset(self) -> None:
         """Restore the settings of power-on; paper and what is printed stay."""
         self.paper.clear_margins()
         fresh = Printer(self.paper)
-        self.put(**{setting.name: getattr(fresh, setting.name) for setting in fields(fresh)})
-
-    def put(self, **settings: Any) -> None:
-        """Change settings of the printer."""
-        for name, value in settings.items():
-            setattr(self, name, value)
-
-    def put_modes(self, **modes: int) -> None:
-        """Change modes of the line."""
-        for name, value in modes.items():
-            setattr(self.modes, name, value)
+        put(self, **{setting.name: getattr(fresh, setting.name) for setting in fields(fresh)})
 
     def set_offset(self, n: int) -> None:
         """Add the low six bits of n to every advance [1/120 in]; bit 6 is the sign."""
-        self.put_modes(offset=-(n & 0x3F) if n & 0x40 else n & 0x3F)
+        put(self.modes, offset=-(n & 0x3F) if n & 0x40 else n & 0x3F)
 
     def next_tab(self) -> str | None:
         """Move the carriage right to the next stop, whatever the direction of printing."""
@@ -146,14 +142,6 @@ class Printer:
             return "a page without length; ignored"
         self.paper.set_form(n * 2 * self.vmi)
         return None
-
-    def set_top_margin(self) -> None:
-        """Begin the pages to come at this line."""
-        self.paper.top_margin = self.paper.from_top
-
-    def set_bottom_margin(self) -> None:
-        """End the pages after this line."""
-        self.paper.bottom_margin = self.paper.from_top
 
 
 # ---- the codes
@@ -226,54 +214,54 @@ CONTROL: Final = _codes("", {
 
 ESCAPE: Final = _codes("ESC ", {
     # -- places and distances
-    "US n": ("horizontal motion index n-1 [1/120 in]", _less_one("motion index", lambda p, n: p.put(hmi=n))),
-    "RS n": ("vertical motion index n-1 [1/48 in]", _less_one("motion index", lambda p, n: p.put(vmi=n))),
+    "US n": ("horizontal motion index n-1 [1/120 in]", _less_one("motion index", lambda p, n: put(p, hmi=n))),
+    "RS n": ("vertical motion index n-1 [1/48 in]", _less_one("motion index", lambda p, n: put(p, vmi=n))),
     "HT n": ("carriage to print position n-1, counted in motion indices",
-             _less_one("print position", lambda p, n: p.put(column=n * p.hmi))),
+             _less_one("print position", lambda p, n: put(p, column=n * p.hmi))),
     "VT n": ("paper to line n-1 of the page", _less_one("line", lambda p, n: p.line_at(n * 2 * p.vmi))),
     "FF n": ("n lines per page; the page begins here", lambda p, n: p.set_page(n)),
     "DC1 n": ("offset added to the advance of every character", lambda p, n: p.set_offset(n)),
-    "S": ("motion index back to the spacing switch, ten characters per inch", lambda p, _: p.put(hmi=WHEEL_PITCH)),
+    "S": ("motion index back to the spacing switch, ten characters per inch", lambda p, _: put(p, hmi=WHEEL_PITCH)),
     # -- margins and tab stops
-    "9": ("left margin here", lambda p, _: p.put(left_margin=p.column)),
+    "9": ("left margin here", lambda p, _: put(p, left_margin=p.column)),
     "0": ("right margin here; it bounds only justified and centred text", Ignored.ACCEPTED),
-    "T": ("top margin here", lambda p, _: p.set_top_margin()),
-    "L": ("bottom margin here", lambda p, _: p.set_bottom_margin()),
+    "T": ("top margin here", lambda p, _: put(p.paper, top_margin=p.paper.from_top)),
+    "L": ("bottom margin here", lambda p, _: put(p.paper, bottom_margin=p.paper.from_top)),
     "C": ("top and bottom margins cleared", lambda p, _: p.paper.clear_margins()),
     "1": ("tab stop here", lambda p, _: p.tab_stops.add(p.column)),
     "8": ("tab stop here cleared", lambda p, _: p.tab_stops.discard(p.column)),
     "-": ("vertical tab stop here", lambda p, _: p.vertical_stops.add(p.paper.from_top)),
-    "2": ("all tab stops cleared", lambda p, _: p.put(tab_stops=set[int](), vertical_stops=set[int]())),
+    "2": ("all tab stops cleared", lambda p, _: put(p, tab_stops=set[int](), vertical_stops=set[int]())),
     # -- single motions
     "BS": ("carriage back by 1/120 inch", lambda p, _: p.move(-1)),
     "LF": ("paper down by one line", lambda p, _: p.feed(-2)),
     "U": ("paper up by half a line", lambda p, _: p.feed(1)),
     "D": ("paper down by half a line", lambda p, _: p.feed(-1)),
     # -- direction of printing
-    "5": ("forward printing", lambda p, _: p.put_modes(backward=False)),
-    "6": ("backward printing: the carriage moves left after every character", lambda p, _: p.put_modes(backward=True)),
+    "5": ("forward printing", lambda p, _: put(p.modes, backward=False)),
+    "6": ("backward printing: the carriage moves left after every character", lambda p, _: put(p.modes, backward=True)),
     "/": ("the printer chooses the direction of each line", Ignored.ACCEPTED),
     "\\": ("every line is printed to the right", Ignored.ACCEPTED),
     "<": ("reverse printing; the lines are printed as they come", Ignored.NOT_SUPPORTED),
     ">": ("reverse printing off", Ignored.ACCEPTED),
-    "?": ("new line of itself at the right end of the print line", lambda p, _: p.put(auto_return=True)),
-    "!": ("no new line of itself", lambda p, _: p.put(auto_return=False)),
+    "?": ("new line of itself at the right end of the print line", lambda p, _: put(p, auto_return=True)),
+    "!": ("no new line of itself", lambda p, _: put(p, auto_return=False)),
     # -- what a character looks like
-    "O": ("bold: every character struck twice", lambda p, _: p.put_modes(bold=True)),
-    "W": ("shadow: every character struck again 1/120 inch to the right", lambda p, _: p.put_modes(shadow=True)),
-    "&": ("bold and shadow off", lambda p, _: p.put_modes(bold=False, shadow=False)),
-    "E": ("underscore on", lambda p, _: p.put_modes(underscore=True)),
-    "R": ("underscore off", lambda p, _: p.put_modes(underscore=False)),
-    "A": ("secondary ribbon colour", lambda p, _: p.put(red=True)),
-    "B": ("primary ribbon colour", lambda p, _: p.put(red=False)),
+    "O": ("bold: every character struck twice", lambda p, _: put(p.modes, bold=True)),
+    "W": ("shadow: every character struck again 1/120 inch to the right", lambda p, _: put(p.modes, shadow=True)),
+    "&": ("bold and shadow off", lambda p, _: put(p.modes, bold=False, shadow=False)),
+    "E": ("underscore on", lambda p, _: put(p.modes, underscore=True)),
+    "R": ("underscore off", lambda p, _: put(p.modes, underscore=False)),
+    "A": ("secondary ribbon colour", lambda p, _: put(p, red=True)),
+    "B": ("primary ribbon colour", lambda p, _: put(p, red=False)),
     "7": ("characters to the end of the line move the carriage and print nothing",
-          lambda p, _: p.put_modes(suppressed=True)),
+          lambda p, _: put(p.modes, suppressed=True)),
     "P": ("proportional spacing; its widths belong to a wheel, the motion index stays in force", Ignored.NOT_SUPPORTED),
     "Q": ("proportional spacing off", Ignored.ACCEPTED),
     # -- modes of text and graphics
     "3": ("graphics: blanks of 1/60 inch, lines of 1/48 inch, characters do not advance",
-          lambda p, _: p.put_modes(graphics=True)),
-    "4": ("graphics off", lambda p, _: p.put_modes(graphics=False)),
+          lambda p, _: put(p.modes, graphics=True)),
+    "4": ("graphics off", lambda p, _: put(p.modes, graphics=False)),
     "X": ("bold, shadow, underscore, offset and program mode off", lambda p, _: p.end_word_processing()),
     "=": ("centring; the line is printed where it comes", Ignored.NOT_SUPPORTED),
     "M": ("justification; the line is printed where it comes", Ignored.NOT_SUPPORTED),
@@ -284,7 +272,7 @@ ESCAPE: Final = _codes("ESC ", {
     "CR n": ("reset, for n = P", _only("P", lambda p, _: p.reset())),
     "SUB n": ("reset, for n = I; otherwise remote diagnosis", _only("I", lambda p, _: p.reset())),
     "SO n": ("program mode, for n = M: a byte of hammer force after each character",
-             _only("M", lambda p, _: p.put(program_mode=True))),
+             _only("M", lambda p, _: put(p, program_mode=True))),
     "EM n": ("sheet feeder; the paper is left where it is", Ignored.NOT_SUPPORTED),
     "SYN n": ("download; ignored", Ignored.NOT_SUPPORTED),
     "CAN n": ("special function; ignored", Ignored.NOT_SUPPORTED),

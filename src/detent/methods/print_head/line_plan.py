@@ -25,7 +25,6 @@ from detent.errors import FileProblem, InputError
 from detent.methods.print_head.printed_page import PrintLine
 
 EMITTERS_PER_COLUMN = 2.5  # columns of 1/120 in
-
 RESERVE = 12  # way that stays free at each frame [emitter]
 STOP_TOLERANCE = 8  # how far a stop may miss its place [emitter]; the axis does not correct it (spec, tests 38 and 45)
 

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from detent.files.quantities import INCH
 from detent.methods.print_head.detail import SIGNALS, how_figures
-from detent.methods.print_head.printed_page import PAGE, PrintJob
+from detent.methods.print_head.printed_page import PAGE
 from detent.methods.print_head.run import ERROR_BIN, ERROR_BINS, LineRecord, PrintRun
 from detent.methods.print_head.schema import COLUMN, PrintHeadSpec
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
@@ -33,11 +33,8 @@ from detent.record.trace import Trace
 
 COLUMN_LIMIT = COLUMN / 2  # largest column error to be called good [m]
 
-ERROR_PLACES = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN
-"""Middle of each bin of the column errors [m], right of the place positive."""
-
+ERROR_PLACES = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN  # middle of each bin [m], right of the place > 0
 MOST_NOTES = 20  # notes about the job on the page: more than anybody reads
-
 UM = 1e6
 
 
@@ -158,7 +155,8 @@ def _result(run: PrintRun) -> list[Figure]:
 def marks_of(run: PrintRun) -> Marks:
     """Every character that was fired, at its place on its page."""
     lines = {line.number: line for line in run.job.lines}
-    tops = _page_tops(run.job)
+    # Eleven inches each [1/48 in]; on shorter forms the first line of a page, here the last that is asked, is its top.
+    tops = {line.page: min(PAGE // 2 * (line.page - 1), line.baseline) for line in reversed(run.job.lines)}
     directions = {line.number: line.direction for line in run.lines}
     struck = [strike for strike in run.strikes if not isnan(strike.offset)]
     of = [lines[strike.line] for strike in struck]
@@ -174,14 +172,6 @@ def marks_of(run: PrintRun) -> Marks:
         direction=np.array([directions[line.number] for line in of], dtype=int),
         strikes=np.array([strike.character.strike for strike in struck], dtype=int),
     )
-
-
-def _page_tops(job: PrintJob) -> dict[int, int]:
-    """Top of each page [1/48 in]: eleven inches each; on shorter forms the first line of a page is its top."""
-    tops: dict[int, int] = {}
-    for line in job.lines:
-        tops.setdefault(line.page, min(PAGE // 2 * (line.page - 1), line.baseline))
-    return tops
 
 
 def _error_figure(run: PrintRun) -> Figure:

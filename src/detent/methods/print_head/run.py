@@ -209,15 +209,12 @@ class _Runner:
         self.machine = print_head_machine(spec, recorder)
         self.state = self.machine.state
         self.result = PrintRun(job)
-        self.supervisor = Supervisor(
-            self.state.controller, self.machine.pass_time, self.on_answer, ack_last=spec.method.ack_last
-        )
-        self.head = self.state.controller.head
-        buffer: Any = self.head.buffer  # ctypes gives the elements of an array no type
+        controller, self.head = self.state.controller, self.state.controller.head
+        self.supervisor = Supervisor(controller, self.machine.pass_time, self.on_answer, spec.method.ack_last)
+        self.buffer: Any = self.head.buffer  # ctypes gives the elements of an array no type
         paper: Any = self.state.plant.paper
-        self.buffer = buffer
         # By bank of the line buffer: banks alternate with every PRINT, the first is bank 1.
-        self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(buffer.ink).reshape(2, COLUMNS)
+        self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(self.buffer.ink).reshape(2, COLUMNS)
         self.landed: NDArray[np.int32] = np.ctypeslib.as_array(paper.landed).reshape(2, COLUMNS)
         self.plans: tuple[LinePlan, ...] = ()
         self.sum_squares = 0.0

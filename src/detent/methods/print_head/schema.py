@@ -157,14 +157,8 @@ class PrintHeadSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: PrintHeadSpec) -> PrintHeadSpec:
     """Fill the defaults that depend on another table, as their `derived` texts say."""
-    defaults = {
-        "mechanics": ("start_position", 0.25 * spec.limits.travel),
-        "method": ("max_print_speed", spec.limits.speed),
-        "disturbance": ("supply", spec.drive.supply),
-    }
-    updates: dict[str, Table] = {}
-    for table, (key, value) in defaults.items():
-        held: Table = getattr(spec, table)
-        if math.isnan(getattr(held, key)):
-            updates[table] = held.model_copy(update={key: value})
-    return spec.model_copy(update=updates)
+    return spec.filled(
+        mechanics={"start_position": 0.25 * spec.limits.travel},
+        method={"max_print_speed": spec.limits.speed},
+        disturbance={"supply": spec.drive.supply},
+    )
