@@ -6,6 +6,7 @@ from typing import TypeVar
 from detent.axisfile.blocks import fill_drive_train, fill_encoder
 from detent.files.fields import Table
 from detent.methods.print_head.controller import PERIOD_US
+from detent.methods.print_head.derive import Machine
 from detent.methods.print_head.plant import AVERAGED, SWITCH_LEVEL
 from detent.methods.print_head.schema import COLUMN, EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.methods.print_head.system import PrintHeadParams
@@ -46,7 +47,7 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
 
 def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
     mechanics, friction = spec.mechanics, spec.mechanics.friction
-    radius, drift = mechanics.pulley_circumference / (2 * math.pi), 1 + spec.disturbance.motor_constant
+    machine, drift = Machine(spec), 1 + spec.disturbance.motor_constant
     # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
     kinds = ("coulomb", "static", "viscous")
     right = _times(friction.right, kinds, 1 + spec.disturbance.friction_right, drift)
@@ -58,8 +59,7 @@ def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
         start = obstacle.position
     fill_drive_train(
         t, _times(spec.motor, ("torque_constant", "back_emf_constant"), drift),
-        friction.model_copy(update={"right": right, "left": left}), radius=radius,
-        mass=mechanics.carriage_mass + mechanics.belt_mass + spec.motor.rotor_inertia / radius**2,
+        friction.model_copy(update={"right": right, "left": left}), radius=machine.radius, mass=machine.mass,
         travel=end, start=start, period=PERIOD_US * 1e-6, bridge_resistance=spec.drive.bridge_resistance,
     )  # fmt: skip
 

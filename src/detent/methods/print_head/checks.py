@@ -11,7 +11,7 @@ from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import Remedies
 from detent.files.quantities import INCH
 from detent.methods.print_head.derive import DIRECTIONS, Machine
-from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
+from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.units import format_quantity as text
 
 MAX_EMITTERS = 65535  # largest position the axis computer can hold (16 bits, 3.1)
@@ -233,7 +233,7 @@ def _ramp(m: Machine) -> Iterator[Caution]:
 def _breaking_loose(m: Machine) -> Iterator[Caution]:
     """The drive of a start and that of homing move the head."""
     method, homing = m.spec.method, m.spec.homing
-    speed = int(homing.speed / SPEED_STEP)
+    speed = speed_value(homing.speed)
     for direction in DIRECTIONS:
         available = m.coulomb_counts[direction] + method.ir_counts
         if m.static_counts[direction] > available:

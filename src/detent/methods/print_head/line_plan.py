@@ -93,8 +93,7 @@ def plan_lines(
     Each line runs at the highest speed that fits between the frames in its direction. The directions are chosen
     together, by dynamic programming over the job.
     """
-    directions = (1, -1) if bidirectional else (1,)
-    choices = [_passes(line, geometry, directions) for line in lines]
+    choices = [_passes(line, geometry, (1, -1) if bidirectional else (1,)) for line in lines]
     misfits = [_misfit(line, geometry, job_name) for line, passes in zip(lines, choices, strict=True) if not passes]
     if misfits:
         raise InputError(misfits)
@@ -122,8 +121,7 @@ class _Pass:
 def _passes(line: PrintLine, geometry: Geometry, directions: tuple[int, ...]) -> tuple[_Pass, ...]:
     """Give the line in each direction in which it fits, at the highest speed that does."""
     left, right = geometry.emitter(line.first_column), geometry.emitter(line.last_column)
-    found = [_fastest(left, right, d, geometry) for d in directions]
-    return tuple(each for each in found if each is not None)
+    return tuple(found for d in directions if (found := _fastest(left, right, d, geometry)))
 
 
 @lru_cache(maxsize=4096)
