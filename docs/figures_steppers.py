@@ -124,12 +124,12 @@ def torque() -> None:
     m = figures_of(*OPEN)
     hz = np.linspace(0, 5000, 400)
     there = np.array([m.motor.pull_out(f) for f in hz.tolist()]) * 1e3
-    used = (m.motor.load.friction_torque + m.acceleration_torque(1.0) * np.diff(m.ramp.hz**2, append=np.nan) / 2) * 1e3
+    used = (m.motor.friction_torque + m.acceleration_torque(1.0) * np.diff(m.ramp.hz**2, append=np.nan) / 2) * 1e3
     with picture("torque.svg", 1, 3.8, columns=2, share_x=False) as (known, wound):
         known.plot(hz, there, color=BLUE, label="pull-out")
         known.plot(hz, there / m.table.drive.torque_safety, color=BLUE, linestyle="--", label="divided by SF")
         known.plot(m.ramp.hz, used, color=ORANGE, label="the ramp takes")
-        known.axhline(m.motor.load.friction_torque * 1e3, color=GREY, linewidth=1, label="friction")
+        known.axhline(m.motor.friction_torque * 1e3, color=GREY, linewidth=1, label="friction")
         for f, text, place in (
             (m.linear_end, "linear up to", (1300, 3.4)),
             (m.torque_end, "no torque left at", (1900, 0.9)),
@@ -348,7 +348,7 @@ def margin() -> None:
         area.plot(fine, bound, "--", color=GREY, label="torque of the rotor − inertia × acceleration")
         area.plot(factors, most, "o-", color=BLUE, markersize=4, label="no step lost below")
         area.fill_between(safe, 0, promised, color=GREEN, alpha=0.35, linewidth=0, label="reserve of the random tests")
-        area.plot(1, m.motor.load.friction_torque * 1e3, "*", color=ORANGE, markersize=13, label="the example")
+        area.plot(1, m.motor.friction_torque * 1e3, "*", color=ORANGE, markersize=13, label="the example")
         area.set_xlim(0.5, 11.5)
         area.set_ylim(0, 18)
         area.set_xlabel("inertia, as a multiple of that of rotor and load")

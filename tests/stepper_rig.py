@@ -24,22 +24,43 @@ from detent.methods.stepper_envelope.system import (
     tables,
     take_over,
 )
-from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import StepEnvelope, StopEdit, Zone, ZoneMap
-from detent.planning.step_ramp import StepperLoad, StepperMotor, StepRamp, make_ramp
+from detent.planning.step_ramp import FirstOrderPullOut, StepperMotor, StepRamp, make_ramp
 from detent.plant.stepper_rotor import RotorParams, fill_curve, lost_steps
 
 N = 8000
 START_HZ, MAX_HZ, FINE_HZ = 400.0, 4000.0, 1000.0
 A_LIN = 40_000.0
-LOAD = StepperLoad(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
+
+
+@dataclass(frozen=True)
+class Load:
+    """What hangs on the shaft."""
+
+    pitch: float
+    mass: float
+    spindle_inertia: float
+    coupling_inertia: float
+    friction_torque: float
+
+    @property
+    def inertia(self) -> float:
+        return self.spindle_inertia + self.coupling_inertia + self.mass * (self.pitch / (2 * math.pi)) ** 2
+
+    @property
+    def of_motor(self) -> dict[str, float]:
+        """Fields of a motor with this load."""
+        return {"load_inertia": self.inertia, "friction_torque": self.friction_torque}
+
+
+LOAD = Load(pitch=1e-3, mass=0.12, spindle_inertia=6.0e-8, coupling_inertia=5.0e-8, friction_torque=0.006)
 MOTOR = StepperMotor(
     steps_per_turn=200,
     rotor_inertia=9.0e-7,
     holding_torque=0.06,
     pull_out=FirstOrderPullOut(torque=0.045, corner_hz=1200.0),
     unloaded_start_hz=900.0,
-    load=LOAD,
+    **LOAD.of_motor,
 )
 DT = 2e-6
 SETTLE = 0.05
@@ -68,7 +89,7 @@ def rotor_params(motor: StepperMotor = MOTOR, inertia: float | None = None, top:
         inertia=total,
         torque=motor.holding_torque,
         damping=0.4 * math.sqrt(teeth * motor.holding_torque * total),
-        friction=motor.load.friction_torque,
+        friction=motor.friction_torque,
     )
     fill_curve(p, motor.pull_out, top)
     return p
@@ -134,7 +155,7 @@ class Rig:
         max_hz: float = MAX_HZ,
         ramp: StepRamp = RAMP,
         motor: StepperMotor = MOTOR,
-        load: StepperLoad | None = None,
+        load: Load | None = None,
         inertia: float | None = None,
         reload: bool = False,
         literal: bool = False,
@@ -142,7 +163,7 @@ class Rig:
         down_zones: Sequence[Zone] | None = None,
     ) -> None:
         turn = steps if turn is None else turn
-        motor = motor if load is None else replace(motor, load=load)
+        motor = motor if load is None else replace(motor, **load.of_motor)
         other = zones if down_zones is None else down_zones
         self.ramp, self.zones = ramp, ZoneMap(steps, max_hz, zones, [max_hz, *(zone.max_hz for zone in other)])
         self.down_zones = ZoneMap(steps, max_hz, other, self.zones.limits)
@@ -349,7 +370,7 @@ def course_of(rows: np.ndarray, clock_hz: int, seconds: float) -> Course:
     )
 
 
-def heavier(load: StepperLoad, **changes: float) -> StepperLoad:
+def heavier(load: Load, **changes: float) -> Load:
     """The load with other figures."""
     return replace(load, **changes)
 

@@ -21,13 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from tests.property.numbered_cases import chance, log_uniform, whole
-from tests.stepper_rig import MOTOR, START_HZ
+from tests.stepper_rig import MOTOR, START_HZ, Load
 
-from detent.planning.pull_out import FIRST_HARMONIC, FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
 from detent.planning.step_ramp import (
-    StepperLoad,
+    FIRST_HARMONIC,
+    FirstOrderPullOut,
+    MeasuredPullOut,
+    PullOut,
     StepperMotor,
     StepRamp,
+    WindingPullOut,
     make_ramp,
 )
 
@@ -100,19 +103,19 @@ def draw_motor(rng: np.random.Generator) -> tuple[StepperMotor, float]:
     inertia = steps / 4 * torque / (2 * math.pi * natural) ** 2
     rotor = inertia / (1 + log_uniform(rng, 0.01, 10.0))
     share, pitch = rng.random(), log_uniform(rng, 5e-4, 2e-2)
-    load = StepperLoad(
+    load = Load(
         pitch=pitch,
         mass=(inertia - rotor) * share / (pitch / (2 * math.pi)) ** 2,
         spindle_inertia=(inertia - rotor) * (1 - share),
         coupling_inertia=0.0,
         friction_torque=0.0 if chance(rng, 0.1) else rng.uniform(0.0, FRICTION) * torque,
     )
-    return StepperMotor(steps, rotor, torque, pull_out, natural, load), natural
+    return StepperMotor(steps, rotor, torque, pull_out, natural, **load.of_motor), natural
 
 
 def is_inside_margin(motor: StepperMotor, ramp: StepRamp) -> bool:
     """Whether the rotor is promised to follow this ramp."""
-    inertia, friction, natural = motor.inertia, motor.load.friction_torque, motor.natural_hz
+    inertia, friction, natural = motor.inertia, motor.friction_torque, motor.natural_hz
     torque = np.array([motor.pull_out(float(hz)) for hz in ramp.hz]) * motor.holding_torque / motor.pull_out(0.0)
     taken = friction + inertia * motor.step_angle * np.diff(ramp.hz**2, append=ramp.hz[-1] ** 2)
     return bool(
@@ -126,7 +129,7 @@ def is_inside_margin(motor: StepperMotor, ramp: StepRamp) -> bool:
 def spare_acceleration(motor: StepperMotor, hz: float) -> float:
     """What the margin leaves at a frequency to accelerate with [step/s^2]."""
     torque = motor.pull_out(hz) / motor.pull_out(0.0) * motor.holding_torque
-    return (USED * torque - motor.load.friction_torque) / 2 / (motor.inertia * motor.step_angle)
+    return (USED * torque - motor.friction_torque) / 2 / (motor.inertia * motor.step_angle)
 
 
 def draw_share(rng: np.random.Generator) -> float:

@@ -25,9 +25,8 @@ from tests.property.step_motors import START, Axis, is_inside_margin, spare_acce
 from tests.stepper_rig import A_LIN, LOAD, MAX_HZ, MOTOR, RAMP, Rig, heavier
 
 from detent.control.step_rule import FAULT, REST
-from detent.planning.pull_out import FirstOrderPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
-from detent.planning.step_ramp import StepperMotor, make_ramp, natural_frequency
+from detent.planning.step_ramp import FirstOrderPullOut, StepperMotor, make_ramp, natural_frequency
 
 pytestmark = pytest.mark.early
 
@@ -49,7 +48,7 @@ def axes(draw: st.DrawFn) -> Axis:
     )
     natural = natural_frequency(200, torque, inertia + load.inertia)
     pull_out = FirstOrderPullOut(0.75 * torque, draw(st.floats(3.1, 12.0)) * natural)
-    motor = StepperMotor(200, inertia, torque, pull_out, 900.0, load)
+    motor = StepperMotor(200, inertia, torque, pull_out, 900.0, **load.of_motor)
     start = draw(st.floats(0.3, START)) * natural
     top = start * draw(st.floats(1.0, 12.0))
     spare = spare_acceleration(motor, top)
@@ -173,8 +172,8 @@ KINDS = (
 
 def test_the_default_motor_lies_inside_the_margin_and_not_far_inside():
     assert is_inside_margin(MOTOR, RAMP)
-    assert not is_inside_margin(replace(MOTOR, load=heavier(LOAD, friction_torque=0.0061)), RAMP)
-    assert not is_inside_margin(replace(MOTOR, load=heavier(LOAD, spindle_inertia=1.5e-7)), RAMP)
+    assert not is_inside_margin(replace(MOTOR, **heavier(LOAD, friction_torque=0.0061).of_motor), RAMP)
+    assert not is_inside_margin(replace(MOTOR, **heavier(LOAD, spindle_inertia=1.5e-7).of_motor), RAMP)
     assert not is_inside_margin(MOTOR, make_ramp(410, MAX_HZ, MOTOR.acceleration_limit(A_LIN)))
     assert not is_inside_margin(replace(MOTOR, pull_out=FirstOrderPullOut(0.045, 800.0)), RAMP)
 

@@ -11,7 +11,6 @@ step over the interval i, from boundary i to i + 1, departs from i upwards and f
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -42,19 +41,16 @@ class ZoneMap:
     """Speed limit of every step."""
 
     def __init__(self, steps: int, max_hz: float, zones: Sequence[Zone] = (), also: Sequence[float] = ()) -> None:
-        self.steps, self.max_hz, self.zones = steps, max_hz, tuple(sorted(zones, key=lambda zone: zone.begin))
-        rows: list[tuple[int, float]] = [(0, max_hz)]
-        for zone in self.zones:
-            rows += [(zone.begin, zone.max_hz), (zone.end, max_hz)]
-        kept = [row for row, following in pairwise([*rows, (steps, 0.0)]) if row[0] < following[0]]
-        # each limit once, the largest first [Hz]
-        self.limits = tuple(sorted({*also, *(hz for _, hz in kept)}, reverse=True))
+        self.steps, self.max_hz, self.zones = steps, max_hz, tuple(zone for zone in zones if zone.begin < zone.end)
+        edges = sorted({0, steps, *(edge for zone in self.zones for edge in (zone.begin, zone.end))})
+        # A step that two zones touch is the slower one's.
+        inside = ([zone.max_hz for zone in self.zones if zone.begin <= place < zone.end] for place in edges[:-1])
+        hz = [min(limits, default=max_hz) for limits in inside]
+        self.limits = tuple(sorted({*also, *hz}, reverse=True))  # each limit once, the largest first [Hz]
         if len(self.limits) > MAX_LIMITS:
             raise ValueError(f"the zones have {len(self.limits)} different limits, must be {MAX_LIMITS} or fewer")
-        # where the limit changes, 0 and N included
-        self.edges = np.array([*(begin for begin, _ in kept), steps], np.int64)
-        # number of each stretch's limit in `limits`
-        self.numbers = np.array([self.limits.index(hz) for _, hz in kept], np.int32)
+        self.edges = np.array(edges, np.int64)  # where the limit changes, 0 and N included
+        self.numbers = np.array([self.limits.index(one) for one in hz], np.int32)  # of each stretch's limit in `limits`
 
     def mirrored(self) -> "ZoneMap":
         """The same limits as one meets them coming from the upper end."""

@@ -1,39 +1,89 @@
-"""How fast an open-loop stepper may gain speed: its ramp list (stepper-envelope specification 3.1).
+"""What an open-loop stepper can do: its pull-out torque, and its ramp list (stepper-envelope specification 3.1).
 
-A stepper has no sensor: a step that the rotor does not follow is lost for good. Coil current rises at a limited rate,
-so the torque falls with the step frequency, and part of it accelerates the inertia. From this follow the frequency at
-which the motor starts and stops directly, and the frequency that each further step may have: the ramp list.
+A stepper has no sensor: a step that the rotor does not follow is lost for good. Pull-out torque is the most a motor
+that is in step can drive without falling out of it. It falls with the step frequency, because coil current rises at a
+limited rate and the rotor's own voltage opposes it. Part of it accelerates the inertia. From this follow the frequency
+at which the motor starts and stops directly, and the frequency that each further step may have: the ramp list.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import pi, sqrt
+from itertools import pairwise
+from math import hypot, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-
-from detent.planning.pull_out import PullOut
 
 Numbers = NDArray[np.float64]
 
 LEAST_GAIN_HZ = 0.5  # a ramp ends where a step gains less than this: the torque left over is used up
 MAX_HZ = 65535  # largest frequency in a 16-bit word
+FIRST_HARMONIC = 4 / pi  # fundamental of a square wave of amplitude 1: full steps switch each coil so
+PullOut = Callable[[float], float]  # pull-out torque [N m] at a step frequency [Hz]; 0 where the motor drives nothing
 
 
 @dataclass(frozen=True, slots=True)
-class StepperLoad:
-    """What hangs on the shaft: coupling, spindle and the mass that the spindle moves."""
+class FirstOrderPullOut:
+    """T_po0 / sqrt(1 + (f/f_c)^2), stepper-envelope specification 3.1."""
 
-    pitch: float  # travel per turn of the spindle [m]
-    mass: float  # moved mass [kg]
-    spindle_inertia: float  # and coupling_inertia: [kg m^2]
-    coupling_inertia: float  # [kg m^2]
-    friction_torque: float  # Coulomb friction at the shaft [N m]
+    torque: float  # pull-out torque at standstill T_po0 [N m]
+    corner_hz: float  # step frequency at which it has fallen to 1/sqrt 2 [Hz]
+
+    def __call__(self, hz: float) -> float:
+        """Pull-out torque at `hz` [N m]."""
+        return self.torque / hypot(1.0, hz / self.corner_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class WindingPullOut:
+    """Two-phase hybrid or permanent-magnet motor on a supply of limited voltage and current.
+
+    With the rotor's linked flux times teeth ``k = T_hold / (sqrt 2 I_rated)``, the electrical frequency
+    ``w = 2 pi f / 4`` and ``Z = sqrt(R^2 + (w L)^2)``, a voltage drive pulls out at ``k (V / Z - w psi R / Z^2)``
+    (P. Acarnley, Stepping Motors, 4th ed., IEE 2002, chapter 5), V the fundamental of the square wave and psi the flux.
+    A chopper holds the current, and with it the torque, to ``k I`` below the frequency where the voltage no longer
+    reaches it. Measured curves lie below this by the ripple and the resonances of a real drive: that is what the
+    safety factor of the ramp is for.
+    """
+
+    holding_torque: float  # both phases at the rated current [N m]
+    rated_current: float  # and current: rated, and set at the drive, per phase [A]
+    current: float  # [A]
+    supply: float  # voltage that drives the current [V]
+    resistance: float  # winding and drive, per phase [ohm]
+    inductance: float  # per phase [H]
+    teeth: float  # rotor teeth, a quarter of the steps per turn
 
     @property
-    def inertia(self) -> float:
-        """All that turns with the rotor, the mass as m (pitch / 2 pi)^2 [kg m^2]."""
-        return self.spindle_inertia + self.coupling_inertia + self.mass * (self.pitch / (2 * pi)) ** 2
+    def per_current(self) -> float:
+        """Torque per current of one phase at its best angle [N m/A]."""
+        return self.holding_torque / (sqrt(2) * self.rated_current)
+
+    def __call__(self, hz: float) -> float:
+        """Pull-out torque at `hz` [N m]."""
+        omega = 2 * pi * hz / 4
+        impedance = hypot(self.resistance, omega * self.inductance)
+        flux = self.per_current / self.teeth
+        driven = FIRST_HARMONIC * self.supply / impedance - omega * flux * self.resistance / impedance**2
+        return self.per_current * max(min(FIRST_HARMONIC * self.current, driven), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPullOut:
+    """Points of a published curve, straight lines between them."""
+
+    # step frequencies, rising [Hz]; below the first one its torque holds, above the last there is none
+    hz: Sequence[float]
+    torque: Sequence[float]  # pull-out torque at each [N m]
+
+    def __call__(self, hz: float) -> float:
+        """Pull-out torque at `hz` [N m]."""
+        if hz <= self.hz[0]:
+            return self.torque[0]
+        for (f0, t0), (f1, t1) in pairwise(zip(self.hz, self.torque, strict=True)):
+            if hz <= f1:
+                return t0 + (t1 - t0) * (hz - f0) / (f1 - f0)
+        return 0.0
 
 
 def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float) -> float:
@@ -48,9 +98,10 @@ class StepperMotor:
     steps_per_turn: int  # 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
     rotor_inertia: float  # [kg m^2]
     holding_torque: float  # peak of the static torque curve [N m]
-    pull_out: PullOut  # pull-out torque [N m] at a step frequency [Hz], of `planning.pull_out`
+    pull_out: PullOut
     unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
-    load: StepperLoad
+    load_inertia: float  # all that turns with the rotor, the moved mass included [kg m^2]
+    friction_torque: float  # Coulomb friction at the shaft [N m]
 
     @property
     def step_angle(self) -> float:
@@ -60,7 +111,7 @@ class StepperMotor:
     @property
     def inertia(self) -> float:
         """Inertia that the motor accelerates, its own rotor included [kg m^2]."""
-        return self.rotor_inertia + self.load.inertia
+        return self.rotor_inertia + self.load_inertia
 
     @property
     def natural_hz(self) -> float:
@@ -69,14 +120,14 @@ class StepperMotor:
 
     def start_hz(self, safety: float = 2.1) -> float:
         """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
-        return self.unloaded_start_hz / sqrt(1 + self.load.inertia / self.rotor_inertia) / safety
+        return self.unloaded_start_hz / sqrt(1 + self.load_inertia / self.rotor_inertia) / safety
 
     def acceleration_limit(self, max_acceleration: float, safety: float = 2.0) -> Callable[[float], float]:
         """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""
         per_torque = 1 / (self.inertia * self.step_angle)
 
         def acceleration(hz: float) -> float:
-            spare = self.pull_out(hz) / safety - self.load.friction_torque
+            spare = self.pull_out(hz) / safety - self.friction_torque
             return min(max_acceleration, spare * per_torque)
 
         return acceleration
@@ -88,7 +139,7 @@ class StepperMotor:
         ramp's rule; friction helps to brake.
         """
         acceleration = np.diff(hz**2, prepend=hz[:1] ** 2) / 2
-        return np.abs(self.inertia * self.step_angle * acceleration + self.load.friction_torque)
+        return np.abs(self.inertia * self.step_angle * acceleration + self.friction_torque)
 
     def torque_margin(self, hz: Numbers) -> Numbers:
         """Pull-out torque over the torque needed in each step of a run, shape (n,); below 1 the rotor falls behind.

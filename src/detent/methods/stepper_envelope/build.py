@@ -1,15 +1,22 @@
 """From a checked specification to ramp, zones and parameters of each motor: SI values to steps and timer words."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
-from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, PullOut, WindingPullOut
 from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
-from detent.planning.step_ramp import MAX_HZ, StepperLoad, StepperMotor, StepRamp, make_ramp, natural_frequency
+from detent.planning.step_ramp import (
+    FirstOrderPullOut,
+    MeasuredPullOut,
+    PullOut,
+    StepperMotor,
+    StepRamp,
+    WindingPullOut,
+    make_ramp,
+    natural_frequency,
+)
 
 if TYPE_CHECKING:
     from detent.methods.stepper_envelope.system import StepperParams
@@ -43,36 +50,28 @@ def stepper_motor(table: StepperTable) -> StepperMotor:
     start = motor.start_frequency
     if start is None:
         start = UNLOADED_STARTS * natural_frequency(motor.steps_per_turn, held, motor.rotor_inertia)
-    load = stepper_load(table)
-    return StepperMotor(motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start, load)
+    load = table.mechanics
+    return StepperMotor(
+        motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start, load.inertia, load.friction_torque
+    )
 
 
 def pull_out(table: StepperTable) -> PullOut:
-    """Pull-out torque of a motor against step frequency, in the way the file states it."""
+    """Pull-out torque of a motor against step frequency, in the way the file states it; NaN without its constants."""
     motor, drive = table.motor, table.drive
     if motor.pull_out == "points":
         return MeasuredPullOut(tuple(motor.curve_frequency), tuple(motor.curve_torque))
     if motor.pull_out == "first order":
-        return FirstOrderPullOut(_given(motor.pull_out_torque), _given(motor.corner_frequency))
+        return FirstOrderPullOut(motor.pull_out_torque or math.nan, motor.corner_frequency or math.nan)
     return WindingPullOut(
         holding_torque=motor.holding_torque,
-        rated_current=_given(motor.rated_current),
-        current=_given(drive.current),
+        rated_current=motor.rated_current or math.nan,
+        current=drive.current or math.nan,
         supply=drive.supply,
-        resistance=_given(motor.resistance) + drive.bridge_resistance,
-        inductance=_given(motor.inductance),
+        resistance=(motor.resistance or math.nan) + drive.bridge_resistance,
+        inductance=motor.inductance or math.nan,
         teeth=motor.steps_per_turn / 4,
     )
-
-
-def _given(value: float | None) -> float:
-    return math.nan if value is None else value
-
-
-def stepper_load(table: StepperTable) -> StepperLoad:
-    """What hangs on the shaft."""
-    m = table.mechanics
-    return StepperLoad(m.travel_per_revolution, m.moving_mass, m.screw_inertia, m.coupling_inertia, m.friction_torque)
 
 
 def bare_start_hz(table: StepperTable) -> float:
@@ -94,32 +93,6 @@ def _acceleration(table: StepperTable) -> Callable[[float], float]:
     """Acceleration that torque and limit allow [step/s^2], of a frequency [Hz]."""
     limit = table.limits.acceleration / table.step
     return stepper_motor(table).acceleration_limit(limit, table.drive.torque_safety)
-
-
-# ---- what can be worked out at all
-
-
-def missing_constants(table: StepperTable) -> list[str]:
-    """Constants that the chosen way of stating the torque needs and nobody states."""
-    return [name for name in NEEDED[table.motor.pull_out] if getattr(table.motor, name) is None]
-
-
-def has_pull_out(table: StepperTable) -> bool:
-    """True where the pull-out torque is known."""
-    if table.motor.pull_out != "points":
-        return not missing_constants(table)
-    hz, torque = table.motor.curve_frequency, table.motor.curve_torque
-    return len(hz) == len(torque) >= 2 and rises(hz) and torque[0] > 0
-
-
-def rises(values: list[float]) -> bool:
-    """True where each value is above the one before."""
-    return all(one < following for one, following in pairwise(values))
-
-
-def is_drivable(table: StepperTable) -> bool:
-    """True where a ramp can be worked out at all."""
-    return has_pull_out(table) and 1 <= table.max_hz <= MAX_HZ and bare_start_hz(table) >= 1
 
 
 def changed(table: StepperTable, name: str, value: float) -> StepperTable:
@@ -151,7 +124,7 @@ def zone_maps(table: StepperTable) -> tuple[ZoneMap, ZoneMap]:
     """Speed limits upwards and downwards; both number their limits alike, for one control unit."""
     limits = [table.max_hz, *(table.hz(zone.speed) for zone in table.zone.values())]
     up, down = (
-        ZoneMap(table.steps, table.max_hz, _apart(_zones(table, {"both", way})), limits) for way in ("up", "down")
+        ZoneMap(table.steps, table.max_hz, list(_zones(table, {"both", way})), limits) for way in ("up", "down")
     )
     return up, down
 
@@ -164,22 +137,6 @@ def _zones(table: StepperTable, directions: set[str]) -> Iterator[Zone]:
             begin = math.floor((zone.begin - lower) / step + 1e-6)
             end = math.ceil((zone.end - lower) / step - 1e-6)
             yield Zone(max(begin, 0), min(end, table.steps), table.hz(zone.speed))
-
-
-def _apart(zones: Iterable[Zone]) -> list[Zone]:
-    """Zones of which each step is in one only: a step that two of them touch is the slower one's."""
-    found: list[Zone] = []
-    for zone in sorted(zones, key=lambda one: (one.begin, one.end)):
-        rest = zone
-        while found and rest.begin < found[-1].end and rest.max_hz < found[-1].max_hz:
-            faster = found.pop()
-            if faster.begin < rest.begin:
-                found.append(replace(faster, end=rest.begin))
-        if found and rest.begin < found[-1].end:
-            rest = replace(rest, begin=found[-1].end)
-        if rest.begin < rest.end:
-            found.append(rest)
-    return found
 
 
 @dataclass(slots=True)
@@ -215,7 +172,7 @@ def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> 
     p.plant.tolerance = spec.controller.tolerance
     r, inertia = p.plant.rotor, motor.inertia
     r.dt, r.teeth, r.step_angle, r.inertia = instant(spec), motor.steps_per_turn / 4, motor.step_angle, inertia
-    r.torque, r.friction = motor.holding_torque, motor.load.friction_torque
+    r.torque, r.friction = motor.holding_torque, motor.friction_torque
     r.damping = DAMPING * math.sqrt(r.teeth * motor.holding_torque * inertia)
     fill_curve(r, motor.pull_out, table.max_hz)
     return p

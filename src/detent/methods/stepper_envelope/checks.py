@@ -14,12 +14,9 @@ from detent.files.findings import Caution
 from detent.files.nearest import BARELY
 from detent.methods.stepper_envelope.build import DAMPING, NEEDED, bare_start_hz
 from detent.methods.stepper_envelope.derive import MotorFigures
-from detent.methods.stepper_envelope.rules import RULES
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.units import format_quantity as text
 from detent.units import parse_quantity
-
-__all__ = ["RULES", "find_cautions"]
 
 START_RESERVE = 1.4604  # start frequency over the natural one up to which no step was lost; that of 7.1
 LEAST_NEAR_START = 0.9  # torque up to there, over that at standstill, down to which no step was lost; 0.95 with 7.1
@@ -76,7 +73,7 @@ def _start(m: MotorFigures) -> Iterator[Caution]:
 
 def _reserves(m: MotorFigures) -> Iterator[Caution]:
     """The ramp and friction leave torque, and no run jumps to a speed."""
-    (share, hz), friction, most = m.torque_used, m.motor.load.friction_torque, MOST_FRICTION * m.motor.holding_torque
+    (share, hz), friction, most = m.torque_used, m.motor.friction_torque, MOST_FRICTION * m.motor.holding_torque
     if share > MOST_USED * (1 + BARELY):
         yield Caution(
             "torque used on the ramp",
@@ -200,7 +197,7 @@ def _unused(m: MotorFigures) -> Iterator[Caution]:
     way, drive = m.table.motor.pull_out, m.table.drive
     own = {"points": {"curve_frequency", "curve_torque"}, "winding": {"resistance", "inductance"}}
     own["first order"] = set(NEEDED["first order"])
-    others = set[str]().union(*own.values()) - own[way]
+    others = {name for names in own.values() for name in names} - own[way]
     idle = [f"motor.{name}" for name in sorted(others) if _is_stated(m, name)]
     if way != "winding":
         fields = type(drive).model_fields

@@ -49,7 +49,7 @@ class StepperLines(Registers):
     """Wires to the power stage; nothing comes back.
 
     A tick has one pulse at most: it takes one tick of the timer, or 2 us at most (`build.instant`), and a period takes
-    ten ticks of the timer (`checks.LEAST_TICKS`) and 15 us (`step_ramp.MAX_HZ`) at least.
+    ten ticks of the timer (`rules.LEAST_TICKS`) and 15 us (`step_ramp.MAX_HZ`) at least.
     """
 
     pulse: u1 = register("1 in the tick of a step pulse", by=CONTROLLER)

@@ -48,7 +48,7 @@ class MotorFigures(Motor):
 
     def torque_left(self, hz: float) -> float:
         """Torque that is left to accelerate with at a frequency [N m]."""
-        return self.motor.pull_out(hz) / self.table.drive.torque_safety - self.motor.load.friction_torque
+        return self.motor.pull_out(hz) / self.table.drive.torque_safety - self.motor.friction_torque
 
     def acceleration_torque(self, acceleration: float) -> float:
         """Torque that an acceleration [step/s^2] takes [N m]."""
@@ -80,7 +80,7 @@ class MotorFigures(Motor):
         hz = self.ramp.hz
         twice = self.acceleration_torque(1.0) * np.diff(hz**2, append=hz[-1] ** 2)
         following = np.append(hz[1:], hz[-1])
-        share = (self.motor.load.friction_torque + twice) / self.torque_there(following)
+        share = (self.motor.friction_torque + twice) / self.torque_there(following)
         worst = int(np.argmax(share))
         return float(share[worst]), float(following[worst])
 
@@ -134,7 +134,7 @@ def _steps(m: MotorFigures) -> Iterator[Row]:
 
 def _rotor(m: MotorFigures) -> Iterator[Row]:
     """How the rotor with its load swings and starts."""
-    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.motor.load.inertia / m.motor.rotor_inertia:.3g} x rotor"
+    text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.motor.load_inertia / m.motor.rotor_inertia:.3g} x rotor"
     yield "inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2"
     yield "natural frequency", m.natural_hz, "Hz", "", "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
     speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.natural_hz
@@ -142,7 +142,7 @@ def _rotor(m: MotorFigures) -> Iterator[Row]:
     formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
     yield "start frequency", m.start_hz, "Hz", text, formula
     # The distance from its step at which friction can hold a resting rotor.
-    error = math.asin(min(m.motor.load.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
+    error = math.asin(min(m.motor.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
     text = f"{error:.3g} steps, {format_quantity(error * m.table.step, 'm')}"
     yield "error at rest", error, "count", text, "asin(friction / holding torque) / 90 deg, at most"
 

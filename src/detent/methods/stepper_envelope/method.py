@@ -31,7 +31,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     spec = StepperEnvelopeSpec
     catalogue = STEPPER_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
-    refuses, warns = "checks:RULES", "checks:find_cautions"
+    refuses, warns = "rules:RULES", "checks:find_cautions"
     state, params = "system:Stepper", "system:StepperParams"
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"

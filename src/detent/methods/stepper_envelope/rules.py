@@ -6,7 +6,7 @@ Sections are those of the stepper-envelope specification.
 import math
 from collections.abc import Callable, Iterator
 from functools import wraps
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from detent.files.fields import unit_of
 from detent.files.findings import Contradiction, wrong
@@ -15,7 +15,7 @@ from detent.files.problems import field_at
 from detent.methods.stepper_envelope import build
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.planning.step_envelope import MAX_RAMP
-from detent.planning.step_ramp import LEAST_GAIN_HZ, MAX_HZ, natural_frequency
+from detent.planning.step_ramp import LEAST_GAIN_HZ, MAX_HZ
 from detent.units import describe_kind
 from detent.units import format_quantity as text
 
@@ -82,24 +82,11 @@ class Motor:
 
 
 Found = Iterator[Contradiction]
-Rule = Callable[[StepperEnvelopeSpec], Found]
-
-
-def per_motor(look: Callable[[Motor], Found]) -> Rule:
-    """A rule of the file from one of its motors."""
-
-    @wraps(look)
-    def rule(spec: StepperEnvelopeSpec) -> Found:
-        for name in spec.stepper:
-            yield from look(Motor(spec, name))
-
-    return rule
 
 
 # ---- steps and timer
 
 
-@per_motor
 def _steps(m: Motor) -> Found:
     """A turn is whole tooth pitches, the travel has a step and not too many, and the largest frequency is a word."""
     table = m.table
@@ -115,7 +102,7 @@ def _steps(m: Motor) -> Found:
         yield m.wrong(f"limits.travel {STEP_KEYS}", allowed, m.most("limits.travel", MOST_STEPS * step))
     if not 1 <= hz <= MAX_HZ:
         slow = build.changed(table, "limits.speed", MAX_HZ * step * (1 - BARELY))
-        lower = m.most("limits.speed", MAX_HZ * step) if not build.is_drivable(slow) or build.ramp_fits(slow) else ""
+        lower = m.most("limits.speed", MAX_HZ * step) if not _is_drivable(m, slow) or build.ramp_fits(slow) else ""
         yield m.wrong(
             f"limits.speed {STEP_KEYS}",
             f"from {text(step, 'm/s')} to {text(MAX_HZ * step, 'm/s')}, step frequencies of 1 Hz to {MAX_HZ} Hz, here "
@@ -124,11 +111,11 @@ def _steps(m: Motor) -> Found:
         )
 
 
-def _timer(spec: StepperEnvelopeSpec) -> Found:
-    """The clock of the step timers is whole, and fine enough for the shortest period."""
-    clock = spec.controller.timer
-    m = Motor(spec, max(spec.stepper, key=lambda name: spec.stepper[name].max_hz))
-    fastest = m.table.max_hz
+def _timer(m: Motor) -> Found:
+    """The clock of the step timers is whole, and fine enough for the shortest period, that of the fastest motor."""
+    clock, fastest = m.spec.controller.timer, m.table.max_hz
+    if m.name != max(m.spec.stepper, key=lambda name: m.spec.stepper[name].max_hz):
+        return
     if abs(clock - round(clock)) > 1e-6:
         yield wrong("controller.timer", "a whole number of Hz", REMEDIES.exactly("controller.timer", round(clock)))
     elif clock < LEAST_TICKS * fastest * (1 - BARELY) and fastest <= MAX_HZ:
@@ -166,7 +153,6 @@ def _inside(m: Motor, name: str, place: float) -> Found:
         yield m.wrong(f"{name} {PLACE_KEYS}", _travel(m.table), nearest)
 
 
-@per_motor
 def _places(m: Motor) -> Found:
     """Start position and extremes lie on the travel; the turn lies above start and stop, a step at least."""
     table, extremes = m.table, m.table.extremes
@@ -189,11 +175,10 @@ def _places(m: Motor) -> Found:
 # ---- torque
 
 
-@per_motor
 def _constants(m: Motor) -> Found:
     """The chosen way of stating the pull-out torque has its constants."""
     way = m.table.motor.pull_out
-    for name in build.missing_constants(m.table):
+    for name in (name for name in build.NEEDED[way] if getattr(m.table.motor, name) is None):
         path = m.keys(f"motor.{name}")
         example = describe_kind(unit_of(field_at(StepperEnvelopeSpec, tuple(path.split(".")))))[1]
         other = "or name a motor of the catalogue that has it, " if way == "winding" else ""
@@ -204,7 +189,6 @@ def _constants(m: Motor) -> Found:
         )
 
 
-@per_motor
 def _curve(m: Motor) -> Found:
     """Points of a published curve: as many torques as frequencies, which rise."""
     hz, torque = m.table.motor.curve_frequency, m.table.motor.curve_torque
@@ -218,7 +202,7 @@ def _curve(m: Motor) -> Found:
     elif len(torque) != len(hz):
         allowed = f"as many as curve_frequency has, {len(hz)}, here {len(torque)}"
         yield m.wrong("motor.curve_torque motor.curve_frequency", allowed, "state one torque for each frequency")
-    elif not build.rises(hz):
+    elif not all(one < following for one, following in pairwise(hz)):
         order = "order the points by frequency, torques with them, and remove what stands there twice"
         yield m.wrong("motor.curve_frequency", "frequencies that rise, each once", order)
     elif torque[0] <= 0:
@@ -226,24 +210,31 @@ def _curve(m: Motor) -> Found:
         yield m.wrong("motor.curve_torque", allowed, "state the pull-out torque at standstill as the first one")
 
 
-@per_motor
+def _has_pull_out(m: Motor) -> bool:
+    """True where the pull-out torque is known."""
+    return not any(_constants(m)) and not any(_curve(m))
+
+
+def _is_drivable(m: Motor, table: StepperTable) -> bool:
+    """True where a ramp can be worked out at all, with a table of the motor that may have another speed."""
+    return _has_pull_out(m) and 1 <= table.max_hz <= MAX_HZ and build.bare_start_hz(table) >= 1
+
+
 def _torques(m: Motor) -> Found:
     """No pull-out torque is above the holding torque; friction does not hold a resting rotor off its step."""
     table, motor, held = m.table, m.table.motor, m.table.held_torque
     name, pull_out = "pull_out_torque", motor.pull_out_torque or 0.0
     if motor.pull_out == "points":
         name, pull_out = "curve_torque", max(motor.curve_torque, default=0.0)
-    if motor.pull_out != "winding" and build.has_pull_out(table) and pull_out > held * (1 + BARELY):
+    if motor.pull_out != "winding" and _has_pull_out(m) and pull_out > held * (1 + BARELY):
         yield m.wrong(
             f"motor.{name} motor.holding_torque drive.current motor.rated_current",
             f"up to the holding torque at the current of the drive, {text(held, 'N*m')}",
             m.least("motor.holding_torque", motor.holding_torque * pull_out / held, "check the units of both torques"),
         )
     tolerance = min(m.spec.controller.tolerance, SURE_REST)
-    most = held * math.sin(math.pi / 2 * tolerance)
-    if table.mechanics.friction_torque > most * (1 + BARELY) and not (
-        build.is_drivable(table) and not build.starts(table)
-    ):
+    friction, most = table.mechanics.friction_torque, held * math.sin(math.pi / 2 * tolerance)
+    if friction > most * (1 + BARELY) and (not _is_drivable(m, table) or build.starts(table)):
         yield m.wrong(
             "mechanics.friction_torque motor.holding_torque controller.tolerance",
             f"up to {text(most, 'N*m')}: against more the field of a resting motor does not bring the rotor within "
@@ -252,11 +243,10 @@ def _torques(m: Motor) -> Found:
         )
 
 
-@per_motor
 def _ramp(m: Motor) -> Found:
     """There is torque to accelerate with, the ramp reaches the largest speed, and its entries have room."""
     table = m.table
-    if not build.is_drivable(table) or build.ramp_fits(table):
+    if not _is_drivable(m, table) or build.ramp_fits(table):
         return
     start = build.start_hz(table)
     if not build.starts(table):
@@ -293,10 +283,9 @@ def _ramp(m: Motor) -> Found:
     )
 
 
-@per_motor
 def _start_frequency(m: Motor) -> Found:
     """The start frequency is no standstill."""
-    if build.has_pull_out(m.table) and (hz := build.bare_start_hz(m.table)) < 1:
+    if _has_pull_out(m) and (hz := build.bare_start_hz(m.table)) < 1:
         safety = m.table.drive.start_safety * hz
         yield m.wrong(
             START_KEYS,
@@ -305,26 +294,23 @@ def _start_frequency(m: Motor) -> Found:
         )
 
 
-@per_motor
 def _rotor_swing(m: Motor) -> Found:
     """The rotor swings slowly enough for the time step of its equation of motion (7.2)."""
-    load = build.stepper_load(m.table).inertia
-    inertia = m.table.motor.rotor_inertia + load
-    hz = natural_frequency(m.table.motor.steps_per_turn, m.table.held_torque, inertia)
+    motor = build.stepper_motor(m.table)
+    hz, load = motor.natural_hz, motor.load_inertia
     most = FASTEST_SWING / (2 * math.pi * build.instant(m.spec))
     if hz > most:
         yield m.wrong(
             f"motor.rotor_inertia motor.holding_torque motor.steps_per_turn {LOAD_KEYS} drive.current "
             "motor.rated_current controller.timer",
             f"such that the rotor swings about its step with {text(most, 'Hz')} or less, here {text(hz, 'Hz')}",
-            m.least("motor.rotor_inertia", inertia * (hz / most) ** 2 - load),
+            m.least("motor.rotor_inertia", motor.inertia * (hz / most) ** 2 - load),
         )
 
 
 # ---- zones
 
 
-@per_motor
 def _zone_places(m: Motor) -> Found:
     """Each zone has a begin below its end, and both lie on the travel."""
     table, lower = m.table, m.table.mechanics.lower_end
@@ -344,7 +330,6 @@ def _zone_places(m: Motor) -> Found:
             yield from _inside(m, end, zone.end)
 
 
-@per_motor
 def _zone_overlap(m: Motor) -> Found:
     """No two zones of one direction overlap."""
     zones = sorted(m.table.zone.items(), key=lambda item: item[1].begin) if _has_places(m.table) else []
@@ -365,11 +350,10 @@ def _zone_overlap(m: Motor) -> Found:
         )
 
 
-@per_motor
 def _zone_speed(m: Motor) -> Found:
     """A zone is not slower than the start frequency, and not faster than the motor."""
     table = m.table
-    if not build.is_drivable(table):
+    if not _is_drivable(m, table):
         return
     start, fastest = build.start_hz(table), table.limits.speed
     slowest = start * table.step
@@ -389,8 +373,19 @@ def _zone_speed(m: Motor) -> Found:
             )
 
 
-TORQUE_RULES: tuple[Rule, ...] = (_constants, _curve, _torques, _ramp)
-RULES: tuple[Rule, ...] = (
-    _steps, _timer, _places, *TORQUE_RULES, _start_frequency, _rotor_swing, _zone_places, _zone_overlap, _zone_speed,
-)  # fmt: skip
+def _per_motor(look: Callable[[Motor], Found]) -> Callable[[StepperEnvelopeSpec], Found]:
+    """A rule of the file from one of its motors."""
+
+    @wraps(look)
+    def rule(spec: StepperEnvelopeSpec) -> Found:
+        for name in spec.stepper:
+            yield from look(Motor(spec, name))
+
+    return rule
+
+
+RULES = tuple(map(_per_motor, (
+    _steps, _timer, _places, _constants, _curve, _torques, _ramp, _start_frequency, _rotor_swing, _zone_places,
+    _zone_overlap, _zone_speed,
+)))  # fmt: skip
 """Contradictions are told in this order."""

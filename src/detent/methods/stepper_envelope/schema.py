@@ -150,6 +150,12 @@ class MechanicsTable(Table, frozen=True):
         "where the motor stands at power-on", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
     )
 
+    @property
+    def inertia(self) -> float:
+        """All that turns with the rotor, the mass as m (lead / 2 pi)^2 [kg m^2]."""
+        mass = self.moving_mass * (self.travel_per_revolution / (2 * math.pi)) ** 2
+        return self.screw_inertia + self.coupling_inertia + mass
+
 
 def _extreme(description: str, derived: str = "mechanics.lower_end") -> Any:
     return optional(description, math.nan, derived=derived, ge=-100.0, le=200.0)

@@ -8,6 +8,7 @@ import math
 import subprocess
 import sys
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -30,8 +31,8 @@ from detent.methods.stepper_envelope.build import (
 )
 from detent.methods.stepper_envelope.system import Stepper, switch_on
 from detent.methods.stepper_envelope.system import tables as feed
-from detent.planning.pull_out import FirstOrderPullOut, MeasuredPullOut, WindingPullOut
 from detent.planning.step_envelope import Zone
+from detent.planning.step_ramp import FirstOrderPullOut, MeasuredPullOut, WindingPullOut
 
 A, X = "stepper.group_a", "stepper.x"
 SHORT = ("limits.travel=6 mm", "zone.near.begin=1 mm", "zone.near.end=2 mm", "zone.far.begin=4 mm", "zone.far.end=5 mm")
@@ -163,7 +164,7 @@ def test_the_motor_of_the_zoom_is_that_of_the_specification():
     )
     assert isinstance(motor.pull_out, FirstOrderPullOut)
     assert motor.pull_out(2000.0) == pytest.approx(MOTOR.pull_out(2000.0))
-    assert motor.load.inertia == pytest.approx(LOAD.inertia)
+    assert motor.load_inertia == pytest.approx(LOAD.inertia)
     ramp = make_step_ramp(table)
     assert len(ramp) == len(RAMP)
     assert ramp.hz == pytest.approx(RAMP.hz, abs=0.5)
@@ -239,16 +240,15 @@ def test_an_extreme_at_the_end_of_a_travel_that_is_no_whole_number_is_its_last_s
     assert (table.steps, make_tables(table).up.stop) == (8000, 8000)
 
 
-def zones_of(*zones):
-    """Zones of the first group, upwards and downwards, for pairs of name and overrides."""
+def maps_of(*zones):
+    """Zone maps of the first group, upwards and downwards, for pairs of name and overrides."""
     texts = [f"{A}.zone.{name}.{key}={value}" for name, keys in zones for key, value in keys.items()]
-    up, down = zone_maps(load(*texts).stepper["group_a"])
-    return up.zones, down.zones
+    return zone_maps(load(*texts).stepper["group_a"])
 
 
 def test_a_zone_may_hold_for_one_direction():
-    up, down = zones_of(("near", {"direction": "up"}), ("far", {"direction": "down"}))
-    assert (up, down) == (COARSE_FINE[:1], COARSE_FINE[1:])
+    up, down = maps_of(("near", {"direction": "up"}), ("far", {"direction": "down"}))
+    assert (up.zones, down.zones) == (COARSE_FINE[:1], COARSE_FINE[1:])
 
 
 def test_both_directions_number_their_limits_alike():
@@ -258,39 +258,42 @@ def test_both_directions_number_their_limits_alike():
 
 
 def test_a_zone_holds_for_every_step_that_it_touches():
-    up, _ = zones_of(("near", {"begin": "10.0024 mm", "end": "12.9976 mm"}))
-    assert up[0] == Zone(2000, 2600, FINE_HZ)
+    up, _ = maps_of(("near", {"begin": "10.0024 mm", "end": "12.9976 mm"}))
+    assert up.zones[0] == Zone(2000, 2600, FINE_HZ)
+
+
+def stretches_of(*zones: tuple[str, dict[str, str]]) -> list[tuple[int, int, float]]:
+    """Begin, end and limit of each stretch upwards that is slower than the motor."""
+    hz = maps_of(*zones)[0].hz
+    edges = [0, *(np.flatnonzero(np.diff(hz)) + 1).tolist(), len(hz)]
+    return [(begin, end, float(hz[begin])) for begin, end in pairwise(edges) if hz[begin] < 4000.0]
 
 
 @pytest.mark.parametrize(
-    ("near", "far", "border"),
+    ("near", "far", "stretches"),
     # The step from 3000 to 3001 is touched by both: the slower one has it.
-    [("5 mm/s", "6 mm/s", 3001), ("6 mm/s", "5 mm/s", 3000), ("5 mm/s", "5 mm/s", 3001)],
+    [
+        ("5 mm/s", "6 mm/s", [(2000, 3001, 1000.0), (3001, 6000, 1200.0)]),
+        ("6 mm/s", "5 mm/s", [(2000, 3000, 1200.0), (3000, 6000, 1000.0)]),
+        ("5 mm/s", "5 mm/s", [(2000, 6000, 1000.0)]),
+    ],
 )
-def test_zones_that_meet_inside_a_step_share_it(near, far, border):
-    up, _ = zones_of(("near", {"end": "15.002 mm", "speed": near}), ("far", {"begin": "15.002 mm", "speed": far}))
-    assert [(zone.begin, zone.end) for zone in up] == [(2000, border), (border, 6000)]
+def test_zones_that_meet_inside_a_step_share_it(near, far, stretches):
+    found = stretches_of(("near", {"end": "15.002 mm", "speed": near}), ("far", {"begin": "15.002 mm", "speed": far}))
+    assert found == stretches
 
 
 def test_a_zone_between_two_others_in_one_step_leaves_it_to_the_slowest():
     between = {"begin": "15.001 mm", "end": "15.003 mm", "direction": "both"}
     fast, slow = {**between, "speed": "9 mm/s"}, {**between, "speed": "4 mm/s"}
     sides = ("near", {"end": "15.001 mm"}), ("far", {"begin": "15.003 mm"})
-    up, _ = zones_of(*sides, ("mid", fast))
-    assert [(zone.begin, zone.end) for zone in up] == [(2000, 3001), (3001, 6000)]
-    up, _ = zones_of(*sides, ("mid", slow))
-    assert [(zone.begin, zone.end, zone.max_hz) for zone in up] == [
-        (2000, 3000, 1000.0),
-        (3000, 3001, 800.0),
-        (3001, 6000, 1000.0),
-    ]
+    assert stretches_of(*sides, ("mid", fast)) == [(2000, 6000, 1000.0)]
+    assert stretches_of(*sides, ("mid", slow)) == [(2000, 3000, 1000.0), (3000, 3001, 800.0), (3001, 6000, 1000.0)]
 
 
 def test_a_zone_shorter_than_a_step_yields_to_a_slower_one_in_it():
-    up, _ = zones_of(
-        ("near", {"begin": "15.0005 mm", "end": "15.002 mm", "speed": "9 mm/s"}), ("far", {"begin": "15.002 mm"})
-    )
-    assert [(zone.begin, zone.end) for zone in up] == [(3000, 6000)]
+    fast = {"begin": "15.0005 mm", "end": "15.002 mm", "speed": "9 mm/s"}
+    assert stretches_of(("near", fast), ("far", {"begin": "15.002 mm"})) == [(3000, 6000, 1000.0)]
 
 
 def test_as_many_zones_as_may_be_have_room_for_their_limits():
