@@ -31,7 +31,7 @@ def zoom(*overrides: str) -> Any:
 
 def standing(way: int, *overrides: str) -> Any:
     """Motor of the example at its lower end, its tables made for a run of `way` steps."""
-    from detent.methods.stepper_envelope.machine import StageMotor
+    from detent.methods.stepper_envelope.host import StageMotor
 
     motor = StageMotor(zoom(*overrides).spec, MOTOR)
     motor.tables.up.move_start(0)
@@ -372,8 +372,8 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 def jerk() -> None:
     """Start by the envelope and by a profile of limited jerk, each as a ramp list, on the rotor."""
+    from detent.methods.stepper_envelope.comparison import compare_jerk
     from detent.methods.stepper_envelope.controller import load_rule
-    from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
     from detent.methods.stepper_envelope.system import tables
     from detent.planning.step_envelope import StepEnvelope
 

@@ -83,9 +83,9 @@ def telling(figures: StageFigures, trace: Trace, made: Mapping[str, MadeSteps]) 
     if not whole:
         return None
     motion, why = _choose(figures, whole)
-    spec, asked = figures.spec, next(asked for asked in figures.run.job.moves if asked.number == motion.move.number)
-    legs = legs_of(made[motion.name], spec.stepper[motion.name], motion.move, motion.motor)
-    return ShownMotion(spec, motion, why, asked, legs)
+    asked = next(asked for asked in figures.run.job.moves if asked.number == motion.move.number)
+    legs = legs_of(made[motion.name], figures.spec.stepper[motion.name], motion.move, motion.motor)
+    return ShownMotion(figures.spec, motion, why, asked, legs)
 
 
 def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str]:
@@ -95,9 +95,8 @@ def _choose(figures: StageFigures, whole: Sequence[Motion]) -> tuple[Motion, str
         ("the motion that had to pass its stop", lambda motion: motion.motor.overrun),
     )
     for why, applies in reasons:
-        found = next(filter(applies, whole), None)
-        if found:
-            return found, why
+        for motion in filter(applies, whole):
+            return motion, why
     # In three digits: what is equal to a reader is equal.
     margins = [float(f"{motion.motor.margin:.3g}") for motion in whole]
     tied = [motion for motion, margin in zip(whole, margins, strict=True) if margin == min(margins)]
@@ -144,11 +143,9 @@ def torque_charts(available: Numbers, needed: Numbers, safety: float) -> list[Ch
     """Torque of every step [mN m], and its margin."""
     margin = np.divide(available, needed, out=np.full(len(needed), np.nan), where=needed > 0)
     kept = np.unique(np.concatenate([thin_indices(y, POINTS) for y in (margin, available, needed)]))
-    planned: list[list[Curve]] = [[], []]
-    if safety > 1:
-        label = f"planned with a reserve of {stated(safety)}"
-        lines = (available[kept] / safety, np.full(len(kept), safety))
-        planned = [[Curve(label=label, colour="left", dash=(6, 4), y=y)] for y in lines]
+    lines = (available[kept] / safety, np.full(len(kept), safety))
+    label = f"planned with a reserve of {stated(safety)}"
+    planned = [[Curve(label=label, colour="left", dash=(6, 4), y=y)] if safety > 1 else [] for y in lines]
     torque = Panel(
         name="detail-torque", label="torque [mN·m]", height=200, zero=True, span=(0.0, _top(available)),
         curves=[
@@ -192,10 +189,9 @@ def _rotor_figures(shown: ShownMotion, trace: Trace | None) -> list[Figure]:
         "The end of the same move, magnified. Green is the time that the host waits for the swing to die away. Look "
         f"for: the line within ±{tolerance:g} steps (dashed) long before that time is over."
     )
+    charts = _rotor_charts(shown, rows, events)
     return [
-        Figure(
-            title="How the rotor followed", caption=followed, charts=_rotor_charts(shown, rows, events), events=events
-        ),
+        Figure(title="How the rotor followed", caption=followed, charts=charts, events=events),
         Figure(title="Coming to rest", caption=rest, charts=_rest_charts(motion, rows, tolerance)),
     ]
 
@@ -238,9 +234,8 @@ def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
         levels=[(limit, f"+{limit:g} steps"), (-limit, f"−{limit:g} steps")],
         curves=[Curve(label="field less rotor", colour="drive", width=2, y=lag, thin=POINTS)],
     )  # fmt: skip
-    return time_charts(
-        Timeline(name="rest", t=rows.t[part], label="time since the start signal", bands=[after]), [panel]
-    )
+    timeline = Timeline(name="rest", t=rows.t[part], label="time since the start signal", bands=[after])
+    return time_charts(timeline, [panel])
 
 
 def motion_events(shown: ShownMotion) -> list[Event]:

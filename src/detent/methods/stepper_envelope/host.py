@@ -1,20 +1,180 @@
-"""The host of a stepper stage: it moves the extremes of the tables and gives the start signal, and waits for rest.
+"""Several steppers in simulated time, side by side, and the host that moves them.
 
-It knows what a controller would know: the step counts. Whether the rotors followed is for an observer to say.
+Nothing is shared but time (stepper-envelope specification 2.2): each motor has its own control unit, tables and rotor,
+and is advanced for itself, up to the instant that all of them reach. A record of the stage is put together from records
+of its motors. The host moves the extremes of the tables, gives the start signal, and waits for rest. It knows what a
+controller would know: the step counts. Whether the rotors followed is for an observer to say.
 """
 
+import ctypes
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
-from detent.control.step_rule import FAULT, acknowledge, deflect, release, start_move
+import numpy as np
+
+from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release, start_move
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
+from detent.kernel.loop import advance
+from detent.kernel.registers import Registers, block, i8, register
+from detent.methods.stepper_envelope.build import build_stepper, instant, make_tables
 from detent.methods.stepper_envelope.controller import NOWHERE
-from detent.methods.stepper_envelope.machine import Stage
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
-from detent.record.machine import AnyRecorder
-from detent.units import format_quantity
+from detent.methods.stepper_envelope.system import Stepper, switch_on, tables, take_over
+from detent.planning.step_envelope import StepEnvelope
+from detent.record.machine import LONGEST_STRETCH, AnyRecorder
+from detent.units import format_quantity as text
+
+
+def stage_registers(spec: StepperEnvelopeSpec) -> type[Registers]:
+    """Class of the registers of a whole stage: ``tick``, and a block per motor of the motor's name."""
+    return _registers_of(tuple(spec.stepper))
+
+
+@cache
+def _registers_of(names: tuple[str, ...]) -> type[Registers]:
+    """One class per set of names; it has the layout of a record, the motors themselves live apart."""
+    # The base's metaclass reads these to lay the structure out.
+    body: dict[str, Any] = {"__module__": __name__, "__doc__": "Registers of a stage."}
+    body["__annotations__"] = {"tick": i8} | dict.fromkeys(names, Stepper)
+    body["tick"] = register("time steps of the rotors since power-on", unit="tick")
+    body |= {name: block(f"motor {name}") for name in names}
+    make: Any = type(Registers)
+    return make("Stage", (Registers,), body)
+
+
+class StageMotor:
+    """One motor of a stage at power-on, with its tables."""
+
+    def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
+        self.name, self.table = name, spec.stepper[name]
+        self.tables = make_tables(self.table)
+        self.p: Any = build_stepper(spec, name, self.tables)
+        # ctypes gives every register its type at run time only.
+        self.r: Any = Stepper()
+        switch_on(self.r, self.table.step_inside(self.table.mechanics.start_position), self.p.plant.rotor.step_angle)
+        self.controller: Any = self.r.controller
+        self.feed: tuple[Any, ...] = tables(self.tables.up.entries, self.tables.down.entries)
+        self.rows, self.picks = np.zeros((1, 1), np.uint8), np.zeros(0, np.int64)  # no record of it
+        self.rested = 0.0  # when its last step was over [s], at the last event
+
+    @property
+    def position(self) -> int:
+        """Position of record [step]."""
+        return int(self.controller.rule.position)
+
+    @property
+    def place(self) -> float:
+        """The same as a length [m]."""
+        return self.table.position_of(self.position)
+
+    def along(self, heading: int) -> tuple[StepEnvelope, StepEnvelope]:
+        """Table of a direction of motion, and of the other one."""
+        up, down = self.tables.up, self.tables.down
+        return (up, down) if heading > 0 else (down, up)
+
+    @property
+    def resting(self) -> bool:
+        """True when it stands and no start waits to be taken."""
+        rule = self.controller.rule
+        return rule.index < 0 and rule.state in {REST, FAULT} and not rule.start
+
+    def compare(self, method: int, way: range, start_hz: float) -> None:
+        """Let a method of `control.step_comparison` drive, upwards over a way [step]."""
+        acceleration = self.table.limits.acceleration / self.table.step
+        self.p, self.r = take_over(
+            self.p, self.r, self.tables.up.zones, way, method=method, start_hz=start_hz, acceleration=acceleration
+        )
+        self.controller, self.feed = self.r.controller, ()
+
+    def advance_to(self, at: int, every: int, *, until_event: bool) -> bool:
+        """Advance up to an instant, or until the control unit has an event for the host; True if it has one."""
+        r, rule = self.r, self.controller.rule
+        while r.tick < at and not (until_event and rule.event):
+            if not until_event:
+                acknowledge(rule)
+            n = min(at - r.tick, LONGEST_STRETCH)
+            advance(self.p, r, n, self.rows, self.picks, every, *self.feed)
+            if rule.event:
+                self.rested = self.controller.timer.expires / self.p.controller.timer.clock_hz
+        return bool(rule.event)
+
+
+class Stage:
+    """All motors of an axis, and the time they share."""
+
+    def __init__(self, spec: StepperEnvelopeSpec, recorder: AnyRecorder | None = None) -> None:
+        self.spec, self.tick, self.recorder = spec, instant(spec), recorder
+        self.motors = {name: StageMotor(spec, name) for name in spec.stepper}
+        self.instant = 0
+        self._every = 0 if recorder is None else recorder.every
+        self._columns: dict[str, Any] = {}  # of the record, by the motor that they are of
+        for field in stage_registers(spec).__fields__.values():
+            if recorder is None or field.block is None:
+                continue
+            end = field.offset + ctypes.sizeof(field.block)
+            columns = np.flatnonzero((recorder.picks >= field.offset) & (recorder.picks < end))
+            motor, self._columns[field.name] = self.motors[field.name], columns
+            motor.picks = np.ascontiguousarray(recorder.picks[columns] - field.offset)
+            motor.rows = np.zeros((len(recorder.rows), len(columns)), np.uint8)
+
+    @property
+    def time(self) -> float:
+        """Simulated time since power-on [s]."""
+        return self.instant * self.tick
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for all motors."""
+        end = self.instant + round(seconds / self.tick)
+        while self.instant < end:
+            self._bring_to(min(end, self.instant + self._room()))
+
+    def wait_for(self, names: Iterable[str], seconds: float) -> set[str]:
+        """Wait until each of these motors has an event for the host, at most so long."""
+        waiting, end = set(names), self.instant + round(seconds / self.tick)
+        reached = self.instant
+        while waiting and self.instant < end:
+            stop = min(end, self.instant + self._room())
+            for name in sorted(waiting):
+                if self.motors[name].advance_to(stop, self._every, until_event=True):
+                    waiting.discard(name)
+                    reached = max(reached, int(self.motors[name].r.tick))
+            self._bring_to(stop if waiting else max(reached, self.instant))
+        return waiting
+
+    def _room(self) -> int:
+        """Instants that may pass before the record must be handed on."""
+        return LONGEST_STRETCH if self.recorder is None else self.recorder.room(self.instant)
+
+    def _bring_to(self, at: int) -> None:
+        """Bring all motors to an instant that none of them has passed."""
+        for motor in self.motors.values():
+            motor.advance_to(at, self._every, until_event=False)
+        self.instant = at
+        if self.recorder is not None and self.recorder.room(at) <= 0:
+            self._flush(self.recorder)
+
+    def _flush(self, recorder: AnyRecorder) -> None:
+        """Put the motors' rows together and hand them on."""
+        for name, columns in self._columns.items():
+            recorder.rows[:, columns] = self.motors[name].rows
+        every = max(recorder.every, 1)
+        last, count = self.instant // every, len(recorder.rows)
+        numbers = np.arange(last - count + 1, last + 1, dtype=np.int64)
+        ticks = (numbers * every).astype("<i8").view(np.uint8).reshape(count, 8)
+        recorder.rows[numbers % count, :8] = ticks  # the tick is the first register of every record
+        recorder.flush(self.instant)
+
+    def close(self) -> None:
+        """Hand the last rows to the recorder's sink."""
+        if self.recorder is not None:
+            self._flush(self.recorder)
+
+
+# ---- the host
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +186,14 @@ class Leg:
     turn: int | None = None  # where it turns on the way
 
     @property
+    def via(self) -> int:
+        """Where the first run ends."""
+        return self.target if self.turn is None else self.turn
+
+    @property
     def steps(self) -> int:
         """Steps made in all."""
-        via = self.target if self.turn is None else self.turn
-        return abs(via - self.start) + abs(self.target - via)
+        return abs(self.via - self.start) + abs(self.target - self.via)
 
 
 class StageHost:
@@ -44,10 +208,9 @@ class StageHost:
         found: dict[str, Leg] = {}
         for name in move.motors:
             motor = self.stage.motors[name]
-            goal = move.targets[name] if name in move.targets else self.goal[name] + move.by[name]
-            self.goal[name] = goal
+            self.goal[name] = move.targets[name] if name in move.targets else self.goal[name] + move.by[name]
             turn = None if move.turn is None else motor.table.step_inside(move.turn)
-            leg = Leg(motor.position, motor.table.step_inside(goal), turn)
+            leg = Leg(motor.position, motor.table.step_inside(self.goal[name]), turn)
             if leg.steps:
                 found[name] = leg
         return found
@@ -56,34 +219,31 @@ class StageHost:
         """Set the extremes of each motor and give all start signals at once."""
         for name, leg in legs.items():
             motor = self.stage.motors[name]
-            via = leg.target if leg.turn is None else leg.turn
-            heading = 1 if via > leg.start else -1
+            heading = 1 if leg.via > leg.start else -1
             first, second = motor.along(heading)
             first.move_start(leg.start)
-            first.move_stop(via)
+            first.move_stop(leg.via)
             if leg.turn is not None:
-                second.move_start(via)
+                second.move_start(leg.via)
                 second.move_stop(leg.target)
             start_move(motor.controller.rule, heading, int(leg.turn is not None))
 
     def wait(self, legs: dict[str, Leg]) -> None:
         """Wait until all motors have come to rest."""
-        limit = 1.0 + 2.0 * sum(leg.steps / self._slowest(name) for name, leg in legs.items())
+        limit = 1.0 + sum(self._longest(name, leg.steps) for name, leg in legs.items())
         late = self.stage.wait_for(legs, limit)
         for name in legs:
             rule = self.stage.motors[name].controller.rule
             if rule.state == FAULT:
                 raise AxisError(f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}")
             if name in late:
-                late_after = format_quantity(limit, "s")
-                raise AxisError(
-                    f"motor {name}: did not come to rest within {late_after}; look at its table in the report"
-                )
+                late_after = f"did not come to rest within {text(limit, 's')}"
+                raise AxisError(f"motor {name}: {late_after}; look at its table in the report")
 
-    def _slowest(self, name: str) -> float:
-        """A step frequency that no run stays below for long [Hz]."""
-        motor = self.stage.motors[name]
-        return min(float(motor.tables.ramp.hz[0]), *motor.tables.up.zones.limits)
+    def _longest(self, name: str, steps: int) -> float:
+        """Time within which a motor makes some steps: no run stays below its slowest frequency for long [s]."""
+        tables = self.stage.motors[name].tables
+        return 2.0 * steps / min(float(tables.ramp.hz[0]), *tables.up.zones.limits)
 
     def run(self, move: StageMove) -> tuple[dict[str, Leg], bool]:
         """Make one move up to rest: what each motor did, and whether it could not stop where it was told to."""
@@ -106,7 +266,7 @@ class StageHost:
         motor = self.stage.motors[name]
         rule = motor.controller.rule
         motor.controller.stop_at = motor.table.step_inside(at)
-        late = self.stage.wait_for([name], 1.0 + 2.0 * motor.table.steps / self._slowest(name))
+        late = self.stage.wait_for([name], 1.0 + self._longest(name, motor.table.steps))
         motor.controller.stop_at = NOWHERE
         if late or motor.resting:
             return False
@@ -122,9 +282,8 @@ class StageHost:
         motor = self.stage.motors[jog.motor]
         start, heading = motor.position, 1 if jog.speed > 0 else -1
         for table in (motor.tables.up, motor.tables.down):
-            lower, upper = (0, motor.table.steps) if table.direction > 0 else (motor.table.steps, 0)
-            table.move_start(lower)
-            table.move_stop(upper)
+            table.move_start(0 if table.direction > 0 else table.steps)
+            table.move_stop(table.steps - table.start)
         # A timer word on the slower side.
         hz, rule = motor.table.hz(abs(jog.speed)), motor.controller.rule
         reload = self.spec.controller.words == "reload"
@@ -140,18 +299,26 @@ class StageHost:
 
 def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
     """Refuse what the axis cannot be told to do, before anything moves."""
-    problems: list[FileProblem] = []
+    problems = [FileProblem(job.name, row, 1, *told) for row, *told in _job_problems(spec, job)]
+    if problems:
+        raise InputError(problems)
+
+
+def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[tuple[int, str, str, str, str]]:
+    """Line and key of what the axis cannot do, what came, what is allowed, and what to do."""
     goal = {name: table.mechanics.start_position for name, table in spec.stepper.items()}
     for move in job.moves:
         unknown = next((name for name in move.motors if name not in spec.stepper), None)
         if unknown is not None:
-            came, allowed = f"the motor {unknown}", f"one of {', '.join(spec.stepper)}"
-            problems.append(FileProblem(job.name, move.row, 1, unknown, came, allowed, "rename it"))
-            break
+            yield move.row, unknown, f"the motor {unknown}", f"one of {', '.join(spec.stepper)}", "rename it"
+            return
         if isinstance(move, StageJog):
-            problems += _jog_problems(spec.stepper[move.motor], job, move)
-            # Where a manual run ends is not known before it is made.
-            goal[move.motor] = math.nan
+            table = spec.stepper[move.motor]
+            if not 1.0 <= table.hz(abs(move.speed)) <= table.max_hz * (1 + 1e-9):
+                came, slowest, top = (text(v, "m/s") for v in (move.speed, table.step, table.limits.speed))
+                remedy = f"write {top}, or correct limits.speed"
+                yield move.row, "speed", came, f"{slowest} to {top}, either way", remedy
+            goal[move.motor] = math.nan  # where a manual run ends is not known before it is made
             continue
         for name in move.motors:
             goal[name] = move.targets[name] if name in move.targets else goal[name] + move.by[name]
@@ -160,28 +327,17 @@ def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
                 places += [move.change.at, move.change.to]
                 goal[name] = move.change.to
             for place in places:
-                if place is not None:
-                    problems += _place_problems(spec.stepper[name], (job.name, move.row, name), place)
-    if problems:
-        raise InputError(problems)
+                if place is not None and (told := _place_problem(spec.stepper[name], place)):
+                    yield move.row, name, *told
 
 
-def _place_problems(table: StepperTable, where: tuple[str, int, str], place: float) -> Iterator[FileProblem]:
-    """What is wrong with a place, of the file, line and motor `where`."""
+def _place_problem(table: StepperTable, place: float) -> tuple[str, str, str] | None:
+    """What is wrong with a place: what came, what is allowed, and what to do."""
+    lower, upper = table.mechanics.lower_end, table.upper_end
     # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.
     end = max(table.steps * table.step, table.limits.travel) + table.step / 2
-    if not math.isnan(place) and not -table.step / 2 <= place - table.mechanics.lower_end <= end:
-        lower, upper = format_quantity(table.mechanics.lower_end, "m"), format_quantity(table.upper_end, "m")
-        nearest = lower if place < table.mechanics.lower_end else upper
-        file, row, name = where
-        remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
-        came = f"the position {format_quantity(place, 'm', 6)}"
-        yield FileProblem(file, row, 1, name, came, f"from {lower} to {upper}", remedy)
-
-
-def _jog_problems(table: StepperTable, job: StageJob, jog: StageJog) -> Iterator[FileProblem]:
-    if not 1.0 <= table.hz(abs(jog.speed)) <= table.max_hz * (1 + 1e-9):
-        came, top = format_quantity(jog.speed, "m/s"), format_quantity(table.limits.speed, "m/s")
-        slowest = format_quantity(table.step, "m/s")
-        remedy = f"write {top}, or correct limits.speed"
-        yield FileProblem(job.name, jog.row, 1, "speed", came, f"{slowest} to {top}, either way", remedy)
+    if math.isnan(place) or -table.step / 2 <= place - lower <= end:
+        return None
+    nearest = text(lower if place < lower else upper, "m")
+    remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
+    return f"the position {text(place, 'm', 6)}", f"from {text(lower, 'm')} to {text(upper, 'm')}", remedy

@@ -46,7 +46,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
         """A stage: the registers of each motor in a block of its name."""
         return replace(
             super().simulated(spec),
-            registers=self.brought("machine:stage_registers")(spec),
+            registers=self.brought("host:stage_registers")(spec),
             signals=self.brought("run:stage_signals")(spec),
             timing=tuple(f"{name}.{signal}" for name in spec.stepper for signal in TIMING),
         )
@@ -67,8 +67,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
 
     def compare(self, spec: StepperEnvelopeSpec, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """Beside speed computed per step, constant speed, and a jerk-limited profile."""
-        from detent.methods.stepper_envelope.comparison import compare_steps
-        from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
+        from detent.methods.stepper_envelope.comparison import compare_jerk, compare_steps
 
         return (*compare_steps(spec, progress=progress), compare_jerk(spec))
 

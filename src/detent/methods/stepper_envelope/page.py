@@ -51,13 +51,6 @@ ARC_POINTS = 4000  # points of all runs of one motor in the figure of frequency 
 MOST_MOVES = 400  # moves of one motor in that figure: more lie on one another
 MOST_ZONES = 4  # zones that are named below a figure
 
-ENVELOPE_CAPTION = (
-    "Step frequency over position: motion up above zero, motion down below it. The grey ground is what the table "
-    "permits between the ends of the travel. Look for: lines that stay inside the grey; a motor that starts or stops "
-    "anywhere keeps to its ramp. "
-)
-"""Stands at the first motor only."""
-
 
 def stage_page(
     spec: StepperEnvelopeSpec,
@@ -90,11 +83,8 @@ def stage_page(
 
 def recorded_steps(figures: StageFigures, trace: Trace | None) -> dict[str, MadeSteps]:
     """Recorded steps of each motor that made some."""
-    if trace is None:
-        return {}
-    timer = figures.spec.controller.timer
-    found = {name: made_steps(trace, name, timer) for name in figures.moved}
-    return {name: made for name, made in found.items() if made is not None and len(made.t)}
+    found = ((name, made_steps(trace, name, figures.spec.controller.timer)) for name in figures.moved)
+    return {name: made for name, made in found if made is not None and len(made.t)}
 
 
 def _headline(figures: StageFigures) -> Headline:
@@ -152,7 +142,7 @@ def _notes(figures: StageFigures) -> list[Note]:
 
 def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
     names = [name for name in figures.moved if has(trace, [f"{name}.controller.rule.position"])]
-    rows = stretch(trace, [f"{name}.controller.rule.position" for name in names], figures.run.time_ready)
+    rows = stretch(trace, [], figures.run.time_ready)
     if not names or rows is None:
         return None
     part = slice(0, int(np.searchsorted(rows.t, LONGEST, side="right")))
@@ -170,12 +160,9 @@ def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
     )
     if len(names) > MOST_MOTORS:
         caption += f" {further(len(names) - MOST_MOTORS, 'motor')} not drawn."
-    timeline = Timeline(name="path", t=t, label="time since the job began", unit="s")
-    return Figure(
-        title=whole_or_first(float(t[-1]), figures.seconds, "Where the motors were"),
-        caption=caption,
-        charts=time_charts(timeline, panels),
-    )
+    charts = time_charts(Timeline(name="path", t=t, label="time since the job began", unit="s"), panels)
+    title = whole_or_first(float(t[-1]), figures.seconds, "Where the motors were")
+    return Figure(title=title, caption=caption, charts=charts)
 
 
 def _path_curves(figures: StageFigures, rows: Stretch, name: str, part: slice) -> list[Curve]:
@@ -200,21 +187,24 @@ def target_of(figures: StageFigures, name: str, t: Numbers) -> Numbers:
     manual = {move.number for move in figures.run.job.moves if isinstance(move, StageJog)}
     moments, targets = [-np.inf], [figures.spec.stepper[name].mechanics.start_position]
     for move, who, motor, _ in figures.motions:
-        if who != name:
-            continue
-        if move.number in manual:
+        if who == name and move.number in manual:
+            moments += [move.begin, motor.arrived]
+            targets += [np.nan, motor.target]
+        elif who == name:
             moments.append(move.begin)
-            targets.append(np.nan)
-        moments.append(motor.arrived if move.number in manual else move.begin)
-        targets.append(motor.target)
+            targets.append(motor.target)
     return np.array(targets)[np.searchsorted(moments, t, side="right") - 1]
 
 
 def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[Figure]:
     runs = [runs for runs in (motor_runs(figures, name, steps) for name, steps in made.items()) if runs.arcs]
     drawn: list[Figure] = []
+    caption = (
+        "Step frequency over position: motion up above zero, motion down below it. The grey ground is what the table "
+        "permits between the ends of the travel. Look for: lines that stay inside the grey; a motor that starts or "
+        "stops anywhere keeps to its ramp. "
+    )
     for k, one in enumerate(runs[:MOST_MOTORS]):
-        caption = "" if k else ENVELOPE_CAPTION
         caption += f"1{GAP}000{GAP}Hz is {stated(one.table.step * 1e6)}{GAP}mm/s.{_zones_text(one)}"
         if one.window != one.travel:
             low, high = (stated(place * MM) for place in one.travel)
@@ -222,6 +212,7 @@ def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[
         if one.left_out:
             caption += f" {further(one.left_out, 'move')} not drawn."
         drawn.append(Figure(title=f"Motor {one.name}", caption=caption, charts=[runs_chart(one, f"runs-{k}")]))
+        caption = ""  # what to look for stands at the first motor only
     if len(runs) > MOST_MOTORS:
         drawn[-1] = replace(drawn[-1], hint=f"{further(len(runs) - MOST_MOTORS, 'motor')} not drawn.")
     return drawn

@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 
 from detent.errors import AxisError
 from detent.methods.stepper_envelope.build import start_hz, stepper_motor
-from detent.methods.stepper_envelope.host import Leg, StageHost, check_stage_job
-from detent.methods.stepper_envelope.machine import StageMotor
+from detent.methods.stepper_envelope.host import Leg, StageHost, StageMotor, check_stage_job
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.plant.stepper_rotor import lost_steps
@@ -31,24 +30,14 @@ class MotorMove:
 
     Attributes
     ----------
-    start, target : float
-        Where it stood, and where it had to go.
-    stop : float
-        Position of record at the end.
-    arrived : float
-        When its last step was over.
-    settled : float
-        When the rotor was outside the tolerance for the last time.
-    steps : int
-        Steps made, both ways.
-    missed : int
-        Steps from the stop to the target.
-    lost : int
-        Steps that the rotor fell behind, or jumped ahead, in this move.
-    rest_lag : float
-        Distance of the rotor from its field when the host took the move for done [steps].
-    peak_lag : float
-        Largest distance of the rotor from its field [steps].
+    start, target, stop : float
+        Where it stood, where it had to go, and its position of record at the end.
+    arrived, settled : float
+        When its last step was over, and when the rotor was outside the tolerance for the last time.
+    steps, missed, lost : int
+        Steps made, both ways; from the stop to the target; and those that the rotor fell behind, or jumped ahead.
+    rest_lag, peak_lag : float
+        Distance of the rotor from its field when the host took the move for done, and the largest one [steps].
     peak_hz : float
         Largest step frequency [Hz].
     margin : float
@@ -85,10 +74,9 @@ class StageMoveRecord:
         From 1.
     label : str
         The tile, or what the job calls it.
-    begin, end : float
-        From the start signals to the end of the dwell, since power-on [s].
-    ready : float
-        When the host took it for done: the last step and the time to settle are over [s].
+    begin, ready, end : float
+        The start signals; when the host took it for done, the last step and the time to settle over; and the end of
+        the dwell, since power-on [s].
     motors : dict of MotorMove by motor
         Those that moved.
     """
@@ -128,9 +116,7 @@ class StageRun(RunRecord[StageJob]):
     moves: list[StageMoveRecord] = field(default_factory=list[StageMoveRecord])
     lost: dict[str, int] = field(default_factory=dict[str, int])
 
-    told: ClassVar[tuple[str, ...]] = (
-        "lost", "worst_lag", "least_margin", "moves_per_second",
-    )  # fmt: skip
+    told: ClassVar[tuple[str, ...]] = ("lost", "worst_lag", "least_margin", "moves_per_second")
 
     @property
     def made(self) -> list[tuple[StageMoveRecord, str, MotorMove]]:
@@ -190,13 +176,11 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
         plant.rotor.peak_lag = abs(plant.rotor.lag)
         plant.gauge.peak_hz, plant.gauge.outside = 0.0, stage.instant
     legs, over = ({move.motor: host.jog(move)}, False) if isinstance(move, StageJog) else host.run(move)
-    arrived = {name: stage.motors[name].rested for name in legs}
     stage.pass_time(stage.spec.controller.settle_time)
     ready = stage.time
-    motors: dict[str, MotorMove] = {}
-    for name, leg in legs.items():
-        motors[name] = _observe(host, name, leg, before[name], arrived=arrived[name], over=over)
-        result.lost[name] += motors[name].lost
+    motors = {name: _observe(host, name, leg, before[name], over=over) for name, leg in legs.items()}
+    for name, motor in motors.items():
+        result.lost[name] += motor.lost
     stage.pass_time(move.dwell)
     return StageMoveRecord(move.number, move.label, begin, ready, stage.time, motors)
 
@@ -206,9 +190,7 @@ def _counted(motor: StageMotor) -> tuple[int, int]:
     return int(motor.controller.timer.pulses), lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
 
 
-def _observe(  # noqa: PLR0913 - what the host knows of the motion
-    host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, arrived: float, over: bool
-) -> MotorMove:
+def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, over: bool) -> MotorMove:
     """What a look at the rotor tells after a motion."""
     motor = host.stage.motors[name]
     plant, table = motor.r.plant, motor.table
@@ -219,7 +201,7 @@ def _observe(  # noqa: PLR0913 - what the host knows of the motion
         start=table.position_of(leg.start),
         target=host.goal[name],
         stop=motor.place,
-        arrived=arrived,
+        arrived=motor.rested,
         settled=plant.gauge.outside * host.stage.tick,
         steps=pulses,
         missed=table.step_inside(host.goal[name]) - motor.position,

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from statistics import median
 from typing import Any
@@ -11,9 +10,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
-from detent.methods.stepper_envelope.comparison import time_text
 from detent.methods.stepper_envelope.run import StageMoveRecord
-from detent.methods.stepper_envelope.summary import StageFigures, stated
+from detent.methods.stepper_envelope.summary import StageFigures, stated, time_text
 from detent.page.figure import Figure
 from detent.page.words import GAP, count, further, number
 
@@ -38,13 +36,73 @@ class Tile:
     off: bool  # a rotor stood steps beside its place
 
 
-@dataclass(frozen=True, slots=True)
 class TilePlan:
-    """The tiles as one sees them from above."""
+    """The tiles as one sees them from above, in the units of the drawing: up is to larger positions."""
 
-    motors: tuple[str, str]  # what moves the stage to the right, and what moves it up in the picture
-    start: Place  # where the stage stood first
-    tiles: Sequence[Tile]  # in the order of the visits, at least one
+    def __init__(self, motors: tuple[str, str], start: Place, tiles: Sequence[Tile]) -> None:
+        self.motors = motors  # what moves the stage to the right, and what moves it up in the picture
+        self.start, self.tiles = start, tiles  # where the stage stood first; in the order of the visits, at least one
+        drawn = tiles[:MOST_TILES]
+        self.usual = median(tile.move.seconds for tile in drawn) or 1.0  # time of the way to a tile [s]
+        xs, ys = ([tile.target[axis] for tile in drawn] for axis in (0, 1))
+        across, up = _pitch(xs), _pitch(ys)
+        # Tiles of a single row or column are squares.
+        pitch = (across or up or LONE, up or across or LONE)
+        spans = [max(places) - min(places) + one for places, one in zip((xs, ys), pitch, strict=True)]
+        # The same scale both ways.
+        self.scale = min((WIDTH - 2 * MARGIN) / spans[0], (HEIGHT - 2 * MARGIN) / spans[1])
+        self.width, self.height = WIDTH, spans[1] * self.scale + 2 * MARGIN
+        self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
+        self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
+        self.squares = [self._square(tile) for tile in drawn]
+        self.about = f"Plan of {count(len(drawn), 'tile')} in their order"
+        self.way = [self._at(place) for place in (start, *(tile.place for tile in drawn))]
+        self.radius = min(max(min(self.sides) / 14, 1.5), 4.0)  # of the points at the stops
+        # The bar of the scale: the largest of 1, 2 and 5 times a power of ten in a fifth of the width [m].
+        wanted = 0.2 * WIDTH / self.scale
+        power = 10.0 ** math.floor(math.log10(wanted))
+        length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
+        self.bar, self.length = length * self.scale, f"{stated(length * 1e3)} mm"
+        self.swatches = {
+            f"{time_text(self.usual)}, the median, or less": self._look(self.usual),
+            f"{time_text(LONG * self.usual)} or more": self._look(LONG * self.usual),
+        }
+        if any(tile.off for tile in tiles):
+            self.swatches["a rotor stood beside its place"] = "fill:var(--bad)"
+
+    def _look(self, seconds: float) -> str:
+        """Colour of a tile by its time."""
+        share = min(max((seconds / self.usual - 1) / (LONG - 1), 0.0), 1.0)
+        return f"fill:var(--speed);fill-opacity:{PALEST + (0.85 - PALEST) * share:.2f}"
+
+    def _at(self, place: Place) -> Place:
+        x = self.width / 2 + (place[0] - self.middle[0]) * self.scale
+        return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
+
+    def _square(self, tile: Tile) -> dict[str, Any]:
+        (x, y), (width, height), move = self._at(tile.target), self.sides, tile.move
+        lag = max((motor.peak_lag for motor in move.motors.values()), default=0.0)
+        return {
+            "title": f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(lag)} steps",
+            "left": x - width / 2,
+            "top": y - height / 2,
+            "look": "fill:var(--bad);fill-opacity:.8" if tile.off else self._look(move.seconds),
+            # Above the path, which goes through the middle.
+            "label": move.label[:6] if min(self.sides) >= LABELLED else "",
+            "ink": "card" if tile.off or move.seconds > (1 + LONG) / 2 * self.usual else "ink",
+        }
+
+    def drawn(self, macro: str) -> Markup:
+        """Its `drawing`, to scale, or the `legend` of its colours."""
+        environment = Environment(loader=PackageLoader("detent.methods.stepper_envelope", ""), autoescape=True)
+        module: Any = environment.get_template("stage_plan.html.j2").module
+        return Markup(getattr(module, macro)(self))  # noqa: S704 - the template escapes
+
+
+def _pitch(places: Sequence[float]) -> float:
+    """Usual distance of one place to the next that is not the same; 0 if there is none."""
+    apart = [abs(b - a) for a, b in pairwise(places) if abs(b - a) > SAME]
+    return median(apart) if apart else 0.0
 
 
 def plan_figure(figures: StageFigures) -> Figure | None:
@@ -62,7 +120,7 @@ def plan_figure(figures: StageFigures) -> Figure | None:
     left_out = len(plan.tiles) - MOST_TILES
     if left_out > 0:
         caption += f" {further(left_out, 'tile')} not drawn."
-    return Figure(title="The tiles from above", caption=caption, drawing=plan_legend(plan) + plan_drawing(plan))
+    return Figure(title="The tiles from above", caption=caption, drawing=plan.drawn("legend") + plan.drawn("drawing"))
 
 
 def tile_plan(figures: StageFigures) -> TilePlan | None:
@@ -81,87 +139,3 @@ def tile_plan(figures: StageFigures) -> TilePlan | None:
         place = {name: target[name] - off[name] * spec.stepper[name].step for name in motors}
         tiles.append(Tile(move, (target[across], target[up]), (place[across], place[up]), any(off.values())))
     return TilePlan((across, up), (start[across], start[up]), tiles)
-
-
-def plan_drawing(plan: TilePlan) -> Markup:
-    """Draw the tiles and the path of the stage, to scale."""
-    view = _View(plan)
-    about = f"Plan of {count(len(view.squares), 'tile')} in their order"
-    return Markup(_macros().drawing(view, plan.motors, about))  # noqa: S704 - the template escapes
-
-
-def plan_legend(plan: TilePlan) -> Markup:
-    """Say what the colours of the drawing mean."""
-    usual = _usual(plan.tiles[:MOST_TILES])
-    swatches = {
-        f"{time_text(usual)}, the median, or less": _look(usual, usual),
-        f"{time_text(LONG * usual)} or more": _look(LONG * usual, usual),
-    }
-    if any(tile.off for tile in plan.tiles):
-        swatches["a rotor stood beside its place"] = "fill:var(--bad)"
-    return Markup(_macros().legend(swatches))  # noqa: S704 - the template escapes
-
-
-@cache
-def _macros() -> Any:
-    loader = PackageLoader("detent.methods.stepper_envelope", "")
-    return Environment(loader=loader, autoescape=True).get_template("stage_plan.html.j2").module
-
-
-def _usual(tiles: Sequence[Tile]) -> float:
-    """Median time of the way to a tile [s]."""
-    return median(tile.move.seconds for tile in tiles) or 1.0
-
-
-def _pitch(places: Sequence[float]) -> float:
-    """Usual distance of one place to the next that is not the same; 0 if there is none."""
-    apart = [abs(b - a) for a, b in pairwise(places) if abs(b - a) > SAME]
-    return median(apart) if apart else 0.0
-
-
-def _look(seconds: float, usual: float) -> str:
-    """Colour of a tile by its time."""
-    share = min(max((seconds / usual - 1) / (LONG - 1), 0.0), 1.0)
-    return f"fill:var(--speed);fill-opacity:{PALEST + (0.85 - PALEST) * share:.2f}"
-
-
-class _View:
-    """The plan in the units of the drawing, the same scale both ways; up is to larger positions."""
-
-    def __init__(self, plan: TilePlan) -> None:
-        tiles = plan.tiles[:MOST_TILES]
-        xs, ys = ([tile.target[axis] for tile in tiles] for axis in (0, 1))
-        across, up = _pitch(xs), _pitch(ys)
-        # Tiles of a single row or column are squares.
-        pitch = (across or up or LONE, up or across or LONE)
-        spans = [max(places) - min(places) + one for places, one in zip((xs, ys), pitch, strict=True)]
-        self.scale = min((WIDTH - 2 * MARGIN) / spans[0], (HEIGHT - 2 * MARGIN) / spans[1])
-        self.width, self.height = WIDTH, spans[1] * self.scale + 2 * MARGIN
-        self.sides = [max(0.86 * one * self.scale, 4.0) for one in pitch]
-        self.middle = ((min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2)
-        usual = _usual(tiles)
-        self.squares = [self._square(tile, usual) for tile in tiles]
-        self.way = [self._at(place) for place in (plan.start, *(tile.place for tile in tiles))]
-        self.radius = min(max(min(self.sides) / 14, 1.5), 4.0)  # of the points at the stops
-        # The bar of the scale: the largest of 1, 2 and 5 times a power of ten in a fifth of the width [m].
-        wanted = 0.2 * WIDTH / self.scale
-        power = 10.0 ** math.floor(math.log10(wanted))
-        length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
-        self.bar, self.length = length * self.scale, f"{stated(length * 1e3)} mm"
-
-    def _at(self, place: Place) -> Place:
-        x = self.width / 2 + (place[0] - self.middle[0]) * self.scale
-        return x, self.height / 2 - (place[1] - self.middle[1]) * self.scale
-
-    def _square(self, tile: Tile, usual: float) -> dict[str, Any]:
-        (x, y), (width, height), move = self._at(tile.target), self.sides, tile.move
-        lag = max((motor.peak_lag for motor in move.motors.values()), default=0.0)
-        return {
-            "title": f"tile {move.label or move.number}: {time_text(move.seconds)}, lag up to {number(lag)} steps",
-            "left": x - width / 2,
-            "top": y - height / 2,
-            "look": "fill:var(--bad);fill-opacity:.8" if tile.off else _look(move.seconds, usual),
-            # Above the path, which goes through the middle.
-            "label": move.label[:6] if min(self.sides) >= LABELLED else "",
-            "ink": "card" if tile.off or move.seconds > (1 + LONG) / 2 * usual else "ink",
-        }

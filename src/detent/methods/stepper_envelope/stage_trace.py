@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import has
 from detent.page.words import GAP, count
-from detent.planning.step_envelope import StepEnvelope, ZoneMap
+from detent.planning.step_envelope import StepEnvelope
 from detent.record.trace import Trace
 
 NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "controller.timer.period")
@@ -55,9 +56,9 @@ class MadeSteps:
         return MadeSteps(self.t[rows], self.position[rows], self.direction[rows], self.hz[rows], index)
 
 
-def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
+def made_steps(trace: Trace | None, motor: str, clock_hz: float) -> MadeSteps | None:
     """Steps that a motor made; None if the registers are not in the trace."""
-    if not has(trace, of(motor, NEEDED_STEPS)):
+    if trace is None or not has(trace, of(motor, NEEDED_STEPS)):
         return None
     position, direction, period = (trace[name].astype(np.int64) for name in of(motor, NEEDED_STEPS))
     new = (period > 0) & (np.diff(position, prepend=position[:1] - direction[:1]) != 0)
@@ -71,8 +72,7 @@ def made_steps(trace: Trace, motor: str, clock_hz: float) -> MadeSteps | None:
 # ---- runs under their tables
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Envelope:
+class Envelope(NamedTuple):
     """Permissible step frequency along the travel; each value holds up to the next place."""
 
     position: Numbers  # places, rising [m], shape (n,)
@@ -80,8 +80,7 @@ class Envelope:
     down: Numbers  # [Hz]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Arc:
+class Arc(NamedTuple):
     """Steps of one motor that followed one another in one direction, as a curve."""
 
     direction: int  # 1 up, -1 down
@@ -89,8 +88,7 @@ class Arc:
     hz: Numbers  # frequency of each step [Hz], shape (n,); 0 at both ends
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
+class Leg(NamedTuple):
     """Steps of one direction, and the extremes they were made between."""
 
     made: MadeSteps  # at least one
@@ -157,33 +155,22 @@ def step_torques(table: StepperTable, legs: Sequence[Leg]) -> NDArray[np.float64
 
     Shape (3, n); None where the ramp indices were not recorded, or no step was made.
     """
-    motor, ramp, maps = stepper_motor(table), make_step_ramp(table).hz, zone_maps(table)
+    motor, ramp, (up, down) = stepper_motor(table), make_step_ramp(table).hz, zone_maps(table)
     rows: list[Numbers] = []
     for leg in legs:
-        planned = _planned_hz(leg, ramp, maps[0] if leg.direction > 0 else maps[1])
-        if planned is None:
+        made, zones = leg.made, up if leg.direction > 0 else down
+        if made.index is None:
             return None
+        # A period rounded to whole ticks of the timer would feign accelerations larger than those of the ramp; an
+        # operator who asks for less than the table allows goes by a frequency of his own.
+        planned = np.minimum(ramp[made.index], zones.hz[made.position - (1 if leg.direction > 0 else 0)])
+        planned = np.where(np.abs(made.hz / planned - 1) < 0.01, planned, made.hz)
         # Between two rows of the trace the square rises evenly.
-        way = np.abs(leg.made.position - leg.start)
+        way = np.abs(made.position - leg.start)
         hz = np.sqrt(np.interp(np.arange(1, abs(leg.stop - leg.start) + 1), way, planned**2))
         rows.append(np.array([hz, [motor.pull_out(f) for f in hz.tolist()], motor.needed_torque(hz)]))
     found = np.concatenate(rows, axis=1)
     return found if found.size else None
-
-
-def _planned_hz(leg: Leg, ramp: Numbers, zones: ZoneMap) -> Numbers | None:
-    """Frequency of each step before it was rounded to whole ticks of the timer.
-
-    A rounded period, a tick off at 4000 Hz and 1 MHz, would feign accelerations larger than those of the ramp.
-    """
-    made = leg.made
-    if made.index is None:
-        return None
-    limit = zones.hz[made.position - (1 if leg.direction > 0 else 0)]
-    planned = np.minimum(ramp[made.index], limit)
-    # An operator who asks for less than the table allows goes by a frequency of his own.
-    rounded = np.abs(made.hz / planned - 1) < 0.01
-    return np.where(rounded, planned, made.hz)
 
 
 # ---- frequency against position
@@ -256,14 +243,10 @@ def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:
         for arc in runs.arcs
         if arc.direction == sign
     ]
-    chart = loop_chart(panel, at * MM, f"position of {runs.name} [mm]", loops)
-    chart["bands"] = [
-        {
-            "spans": [[round(zone.begin * MM, 4), round(zone.end * MM, 4)]],
-            "colour": "brake",
-            "label": f"{zone_name}: {stated(zone.speed * MM)} mm/s"
-            + ("" if zone.direction == "both" else f", {zone.direction} only"),
-        }
-        for zone_name, zone in runs.zones.items()
-    ]
-    return chart
+    bands: list[Chart] = []
+    for zone_name, zone in runs.zones.items():
+        part = [round(zone.begin * MM, 4), round(zone.end * MM, 4)]
+        told = f"{zone_name}: {stated(zone.speed * MM)} mm/s"
+        told += "" if zone.direction == "both" else f", {zone.direction} only"
+        bands.append({"spans": [part], "colour": "brake", "label": told})
+    return loop_chart(panel, at * MM, f"position of {runs.name} [mm]", loops) | {"bands": bands}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.page.run_page import Worst, worst
-from detent.page.words import GAP, count, duration, number
+from detent.page.words import GAP, count, duration, milliseconds, number
 
 PULL_OUT_LAG = 2.0
 """Lag from which on the field pulls the rotor the wrong way: half a period of the torque curve, which has four steps
@@ -63,6 +63,9 @@ class StageFigures:
         self.rest = largest(self.motions, lambda motion: abs(motion.motor.rest_lag))  # when a move was done [step]
         self.peak_hz = largest(self.motions, lambda motion: motion.motor.peak_hz)
         self.peak_speed = largest(self.motions, lambda motion: motion.motor.peak_hz * spec.stepper[motion.name].step)
+        needy = [motion for motion in self.motions if math.isfinite(motion.motor.margin)]
+        least = largest(needy, lambda motion: -motion.motor.margin)
+        self.margin = least and Worst(-least.value, least.of)  # smallest torque margin; None if none needed torque
 
     def _longest(self, time: Callable[[Motion], float]) -> float:
         """Sum over the moves of the longest time of a motor [s]."""
@@ -71,13 +74,6 @@ class StageFigures:
     def astray(self, motion: Motion) -> bool:
         """Whether a motion of its own did not end in its place."""
         return motion.motor.missed != 0 or abs(motion.motor.rest_lag) > self.spec.controller.tolerance
-
-    @property
-    def margin(self) -> WorstMotion:
-        """Smallest torque margin; None if no motion needed torque."""
-        needy = [motion for motion in self.motions if math.isfinite(motion.motor.margin)]
-        found = largest(needy, lambda motion: -motion.motor.margin)
-        return found and Worst(-found.value, found.of)
 
     def whose(self, motion: Motion) -> str:
         """Whose motion it is: "move 1, x"."""
@@ -129,6 +125,11 @@ def stated(value: float) -> str:
     ('0.5', '55', '−40', '87.44')
     """
     return f"{float(f'{value:.4g}'):.12g}".replace("-", "−")
+
+
+def time_text(seconds: float) -> str:
+    """Write a time below 1 s in milliseconds."""
+    return milliseconds(seconds) if seconds < 1 else duration(seconds)
 
 
 def called(move: StageMoveRecord, kind: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import detent
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope.build import instant
-from detent.methods.stepper_envelope.machine import stage_registers
+from detent.methods.stepper_envelope.host import stage_registers
 from detent.methods.stepper_envelope.run import StageRun, run_stage, stage_signals
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove

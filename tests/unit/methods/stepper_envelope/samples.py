@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from detent.methods.stepper_envelope.comparison import METHODS, Course, StepComparison
-from detent.methods.stepper_envelope.jerk_comparison import JerkComparison, Profile
+from detent.methods.stepper_envelope.comparison import METHODS, Course, JerkComparison, Profile, StepComparison
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.stage_job import StageJob, StageMove
 from detent.methods.stepper_envelope.stage_plan import Tile, TilePlan
@@ -63,7 +62,7 @@ def tile_plan(**changes: object) -> TilePlan:
         tile(1, 5 * MM, 7 * MM, seconds=0.4), tile(2, 5.4 * MM, 7 * MM), tile(3, 5.4 * MM, 7.3 * MM),
         tile(4, 5 * MM, 7.3 * MM),
     ]  # fmt: skip
-    return replace(TilePlan(("x", "y"), (0.0, 0.0), tiles), **changes)
+    return TilePlan(**({"motors": ("x", "y"), "start": (0.0, 0.0), "tiles": tiles} | changes))
 
 
 # ---- comparisons
@@ -78,7 +77,7 @@ def step_comparison(motor: str = "x", *, zones_lose: int = 0) -> StepComparison:
         (Course(0.24, 0, 1.0), Course(5.4, 0, 1.0)),
         (Course(0.025, 36, 40.0), Course(0.5, -460, 461.0)),
     )
-    return StepComparison(motor, STEP, (100, 2000), tuple(METHODS), courses)
+    return StepComparison(motor, STEP, (100, 2000), dict(zip(METHODS, courses, strict=True)))
 
 
 def jerk_comparison() -> JerkComparison:

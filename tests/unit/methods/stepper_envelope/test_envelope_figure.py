@@ -6,9 +6,8 @@ import pytest
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, turn_envelopes
 
 from detent.errors import DetentError
-from detent.methods.stepper_envelope import envelope_figure
-from detent.methods.stepper_envelope.envelope_figure import plot_envelope
-from detent.methods.stepper_envelope.envelope_files import EnvelopeTables
+from detent.methods.stepper_envelope import envelope_files
+from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, plot_envelope
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap
 
 
@@ -87,7 +86,7 @@ def test_a_long_travel_is_a_small_file(tmp_path):
 
 def test_values_that_repeat_are_drawn_once():
     hz = np.array([1.0, 2.0, 2.0, 2.0, 3.0, 1.0, 1.0])
-    values, edges = envelope_figure._corners(hz, 10)
+    values, edges = envelope_files._corners(hz, 10)
     assert values.tolist() == [1.0, 2.0, 3.0, 1.0]
     assert edges.tolist() == [10, 11, 14, 15, 17]
 
@@ -104,7 +103,7 @@ def test_the_curve_is_the_table():
     given = tables()
     for table in (given.up, given.down):
         found.clear()
-        assert envelope_figure._draw_table(Area(), table, "red")
+        assert envelope_files._draw_table(Area(), table, "red")
         whole = np.zeros(N)
         for values, edges in found["dashed"] + found["line"]:
             whole[edges[0] : edges[-1]] = np.repeat(values, np.diff(edges))

@@ -12,7 +12,7 @@ import detent
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope import page as stage_module
 from detent.methods.stepper_envelope import stage_plan
-from detent.methods.stepper_envelope.jerk_comparison import compare_jerk
+from detent.methods.stepper_envelope.comparison import compare_jerk
 from detent.methods.stepper_envelope.page import motor_runs, recorded_steps, stage_page, target_of
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
 from detent.methods.stepper_envelope.stage_file import load_stage_job

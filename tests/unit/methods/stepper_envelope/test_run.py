@@ -102,6 +102,8 @@ def test_a_manual_run_keeps_to_the_table_and_ends_at_the_travel(spec):
     assert first.peak_hz <= 1000.0
     assert 0 < first.stop < 1 * MM
     assert second.stop == 0.0
+    # It stood at the end of the travel long before the joystick was let go.
+    assert 0.08 < second.arrived - run.moves[1].begin < 0.1
 
 
 def test_after_a_manual_run_ways_count_from_where_it_ended(spec):

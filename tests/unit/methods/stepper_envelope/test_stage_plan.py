@@ -6,7 +6,15 @@ from tests.page_reader import Reader
 from tests.unit.methods.stepper_envelope.samples import MM, tile, tile_plan
 
 from detent.methods.stepper_envelope import stage_plan
-from detent.methods.stepper_envelope.stage_plan import plan_drawing, plan_legend
+from detent.methods.stepper_envelope.stage_plan import TilePlan
+
+
+def plan_drawing(plan: TilePlan) -> str:
+    return plan.drawn("drawing")
+
+
+def plan_legend(plan: TilePlan) -> str:
+    return plan.drawn("legend")
 
 
 def rects(html: str) -> list[tuple[float, float, float, float]]:

@@ -5,7 +5,7 @@ from detent import examples
 from detent.control.step_rule import start_move
 from detent.methods.load import read_axis
 from detent.methods.stepper_envelope.build import instant
-from detent.methods.stepper_envelope.machine import Stage, stage_registers
+from detent.methods.stepper_envelope.host import Stage, stage_registers
 from detent.plant.stepper_rotor import lost_steps
 from detent.record.recorder import Recorder
 
