@@ -6,8 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from detent.errors import InputError
-from detent.methods.stepper_envelope.stage_file import load_stage_job
-from detent.methods.stepper_envelope.stage_job import Change, StageJog
+from detent.methods.stepper_envelope.stage_job import Change, StageJog, load_stage_job
 
 MOTORS = ("x", "y", "group_a")
 LENGTHS = {"m": Fraction(1), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6), "in": Fraction(127, 5000)}

@@ -53,7 +53,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
 
     def load(self, spec: StepperEnvelopeSpec, path: Path) -> "StageJob":
         """Moves of its motors."""
-        return self.brought("stage_file:load_stage_job")(path, tuple(spec.stepper))
+        return self.brought("stage_job:load_stage_job")(path, tuple(spec.stepper))
 
     def sample_job(self, spec: StepperEnvelopeSpec) -> "StageJob":
         """All motors 200 steps, as far as their ways go."""

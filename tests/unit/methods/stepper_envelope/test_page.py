@@ -15,8 +15,7 @@ from detent.methods.stepper_envelope import stage_plan
 from detent.methods.stepper_envelope.comparison import compare_jerk
 from detent.methods.stepper_envelope.page import motor_runs, recorded_steps, stage_page, target_of
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
-from detent.methods.stepper_envelope.stage_file import load_stage_job
-from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove
+from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove, load_stage_job
 from detent.methods.stepper_envelope.stage_plan import tile_plan
 from detent.methods.stepper_envelope.stage_trace import NEEDED_STEPS
 from detent.methods.stepper_envelope.summary import StageFigures

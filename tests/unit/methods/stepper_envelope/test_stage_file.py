@@ -9,8 +9,7 @@ from tests.places import DATA
 from detent.errors import MOST_PROBLEMS, InputError
 from detent.files.text import MAX_BYTES
 from detent.methods.moves.job import MOST_MOVES
-from detent.methods.stepper_envelope.stage_file import load_stage_job
-from detent.methods.stepper_envelope.stage_job import Change, StageJog
+from detent.methods.stepper_envelope.stage_job import Change, StageJog, load_stage_job
 
 EXAMPLES = files("detent") / "examples"
 SLIDES = DATA / "workloads/stage_tiles_czi"
