@@ -17,7 +17,7 @@ from detent.methods.stepper_envelope.build import changed, stepper_motor
 from detent.methods.stepper_envelope.envelope_files import envelope_tables
 from detent.methods.stepper_envelope.host import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.summary import stated, time_text
+from detent.methods.stepper_envelope.summary import MM, stated, time_text
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
@@ -45,7 +45,6 @@ METHODS = {
 """What is compared: its code (`control.step_comparison`), its name in full, what it works out before every step."""
 
 POINTS = 900  # points of one curve over time
-MM = 1e3
 
 
 @dataclass(frozen=True, slots=True)

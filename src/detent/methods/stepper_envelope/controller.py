@@ -7,15 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from detent.control.step_rule import (
-    IDLE,
-    PAUSE,
-    STEP,
-    StepRule,
-    StepRuleParams,
-    next_entry,
-    next_step,
-)
+from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
 from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, reload_values
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4

@@ -12,12 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.files.findings import Derived
-from detent.methods.stepper_envelope.build import (
-    make_step_ramp,
-    start_hz,
-    stepper_motor,
-    zone_maps,
-)
+from detent.methods.stepper_envelope.build import make_step_ramp, start_hz, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.rules import Motor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.planning.step_envelope import StepEnvelope, envelope_memory

@@ -8,19 +8,8 @@ import numpy as np
 
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJog, StageMove
-from detent.methods.stepper_envelope.stage_trace import (
-    MM,
-    Leg,
-    MadeSteps,
-    Runs,
-    arc_of,
-    envelope_of,
-    legs_of,
-    of,
-    runs_chart,
-    step_torques,
-)
-from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
+from detent.methods.stepper_envelope.stage_trace import Leg, MadeSteps, legs_of, of, runs_chart, runs_of, step_torques
+from detent.methods.stepper_envelope.summary import MM, PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
 from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, thin_indices, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Section
@@ -114,8 +103,7 @@ def _table_figure(shown: ShownMotion) -> Figure:
         "for: the line on the edge of the grey."
     )
     # The extremes of a manual run are the ends of the travel.
-    envelope = envelope_of(table, () if isinstance(shown.asked, StageJog) else legs)
-    runs = Runs(motion.name, table, envelope, [arc_of(leg, table, ARC_POINTS) for leg in legs])
+    runs = runs_of(motion.name, table, legs, ARC_POINTS, () if isinstance(shown.asked, StageJog) else legs)
     title = "Frequency against position, under the table of the move"
     return Figure(title=title, caption=caption, charts=[runs_chart(runs, "detail-runs", height=260)])
 

@@ -155,10 +155,13 @@ class Stage:
             motor.advance_to(at, self._every, until_event=False)
         self.instant = at
         if self.recorder is not None and self.recorder.room(at) <= 0:
-            self._flush(self.recorder)
+            self.flush()
 
-    def _flush(self, recorder: AnyRecorder) -> None:
-        """Put the motors' rows together and hand them on."""
+    def flush(self) -> None:
+        """Put the motors' rows together and hand them to the recorder's sink."""
+        recorder = self.recorder
+        if recorder is None:
+            return
         for name, columns in self._columns.items():
             recorder.rows[:, columns] = self.motors[name].rows
         every = max(recorder.every, 1)
@@ -167,11 +170,6 @@ class Stage:
         ticks = (numbers * every).astype("<i8").view(np.uint8).reshape(count, 8)
         recorder.rows[numbers % count, :8] = ticks  # the tick is the first register of every record
         recorder.flush(self.instant)
-
-    def close(self) -> None:
-        """Hand the last rows to the recorder's sink."""
-        if self.recorder is not None:
-            self._flush(self.recorder)
 
 
 # ---- the host

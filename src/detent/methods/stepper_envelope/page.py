@@ -12,17 +12,8 @@ from detent.methods.stepper_envelope.run import StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJog
 from detent.methods.stepper_envelope.stage_plan import plan_figure
-from detent.methods.stepper_envelope.stage_trace import (
-    MM,
-    MadeSteps,
-    Runs,
-    arc_of,
-    envelope_of,
-    legs_of,
-    made_steps,
-    runs_chart,
-)
-from detent.methods.stepper_envelope.summary import PULL_OUT_LAG, Motion, StageFigures, margin_text, stated
+from detent.methods.stepper_envelope.stage_trace import MadeSteps, Runs, motor_runs, recorded_steps, runs_chart
+from detent.methods.stepper_envelope.summary import MM, PULL_OUT_LAG, Motion, StageFigures, margin_text, stated
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -47,8 +38,6 @@ from detent.record.trace import Trace
 
 MOST_MOTORS = 6  # motors that are drawn
 POINTS = 1500  # rows that are chosen for one curve's sake: a page has many of them
-ARC_POINTS = 4000  # points of all runs of one motor in the figure of frequency against position
-MOST_MOVES = 400  # moves of one motor in that figure: more lie on one another
 MOST_ZONES = 4  # zones that are named below a figure
 
 
@@ -79,12 +68,6 @@ def stage_page(
         ],
         settings=settings or {},
     )
-
-
-def recorded_steps(figures: StageFigures, trace: Trace | None) -> dict[str, MadeSteps]:
-    """Recorded steps of each motor that made some."""
-    found = ((name, made_steps(trace, name, figures.spec.controller.timer)) for name in figures.moved)
-    return {name: made for name, made in found if made is not None and len(made.t)}
 
 
 def _headline(figures: StageFigures) -> Headline:
@@ -216,17 +199,6 @@ def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[
     if len(runs) > MOST_MOTORS:
         drawn[-1] = replace(drawn[-1], hint=f"{further(len(runs) - MOST_MOTORS, 'motor')} not drawn.")
     return drawn
-
-
-def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
-    """Those runs of a motor that were recorded whole."""
-    table = figures.spec.stepper[name]
-    motions = [motion for motion in figures.motions if motion.name == name]
-    whole = [motion for motion in motions if motion.motor.arrived <= made.t[-1] + 1 / made.hz[-1]][:MOST_MOVES]
-    points = max(ARC_POINTS // max(len(whole), 1), 12)
-    legs = [leg for motion in whole for leg in legs_of(made, table, motion.move, motion.motor)]
-    arcs = [arc_of(leg, table, points) for leg in legs]
-    return Runs(name, table, envelope_of(table), arcs, left_out=len(motions) - len(whole))
 
 
 def _zones_text(runs: Runs) -> str:

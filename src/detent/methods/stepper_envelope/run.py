@@ -159,7 +159,7 @@ def run_stage(
     except AxisError as error:
         result.failure = f"move {len(result.moves) + 1}: {error}"
     finally:
-        host.stage.close()
+        host.stage.flush()
     result.time_end = host.stage.time
     result.failure = result.failure or _verdict(spec, result)
     result.done = not result.failure

@@ -12,7 +12,7 @@ from detent.control.step_rule import TURN
 from detent.methods.stepper_envelope.build import make_step_ramp, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
 from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
-from detent.methods.stepper_envelope.summary import stated
+from detent.methods.stepper_envelope.summary import MM, StageFigures, stated
 from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import has
@@ -26,7 +26,8 @@ NEEDED_STEPS = ("controller.rule.position", "controller.rule.direction", "contro
 HEADROOM = 1.25  # height of a half of the figure over the motor's limit
 LONG_NUMBERS = 1e4  # limit from which on frequencies are written in kHz [Hz]
 CROPPED = 0.35  # runs that lie within less than this part of the travel are drawn alone, not with all of it
-MM = 1e3
+ARC_POINTS = 4000  # points of all runs of one motor in the figure of frequency against position
+MOST_MOVES = 400  # moves of one motor in that figure: more lie on one another
 FLAT = 20  # steps of one frequency that make a stretch of their own in a curve
 
 
@@ -67,6 +68,12 @@ def made_steps(trace: Trace | None, motor: str, clock_hz: float) -> MadeSteps | 
     rows = np.flatnonzero(new)
     index = trace[f"{motor}.controller.rule.index"][rows] if f"{motor}.controller.rule.index" in trace else None
     return MadeSteps(trace.time[rows], position[rows], direction[rows], clock_hz / period[rows], index)
+
+
+def recorded_steps(figures: StageFigures, trace: Trace | None) -> dict[str, MadeSteps]:
+    """Recorded steps of each motor that made some."""
+    found = ((name, made_steps(trace, name, figures.spec.controller.timer)) for name in figures.moved)
+    return {name: made for name, made in found if made is not None and len(made.t)}
 
 
 # ---- runs under their tables
@@ -216,6 +223,22 @@ class Runs:
         rows = np.searchsorted(envelope.position, at + 0.01 * self.table.step, side="right") - 1
         rows = rows.clip(0, len(envelope.position) - 1)
         return at, envelope.up[rows], envelope.down[rows]
+
+
+def motor_runs(figures: StageFigures, name: str, made: MadeSteps) -> Runs:
+    """Those runs of a motor that were recorded whole."""
+    table = figures.spec.stepper[name]
+    motions = [motion for motion in figures.motions if motion.name == name]
+    whole = [motion for motion in motions if motion.motor.arrived <= made.t[-1] + 1 / made.hz[-1]][:MOST_MOVES]
+    points = max(ARC_POINTS // max(len(whole), 1), 12)
+    legs = [leg for motion in whole for leg in legs_of(made, table, motion.move, motion.motor)]
+    arcs = [arc_of(leg, table, points) for leg in legs]
+    return Runs(name, table, envelope_of(table), arcs, left_out=len(motions) - len(whole))
+
+
+def runs_of(name: str, table: StepperTable, legs: Sequence[Leg], points: int, bounds: Sequence[Leg]) -> Runs:
+    """Runs as curves of so many points, under the table between the extremes of `bounds`, or of the travel."""
+    return Runs(name, table, envelope_of(table, bounds), [arc_of(leg, table, points) for leg in legs])
 
 
 def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:

@@ -9,6 +9,7 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.page.run_page import Worst, worst
 from detent.page.words import GAP, count, duration, milliseconds, number
 
+MM = 1e3  # mm per m
 PULL_OUT_LAG = 2.0
 """Lag from which on the field pulls the rotor the wrong way: half a period of the torque curve, which has four steps
 (stepper-envelope specification 7.2) [step]."""
@@ -113,7 +114,7 @@ def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[s
         least = number(margin.value)
         rows.append(("torque margin", f"at least {least} ({figures.whose(margin.of)}); falls behind below 1"))
     if (peak := figures.peak_hz) and (fastest := figures.peak_speed):
-        speed = number(fastest.value * 1e3)
+        speed = number(fastest.value * MM)
         rows.append(("peak", f"{count(round(peak.value))} Hz ({figures.whose(peak.of)}), {speed} mm/s"))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
 

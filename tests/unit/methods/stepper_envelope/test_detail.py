@@ -8,9 +8,10 @@ from tests.unit.methods.stepper_envelope.players import MM, Played, chart_of, cu
 
 from detent.methods.stepper_envelope import detail
 from detent.methods.stepper_envelope.detail import NEEDED_ROTOR, ShownMotion, telling, torque_charts
-from detent.methods.stepper_envelope.page import recorded_steps, stage_page
+from detent.methods.stepper_envelope.page import stage_page
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
 from detent.methods.stepper_envelope.stage_job import Change, StageJog, StageMove
+from detent.methods.stepper_envelope.stage_trace import recorded_steps
 from detent.methods.stepper_envelope.summary import StageFigures
 from detent.page.draw import plain
 from detent.page.figure import Figure

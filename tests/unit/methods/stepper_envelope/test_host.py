@@ -83,7 +83,7 @@ def recorded(spec, every: int, rooms: int) -> np.ndarray:
     stage.wait_for(stage.motors, 5.0)
     for _ in range(rooms):
         stage.pass_time(0.013)
-    stage.close()
+    stage.flush()
     return np.concatenate(blocks)
 
 

@@ -11,13 +11,13 @@ from tests.unit.methods.stepper_envelope.samples import motor_move, record, run_
 import detent
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope import page as stage_module
-from detent.methods.stepper_envelope import stage_plan
+from detent.methods.stepper_envelope import stage_plan, stage_trace
 from detent.methods.stepper_envelope.comparison import compare_jerk
-from detent.methods.stepper_envelope.page import motor_runs, recorded_steps, stage_page, target_of
+from detent.methods.stepper_envelope.page import stage_page, target_of
 from detent.methods.stepper_envelope.run import MOTOR_SIGNALS
 from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageMove, load_stage_job
 from detent.methods.stepper_envelope.stage_plan import tile_plan
-from detent.methods.stepper_envelope.stage_trace import NEEDED_STEPS
+from detent.methods.stepper_envelope.stage_trace import NEEDED_STEPS, motor_runs, recorded_steps
 from detent.methods.stepper_envelope.summary import StageFigures
 from detent.page.draw import plain
 from detent.page.figure import Figure
@@ -249,7 +249,7 @@ def test_moves_that_the_trace_does_not_reach_are_left_out(zoom: Played) -> None:
 
 
 def test_of_very_many_moves_the_first_are_drawn(zoom: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stage_module, "MOST_MOVES", 1)
+    monkeypatch.setattr(stage_trace, "MOST_MOVES", 1)
     figures = StageFigures(*zoom[:2])
     made = recorded_steps(figures, zoom[2])
     assert [motor_runs(figures, name, steps).left_out for name, steps in made.items()] == [1, 2]
