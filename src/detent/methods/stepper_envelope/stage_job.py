@@ -321,9 +321,8 @@ def _make_move(line: int, row: StageRow) -> tuple[StageMove | StageJog, int]:
     label = " ".join(word for word in (row.tile if isinstance(row, PlaceRow) else "", row.label) if word)
     if row.jog is not None:
         return StageJog(1, line, row.jog, row.speed or 0.0, row.duration or 0.0, row.dwell, label), row.repeat
-    change = None
-    if row.changed_at is not None and row.changed_to is not None:
-        change = Change(row.changed_at, row.changed_to)
+    at, to = row.changed_at, row.changed_to
+    change = None if at is None or to is None else Change(at, to)
     targets, by = places_of(row, row.motors), places_of(row.by, row.motors)
     return StageMove(1, line, targets, by, row.dwell, label, row.turn, change), row.repeat
 
