@@ -36,12 +36,12 @@ def follow(p: GearParams, r: Gear, travel: float) -> None:
 
 @step
 def output_phase(p: GearParams, slack: float, turns: int, angle: float) -> int:
-    """Phase of the output in [0, 2^32), the motor at `turns` whole turns and `angle` [rad]."""
-    motor = math.floor((angle + slack) * PHASE_PER_RADIAN)
-    phase = ((((turns % p.ratio) << 32) + motor) // p.ratio) & FRACTION
-    if p.eccentricity.used:
-        phase = (phase + at_phase(p.eccentricity, phase)) & FRACTION
-    return phase
+    """Phase of the output, the motor at `turns` whole turns and `angle` [rad].
+
+    Counted from the whole output turns in `turns`: by slack and eccentricity it comes below 0 and beyond 2^32.
+    """
+    phase = (((turns % p.ratio) << 32) + math.floor((angle + slack) * PHASE_PER_RADIAN)) // p.ratio
+    return phase + at_phase(p.eccentricity, phase & FRACTION) if p.eccentricity.used else phase
 
 
 def fill_eccentricity(p: GearParams, amplitude: float, angle: float) -> None:

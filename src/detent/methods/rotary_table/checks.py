@@ -309,7 +309,7 @@ def _torque(m: Machine) -> Iterator[Caution]:
             remedy.most("limits.acceleration", lower, "raise limits.effort"),
         )
     giver = "the amplifier asks for, reversed from full speed"
-    yield from common.idle_effort(remedy, effort, 2 * m.stiffness * spec.drive.full_speed, "N*m", giver)
+    yield from common.idle_effort(remedy, effort, 2 * m.spec.stiffness * spec.drive.full_speed, "N*m", giver)
     torque = abs(load.torque) / spec.ratio if load else 0.0
     together = torque + max(needed if moves else 0.0, spec.mechanics.coulomb)
     if load and together > effort * (1 + BARELY):
@@ -331,7 +331,7 @@ def _rest(m: Machine) -> Iterator[Caution]:
         yield Caution(
             "static friction",
             text(spec.mechanics.static, "N*m"),
-            f"below the torque of the largest word, {text(m.stiffness * spec.drive.full_speed, 'N*m')}",
+            f"below the torque of the largest word, {text(m.spec.stiffness * spec.drive.full_speed, 'N*m')}",
             "the table never breaks loose",
             "shorten drive.time_constant or lower mechanics.static",
         )
@@ -360,7 +360,7 @@ def _slow(m: Machine) -> Iterator[Caution]:
     step = m.deviation(mechanics.static - mechanics.coulomb) / spec.count
     window = max(1, method.in_position)
     if method.position_control and m.breaking_word <= spec.largest_word and step > window:
-        lower = window * spec.count * m.gain * spec.ratio * m.stiffness
+        lower = window * spec.count * m.gain * spec.ratio * m.spec.stiffness
         yield Caution(
             "stick-slip",
             f"{step:.4g} counts of deviation more to break loose than to move on",

@@ -23,16 +23,25 @@ class Machine:
     """The machine behind a specification."""
 
     def __init__(self, spec: RotaryTableSpec) -> None:
-        self.spec = spec
-        self.stiffness, self.viscous = spec.stiffness, spec.viscous
-        self.gain = spec.method.position_gain
-        self.speed = spec.limits.speed
-
-    @cached_property
-    def loop(self) -> HeldLoop:
-        """Exact model of the position loop."""
-        drive, method = self.spec.drive, self.spec.method
-        return HeldLoop(self.gain, 1 - drive.droop, drive.time_constant, method.strobe_period, method.interrupt_delay)
+        drive, method, mechanics, fine = spec.drive, spec.method, spec.mechanics, spec.detector.fine
+        self.spec, self.gain, self.speed = spec, method.position_gain, spec.limits.speed
+        self.loop = HeldLoop(
+            self.gain, 1 - drive.droop, drive.time_constant, method.strobe_period, method.interrupt_delay
+        )
+        # What droop and friction take at limits.speed [N m].
+        self.resisting_torque = spec.viscous * self.speed * spec.ratio + mechanics.coulomb
+        # Least speed word whose torque at standstill is above static friction [count].
+        per_word = spec.stiffness * spec.speed_per_word * spec.ratio
+        self.breaking_word = math.floor(mechanics.static / per_word) + 1
+        # Largest deviation at which the table stays at rest [count]: S4 is rounded to a word too small.
+        least = (self.breaking_word - 0.5) * spec.speed_per_word / self.gain / spec.count
+        self.resting_error = max(0, math.ceil(least * (1 - 1e-9)) - 1)
+        self.noise = math.ceil(fine.noise / math.tau * fine.counts)  # largest error of an angle by it [count]
+        self.latency_way = self.speed * method.task_period  # in a period of the timer task at limits.speed [rad]
+        # Largest sum of errors with which the motor turns still come out right [rad] (3.1).
+        self.allowed_coarse_error = math.pi / spec.ratio - math.tau / spec.detector.coarse.counts - spec.count
+        # Largest error of the table against the fine resolver's angle, which no loop sees [rad].
+        self.table_error = 0.5 * mechanics.backlash + mechanics.eccentricity + resolver_error(fine) / spec.ratio
 
     @cached_property
     def is_stable(self) -> bool:
@@ -51,17 +60,12 @@ class Machine:
 
     def word_at(self, speed: float) -> float:
         """Speed word that holds a speed of the table [rad/s] against droop and friction [count]."""
-        against = self.spec.mechanics.coulomb / self.stiffness / self.spec.ratio
+        against = self.spec.mechanics.coulomb / self.spec.stiffness / self.spec.ratio
         return (speed / (1 - self.spec.drive.droop) + against) / self.spec.speed_per_word
 
     def following_error(self, speed: float) -> float:
         """Deviation with which the table follows at a steady speed [rad]."""
         return self.word_at(speed) * self.spec.speed_per_word / self.gain
-
-    @property
-    def resisting_torque(self) -> float:
-        """What droop and friction take at limits.speed [N m]."""
-        return self.viscous * self.speed * self.spec.ratio + self.spec.mechanics.coulomb
 
     @property
     def accelerating_torque(self) -> float:
@@ -75,35 +79,7 @@ class Machine:
 
     def deviation(self, torque: float) -> float:
         """Deviation that holds a torque at the motor [rad]: neither loop has an integral part."""
-        return torque / self.stiffness / self.spec.ratio / self.gain
-
-    @property
-    def breaking_word(self) -> int:
-        """Least speed word whose torque at standstill is above static friction [count]."""
-        per_word = self.stiffness * self.spec.speed_per_word * self.spec.ratio
-        return math.floor(self.spec.mechanics.static / per_word) + 1
-
-    @property
-    def resting_error(self) -> int:
-        """Largest deviation at which the table stays at rest [count]: S4 is rounded to a word too small."""
-        least = (self.breaking_word - 0.5) * self.spec.speed_per_word / self.gain / self.spec.count
-        return max(0, math.ceil(least * (1 - 1e-9)) - 1)
-
-    @property
-    def noise(self) -> int:
-        """Largest error of an angle by the noise of the fine resolver [count]."""
-        return math.ceil(self.spec.detector.fine.noise / math.tau * self.spec.detector.fine.counts)
-
-    @property
-    def latency_way(self) -> float:
-        """Way in a period of the timer task at limits.speed [rad]."""
-        return self.speed * self.spec.method.task_period
-
-    @property
-    def allowed_coarse_error(self) -> float:
-        """Largest sum of errors with which the motor turns still come out right [rad] (3.1)."""
-        spec = self.spec
-        return math.pi / spec.ratio - math.tau / spec.detector.coarse.counts - spec.count
+        return torque / self.spec.stiffness / self.spec.ratio / self.gain
 
     @property
     def coarse_errors(self) -> dict[str, float]:
@@ -118,13 +94,6 @@ class Machine:
             "fine resolver": (resolver_error(fine) + fine.noise) / self.spec.ratio,
         }
         return {name: error for name, error in errors.items() if error > 0}
-
-    @property
-    def table_error(self) -> float:
-        """Largest error of the table against the fine resolver's angle, which no loop sees [rad]."""
-        mechanics = self.spec.mechanics
-        fine = resolver_error(self.spec.detector.fine) / self.spec.ratio
-        return 0.5 * mechanics.backlash + mechanics.eccentricity + fine
 
 
 def resolver_error(table: FineTable) -> float:
@@ -147,12 +116,10 @@ def resolver_error(table: FineTable) -> float:
 def weakest_output(table: FineTable) -> float:
     """Smallest amplitude of a resolver's output over a turn, of the nominal one.
 
-    The smaller singular value of the matrix with which the windings give sine and cosine.
+    The smaller singular value of ``(1 + g, -sin q; 0, cos q)``, by which the windings give sine and cosine.
     """
-    gain, q = 1 + table.gain_error, table.quadrature_error
-    # Squares of the singular values add up to (1 + g)^2 + 1, their product is (1 + g) cos q.
-    total, product = gain**2 + 1, gain * math.cos(q)
-    return math.sqrt(max(0.0, total - math.sqrt(max(0.0, total**2 - 4 * product**2))) / 2)
+    gain, cos, sin = 1 + table.gain_error, math.cos(table.quadrature_error), math.sin(table.quadrature_error)
+    return (math.hypot(gain + cos, sin) - math.hypot(gain - cos, sin)) / 2
 
 
 def arc_seconds(angle: float) -> str:
@@ -198,7 +165,7 @@ def _drive(machine: Machine) -> Iterator[Derived]:
     """Inertia, stiffness, acceleration."""
     spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
     yield quantity_figure("inertia at the motor J", spec.inertia, "kg*m^2", "rotor + gear + table / G^2")
-    yield quantity_figure("stiffness of the velocity loop", machine.stiffness, "N*m*s/rad", "(1 - droop) x J / tau")
+    yield quantity_figure("stiffness of the velocity loop", spec.stiffness, "N*m*s/rad", "(1 - droop) x J / tau")
     yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a")
     formula = "v^2 / (2 a), to limits.speed or from it to rest"
     yield quantity_figure("way of an acceleration", speed**2 / (2 * acceleration), "rad", formula)

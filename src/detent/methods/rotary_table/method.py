@@ -30,7 +30,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
         "controller.positioner.s4", "lines.word", "plant.train.motor.velocity",
     )  # fmt: skip
     takes, reads, runs = "sequence_job:SequenceJob", "sequence_file:load_sequence", "run:run_sequence"
-    compares = ("comparison_runs:compare_angle",)
+    compares = ("comparison:compare_angle",)
     sums_up, reports = "summary:sequence_summary_rows", "page:table_page"
     says = "{job}: every step was done on {axis}.", "Not done: {failure}"
 

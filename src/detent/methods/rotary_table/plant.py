@@ -4,6 +4,7 @@ from detent.drive.velocity_amplifier import VelocityAmplifier, VelocityAmplifier
 from detent.kernel.noise import NoiseSource
 from detent.kernel.registers import Registers, block, register, u4
 from detent.kernel.step import hot_step, step
+from detent.kernel.turn_table import FRACTION
 from detent.methods.rotary_table.controller import TableLines
 from detent.plant.gearing import PHASE_PER_RADIAN, Gear, GearParams, follow, output_phase
 from detent.plant.rotary_motor import LoadTorque, RotaryMotor, RotaryMotorParams, load_torque, rotate
@@ -56,7 +57,7 @@ def latch(
     coarse = output_phase(p.train.reduction, coarse_slack, turns, angle)
     lines.fine = count_phase(p.fine, r.fine, int(angle * PHASE_PER_RADIAN))
     lines.coarse = count_phase(p.coarse, r.coarse, coarse)
-    r.table = output_phase(p.train.gear, slack, turns, angle)
+    r.table = output_phase(p.train.gear, slack, turns, angle) & FRACTION
 
 
 @hot_step

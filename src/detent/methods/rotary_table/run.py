@@ -5,13 +5,13 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from detent.errors import AxisError
-from detent.kernel.turn_table import FRACTION, TURN, at_phase
+from detent.kernel.turn_table import TURN
 from detent.methods.rotary_table.host import TableHost, check_sequence, dial_speed
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change, SequenceController, suspect
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, SequenceJob
 from detent.methods.rotary_table.system import RotaryTable, RotaryTableParams
-from detent.plant.gearing import PHASE_PER_RADIAN
+from detent.plant.gearing import output_phase
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 from detent.sensing.gauge import set_angle_gauge
@@ -33,99 +33,47 @@ class StepRecord:
     """How one step went; times in seconds since power-on, angles of the table in radians.
 
     The angles are those of the table itself, endless: they go on beyond a turn.
-
-    Attributes
-    ----------
-    number : int
-        Counted from 1, repeats counted.
-    index : int
-        Of the step in the job, from 0.
-    kind : str
-        "go", "jog", "wait" or "output".
-    text : str
-        What was asked, for people.
-    begin, end : float
-        When it began and ended.
-    start, stop : float
-        Angle of the table at both.
-    target : float
-        Where it was sent, or is held after a jog; NaN for waits and outputs, and for a jog that did not end.
-    error : float
-        Target less angle at the end; NaN without a target.
-    travel : float
-        Way from start to stop, positive to larger angles.
-    peak_speed : float
-        Largest speed, at the interrupts [rad/s].
-    peak_deviation : float
-        Largest magnitude of the deviation dR, at the interrupts.
-    crossings, rollovers : int
-        Ends of the turn that were crossed, and rollovers of the positioner.
     """
 
-    number: int
-    index: int
-    kind: str
-    text: str
-    begin: float
-    end: float
-    start: float
-    stop: float
+    number: int  #: counted from 1, repeats counted
+    index: int  #: of the step in the job, from 0
+    kind: str  #: "go", "jog", "wait" or "output"
+    text: str  #: what was asked, for people
+    begin: float  #: when it began
+    end: float  #: when it ended
+    start: float  #: angle of the table at the beginning
+    stop: float  #: and at the end
+    #: where it was sent, or is held after a jog; NaN for waits and outputs, and for a jog that did not end
     target: float
-    error: float
-    travel: float
-    peak_speed: float
-    peak_deviation: float
-    crossings: int
-    rollovers: int
+    error: float  #: target less angle at the end; NaN without a target
+    travel: float  #: way from start to stop, positive to larger angles
+    peak_speed: float  #: largest speed, at the interrupts [rad/s]
+    peak_deviation: float  #: largest magnitude of the deviation dR, at the interrupts
+    crossings: int  #: ends of the turn that were crossed
+    rollovers: int  #: of the positioner
 
 
 @dataclass
 class SequenceRun(RunRecord[SequenceJob]):
     """Outcome of a sequence. Times since power-on [s], angles of the table [rad].
 
-    Attributes
-    ----------
-    job : SequenceJob
-        What was asked.
-    done : bool
-        Every step came to its end.
-    failure : str
-        Why not, and what to do; empty if `done`.
-    warnings : list of str
-        What a user of the axis should know though the sequence was done.
-    time_ready, time_end : float
-        The axis holds its table, and the sequence begins; the end of the last step.
-    steps : list of StepRecord
-        Steps made, in order.
-    outputs, inputs : list of (float, str, bool)
-        Output signals as they were switched, and input signals as they came: (time, name, on). All are off before.
-    count : float
-        Angle of the table per count of the axis.
-    in_position : float
-        Deviation that counts as in position.
-    travel : float
-        Way of all steps, in either direction.
-    turns : int
-        Whole turns from where the table stood first to where it stands at the end, signed.
-    crossings, rollovers : int
-        Of all steps.
-    position : int
-        Position of record at the end [count].
-    refused : int
-        Starts of a positioning that the axis has refused.
+    Also `done`: every step came to its end; `failure`: why not, and what to do, empty if `done`; `warnings`: what a
+    user of the axis should know though the sequence was done; `time_ready` and `time_end`: the axis holds its table,
+    and the sequence begins; the end of the last step.
     """
 
-    steps: list[StepRecord] = field(default_factory=list[StepRecord])
+    steps: list[StepRecord] = field(default_factory=list[StepRecord])  #: steps made, in order
+    #: output signals as they were switched: (time, name, on); all are off before
     outputs: list[Change] = field(default_factory=list[Change])
-    inputs: list[Change] = field(default_factory=list[Change])
-    count: float = 0.0
-    in_position: float = 0.0
-    travel: float = 0.0
-    turns: int = 0
-    crossings: int = 0
-    rollovers: int = 0
-    position: int = 0
-    refused: int = 0
+    inputs: list[Change] = field(default_factory=list[Change])  #: input signals as they came
+    count: float = 0.0  #: angle of the table per count of the axis
+    in_position: float = 0.0  #: deviation that counts as in position
+    travel: float = 0.0  #: way of all steps, in either direction
+    turns: int = 0  #: whole turns from where the table stood first to where it stands at the end, signed
+    crossings: int = 0  #: of all steps
+    rollovers: int = 0  #: of all steps
+    position: int = 0  #: position of record at the end [count]
+    refused: int = 0  #: starts of a positioning that the axis has refused
 
     told: ClassVar[tuple[str, ...]] = (
         "count", "in_position", "travel", "turns", "crossings", "rollovers", "position", "refused", "peak_deviation",
@@ -143,17 +91,12 @@ class SequenceRun(RunRecord[SequenceJob]):
         return max((abs(step.error) for step in self.steps if step.kind == "go"), default=0.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for ``--json``; null for what is not a number."""
-        found = super().to_dict()
-        found["steps"] = [{key: finite(value) for key, value in asdict(step).items()} for step in self.steps]
-        for name in ("outputs", "inputs"):
-            found[name] = [{"time": time, "name": signal, "on": on} for time, signal, on in getattr(self, name)]
-        return found
-
-
-def finite(value: Any) -> Any:
-    """JSON has no word for NaN."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        """Plain data for ``--json``."""
+        told = {
+            name: [{"time": time, "name": signal, "on": on} for time, signal, on in changes]
+            for name, changes in (("outputs", self.outputs), ("inputs", self.inputs))
+        }
+        return super().to_dict() | {"steps": [asdict(step) for step in self.steps]} | told
 
 
 def run_sequence(
@@ -181,22 +124,11 @@ def run_sequence(
     return result
 
 
-def endless_phase(p: RotaryTableParams, r: RotaryTable) -> int:
-    """True angle of the table with all its turns [turn/2^32]: `detent.plant.gearing.output_phase` goes on beyond one.
-
-    Whole numbers of any length: it is as fine after a million turns as in the first.
-    """
-    gear, motor = p.plant.train.gear, r.plant.train.motor
-    within = math.floor((motor.angle + r.plant.train.gear.slack) * PHASE_PER_RADIAN)
-    phase = ((motor.turns << 32) + within) // gear.ratio
-    return phase + at_phase(gear.eccentricity, phase & FRACTION) if gear.eccentricity.used else phase
-
-
 class TableObserver:
     """Looks at a table whose axis has taken its first angle."""
 
     def __init__(self, spec: RotaryTableSpec, machine: Machine[RotaryTableParams, RotaryTable]) -> None:
-        self._spec, self._machine = spec, machine
+        self._spec, self._gear = spec, machine.params.plant.train.gear
         self._state: Any = machine.state  # ctypes gives every register its type at run time only
         # The axis knows the angle within a turn only: it starts in [0, T) whatever turn the table is in.
         away = self._state.controller.positioner.angle.position - self._motor_counts
@@ -204,8 +136,13 @@ class TableObserver:
 
     @property
     def angle(self) -> float:
-        """True angle of the table [rad], endless; 0 where the motor's angle is 0."""
-        turns, phase = divmod(endless_phase(self._machine.params, self._machine.state), TURN)
+        """True angle of the table [rad], endless; 0 where the motor's angle is 0.
+
+        Whole numbers of any length: it is as fine after a million turns as in the first.
+        """
+        train = self._state.plant.train
+        within = output_phase(self._gear, train.gear.slack, train.motor.turns, train.motor.angle)
+        turns, phase = divmod((train.motor.turns // self._gear.ratio << 32) + within, TURN)
         return turns * math.tau + phase / TURN * math.tau
 
     @property

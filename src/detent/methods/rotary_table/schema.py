@@ -199,12 +199,6 @@ class TableProtectionTable(TurnProtectionTable, frozen=True):
     )  # fmt: skip
     following_time: Time = optional("how long it may last", 0.06, ge=0.0, le=10.0)
 
-    def lifted(self) -> "TableProtectionTable":
-        """The same with every watch off: for an axis that shall be seen to run away."""
-        watches = ("saturation_time", "stuck_time", "overspeed", "jump", "reversed_time", "following_time")
-        off: dict[str, float] = dict.fromkeys(watches, 0.0)
-        return self.model_copy(update=off)
-
 
 class LoadTable(Table, frozen=True):
     """A torque on the table for a while."""
@@ -299,26 +293,19 @@ class RotaryTableSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: RotaryTableSpec) -> RotaryTableSpec:
     """Fill the defaults that depend on another table, as their `derived` texts say."""
-    drive, coarse = spec.drive, spec.detector.coarse
-    if math.isnan(drive.full_speed):
-        drive = drive.model_copy(update={"full_speed": spec.motor.max_speed})
+    speed, coarse = spec.limits.speed, spec.detector.coarse
     if math.isnan(coarse.reduction):
         coarse = coarse.model_copy(update={"reduction": spec.mechanics.gear_ratio})
     position = {
-        number: entry.model_copy(update={"speed": spec.limits.speed}) if math.isnan(entry.speed) else entry
+        number: entry.model_copy(update={"speed": speed}) if math.isnan(entry.speed) else entry
         for number, entry in spec.position.items()
     }
-    detector = spec.detector.model_copy(update={"coarse": coarse})
-    filled = spec.model_copy(update={"drive": drive, "detector": detector, "position": position})
-    return filled.model_copy(update={"protection": _filled_protection(filled)})
-
-
-def _filled_protection(spec: RotaryTableSpec) -> TableProtectionTable:
-    """The effort that must move the table, and the deviation that is a fault."""
-    protection, changes = spec.protection, dict[str, float]()
-    if math.isnan(protection.stuck_effort):
-        changes["stuck_effort"] = breaking_effort(spec.mechanics.static, spec.stiffness * spec.drive.full_speed)
-    if math.isnan(protection.following_error):
-        speed = spec.limits.speed / (1 - spec.drive.droop) + spec.breaking_speed
-        changes["following_error"] = min(2 * speed / spec.method.position_gain, LARGEST_ERROR)
-    return protection.model_copy(update=changes)
+    spec = spec.model_copy(update={"position": position}).changed(detector={"coarse": coarse})
+    spec = spec.filled(drive={"full_speed": spec.motor.max_speed})
+    error = 2 * (speed / (1 - spec.drive.droop) + spec.breaking_speed) / spec.method.position_gain
+    return spec.filled(
+        protection={
+            "stuck_effort": breaking_effort(spec.mechanics.static, spec.stiffness * spec.drive.full_speed),
+            "following_error": min(error, LARGEST_ERROR),
+        }
+    )

@@ -31,6 +31,7 @@ from detent.methods.rotary_table.sequence_job import (
     find_loops,
     join_stretches,
     next_on,
+    stated_keys,
 )
 
 WHAT_A_JOB_IS = "a sequence of steps (.toml)"
@@ -71,13 +72,13 @@ def parse_sequence(file: str, text: str) -> SequenceJob:
 def _make_step(row: StepRow, line: int) -> Step:
     """The step that a table says."""
     if row.go is not None:
-        return Go(row.go, line, row.label)
+        return Go(row.go, row=line, label=row.label)
     if row.jog is not None:
-        return Jog(1 if row.jog == "+" else -1, row.speed, row.signal, row.duration, line, row.label)
+        return Jog(1 if row.jog == "+" else -1, row.speed, row.signal, row.duration, row=line, label=row.label)
     if row.repeat is not None:
-        return Repeat(row.repeat, row.times or 1, line)
+        return Repeat(row.repeat, row.times or 1, row=line)
     if row.wait is not None or row.wait_for is not None:
-        return Wait(row.wait, row.wait_for, row.level, line, row.label)
+        return Wait(row.wait, row.wait_for, row.level, row=line, label=row.label)
     return Output(row.set_on or row.clear or "", on=row.set_on is not None, row=line, label=row.label)
 
 
@@ -137,13 +138,8 @@ def _signal_faults(job: SequenceJob) -> Iterator[Fault]:
 
 def _signal_of(step: Step) -> tuple[str | None, str]:
     """Signal of a step, None for a step without one, and its key in a job file."""
-    if isinstance(step, Jog):
-        return step.signal, "while"
-    if isinstance(step, Wait):
-        return step.signal, "wait_for"
-    if isinstance(step, Output):
-        return step.signal, "set" if step.on else "clear"
-    return None, ""
+    found = ((value, key) for key, value in stated_keys(step).items() if key in {"while", "wait_for", "set", "clear"})
+    return next(((value, key) for value, key in found if isinstance(value, str)), (None, ""))
 
 
 def _time_faults(job: SequenceJob) -> Iterator[Fault]:

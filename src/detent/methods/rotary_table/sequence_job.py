@@ -6,13 +6,12 @@ switches other machinery. Job files are read in `sequence_file`; here everything
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ValidationInfo, field_validator
+from pydantic import StringConstraints, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from detent.errors import FileProblem
@@ -24,7 +23,7 @@ MOST_STEPS = 100_000  # steps of a job at most, repeats counted
 LONGEST_TIME = 1e5  # longest wait, longest jog and latest input of a job [s]: more than a day
 LAST_NUMBER = 127  # position numbers go from 0 to this
 
-SIGNAL_NAME = re.compile(r"[^\W_][\w.:-]{0,39}")  # names of signals and labels
+NAME = r"[^\W_][\w.:-]{0,39}"  # names of signals and labels
 WHAT_A_NAME_IS = "a letter or digit, then up to 39 letters, digits and _ . : -"
 ACTIONS: dict[str, tuple[str, ...]] = {
     "go": ("label",),
@@ -38,13 +37,7 @@ ACTIONS: dict[str, tuple[str, ...]] = {
 """What a step can be, and the keys that it may have beside."""
 
 
-def _check_name(name: str) -> str:
-    if not SIGNAL_NAME.fullmatch(name):
-        raise PydanticCustomError("refused", "not a name", {})
-    return name
-
-
-Name = Annotated[str, AfterValidator(_check_name)]
+Name = Annotated[str, StringConstraints(pattern=f"^{NAME}$")]
 
 
 def name_key(doc: str, alias: str | None = None) -> Any:
@@ -88,7 +81,7 @@ class StepRow(Row, frozen=True):
     duration: Time | None = optional("how long the button is held down", None, alias="for", gt=0, le=LONGEST_TIME)
     level: bool = optional("level of the input that ends the wait", default=True, allowed="true (on) or false (off)")
     times: int | None = optional("how often the loop is done altogether", None, ge=1, le=MOST_STEPS)
-    label: Annotated[str, AfterValidator(lambda name: name and _check_name(name))] = optional(
+    label: Annotated[str, StringConstraints(pattern=f"^({NAME})?$")] = optional(
         "name of the step, for a repeat", "", allowed=f"a name: {WHAT_A_NAME_IS}"
     )
 
@@ -131,148 +124,80 @@ def _lacking(action: str, stated: Mapping[str, Any]) -> Iterator[FileProblem]:
         yield FileProblem.of_key("jog", came, "exactly one of while (a signal) and for (a time)", remedy)
 
 
-def _check(row: int, **values: object) -> None:
-    """Refuse a step that no file could have; keys that are words of Python end in an underscore."""
-    where = f"step of line {row}" if row else "step"
-    check_values(StepRow, where, {key.removesuffix("_"): value for key, value in values.items()})
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SequenceStep:
+    """What every step of a sequence has. A value that no job file could have is a `DetentError`."""
 
-
-@dataclass(frozen=True, slots=True)
-class Go:
-    """Send the table to an entry of its position table; the step ends when it is in position.
-
-    Attributes
-    ----------
-    number : int
-        Position number, 0..127.
-    row : int
-        Line of the file, from 1; 0 for a job that comes from elsewhere.
-    label : str
-        Name by which a `Repeat` refers to the step; empty for none.
-
-    Raises
-    ------
-    DetentError
-        A value is outside what is said above.
-    """
-
-    number: int
-    row: int = 0
-    label: str = ""
+    row: int = 0  #: line of the file, from 1; 0 for a job that comes from elsewhere
 
     def __post_init__(self) -> None:
-        """Refuse numbers that no position table has."""
-        _check(self.row, go=self.number, label=self.label)
+        """Refuse what no job file could say."""
+        check_values(StepRow, f"step of line {self.row}" if self.row else "step", stated_keys(self))
 
 
 @dataclass(frozen=True, slots=True)
-class Jog:
+class Go(SequenceStep):
+    """Send the table to an entry of its position table; the step ends when it is in position."""
+
+    number: int  #: position number, 0..127
+    label: str = ""  #: name by which a `Repeat` refers to the step; empty for none
+
+
+@dataclass(frozen=True, slots=True)
+class Jog(SequenceStep):
     """Hold a manual-feed button down: for a time, or while an input signal is on.
 
     A step with a signal that is off when the step begins waits for it to come on. The step ends when the button has
     been released and the table is at rest.
-
-    Attributes
-    ----------
-    direction : int
-        1 to larger angles, -1 to smaller.
-    speed : float or None
-        Of the dial [rad/s], above 0; None for the axis's largest.
-    signal : str or None
-        Input that holds the button down.
-    duration : float or None
-        How long the button is held down [s], above 0. Exactly one of `signal` and `duration` is given.
-    row, label
-        As in `Go`.
     """
 
-    direction: int
-    speed: float | None = None
-    signal: str | None = None
-    duration: float | None = None
-    row: int = 0
-    label: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse what no panel could do."""
-        signs = {1: "+", -1: "-"}
-        jog = signs.get(self.direction, self.direction)
-        _check(self.row, jog=jog, speed=self.speed, while_=self.signal, for_=self.duration, label=self.label)
+    direction: int  #: 1 to larger angles, -1 to smaller
+    speed: float | None = None  #: of the dial [rad/s], above 0; None for the axis's largest
+    signal: str | None = None  #: input that holds the button down
+    duration: float | None = None  #: how long it is held down [s], above 0; either this or `signal` is given
+    label: str = ""  #: as in `Go`
 
 
 @dataclass(frozen=True, slots=True)
-class Wait:
-    """Let time pass, or wait for an input signal.
+class Wait(SequenceStep):
+    """Let time pass, or wait for an input signal."""
 
-    Attributes
-    ----------
-    duration : float or None
-        How long [s], 0 or more.
-    signal : str or None
-        Input to wait for. Exactly one of `duration` and `signal` is given.
-    level : bool
-        Level of the signal that ends the wait: True for on.
-    row, label
-        As in `Go`.
-    """
-
-    duration: float | None = None
-    signal: str | None = None
-    level: bool = True
-    row: int = 0
-    label: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse waits without a meaning."""
-        ended = {} if self.signal is None else {"level": self.level}
-        _check(self.row, wait=self.duration, wait_for=self.signal, label=self.label, **ended)
+    duration: float | None = None  #: how long [s], 0 or more
+    signal: str | None = None  #: input to wait for; either this or `duration` is given
+    level: bool = True  #: level of the signal that ends the wait: True for on
+    label: str = ""  #: as in `Go`
 
 
 @dataclass(frozen=True, slots=True)
-class Output:
-    """Switch an output signal.
+class Output(SequenceStep):
+    """Switch an output signal. All outputs are off at power-on."""
 
-    Attributes
-    ----------
-    signal : str
-        Its name.
-    on : bool
-        What it is switched to. All outputs are off at power-on.
-    row, label
-        As in `Go`.
-    """
-
-    signal: str
-    on: bool
-    row: int = 0
-    label: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse names that are none."""
-        _check(self.row, **{"set" if self.on else "clear": self.signal}, label=self.label)
+    signal: str  #: its name
+    on: bool  #: what it is switched to
+    label: str = ""  #: as in `Go`
 
 
 @dataclass(frozen=True, slots=True)
-class Repeat:
-    """Do the steps from the labelled one up to here again.
+class Repeat(SequenceStep):
+    """Do the steps from the labelled one up to here again."""
 
-    Attributes
-    ----------
-    label : str
-        Label of the first step of the loop, which is an earlier one.
-    times : int
-        How often the loop is done altogether, 1 or more.
-    row : int
-        As in `Go`.
-    """
+    label: str  #: label of the first step of the loop, which is an earlier one
+    times: int  #: how often the loop is done altogether, 1 or more
 
-    label: str
-    times: int
-    row: int = 0
 
-    def __post_init__(self) -> None:
-        """Refuse loops that are done no time."""
-        _check(self.row, repeat=self.label, times=self.times)
+def stated_keys(step: SequenceStep) -> dict[str, object]:
+    """What a step says, by the keys of a job file; what is None or empty is left out there."""
+    if isinstance(step, Go):
+        return {"go": step.number, "label": step.label}
+    if isinstance(step, Jog):
+        jog = {1: "+", -1: "-"}.get(step.direction, step.direction)
+        return {"jog": jog, "speed": step.speed, "while": step.signal, "for": step.duration, "label": step.label}
+    if isinstance(step, Wait):
+        level = None if step.signal is None else step.level
+        return {"wait": step.duration, "wait_for": step.signal, "level": level, "label": step.label}
+    if isinstance(step, Output):
+        return {"set" if step.on else "clear": step.signal, "label": step.label}
+    return {"repeat": step.label, "times": step.times} if isinstance(step, Repeat) else {}
 
 
 Step = Go | Jog | Wait | Output | Repeat  # a step as the job says it
@@ -282,20 +207,11 @@ Stretches = tuple[tuple[float, float], ...]  # times [s] in which a signal is on
 
 @dataclass(frozen=True, slots=True)
 class SequenceJob:
-    """A program of the sequence controller; `sequence_file.find_faults` tells whether it can be run at all.
+    """A program of the sequence controller; `sequence_file.find_faults` tells whether it can be run at all."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the file, without its folders.
-    steps : tuple of Step
-        As the file says them, at least one.
-    inputs : dict
-        Per input signal the stretches in which it is on [s since the start of the sequence], see `join_stretches`.
-    """
-
-    name: str
-    steps: tuple[Step, ...]
+    name: str  #: name of the file, without its folders
+    steps: tuple[Step, ...]  #: as the file says them, at least one
+    #: per input signal the stretches in which it is on [s since the start of the sequence], see `join_stretches`
     inputs: dict[str, Stretches] = field(default_factory=dict[str, Stretches])
     kind: str = "sequence"
 

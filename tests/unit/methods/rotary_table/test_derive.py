@@ -97,7 +97,7 @@ def test_the_simulated_axis_follows_as_the_figures_say(bench_of, overrides):
     assert bench.r.controller.positioner.s4 == pytest.approx(machine.word_at(machine.speed), abs=1)
     # Droop and friction are at their largest at the end of an acceleration, which itself is at its beginning; a short
     # one does not come to its peak. The word is rounded.
-    word = machine.stiffness * bench.spec.speed_per_word * bench.spec.ratio
+    word = bench.spec.stiffness * bench.spec.speed_per_word * bench.spec.ratio
     assert 0.8 * (machine.accelerating_torque - machine.resisting_torque) <= torque
     assert torque <= machine.accelerating_torque + word
 

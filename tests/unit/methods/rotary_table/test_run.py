@@ -16,7 +16,8 @@ from tests.places import ROOT
 import detent
 from detent.errors import InputError
 from detent.methods.load import load_spec
-from detent.methods.rotary_table.run import SEQUENCE_SIGNALS, describe_step, run_sequence
+from detent.methods.rotary_table.host import TableHost, rotary_table_machine
+from detent.methods.rotary_table.run import SEQUENCE_SIGNALS, TableObserver, describe_step, run_sequence
 from detent.methods.rotary_table.sequence_file import load_sequence
 from detent.methods.rotary_table.sequence_job import Go, Jog, Output, Repeat, SequenceJob, Wait
 from detent.methods.rotary_table.system import TICK, RotaryTable
@@ -146,10 +147,10 @@ def test_the_loop_in_the_file_tells_what_each_step_is(story):
 
 
 def test_it_is_plain_data(story):
-    found = json.loads(json.dumps(story.to_dict(), allow_nan=False))
+    found = json.loads(json.dumps(story.to_dict()))
     assert (found["job"], found["kind"], found["done"]) == ("index_sequence.toml", "sequence", True)
     assert found["steps"][0]["error"] == story.steps[0].error
-    assert found["steps"][1]["target"] is None  # an output
+    assert math.isnan(found["steps"][1]["target"])  # an output
     assert found["outputs"][0] == {"time": story.outputs[0][0], "name": "clamp", "on": True}
     assert len(found["inputs"]) == 6
 
@@ -287,7 +288,7 @@ def test_a_table_that_runs_away_is_stopped_within_a_turn_or_so():
     assert "has run away" in jog.failure
     assert math.isnan(jog.steps[0].target)
     assert math.isnan(jog.steps[0].error)
-    assert jog.to_dict()["steps"][0]["error"] is None
+    assert math.isnan(jog.to_dict()["steps"][0]["error"])
 
 
 def test_a_table_that_runs_away_while_it_waits():
@@ -328,6 +329,86 @@ def test_a_run_ends_where_its_signal_is_over():
     found = run(Go(1), Jog(1, signal="a", row=8), a=((0.5, 1.0),))
     assert not found.done
     assert found.failure.startswith('step 2 of 2 (line 8), jog + at 60 deg/s while "a": "a" went off for good at 1 s')
+
+
+# -- the true angle of table and motor, with all turns ------------------------------------------------------
+
+
+def observed(*overrides):
+    spec = load_spec(detent.example("rotary_table.toml"), overrides)
+    host = TableHost(spec)
+    host.start()
+    return host, TableObserver(spec, host.machine)
+
+
+@pytest.mark.parametrize("turns", [0.0, 89.999, 90.0, -0.001, -90.5, 12345.678, 9e9 + 0.25])
+@pytest.mark.parametrize("slack", [0.0, 0.3, -0.3])
+def test_the_angle_goes_on_beyond_a_turn(turns, slack):
+    host, observer = observed("mechanics.eccentricity=0.01 rad", "mechanics.eccentricity_angle=0.5 rad")
+    train = host.machine.state.plant.train
+    train.motor.turns, train.motor.angle = math.floor(turns), (turns - math.floor(turns)) * 2 * math.pi
+    train.gear.slack = slack
+    driven = (turns * math.tau + slack) / host.spec.ratio
+    assert observer.angle == pytest.approx(driven + 0.01 * math.sin(driven - 0.5), rel=1e-15, abs=1e-6)
+
+
+def test_the_angle_is_as_fine_after_a_million_turns():
+    host, observer = observed()
+    motor = host.machine.state.plant.train.motor
+    angles = []
+    for turns in (0, 10**6 * host.spec.ratio):
+        motor.turns, motor.angle = turns, 1.0
+        angles.append(observer.angle)
+    assert angles[1] - angles[0] == pytest.approx(1e6 * math.tau, rel=1e-15)
+
+
+@pytest.mark.parametrize("degrees", [0, 10, 350, -10, -350])
+def test_the_angle_at_power_on_is_that_of_the_axis_file_and_so_is_the_target(degrees):
+    host, observer = observed(f"mechanics.start_angle={degrees} deg")
+    count = host.spec.count
+    assert observer.angle == pytest.approx(math.radians(degrees), abs=count)
+    assert observer.target == pytest.approx(math.radians(degrees), abs=count)
+    assert observer.miss * host.spec.detector.fine.counts == pytest.approx(-0.5)  # it stands in the middle of a count
+    position = host.machine.state.controller.positioner.angle.position
+    assert position == round(degrees / 360 * host.spec.period) % host.spec.period
+
+
+def test_angle_and_target_stay_together_over_turns_and_boundaries():
+    host, observer = observed("mechanics.start_angle=-10 deg")
+    for direction, seconds in ((1, 20.0), (-1, 31.0)):
+        host.press(direction, math.radians(60))
+        host.machine.pass_time(seconds)
+        assert observer.speed == pytest.approx(direction * math.radians(60), rel=1e-3)
+        host.release()
+        host.machine.pass_time(1.0)
+        host.acknowledge()
+        host.machine.pass_time(1.0)
+        assert abs(observer.miss) * host.spec.detector.fine.counts < 2.5
+        assert observer.target == pytest.approx(observer.angle, abs=2.5 * host.spec.count)
+    # Each jog goes on up to the task's next pass.
+    assert math.degrees(observer.angle) == pytest.approx(-10 + 20 * 60 - 31 * 60, abs=2.5)
+    assert host.machine.state.controller.positioner.angle.crossings > 3
+
+
+def test_a_detector_that_is_wrong_by_a_motor_turn_shows_as_a_miss():
+    for error, turns in (("1.8 deg", 0), ("2.2 deg", 1), ("-2.2 deg", -1)):
+        _, observer = observed(f"detector.coarse.alignment_error={error}", "mechanics.start_angle=180 deg")
+        assert observer.miss == pytest.approx(turns, abs=0.001)
+
+
+def test_backlash_and_eccentricity_are_in_the_angle_not_in_the_miss():
+    spec = load_spec(
+        detent.example("rotary_table.toml"), ["mechanics.backlash=0.4 deg", "mechanics.eccentricity=1 deg"]
+    )
+    machine = rotary_table_machine(spec)
+    machine.pass_ticks(3)
+    observer = TableObserver(spec, machine)
+    state = machine.state
+    state.controller.positioner.dial, state.controller.positioner.plus = round(spec.per_interrupt(1.0)), 1
+    machine.pass_time(1.5)  # in the first quarter: the table leads by up to a degree, less the half backlash
+    motor = (state.plant.train.motor.turns + state.plant.train.motor.angle / 2 / math.pi) * 360 / spec.ratio
+    led = math.sin(math.radians(motor)) - 0.2
+    assert math.degrees(observer.angle) - motor == pytest.approx(led, abs=0.01)
 
 
 # -- one result ---------------------------------------------------------------------------------------------
