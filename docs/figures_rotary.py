@@ -46,7 +46,7 @@ def degrees(spec: Any, words: Any) -> Any:
 def composition() -> None:
     """Motor turns by both words and by their difference, and the share of wrong angles over the coarse error."""
     from detent.methods.rotary_table.build import build_rotary_table
-    from detent.sensing.angle_composition import AbsoluteAngle, compose
+    from detent.sensing.resolver_counter import AbsoluteAngle, compose
 
     spec = table().spec
     p, r = build_rotary_table(spec).controller.composition, AbsoluteAngle()

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from detent.control.endless_angle import TURN_COUNTER
-from detent.control.position_table import SHORTEST
-from detent.control.table_positioner import POWER_ON, Positioner, PositionerParams, interrupt
+from detent.control.table_positioner import POWER_ON, SHORTEST, Positioner, PositionerParams, interrupt
 from detent.kernel.loop import advance
 from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.plant.rotary_motor import fill_motor
-from detent.sensing.angle_composition import CompositionParams
+from detent.sensing.resolver_counter import CompositionParams
 
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
 

@@ -23,20 +23,21 @@ from tests.rotary_table_rig import (
 )
 
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
-from detent.control.position_table import AS_COMMANDED, SHORTEST, way_to
 from detent.control.table_positioner import (
+    AS_COMMANDED,
     ATOMIC,
     BY_ACTUAL,
     FLAG_FIRST,
     HOLD,
     JOG,
     REMAINING_FIRST,
+    SHORTEST,
     begin_task,
+    way_to,
 )
 from detent.kernel.noise import NoiseSource
 from detent.kernel.step import step
-from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
-from detent.sensing.resolver_counter import ResolverParams, count_phase
+from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, ResolverParams, compose, count_phase
 
 POSITIONER = "controller.positioner."
 DR, S4 = POSITIONER + "dr", POSITIONER + "s4"

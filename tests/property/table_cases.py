@@ -23,8 +23,7 @@ from scipy.signal import lfilter, ss2tf
 from tests.property.numbered_cases import chance, generator, log_uniform, whole
 from tests.rotary_table_rig import COUNT, DAC_12, FINE, FINE_DAC, INTERRUPT, LAG, ONE, Rig, T, speed_word
 
-from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
-from detent.control.table_positioner import HOLD
+from detent.control.table_positioner import AS_COMMANDED, HOLD, NEGATIVE, POSITIVE, SHORTEST
 
 DELAY = 2e-4
 """From the strobe to the interrupt that works with its angle [s]."""

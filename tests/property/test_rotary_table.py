@@ -12,11 +12,14 @@ from tests.property.table_cases import DELAY_TICKS, STROBE_TICKS, TableCase, run
 from tests.rotary_table_rig import COUNT, FINE, KP, ONE, RATIO, PositionerBench, Rig, T
 
 from detent.control.endless_angle import FLAG, RAW, EndlessAngle, EndlessAngleParams, extend, first_angle, read_angle
-from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
 from detent.control.table_positioner import (
+    AS_COMMANDED,
     FLAG_FIRST,
     HOLD,
+    NEGATIVE,
+    POSITIVE,
     REMAINING_FIRST,
+    SHORTEST,
     Positioner,
     PositionerParams,
     begin_task,
@@ -25,7 +28,7 @@ from detent.control.table_positioner import (
 )
 from detent.kernel.noise import NoiseSource, uniform
 from detent.kernel.step import step
-from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
+from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, compose
 
 FASTEST = T // 2
 """Counts per interrupt that can still be told from a crossing."""

@@ -7,7 +7,6 @@ names of the specification; the target is OAR, the interpolated one is ``C = OAR
 
 import math
 
-from detent.control.angle_interpolator import Interpolator, InterpolatorParams, braking_path, interpolate
 from detent.control.endless_angle import (
     RAW,
     TURN_COUNTER,
@@ -19,8 +18,7 @@ from detent.control.endless_angle import (
     shift_back,
     start_raw,
 )
-from detent.control.position_table import AS_COMMANDED, PositionTable, way_to
-from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
+from detent.kernel.registers import Registers, block, f8, i1, i4, i8, i8_array, register, u1, u1_array
 from detent.kernel.step import step
 
 # States of specification 4; JOG-RAW and JOG-EXT differ in FLG and n only.
@@ -30,6 +28,40 @@ BY_THEORETICAL, BY_ACTUAL = 0, 1  # remaining angle that the judge looks at
 ATOMIC, FLAG_FIRST, REMAINING_FIRST = 0, 1, 2
 BUSY, NO_SUCH_POSITION, TOO_FAR = 1, 2, 3  # reasons for a refusal
 LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count]
+SHORTEST, POSITIVE, NEGATIVE, AS_COMMANDED = 0, 1, 2, 3  # direction policies: ways to an angle
+POSITIONS = 128
+
+
+class InterpolatorParams(Registers):
+    """Format and acceleration of the interpolator, which runs IR to zero in a trapezoid of speed (3.3).
+
+    Remaining angle, speed and acceleration have f fraction bits: at a slow jog an interrupt moves less than a count.
+    """
+
+    fraction: i8 = register("fraction bits f of remaining angle, speed and acceleration, at most 16", unit="count")
+    acceleration: i8 = register("change of speed per interrupt, above 0", unit="count/2^f")
+    max_speed: i8 = register("largest speed, whatever dial or table say", unit="count/2^f")
+
+
+class Interpolator(Registers):
+    """Theoretical remaining angle and speed."""
+
+    irr: i8 = register("IRR: theoretical remaining angle IR", unit="count/2^f")
+    speed: i8 = register("v: what IR loses per interrupt", unit="count/2^f")
+
+
+class PositionTable(Registers):
+    """PDT (3.6): angle, speed and way per position number, written by operator or program."""
+
+    entries: i8 = register("position numbers in use, from 0", unit="count")
+    angle: i8_array = register("angle", unit="count", length=POSITIONS)
+    speed: i8_array = register(
+        "speed per interrupt; 0 where there is no such position", unit="count/2^f", length=POSITIONS
+    )
+    policy: u1_array = register("0 shortest, 1 positive, 2 negative, 3 as commanded", unit="code", length=POSITIONS)
+    tolerance: i8 = register(
+        "a target this near is taken the short way, whatever its direction; below T/2", unit="count"
+    )
 
 
 class PositionerParams(Registers):
@@ -101,6 +133,20 @@ def interrupt(p: PositionerParams, r: Positioner, d: int) -> None:
     r.s4 = speed_word(p, r)
     r.interrupts += 1
     watch_end(p, r)
+
+
+@step
+def interpolate(p: InterpolatorParams, r: Interpolator, limit: int) -> None:
+    """Step 222: one interrupt; `limit` is the speed of dial or table.
+
+    ``v <= sqrt(2 a IR)`` lets it end at rest. A dial turned down takes the speed back no faster than the acceleration.
+    """
+    allowed = max(min(limit, p.max_speed), r.speed - p.acceleration)
+    braking = math.floor(math.sqrt(2.0 * p.acceleration * r.irr))
+    r.speed = min(r.speed + p.acceleration, allowed, braking)
+    r.irr -= min(r.speed, r.irr)
+    if r.irr == 0:
+        r.speed = 0
 
 
 @step
@@ -217,6 +263,12 @@ def advance_remaining(p: PositionerParams, r: Positioner) -> None:
 
 
 @step
+def braking_path(p: InterpolatorParams, r: Interpolator) -> int:
+    """Path from the present speed to rest, v^2 / 2a [count/2^f]."""
+    return r.speed * r.speed // (2 * p.acceleration)
+
+
+@step
 def stop_jog(p: PositionerParams, r: Positioner) -> None:
     """Release: the target comes to where the interpolated one can stop, by whole counts, so C stays where it is."""
     f = p.interpolator.fraction
@@ -224,6 +276,24 @@ def stop_jog(p: PositionerParams, r: Positioner) -> None:
     r.interpolator.irr -= spare << f
     r.oar -= r.z * spare
     r.state = STOPPING
+
+
+@step
+def way_to(period: int, tolerance: int, policy: int, target: int, present: int) -> int:
+    """Signed way from the present angle to a target [count]; exactly half a turn goes negative by the shortest way.
+
+    A table that stands a count beyond its target would go round almost a whole turn to come to it from its own side:
+    within `tolerance` it goes back.
+    """
+    if policy == AS_COMMANDED:
+        return target - present
+    half = period >> 1
+    way = (target - present + half) % period - half
+    if policy == POSITIVE and way < -tolerance:
+        return way + period
+    if policy == NEGATIVE and way > tolerance:
+        return way - period
+    return way
 
 
 @step

@@ -93,17 +93,18 @@ def rotate(p: RotaryMotorParams, r: RotaryMotor, drive: float, within_limit: boo
     return travel
 
 
-def fill_response(p: RotaryMotorParams, target: Response, stiffness: float) -> None:
-    """Exact solution of ``J dw/dt = T - (b + s) w`` over one tick for unit velocity and unit torque."""
+def fill_motor(p: RotaryMotorParams, stiffness: float) -> None:
+    """Exact solutions of ``J dw/dt = T - (b + s) w`` over one tick for unit velocity and unit torque.
+
+    In the first s is the amplifier's `stiffness`, its torque per velocity [N.m.s/rad], in the second it is 0.
+    """
     h = p.period
-    k = (p.viscous + stiffness) / p.inertia
-    lag = k * h
-    first = one_less_exp(lag) / lag if lag > 0.0 else 1.0
-    second = (1.0 - first) / lag if lag > 1e-2 else _second(lag)
-    target.v_v = exp(-lag)
-    target.v_t = h / p.inertia * first
-    target.x_v = h * first
-    target.x_t = h * h / p.inertia * second
+    for target, held in ((p.held, stiffness), (p.free, 0.0)):
+        lag = (p.viscous + held) / p.inertia * h
+        first = one_less_exp(lag) / lag if lag > 0.0 else 1.0
+        second = (1.0 - first) / lag if lag > 1e-2 else _second(lag)
+        target.v_v, target.v_t = exp(-lag), h / p.inertia * first
+        target.x_v, target.x_t = h * first, h * h / p.inertia * second
 
 
 def _second(lag: float) -> float:
@@ -113,12 +114,6 @@ def _second(lag: float) -> float:
         term *= -lag / n
         total += term
     return total
-
-
-def fill_motor(p: RotaryMotorParams, stiffness: float) -> None:
-    """Compute both responses; `stiffness` is the amplifier's torque per velocity [N.m.s/rad]."""
-    fill_response(p, p.held, stiffness)
-    fill_response(p, p.free, 0.0)
 
 
 def stand_at(r: RotaryMotor, turns: float) -> None:

@@ -1,24 +1,36 @@
+import itertools
+import math
+
 import pytest
 from tests.rotary_table_rig import ONE, PositionerBench, T, speed_word
 
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
-from detent.control.position_table import AS_COMMANDED
 from detent.control.table_positioner import (
+    AS_COMMANDED,
     BUSY,
     BY_ACTUAL,
     FLAG_FIRST,
     HOLD,
     JOG,
     MOVE,
+    NEGATIVE,
     NO_SUCH_POSITION,
+    POSITIVE,
     REMAINING_FIRST,
+    SHORTEST,
     STOPPING,
     TOO_FAR,
+    Interpolator,
+    InterpolatorParams,
     begin_task,
+    braking_path,
     end_task,
+    interpolate,
+    way_to,
 )
 
 PLACE = 100_000
+TURN = 3600
 
 
 def jogging(sign: int = 1, interrupts: int = 0, **changes) -> PositionerBench:
@@ -249,3 +261,113 @@ def test_a_dial_below_zero_does_not_move():
     run_pass(bench)
     bench.feed(PLACE)
     assert bench.r.interpolator.irr == 2 * T * ONE
+
+
+# -- the interpolator
+
+INTERPOLATOR = InterpolatorParams(fraction=16, acceleration=80531, max_speed=1000 * ONE)
+
+
+def speeds_of(r: Interpolator, limit: int, interrupts: int) -> list[int]:
+    speeds = []
+    for _ in range(interrupts):
+        interpolate(INTERPOLATOR, r, limit)
+        speeds.append(r.speed)
+    return speeds
+
+
+def test_it_accelerates_runs_and_stops():
+    r, limit = Interpolator(irr=100_000 * ONE), 122 * ONE
+    speeds = speeds_of(r, limit, 3000)
+    rise = math.ceil(limit / INTERPOLATOR.acceleration)
+    assert speeds[: rise - 1] == [INTERPOLATOR.acceleration * (n + 1) for n in range(rise - 1)]
+    assert max(speeds) == limit
+    assert (r.irr, r.speed) == (0, 0)
+    assert sum(speed > 0 for speed in speeds) * limit == pytest.approx(100_000 * ONE + rise * limit, rel=0.01)
+    # v = sqrt(2 a IR) is taken at the beginning of an interrupt: it brakes by a, and a little more near the end.
+    falls = [before - after for before, after in itertools.pairwise(speeds) if after < before]
+    assert max(falls[:-5]) < 1.2 * INTERPOLATOR.acceleration
+    # The last interrupt ends on IR <= 2 a; the one before came from v^2 = 2 a (2 a + v) at most, v = (1 + sqrt 5) a.
+    assert max(falls) <= (1 + math.sqrt(5)) * INTERPOLATOR.acceleration
+
+
+@pytest.mark.parametrize("irr", [1, 7, ONE, 5 * ONE, 12_345_678])
+def test_the_whole_way_is_used_up(irr):
+    r = Interpolator(irr=irr)
+    speeds_of(r, 122 * ONE, 1000)
+    assert (r.irr, r.speed) == (0, 0)
+
+
+def test_a_dial_turned_down_slows_down_no_faster_than_the_acceleration():
+    r = Interpolator(irr=700_000 * ONE, speed=122 * ONE)
+    speeds = speeds_of(r, 10 * ONE, 100)
+    assert speeds[0] == 122 * ONE - INTERPOLATOR.acceleration
+    assert speeds[-1] == 10 * ONE
+
+
+def test_no_dial_exceeds_the_largest_speed():
+    r = Interpolator(irr=700_000 * ONE)
+    assert max(speeds_of(r, 5000 * ONE, 1200)) <= 1000 * ONE
+
+
+def test_at_the_end_nothing_moves():
+    r = Interpolator()
+    assert speeds_of(r, 122 * ONE, 3) == [0, 0, 0]
+
+
+def test_braking_path():
+    r = Interpolator(speed=122 * ONE)
+    path = braking_path(INTERPOLATOR, r)
+    assert path == (122 * ONE) ** 2 // (2 * INTERPOLATOR.acceleration)
+    r.irr = path
+    start = r.speed
+    interrupts = 0
+    while r.irr > 0:
+        interpolate(INTERPOLATOR, r, r.speed)
+        interrupts += 1
+    assert interrupts == pytest.approx(start / INTERPOLATOR.acceleration, rel=0.05)
+
+
+# -- ways to an angle
+
+
+@pytest.mark.parametrize(
+    ("policy", "target", "present", "way"),
+    [
+        (SHORTEST, 100, 3500, 200),
+        (SHORTEST, 3500, 100, -200),
+        (SHORTEST, 5, 5, 0),
+        (SHORTEST, 1800, 0, -1800),  # half a turn goes negative
+        (SHORTEST, 0, 1800, -1800),
+        (SHORTEST, 1799, 0, 1799),
+        (SHORTEST, 10, -1, 11),  # from just below the boundary
+        (POSITIVE, 100, 3500, 200),
+        (POSITIVE, 3500, 100, 3400),
+        (POSITIVE, 1800, 0, 1800),
+        (POSITIVE, 5, 5, 0),
+        (POSITIVE, 5, 7, -2),  # within the tolerance: back
+        (POSITIVE, 5, 8, 3597),
+        (NEGATIVE, 3500, 100, -200),
+        (NEGATIVE, 100, 3500, -3400),
+        (NEGATIVE, 1800, 0, -1800),
+        (NEGATIVE, 7, 5, 2),
+        (NEGATIVE, 8, 5, -3597),
+        (NEGATIVE, 1, 3599, 2),
+        (AS_COMMANDED, 100, 3500, -3400),
+        (AS_COMMANDED, 3500, 100, 3400),
+        (AS_COMMANDED, 5400, 100, 5300),
+        (AS_COMMANDED, -100, 100, -200),
+    ],
+)
+def test_way(policy, target, present, way):
+    assert way_to(TURN, 2, policy, target, present) == way
+
+
+def test_every_way_but_as_commanded_ends_at_the_target():
+    for policy in (SHORTEST, POSITIVE, NEGATIVE):
+        for target in range(0, TURN, 101):
+            for present in range(-TURN, 2 * TURN, 97):
+                way = way_to(TURN, 2, policy, target, present)
+                assert (present + way - target) % TURN == 0
+                assert abs(way) <= (TURN // 2 if policy == SHORTEST else TURN)
+                assert policy == SHORTEST or abs(way) <= 2 or (way > 0) == (policy == POSITIVE)

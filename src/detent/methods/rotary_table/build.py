@@ -3,9 +3,8 @@
 import math
 
 from detent.axisfile.blocks import fill_guard, samples
+from detent.control import table_positioner as codes
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
-from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
-from detent.control.table_positioner import ATOMIC, BY_ACTUAL, BY_THEORETICAL, FLAG_FIRST, REMAINING_FIRST
 from detent.kernel.turn_table import FRACTION, TURN
 from detent.methods.rotary_table.controller import TableControllerParams
 from detent.methods.rotary_table.schema import CoarseTable, FineTable, MechanicsTable, RotaryTableSpec
@@ -14,27 +13,26 @@ from detent.plant.gearing import GearParams, fill_eccentricity
 from detent.plant.rotary_motor import fill_motor
 from detent.sensing.resolver_counter import ResolverParams, fill_resolver
 
-FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
-JUDGES = {"theoretical": BY_THEORETICAL, "actual": BY_ACTUAL}
 GUARD_PERIOD = 20e-3  # time between two looks of the guard [s]; a strobe period where that is longer
-
-UPDATES = {"atomic": ATOMIC, "flag first": FLAG_FIRST, "remaining first": REMAINING_FIRST}
-DIRECTIONS = {"shortest": SHORTEST, "positive": POSITIVE, "negative": NEGATIVE, "as commanded": AS_COMMANDED}
+FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
+JUDGES = {"theoretical": codes.BY_THEORETICAL, "actual": codes.BY_ACTUAL}
+UPDATES = {"atomic": codes.ATOMIC, "flag first": codes.FLAG_FIRST, "remaining first": codes.REMAINING_FIRST}
+DIRECTIONS = {
+    "shortest": codes.SHORTEST, "positive": codes.POSITIVE, "negative": codes.NEGATIVE,
+    "as commanded": codes.AS_COMMANDED,
+}  # fmt: skip
 
 
 def build_rotary_table(spec: RotaryTableSpec) -> RotaryTableParams:
     """Parameters of the rotary table."""
-    p = RotaryTableParams()
-    method = spec.method
-    clocks = p.controller.clocks
+    p, method = RotaryTableParams(), spec.method
+    clocks, load = p.controller.clocks, spec.disturbance.load
     clocks.strobe_ticks, clocks.delay_ticks = ticks(method.strobe_period), ticks(method.interrupt_delay)
     clocks.task_ticks = ticks(method.task_period)
     _fill_detector(p, spec)
     _fill_positioner(p, spec)
-    _fill_positions(p, spec)
     _fill_guard(p.controller, spec)
     _fill_machine(p, spec)
-    load = spec.disturbance.load
     if load is not None:
         p.plant.train.load.torque = load.torque / spec.ratio
         p.plant.train.load.begin, p.plant.train.load.end = ticks(load.at), ticks(load.at) + ticks(load.duration)
@@ -67,20 +65,17 @@ def _word(angle: float, counts: int) -> int:
 
 def _fill_detector(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     fine, coarse = spec.detector.fine, spec.detector.coarse
-    _fill_resolver(p.plant.fine, fine)
-    _fill_resolver(p.plant.coarse, coarse)
+    resolvers: tuple[tuple[ResolverParams, FineTable], ...] = ((p.plant.fine, fine), (p.plant.coarse, coarse))
+    for resolver, table in resolvers:
+        resolver.counts, resolver.offset = table.counts, _phase(table.mounting)
+        resolver.noise = table.noise / (2 * math.pi) * TURN
+        if table.gain_error or table.quadrature_error or table.offset_error:
+            fill_resolver(resolver, table.gain_error, table.quadrature_error, table.offset_error)
     p.plant.coarse.offset = _phase(coarse.mounting + coarse.alignment_error)
     c = p.controller.composition
     c.ratio, c.fine, c.coarse = spec.ratio, fine.counts, coarse.counts
     c.fine_zero, c.coarse_zero = _word(fine.mounting, fine.counts), _word(coarse.mounting, coarse.counts)
     c.truncating = spec.detector.composition == "truncated"
-
-
-def _fill_resolver(p: ResolverParams, table: FineTable) -> None:
-    p.counts, p.offset = table.counts, _phase(table.mounting)
-    if table.gain_error or table.quadrature_error or table.offset_error:
-        fill_resolver(p, table.gain_error, table.quadrature_error, table.offset_error)
-    p.noise = table.noise / (2 * math.pi) * TURN
 
 
 def _fill_positioner(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
@@ -98,17 +93,14 @@ def _fill_positioner(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
     q.judge, q.update = JUDGES[method.judge], UPDATES[method.update]
     q.inclusive, q.guarded = method.inclusive, method.guarded
     q.unsigned_remaining, q.open_loop = not method.signed_remaining, not method.position_control
-
-
-def _fill_positions(p: RotaryTableParams, spec: RotaryTableSpec) -> None:
-    pdt = p.controller.positioner.pdt
+    pdt = q.pdt
     for name, entry in spec.position.items():
         number = int(name)
         pdt.angle[number] = round(entry.angle / spec.count)
         pdt.speed[number] = round(spec.per_interrupt(entry.speed))
         pdt.policy[number] = DIRECTIONS[entry.direction]
         pdt.entries = max(pdt.entries, number + 1)
-    pdt.tolerance = round(spec.method.short_way / spec.count)
+    pdt.tolerance = round(method.short_way / spec.count)
 
 
 def _fill_guard(c: TableControllerParams, spec: RotaryTableSpec) -> None:

@@ -15,12 +15,12 @@ from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
 from detent.methods.rotary_table.derive import TICK, Machine, counted, weakest_output
-from detent.methods.rotary_table.form_checks import FORMS
+from detent.methods.rotary_table.form_checks import FORMS, form_caution
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity as text
 
 LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count] (`control.table_positioner`)
-FASTEST_WORD = (1 << 31) - 1  # largest speed of the interpolator: its square has 64 bits (`control.angle_interpolator`)
+FASTEST_WORD = (1 << 31) - 1  # largest speed of the interpolator: its square has 64 bits (`control.table_positioner`)
 HIGHEST_OFFSET = 0.95  # share of a resolver's weakest output that an offset may reach: beyond it hardly crosses at all
 LEAST_DAMPING = 0.4  # damping ratio from which a step is answered with an overshoot of a quarter at most
 DIAL_RANGE = 600  # largest over smallest speed of a dial: 0.1 to 60 deg/s (7)
@@ -386,13 +386,8 @@ def _composition(m: Machine) -> Iterator[Caution]:
     spec, errors, allowed = m.spec, m.coarse_errors, m.allowed_coarse_error
     turn, total = text(math.tau / spec.ratio, "rad"), sum(errors.values())
     if spec.detector.composition == "truncated":
-        yield Caution(
-            "detector.composition",
-            '"truncated"',
-            '"rounded"',
-            f"near each zero of the fine word the angle is wrong by a motor turn, {turn} (3.1, test 2)",
-            put("detector.composition", '"rounded"'),
-        )
+        result = f"near each zero of the fine word the angle is wrong by a motor turn, {turn} (3.1, test 2)"
+        yield form_caution("detector.composition", '"truncated"', '"rounded"', result)
     if total > allowed:
         parts = ", ".join(f"{name} {text(error, 'rad')}" for name, error in errors.items())
         largest = text(max(errors.values()), "rad")

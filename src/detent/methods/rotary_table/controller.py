@@ -4,12 +4,12 @@ Its clocks are divisions of the base tick: the strobe of the real-time clock, th
 timer task. What holds the dial, the buttons and the position number is the host.
 """
 
-from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
+from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
 from detent.control.table_positioner import Positioner, PositionerParams, begin_task, end_task, interrupt
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i4, i8, register, u1, u4
 from detent.kernel.step import hot_step, step
-from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
+from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, compose
 
 
 class TableClockParams(Registers):
@@ -121,42 +121,9 @@ def control(p: TableControllerParams, c: TableController, lines: TableLines) -> 
     lines.strobe = 1 if c.tick == c.clocks.strobe else 0
 
 
-# ------------------------------------------------------------------------------------------------------ host actions
-
-
 @step
 def power_on(p: TableControllerParams, c: TableController, lines: TableLines, task_at: int) -> None:
     """The first strobe is in the first tick, the first pass of the task at a tick."""
     c.clocks.interrupt, c.clocks.task = p.clocks.delay_ticks, task_at
     c.positioner.z = lines.strobe = lines.enable = 1
     enable_guard(c.guard)
-
-
-@step
-def press(c: TableController, direction: int) -> None:
-    """Hold a button down: 1 for +, -1 for -, 0 for none."""
-    c.positioner.plus, c.positioner.minus = direction > 0, direction < 0
-
-
-@step
-def set_dial(c: TableController, dial: int) -> None:
-    """Turn the speed dial [count/2^f per interrupt]."""
-    c.positioner.dial = dial
-
-
-@step
-def start_position(c: TableController, number: int) -> None:
-    """Set the position number and start; the next pass of the task takes it."""
-    c.positioner.number, c.positioner.start = number, 1
-
-
-@step
-def arrive_within(c: TableController, interrupts: int) -> None:
-    """The table must come to rest within so many interrupts; 0 lifts it."""
-    await_arrival(c.guard, interrupts)
-
-
-@step
-def acknowledge(c: TableController) -> None:
-    """The host has seen that the table has come to rest, or what the guard says."""
-    c.positioner.event = 0

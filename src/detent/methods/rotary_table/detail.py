@@ -67,17 +67,6 @@ class ShownStep:
         """M [rad]; NaN before the step was taken."""
         return np.where(self.rows.t < 0, np.nan, self.angle(TARGET))
 
-    @property
-    def threshold(self) -> Numbers:
-        """M less one turn along the motion: where C sets off a rollover [rad]; NaN outside a jog."""
-        turn = self.rows[AHEAD].astype(np.int64) * math.tau
-        return np.where(self.rows[STATE] == JOG, self.target - turn, np.nan)
-
-    @property
-    def command(self) -> Numbers:
-        """C [rad], what remains before M."""
-        return self.angle(TARGET) - self.rows[AHEAD].astype(np.int64) * self.fine_angle(REMAINING)
-
     @cached_property
     def crossed(self) -> list[int]:
         """First rows on the other side of the end of the turn, since the positioner took the step."""
@@ -174,46 +163,43 @@ def _caption(shown: ShownStep) -> str:
 # ---- charts
 
 
+def degree_curve(label: str, colour: str, y: Numbers, **look: Any) -> Curve:
+    """Curve of an angle [rad] or a speed [rad/s] in degrees."""
+    return Curve(label=label, colour=colour, y=y * DEG, digits=2, thin=POINTS, **look)
+
+
 def _charts(shown: ShownStep, events: list[Event]) -> list[dict[str, Any]]:
-    rows = shown.rows
+    rows, spec, ahead = shown.rows, shown.spec, shown.rows[AHEAD].astype(np.int64)
+    # C is what remains before M; in a jog it sets off a rollover at M less one turn along the motion.
+    threshold = np.where(rows[STATE] == JOG, shown.target - ahead * math.tau, np.nan)
+    command = shown.angle(TARGET) - ahead * shown.fine_angle(REMAINING)
     added = Band(label="", colour="good", spans=spans_of(rows.t, rows[PRESENT] != rows[DETECTED]))
     since = "time since the button was seen" if shown.step.kind == "jog" else "time since the position was taken"
-    lag = Curve(
-        label="deviation dR: how far the table lags", colour="drive", width=2, y=shown.fine_angle(DEVIATION) * DEG
-    )
+    angles = [
+        degree_curve("M target", "ink", shown.target, dash=(2, 3), step=True),
+        degree_curve("M \u2212 one turn: rollover", "muted", threshold, dash=(8, 4), step=True),
+        degree_curve("D detected", "muted", shown.angle(DETECTED), width=2),
+        degree_curve("R present", "speed", shown.angle(PRESENT), width=2.5),
+        degree_curve("C commanded", "left", command, dash=(6, 4)),
+    ]
+    angles = [one for one in angles if not np.isnan(one.y).all()]
     counters = [
         Curve(label="turns n", colour="speed", width=2.5, step=True, y=rows[TURNS], digits=0),
         Curve(label="FLG", colour="left", dash=(6, 4), step=True, y=rows[FLAG], digits=0),
     ]
+    lag = Curve(
+        label="deviation dR: how far the table lags", colour="drive", width=2, y=shown.fine_angle(DEVIATION) * DEG
+    )
+    speeds = [
+        degree_curve("speed signal S4, as told to the drive", "left", rows[SIGNAL] * spec.speed_per_word, step=True),
+        degree_curve("true speed", "speed", rows[VELOCITY] / spec.ratio, width=2),
+    ]
     return time_charts(Timeline(name="turn", t=rows.t, label=since, unit="s", bands=[added], events=events), [
-        Panel(name="turn-angles", label="angle [deg]", height=340, zero=True, curves=_angles(shown)),
+        Panel(name="turn-angles", label="angle [deg]", height=340, zero=True, curves=angles),
         Panel(name="turn-count", label="turns added", height=110, zero=True, curves=counters),
         Panel(name="turn-deviation", label="lag dR [deg]", height=150, zero=True, curves=[lag]),
-        Panel(name="turn-speed", label="speed [deg/s]", height=160, zero=True, curves=_speeds(shown)),
+        Panel(name="turn-speed", label="speed [deg/s]", height=160, zero=True, curves=speeds),
     ])  # fmt: skip
-
-
-def _angles(shown: ShownStep) -> list[Curve]:
-    def curve(label: str, colour: str, y: Numbers, **look: Any) -> Curve:
-        return Curve(label=label, colour=colour, y=y * DEG, digits=2, thin=POINTS, **look)
-
-    drawn = [
-        curve("M target", "ink", shown.target, dash=(2, 3), step=True),
-        curve("M \u2212 one turn: rollover", "muted", shown.threshold, dash=(8, 4), step=True),
-        curve("D detected", "muted", shown.angle(DETECTED), width=2),
-        curve("R present", "speed", shown.angle(PRESENT), width=2.5),
-        curve("C commanded", "left", shown.command, dash=(6, 4)),
-    ]
-    return [one for one in drawn if not np.isnan(one.y).all()]
-
-
-def _speeds(shown: ShownStep) -> list[Curve]:
-    signal, true = shown.rows[SIGNAL] * shown.spec.speed_per_word, shown.rows[VELOCITY] / shown.spec.ratio
-    told = "speed signal S4, as told to the drive"
-    return [
-        Curve(label=told, colour="left", step=True, y=signal * DEG, digits=2, thin=POINTS),
-        Curve(label="true speed", colour="speed", width=2, y=true * DEG, digits=2, thin=POINTS),
-    ]
 
 
 # ---- events

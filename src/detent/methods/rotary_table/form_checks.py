@@ -15,17 +15,17 @@ from detent.units import format_quantity as text
 TURN_COUNTER = put("method.form", '"turn counter"')
 
 
+def form_caution(key: str, came: str, sound: str, consequence: str) -> Caution:
+    """Look at a form that is known to fail, where another value of its key is sound."""
+    return Caution(key, came, sound, consequence, put(key, sound))
+
+
 def _angle(m: Machine) -> Iterator[Caution]:
     """The angle goes on beyond a turn."""
     if m.spec.method.form == "raw":
-        yield Caution(
-            "method.form",
-            '"raw", the conventional angle of one turn',
-            '"turn counter"',
-            "at the boundary the deviation jumps by a turn and the table runs away (test 11); a jog ends after two "
-            "turns at most",
-            TURN_COUNTER,
-        )
+        ends = "the deviation jumps by a turn and the table runs away (test 11); a jog ends after two turns at most"
+        came = '"raw", the conventional angle of one turn'
+        yield form_caution("method.form", came, '"turn counter"', f"at the boundary {ends}")
     if m.spec.method.form == "flag" and m.spec.detector.fine.noise > 0:
         yield Caution(
             "noise at the boundary",
@@ -71,36 +71,25 @@ def _race(m: Machine) -> Iterator[Caution]:
     )
     lag = m.following_error(m.speed)
     jump = math.tau + lag if method.update == "flag first" else lag - math.tau
-    yield Caution(
-        "method.update",
-        f'"{method.update}": {value}',
-        '"atomic"',
-        f"an interrupt there sees a deviation of {text(jump, 'rad')}, and the drive is at its limit for a sample "
-        "(trap 3, test 15)",
-        put("method.update", '"atomic"'),
-    )
+    seen = f"an interrupt there sees a deviation of {text(jump, 'rad')}, and the drive is at its limit for a sample"
+    yield form_caution("method.update", f'"{method.update}": {value}', '"atomic"', f"{seen} (trap 3, test 15)")
 
 
 def _remaining(m: Machine) -> Iterator[Caution]:
     """The remaining angle has a sign, and the position is controlled."""
     spec = m.spec
     if not spec.method.signed_remaining:
-        yield Caution(
-            "method.signed_remaining",
-            "false: the remaining angle is |M - R|",
-            "true",
-            "a table that passes its target by a count, in a positioning or at rest, is driven on and away (trap 4)",
-            put("method.signed_remaining", "true"),
+        driven = (
+            "a table that passes its target by a count, in a positioning or at rest, is driven on and away (trap 4)"
         )
+        yield form_caution("method.signed_remaining", "false: the remaining angle is |M - R|", "true", driven)
     if not spec.method.position_control:
-        yield Caution(
-            "method.position_control",
+        came, half_word = (
             "false: the speed signal is the commanded speed alone",
-            "true",
-            f"speeds are wrong by the droop, {text(spec.drive.droop, '%')}, and by up to half a word, "
-            f"{text(0.5 * spec.speed_per_word, 'rad/s')}, and no place is kept (test 19)",
-            put("method.position_control", "true"),
+            text(0.5 * spec.speed_per_word, "rad/s"),
         )
+        wrong = f"speeds are wrong by the droop, {text(spec.drive.droop, '%')}, and by up to half a word, {half_word}"
+        yield form_caution("method.position_control", came, "true", f"{wrong}, and no place is kept (test 19)")
 
 
 def _near_boundary(m: Machine) -> Iterator[Caution]:

@@ -11,16 +11,15 @@ from itertools import groupby
 from typing import Any
 
 from detent.axisfile.blocks import describe_fault
-from detent.control.guard import NO_ARRIVAL
+from detent.control.guard import NO_ARRIVAL, await_arrival
 from detent.control.table_positioner import HOLD, POWER_ON
 from detent.errors import MOST_PROBLEMS, TABLE_REFUSAL_TEXT, FileProblem, InputError
 from detent.files.nearest import BARELY, at_least, at_most
-from detent.methods.rotary_table import controller
 from detent.methods.rotary_table.build import build_rotary_table, start_turns, ticks
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_file import find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
-from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
+from detent.methods.rotary_table.system import TICK, RotaryTable, switch_on
 from detent.record.machine import AnyRecorder, Machine
 from detent.units import format_quantity
 
@@ -28,21 +27,13 @@ MARGIN = 0.5  # what a step may take longer than twice the time of its way [s]
 SETTLING = 10.0  # time that the position loop is given to settle, in units of 1 / Kp
 
 
-def rotary_table_machine(
-    spec: RotaryTableSpec, recorder: AnyRecorder | None = None
-) -> Machine[RotaryTableParams, RotaryTable]:
-    """Rotary table at power-on."""
-    p, r = build_rotary_table(spec), RotaryTable()
-    switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
-    return Machine(p, r, TICK, recorder)
-
-
 class TableHost:
     """Panel of a rotary table, and the passing of time."""
 
     def __init__(self, spec: RotaryTableSpec, recorder: AnyRecorder | None = None) -> None:
-        self.spec = spec
-        self.machine = rotary_table_machine(spec, recorder)  # the simulated axis
+        self.spec, p, r = spec, build_rotary_table(spec), RotaryTable()
+        switch_on(p, r, start_turns(spec), ticks(spec.method.task_phase), spec.detector.seed)
+        self.machine = Machine(p, r, TICK, recorder)  # the simulated axis, at power-on
         # ctypes gives every register its type at run time only.
         self._controller: Any = self.machine.state.controller
         self.positioner: Any = self._controller.positioner
@@ -77,12 +68,12 @@ class TableHost:
 
     def acknowledge(self) -> None:
         """The host has seen that the table is at rest."""
-        controller.acknowledge(self._controller)
+        self.positioner.event = 0
 
     def arrive_within(self, seconds: float) -> None:
         """The table must come to rest within a time [s]; 0 lifts it."""
         strobes = seconds / self.spec.method.strobe_period
-        controller.arrive_within(self._controller, max(1, math.floor(strobes)) if seconds else 0)
+        await_arrival(self._controller.guard, max(1, math.floor(strobes)) if seconds else 0)
 
     @property
     def is_moving(self) -> bool:
@@ -96,17 +87,17 @@ class TableHost:
 
     def press(self, direction: int, speed: float) -> None:
         """Set the dial to a table speed [rad/s] and hold a button down: 1 for +, -1 for -."""
-        controller.set_dial(self._controller, dial_of(self.spec, speed))
-        controller.press(self._controller, direction)
+        self.positioner.dial = dial_of(self.spec, speed)
+        self.positioner.plus, self.positioner.minus = direction > 0, direction < 0
 
     def release(self) -> None:
         """No button."""
-        controller.press(self._controller, 0)
+        self.positioner.plus = self.positioner.minus = 0
 
     def begin(self, number: int) -> None:
         """Set the position number and start; the positioner takes it in its next task."""
         self._refused_before = self.positioner.refused
-        controller.start_position(self._controller, number)
+        self.positioner.number, self.positioner.start = number, 1
 
     @property
     def refusal(self) -> str:

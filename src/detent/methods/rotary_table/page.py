@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from detent.methods.rotary_table.detail import AHEAD, DEG, DETECTED, POINTS, VELOCITY, step_section
+from detent.methods.rotary_table.detail import AHEAD, DETECTED, POINTS, VELOCITY, degree_curve, step_section
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change
@@ -190,7 +190,6 @@ def _spans(run: SequenceRun, changes: Sequence[Change]) -> dict[str, list[tuple[
 def _line_charts(spec: RotaryTableSpec, run: SequenceRun, rows: Stretch, lanes: list[Lane]) -> list[Chart]:
     """Steps and signals as bars, angle and speed of the table below."""
     speed, demanded = rows[VELOCITY] / spec.ratio, rows[AHEAD] * rows[COMMANDED] / spec.per_interrupt(1.0)
-
     target = np.full(len(rows.t), np.nan)
     for step in run.steps:
         if step.kind == "go":
@@ -202,11 +201,10 @@ def _line_charts(spec: RotaryTableSpec, run: SequenceRun, rows: Stretch, lanes: 
         Curve(label="target of a positioning", colour="left", dash=(6, 4), y=target, thin=0),
         Curve(label="true angle", colour="speed", width=2, y=true, digits=5, thin=POINTS),
     ]
-    degrees_seen = rows[DETECTED] * spec.count * DEG
-    detected = Curve(label="detected angle D", colour="ink", y=degrees_seen, digits=2, thin=POINTS)
+    detected = degree_curve("detected angle D", "ink", rows[DETECTED] * spec.count)
     speeds = [
-        Curve(label="commanded", colour="left", dash=(6, 4), y=demanded * DEG, digits=2, thin=POINTS),
-        Curve(label="true speed", colour="speed", width=2, y=speed * DEG, digits=2, thin=POINTS),
+        degree_curve("commanded", "left", demanded, dash=(6, 4)),
+        degree_curve("true speed", "speed", speed, width=2),
     ]
     return [
         _lane_chart(lanes, (float(rows.t[0]), float(rows.t[-1])), LINE),

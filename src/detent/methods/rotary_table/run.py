@@ -189,13 +189,34 @@ class _WatchedTable(TableObserver):
         self._tell()
         set_angle_gauge(self._state.plant.gauge)
         self._start = self.angle
-        begin, counters = self._host.machine.time, self._counters
+        positioner, begin = self._host.positioner, self._host.machine.time
+        crossings, rollovers = positioner.angle.crossings, positioner.rollovers
         try:
             self._controller.do(step)
             failure = self._verdict(step)
         except AxisError as error:
             failure = str(error)
-        record = self._make_record(index, step, begin, counters)
+        spec, gauge, stop = self._spec, self._state.plant.gauge, self.angle
+        # During a jog the target is two turns ahead: it is nowhere to be held.
+        is_held = isinstance(step, Go) or (isinstance(step, Jog) and not self._host.is_moving)
+        target = self.target if is_held else math.nan
+        record = StepRecord(
+            number=number,
+            index=index,
+            kind=type(step).__name__.lower(),
+            text=describe_step(spec, step),
+            begin=begin,
+            end=self._host.machine.time,
+            start=self._start,
+            stop=stop,
+            target=target,
+            error=target - stop,
+            travel=stop - self._start,
+            peak_speed=gauge.peak_speed / spec.ratio,
+            peak_deviation=gauge.peak_deviation * spec.count / (1 << spec.method.fraction_bits),
+            crossings=positioner.angle.crossings - crossings,
+            rollovers=positioner.rollovers - rollovers,
+        )
         self._result.steps.append(record)
         if not failure:
             return ""
@@ -208,11 +229,6 @@ class _WatchedTable(TableObserver):
         if self._progress is not None:
             text = f"step {self._number} of {self._count}, {self._host.machine.time:.0f} s"
             self._progress((self._number - 1) / self._count, text)
-
-    @property
-    def _counters(self) -> tuple[int, int]:
-        positioner = self._state.controller.positioner
-        return positioner.angle.crossings, positioner.rollovers
 
     def _watch(self, asked: float) -> None:
         """A table that goes a turn farther than it was asked has run away."""
@@ -246,32 +262,6 @@ class _WatchedTable(TableObserver):
                 f"wrong; {remedy}"
             )
         return ""
-
-    def _make_record(self, index: int, step: Action, begin: float, counters: tuple[int, int]) -> StepRecord:
-        """The record of the step that has ended."""
-        spec, gauge = self._spec, self._state.plant.gauge
-        stop = self.angle
-        # During a jog the target is two turns ahead: it is nowhere to be held.
-        is_held = isinstance(step, Go) or (isinstance(step, Jog) and not self._host.is_moving)
-        target = self.target if is_held else math.nan
-        crossings, rollovers = self._counters
-        return StepRecord(
-            number=self._number,
-            index=index,
-            kind=type(step).__name__.lower(),
-            text=describe_step(spec, step),
-            begin=begin,
-            end=self._host.machine.time,
-            start=self._start,
-            stop=stop,
-            target=target,
-            error=target - stop,
-            travel=stop - self._start,
-            peak_speed=gauge.peak_speed / spec.ratio,
-            peak_deviation=gauge.peak_deviation * spec.count / (1 << spec.method.fraction_bits),
-            crossings=crossings - counters[0],
-            rollovers=rollovers - counters[1],
-        )
 
     def finish(self) -> None:
         """Totals."""

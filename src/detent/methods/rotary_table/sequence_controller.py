@@ -62,7 +62,7 @@ class SequenceController:
         elif step.signal is not None:
             self._await(step.signal, level=step.level)
         else:
-            self._pass_until(self.host.tick + ticks(step.duration or 0.0))
+            self._pass(step.duration or 0.0)
 
     # ------------------------------------------------------------------------------------------------------ steps
 
@@ -70,20 +70,17 @@ class SequenceController:
         host = self.host
         host.begin(step.number)
         while host.positioner.start:  # its next task takes it
-            self._pass_until(host.tick + ticks(host.spec.method.strobe_period), rest=True)
+            self._pass(host.spec.method.strobe_period, rest=True)
         if host.refusal:
             raise AxisError(f"the positioner refused the start: {host.refusal}")
         self._way = host.way
-        speed = min(host.spec.position[str(step.number)].speed, host.spec.limits.speed)
-        limit = host.move_time(host.way, speed)
+        limit = host.move_time(host.way, min(host.spec.position[str(step.number)].speed, host.spec.limits.speed))
         host.arrive_within(limit)
-        self._pass_until(host.tick + ticks(limit), rest=True)
+        self._pass(limit, rest=True)
         host.arrive_within(0)
         if not host.at_rest:
-            raise AxisError(
-                f"it was not in position within {format_quantity(limit, 's')}; it is "
-                f"{format_quantity(host.way, 'rad')} away; {suspect(host)}"
-            )
+            away = f"it is {format_quantity(host.way, 'rad')} away"
+            raise AxisError(f"it was not in position within {format_quantity(limit, 's')}; {away}; {suspect(host)}")
 
     def _jog(self, step: Jog) -> None:
         host = self.host
@@ -94,7 +91,7 @@ class SequenceController:
         if step.signal is not None:
             self._await(step.signal, level=False)
         else:
-            self._pass_until(host.tick + ticks(step.duration or 0.0))
+            self._pass(step.duration or 0.0)
         host.release()
         self._released = host.tick
         if not host.is_moving:
@@ -102,16 +99,15 @@ class SequenceController:
             self._warn(step, f'"{step.signal}" was on for less than the task period, {task}: the table did not move')
             return
         limit = host.stop_time(self._speed)
-        self._pass_until(host.tick + ticks(limit), rest=True)
+        self._pass(limit, rest=True)
         if not host.at_rest:
             raise AxisError(f"it did not come to rest within {format_quantity(limit, 's')}; {suspect(host)}")
         host.acknowledge()
         if not self._settle():
-            self._warn(
-                step,
-                "after the jog the table did not come within its window of where it is held: look at the step's error; "
-                "friction, a load or noise of the detector keeps it away",
+            away = (
+                "after the jog the table did not come within its window of where it is held: look at the step's error"
             )
+            self._warn(step, f"{away}; friction, a load or noise of the detector keeps it away")
 
     def _warn(self, step: Action, text: str) -> None:
         """Note a warning, once for each step of the job."""
@@ -122,7 +118,7 @@ class SequenceController:
         host, method = self.host, self.host.spec.method
         end, inside = host.tick + ticks(host.settling_time), 0
         while host.tick < end and inside * method.strobe_period < method.in_position_time:
-            self._pass_until(host.tick + ticks(method.strobe_period))
+            self._pass(method.strobe_period)
             inside = inside + 1 if host.in_position else 0
         return host.in_position
 
@@ -141,6 +137,9 @@ class SequenceController:
                 f'ever; let "{name}" be on later, or shorten the steps before'
             )
         self._pass_until(changes[len(past)][0])
+
+    def _pass(self, seconds: float, *, rest: bool = False) -> None:
+        self._pass_until(self.host.tick + ticks(seconds), rest=rest)
 
     def _pass_until(self, tick: int, *, rest: bool = False) -> None:
         """Let time pass up to a tick; `rest` ends it when the table comes to rest."""

@@ -1,60 +1,31 @@
 """The figures of a sequence on a rotary table that a person wants first, and the same as rows for the terminal."""
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 
 from detent.methods.rotary_table.run import SequenceRun, StepRecord
 from detent.methods.rotary_table.schema import RotaryTableSpec
-from detent.page.run_page import Worst, worst
+from detent.page.run_page import worst
 from detent.page.words import GAP, CountUnit, angle, count, degrees, duration
 
-WorstStep = Worst[StepRecord] | None
 
-
-@dataclass(frozen=True)
 class SequenceFigures:
     """Sums and extremes of a run beside those that it has itself; None where no step has the figure."""
 
-    run: SequenceRun
-
-    @cached_property
-    def made(self) -> list[StepRecord]:
-        """Steps that came to their end."""
-        return self.run.steps if self.run.done else self.run.steps[:-1]
-
-    @cached_property
-    def moved(self) -> list[StepRecord]:
-        """Steps that move the table; one that is held dithers, but that is not what was asked."""
-        return [step for step in self.run.steps if step.kind in {"go", "jog"}]
-
-    @property
-    def kinds(self) -> str:
-        """How many steps of each kind move the table: "8 positionings, 3 jogs"; empty if none does."""
-        kinds = [step.kind for step in self.moved]
+    def __init__(self, run: SequenceRun) -> None:
+        self.run = run
+        self.made = run.steps if run.done else run.steps[:-1]  # steps that came to their end
+        # Steps that move the table; one that is held dithers, but that is not what was asked.
+        moved = [step for step in run.steps if step.kind in {"go", "jog"}]
+        kinds = [step.kind for step in moved]
         counted = (kinds.count("go"), "positioning"), (kinds.count("jog"), "jog")
-        return ", ".join(count(n, word) for n, word in counted if n)
-
-    @property
-    def seconds(self) -> float:
-        """From the start of the sequence to the end of its last step [s]."""
-        return max(self.run.time_end - self.run.time_ready, 0.0) if self.run.steps else 0.0
-
-    @property
-    def error(self) -> WorstStep:
-        """Largest magnitude of target less angle at the end of a positioning [rad]."""
+        self.kinds = ", ".join(count(n, word) for n, word in counted if n)  # "8 positionings, 3 jogs"
+        # From the start of the sequence to the end of its last step [s].
+        self.seconds = max(run.time_end - run.time_ready, 0.0) if run.steps else 0.0
+        # Largest magnitudes: target less angle at the end of a positioning [rad], deviation dR [rad], speed [rad/s].
         ended = [step for step in self.made if step.kind == "go" and not math.isnan(step.error)]
-        return worst(ended, lambda step: abs(step.error))
-
-    @property
-    def deviation(self) -> WorstStep:
-        """Largest magnitude of the deviation dR [rad]."""
-        return worst(self.moved, lambda step: step.peak_deviation)
-
-    @property
-    def peak_speed(self) -> WorstStep:
-        """Largest speed [rad/s]."""
-        return worst(self.moved, lambda step: step.peak_speed)
+        self.error = worst(ended, lambda step: abs(step.error))
+        self.deviation = worst(moved, lambda step: step.peak_deviation)
+        self.peak_speed = worst(moved, lambda step: step.peak_speed)
 
 
 def sequence_summary_rows(spec: RotaryTableSpec, run: SequenceRun) -> list[tuple[str, str]]:

@@ -13,8 +13,17 @@ from typing import Any
 import pytest
 
 from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
-from detent.control.position_table import AS_COMMANDED, NEGATIVE, POSITIVE, SHORTEST
-from detent.control.table_positioner import ATOMIC, BY_ACTUAL, FLAG_FIRST, HOLD, REMAINING_FIRST
+from detent.control.table_positioner import (
+    AS_COMMANDED,
+    ATOMIC,
+    BY_ACTUAL,
+    FLAG_FIRST,
+    HOLD,
+    NEGATIVE,
+    POSITIVE,
+    REMAINING_FIRST,
+    SHORTEST,
+)
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
 from detent.methods.rotary_table.build import build_rotary_table, start_turns

@@ -4,16 +4,7 @@ import pytest
 from tests.rotary_table_rig import FINE, make_params
 
 from detent.control.table_positioner import HOLD, JOG, POWER_ON
-from detent.methods.rotary_table.controller import (
-    TableController,
-    TableLines,
-    acknowledge,
-    control,
-    power_on,
-    press,
-    set_dial,
-    start_position,
-)
+from detent.methods.rotary_table.controller import TableController, TableLines, control, power_on
 
 
 class Bench:
@@ -73,22 +64,15 @@ def test_buttons_and_dial(direction, buttons):
     bench = Bench()
     c = bench.c
     assert c.positioner.state == POWER_ON
-    set_dial(c, 1234)
-    press(c, direction)
-    assert (c.positioner.dial, c.positioner.plus, c.positioner.minus) == (1234, *buttons)
+    c.positioner.dial, c.positioner.plus, c.positioner.minus = 1234, *buttons
     bench.run(6)
     assert (c.positioner.state, c.positioner.z) == (JOG, direction)
-    press(c, 0)
-    assert (c.positioner.plus, c.positioner.minus) == (0, 0)
 
 
-def test_a_number_waits_for_the_task_and_a_rest_for_its_host():
+def test_a_number_waits_for_the_task():
     bench = Bench()
-    start_position(bench.c, 3)
+    bench.c.positioner.number, bench.c.positioner.start = 3, 1
     bench.run(5)
     assert (bench.c.positioner.start, bench.c.positioner.number) == (1, 3)
     bench.run(1)
     assert (bench.c.positioner.start, bench.c.positioner.refused) == (0, 1)  # the table has no positions
-    bench.c.positioner.event = 1
-    acknowledge(bench.c)
-    assert bench.c.positioner.event == 0

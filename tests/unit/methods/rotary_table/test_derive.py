@@ -7,8 +7,7 @@ import pytest
 from detent.kernel.turn_table import TURN
 from detent.methods.rotary_table.derive import Machine, derive, resolver_error, weakest_output
 from detent.methods.rotary_table.schema import FineTable
-from detent.sensing.angle_composition import AbsoluteAngle, CompositionParams, compose
-from detent.sensing.resolver_counter import ResolverParams, fill_resolver
+from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, ResolverParams, compose, fill_resolver
 
 IDEAL = ("drive.droop=0 %",)
 LOAD = ("disturbance.load.torque=100 N*m", "disturbance.load.at=1 s", "disturbance.load.duration=5 s")

@@ -14,7 +14,6 @@ from detent.methods.rotary_table.host import (
     describe_numbers,
     dial_of,
     dial_speed,
-    rotary_table_machine,
 )
 from detent.methods.rotary_table.sequence_job import Go, Jog, Repeat, SequenceJob, Wait
 from detent.methods.rotary_table.system import TICK
@@ -41,7 +40,7 @@ def positioner(host):
 
 def test_the_machine_stands_where_the_axis_file_says():
     spec = table("mechanics.start_angle=200 deg", "method.task_phase=3 ms", "detector.seed=7")
-    machine = rotary_table_machine(spec)
+    machine = TableHost(spec).machine
     motor = machine.state.plant.train.motor
     assert (motor.turns + motor.angle / (2 * math.pi)) / spec.ratio * 360 == pytest.approx(200, abs=360 / spec.period)
     assert motor.velocity == 0.0

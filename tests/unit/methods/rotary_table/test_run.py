@@ -16,7 +16,7 @@ from tests.places import ROOT
 import detent
 from detent.errors import InputError
 from detent.methods.load import load_spec
-from detent.methods.rotary_table.host import TableHost, rotary_table_machine
+from detent.methods.rotary_table.host import TableHost
 from detent.methods.rotary_table.run import SEQUENCE_SIGNALS, TableObserver, describe_step, run_sequence
 from detent.methods.rotary_table.sequence_file import load_sequence
 from detent.methods.rotary_table.sequence_job import Go, Jog, Output, Repeat, SequenceJob, Wait
@@ -400,7 +400,7 @@ def test_backlash_and_eccentricity_are_in_the_angle_not_in_the_miss():
     spec = load_spec(
         detent.example("rotary_table.toml"), ["mechanics.backlash=0.4 deg", "mechanics.eccentricity=1 deg"]
     )
-    machine = rotary_table_machine(spec)
+    machine = TableHost(spec).machine
     machine.pass_ticks(3)
     observer = TableObserver(spec, machine)
     state = machine.state

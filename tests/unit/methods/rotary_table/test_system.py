@@ -12,8 +12,7 @@ import pytest
 from tests.places import ROOT
 from tests.rotary_table_rig import COUNT, NO_TRACE, RATIO, Rig, T
 
-from detent.control.position_table import NEGATIVE, POSITIVE
-from detent.control.table_positioner import HOLD, MOVE, POWER_ON
+from detent.control.table_positioner import HOLD, MOVE, NEGATIVE, POSITIVE, POWER_ON
 from detent.kernel.loop import advance
 from detent.methods.rotary_table.system import RotaryTable, switch_on
 from detent.plant.gearing import fill_eccentricity
