@@ -121,7 +121,8 @@ class Shuttle:
         from detent.planning.profile import plan_move
 
         spec = load_spec(EXAMPLES / "cascade.toml", ())
-        self.host = CascadeHost(spec, guarded=guarded)
+        self.host = CascadeHost(spec)
+        self.host.controller.guarded = guarded
         start = spec.mechanics.start_position
         way = plan_move(start, start + 0.2, motion_limits(spec), self.host.period)
         self.samples = round(10.0 / self.host.period)

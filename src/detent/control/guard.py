@@ -19,11 +19,8 @@ STUCK, JUMPED, REVERSED = 2, 3, 4
 FOLLOWING, SATURATED, OVERSPEED, NO_ARRIVAL = 10, 11, 12, 13
 TRAVEL = 32
 
-JUMPS = 2
-"""Jumps of the sensor that are a fault: one alone may be a disturbance of its line."""
-
-FAST = 2
-"""Samples in a row beyond the largest speed that are a fault."""
+JUMPS = 2  # jumps of the sensor that are a fault: one alone may be a disturbance of its line
+FAST = 2  # samples in a row beyond the largest speed that are a fault
 
 
 class GuardParams(Registers):
@@ -34,9 +31,7 @@ class GuardParams(Registers):
     following: i4 = register("samples beyond the largest following error until that is a fault", unit="count")
     travel: u1 = register("1 watches the ends of the travel")
     saturated: i4 = register("samples with the command at its limit until that is a fault", unit="count")
-    stuck: i4 = register(
-        "samples at rest under an effort that breaks the axis loose until that is a fault", unit="count"
-    )
+    stuck: i4 = register("samples at rest under effort that breaks it loose until that is a fault", unit="count")
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
 
 

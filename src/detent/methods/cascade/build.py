@@ -4,14 +4,13 @@ import math
 from typing import Any
 
 from detent.axisfile.blocks import fill_guard, fill_push, samples
-from detent.control.cascade_law import FeedForwardParams
+from detent.control.cascade_law import CascadeLawParams
 from detent.methods.cascade.controller import CascadeControllerParams
 from detent.methods.cascade.loop import machine_of
-from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec, EncoderTable
+from detent.methods.cascade.schema import IDEAL_ENCODER, CascadeSpec
 from detent.methods.cascade.system import CascadeParams, fill_clocks, set_count, smoothing
 from detent.planning.profile import MotionLimits
 from detent.plant.linear_two_mass import fastest_rate
-from detent.sensing.position_sensor import PositionSensorParams
 
 LARGEST_ANGLE = 0.5
 """Fastest rate of the plant times the tick: a swing of that rate then loses 0.02 % of its amplitude per radian."""
@@ -21,22 +20,22 @@ LONGEST_TICK = 1e-4  # longest tick [s]: a push begins, and a record is written,
 
 def build_cascade(spec: CascadeSpec) -> CascadeParams:
     """Parameters of the cascade axis."""
-    p = CascadeParams()
+    p, drive, period = CascadeParams(), spec.drive, spec.method.sample_period
+    c, source, load_encoder = p.controller, p.plant.source, spec.load_encoder or IDEAL_ENCODER
     _fill(p.plant.machine, machine_of(spec))
-    source, drive = p.plant.source, spec.drive
     source.gain = drive.voltage_gain if drive.input == "voltage" else spec.effort_per_command
     source.step, source.limit, source.delay = drive.command_step, spec.largest_command, drive.delay
-    _fill_sensor(p.controller.motor_sensor, spec.encoder, spec.method.sample_period)
-    _fill_sensor(p.controller.load_sensor, spec.load_encoder or IDEAL_ENCODER, spec.method.sample_period)
-    set_count(p, spec.encoder.resolution, (spec.load_encoder or IDEAL_ENCODER).resolution)
-    p.controller.feedback.position_on_load = spec.method.feedback.position == "load"
-    p.controller.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
-    _fill_law(p, spec)
-    _fill_limits(p.controller, spec)
-    ticks = sample_ticks(spec.method.sample_period, fastest_rate(p.plant.machine))
-    tick = spec.method.sample_period / ticks
-    fill_push(p.plant.push, spec.disturbance.push, tick)
-    fill_clocks(p, tick, ticks)
+    for sensor, table in ((c.motor_sensor, spec.encoder), (c.load_sensor, load_encoder)):
+        sensor.delay, sensor.span = table.delay, table.velocity_span
+        sensor.smoothing = smoothing(table.velocity_filter, period)
+    set_count(p, spec.encoder.resolution, load_encoder.resolution)
+    c.feedback.position_on_load = spec.method.feedback.position == "load"
+    c.feedback.velocity_on_load = spec.method.feedback.velocity == "load"
+    _fill_law(c.law, spec)
+    _fill_limits(c, spec)
+    ticks = sample_ticks(period, fastest_rate(p.plant.machine))
+    fill_push(p.plant.push, spec.disturbance.push, period / ticks)
+    fill_clocks(p, period / ticks, ticks)
     return p
 
 
@@ -61,11 +60,6 @@ def _fill(p: Any, values: Any) -> None:
             setattr(p, name, value)
 
 
-def _fill_sensor(p: PositionSensorParams, table: EncoderTable, sample_period: float) -> None:
-    p.delay, p.span = table.delay, table.velocity_span
-    p.smoothing = smoothing(table.velocity_filter, sample_period)
-
-
 def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
     method, table, resolution = spec.method, spec.protection, spec.encoder.resolution
     limits, period = p.limits, method.sample_period
@@ -84,25 +78,17 @@ def _fill_limits(p: CascadeControllerParams, spec: CascadeSpec) -> None:
         p.guard.reversed += spec.drive.delay + spec.encoder.delay + samples(spec.swing, period)
 
 
-def _fill_law(p: CascadeParams, spec: CascadeSpec) -> None:
-    law, method = p.controller.law, spec.method
-    law.position_pid = method.structure == "pid"
-    law.max_command = spec.largest_command
-    law.cascade.position_gain, law.cascade.max_velocity = method.position_gain, method.velocity_limit
-    law.cascade.velocity_gain, law.cascade.integral_gain = method.velocity_gain, method.velocity_integral
-    law.pid.proportional, law.pid.integral = method.proportional, method.integral
-    law.pid.derivative = method.derivative
-    law.pid.smoothing = smoothing(method.derivative_filter, method.sample_period)
-    _fill_feed_forward(law.feed_forward, spec)
-
-
-def _fill_feed_forward(p: FeedForwardParams, spec: CascadeSpec) -> None:
-    shares, mechanics, per_command = spec.method.feed_forward, spec.mechanics, spec.effort_per_command
-    p.velocity = shares.velocity
-    p.acceleration = shares.acceleration * spec.mass / per_command
-    p.viscous = shares.viscous * (spec.viscous + spec.back_emf_drag) / per_command
-    p.coulomb_positive = shares.coulomb * spec.friction(1).coulomb / per_command
-    p.coulomb_negative = shares.coulomb * spec.friction(-1).coulomb / per_command
-    p.dead_band = shares.dead_band
-    p.weight = shares.weight * mechanics.weight / per_command
-    p.pendulum = shares.weight * mechanics.pendulum / per_command
+def _fill_law(p: CascadeLawParams, spec: CascadeSpec) -> None:
+    method, feed, shares = spec.method, p.feed_forward, spec.method.feed_forward
+    p.position_pid, p.max_command = method.structure == "pid", spec.largest_command
+    p.cascade.position_gain, p.cascade.max_velocity = method.position_gain, method.velocity_limit
+    p.cascade.velocity_gain, p.cascade.integral_gain = method.velocity_gain, method.velocity_integral
+    p.pid.proportional, p.pid.integral, p.pid.derivative = method.proportional, method.integral, method.derivative
+    p.pid.smoothing = smoothing(method.derivative_filter, method.sample_period)
+    feed.velocity, feed.dead_band, per_command = shares.velocity, shares.dead_band, spec.effort_per_command
+    feed.acceleration = shares.acceleration * spec.mass / per_command
+    feed.viscous = shares.viscous * (spec.viscous + spec.back_emf_drag) / per_command
+    feed.coulomb_positive = shares.coulomb * spec.friction(1).coulomb / per_command
+    feed.coulomb_negative = shares.coulomb * spec.friction(-1).coulomb / per_command
+    feed.weight = shares.weight * spec.mechanics.weight / per_command
+    feed.pendulum = shares.weight * spec.mechanics.pendulum / per_command

@@ -4,7 +4,7 @@ An unstable loop is a caution: it can be simulated, and shows what it does.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from detent.axisfile import common_checks as common
 from detent.axisfile.motion import rotary_model
@@ -19,14 +19,9 @@ LEAST_MASS = 1e-12  # smallest mass [kg] or moment of inertia [kg m^2]: a thousa
 MOST_COUNTS = 2**53  # counts of an encoder: beyond them a float no longer knows each
 QUICK = 0.1  # bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit
 
-LEAST_GAIN_MARGIN = 1.5
-
-LEAST_PHASE_MARGIN = math.radians(30)  # phase margin below which a loop rings
+LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, math.radians(30)  # below them a loop rings
 SLOWER = 2.0  # by how much the velocity loop should be faster than the position loop around it
-
-NEAR_RESONANCE = 0.5
-"""Share of the anti-resonance from which on a velocity loop on the motor no longer moves the load with it."""
-
+NEAR_RESONANCE = 0.5  # share of the anti-resonance above which a velocity loop on the motor leaves the load behind
 LARGEST_JUMP = 0.1  # share of the largest command by which one count may move the drive
 MOST_COMMAND = 0.95  # share of what the drive can do that a move at its limits may take
 
@@ -48,35 +43,26 @@ def _motor(spec: CascadeSpec) -> Iterator[Contradiction]:
     if drive != "force" and motor is None:
         yield wrong("drive.input", '"force" where there is no [motor]', put("drive.input", '"force"'))
     if motor is not None and spec.mechanics.travel_per_revolution is None:
-        yield wrong(
-            "mechanics.travel_per_revolution drive.input",
-            "a length where there is a [motor]",
-            'add travel_per_revolution = "10 mm" in [mechanics] (lead of the screw, or circumference of the pulley)',
-        )
+        lead = 'add travel_per_revolution = "10 mm" in [mechanics] (lead of the screw, or circumference of the pulley)'
+        yield wrong("mechanics.travel_per_revolution drive.input", "a length where there is a [motor]", lead)
 
 
 def _masses(spec: CascadeSpec) -> Iterator[Contradiction]:
     """There is something to move, on both sides of a coupling; only what turns can hang."""
-    mechanics, coupled = spec.mechanics, spec.mechanics.coupling is not None
-    masses = {"mechanics.load_mass": (spec.mass, "all that moves")}
-    if coupled:
-        masses = {
-            "mechanics.motor_mass": (spec.motor_mass, "what moves on the motor's side of the coupling"),
-            "mechanics.load_mass": (mechanics.load_mass, "what moves on the load's side of the coupling"),
-        }
-    for key, (mass, what) in masses.items():
+    mechanics, masses, otherwise = spec.mechanics, {"load": spec.mass}, ""
+    if mechanics.coupling is not None:
+        masses = {"motor": spec.motor_mass, "load": mechanics.load_mass}
+        otherwise = ", or leave [mechanics.coupling] out"
+    for side, mass in masses.items():
         if mass < LEAST_MASS:
-            yield wrong(
-                f"{key} mechanics.coupling.stiffness",
-                f"such that {what} comes to at least {LEAST_MASS:g} {spec.unit('kg')}",
-                f"state {key}" + (", or leave [mechanics.coupling] out" if coupled else ""),
-            )
+            key, what = f"mechanics.{side}_mass", f"what moves on the {side}'s side of the coupling"
+            what = what if mechanics.coupling else "all that moves"
+            allowed = f"such that {what} comes to at least {LEAST_MASS:g} {spec.unit('kg')}"
+            yield wrong(f"{key} mechanics.coupling.stiffness", allowed, f"state {key}{otherwise}")
     if mechanics.pendulum > 0 and spec.axis.motion == "linear":
-        yield wrong(
-            "mechanics.pendulum axis.motion",
-            "0 N*m where axis.motion is linear: a load hangs from an axis that turns; a weight is mechanics.weight",
-            put("mechanics.pendulum", '"0 N*m"'),
-        )
+        here = "a load hangs from an axis that turns; a weight is mechanics.weight"
+        allowed = f"0 N*m where axis.motion is linear: {here}"
+        yield wrong("mechanics.pendulum axis.motion", allowed, put("mechanics.pendulum", '"0 N*m"'))
 
 
 def _gains(spec: CascadeSpec) -> Iterator[Contradiction]:
@@ -84,11 +70,8 @@ def _gains(spec: CascadeSpec) -> Iterator[Contradiction]:
     method = spec.method
     for name in ("velocity_gain", "position_gain") if method.structure == "cascade" else ("proportional",):
         if getattr(method, name) == 0:
-            yield wrong(
-                f"method.{name} method.structure",
-                f'above 0 where method.structure is "{method.structure}"',
-                f"state {name} in [method]{_to_begin_with(spec, name)}",
-            )
+            keys, allowed = f"method.{name} method.structure", f'above 0 where method.structure is "{method.structure}"'
+            yield wrong(keys, allowed, f"state {name} in [method]{_to_begin_with(spec, name)}")
 
 
 def _to_begin_with(spec: CascadeSpec, name: str) -> str:
@@ -125,11 +108,9 @@ def _encoders(spec: CascadeSpec) -> Iterator[Contradiction]:
             yield wrong(f"{name}.velocity_span {name}.delay", allowed, fewer)
     for name, table in tables.items():
         if 0 < table.resolution < finest:
-            yield wrong(
-                f"{name}.resolution limits.travel",
-                f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be told apart",
-                remedy_of(spec).least(f"{name}.resolution", finest),
-            )
+            allowed = f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be told apart"
+            coarser = remedy_of(spec).least(f"{name}.resolution", finest)
+            yield wrong(f"{name}.resolution limits.travel", allowed, coarser)
 
 
 def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
@@ -137,11 +118,9 @@ def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
     start, low, high, unit = spec.mechanics.start_position, spec.limits.lowest, spec.highest, spec.unit("m")
     yield from common.static_friction(directions(spec), spec.unit("N"))
     if not low <= start <= high:
-        yield wrong(
-            "mechanics.start_position limits.travel limits.lowest",
-            f"from {text(low, unit)} to {text(high, unit)}, the way of the axis",
-            put("mechanics.start_position", f'"{low if start < low else high!r} {unit}"'),
-        )
+        key, allowed = "mechanics.start_position", f"from {text(low, unit)} to {text(high, unit)}, the way of the axis"
+        nearest = put(key, f'"{low if start < low else high!r} {unit}"')
+        yield wrong(f"{key} limits.travel limits.lowest", allowed, nearest)
 
 
 def directions(spec: CascadeSpec) -> dict[str, DirectionTable]:
@@ -164,19 +143,22 @@ def _rate(spec: CascadeSpec) -> Iterator[Contradiction]:
     rate = fastest_rate(machine_of(spec))
     if rate > FASTEST:
         key = _culprit(spec)
-        rises = key.endswith(("stribeck", "resistance", "inductance"))
-        yield wrong(
-            f"{key} mechanics.load_mass mechanics.motor_mass",
-            f"such that the fastest rate of motor, coupling and load is 1/{text(1 / FASTEST, 's')} or less, "
-            f"here 1/{text(1 / rate, 's', 3)}",
-            f"{'raise' if rises else 'lower'} {key}, or check its unit and those of the masses",
-        )
+        change = "raise" if key.endswith(("stribeck", "resistance", "inductance")) else "lower"
+        limit = f"1/{text(1 / FASTEST, 's')} or less, here 1/{text(1 / rate, 's', 3)}"
+        allowed = f"such that the fastest rate of motor, coupling and load is {limit}"
+        remedy = f"{change} {key}, or check its unit and those of the masses"
+        yield wrong(f"{key} mechanics.load_mass mechanics.motor_mass", allowed, remedy)
+
+
+def _ends(spec: CascadeSpec) -> tuple[float, float]:
+    """What moves at the motor and at the load [kg]; all of it at both where the axis is rigid."""
+    coupled = spec.mechanics.coupling is not None
+    return (spec.motor_mass, spec.mechanics.load_mass) if coupled else (spec.mass, spec.mass)
 
 
 def _culprit(spec: CascadeSpec) -> str:
     """Key that makes the plant too fast."""
-    coupling, motor = spec.mechanics.coupling, spec.motor
-    at_motor, at_load = (spec.mass,) * 2 if coupling is None else (spec.motor_mass, spec.mechanics.load_mass)
+    coupling, motor, (at_motor, at_load) = spec.mechanics.coupling, spec.motor, _ends(spec)
     light = min(at_motor, at_load)
     rates = {"mechanics.pendulum": math.sqrt(spec.mechanics.pendulum / light)}
     for key, table in directions(spec).items():
@@ -198,51 +180,33 @@ def _drive(spec: CascadeSpec) -> Iterator[Contradiction]:
     """The drive does not throw the axis away, and its converter has a step."""
     if not _is_solid(spec):
         return
-    light = spec.mass if spec.mechanics.coupling is None else min(spec.motor_mass, spec.mechanics.load_mass)
-    moved = 0.5 * spec.limits.effort / light * spec.method.sample_period**2
-    if moved > spec.limits.travel:
-        yield wrong(
-            "limits.effort mechanics.load_mass mechanics.motor_mass method.sample_period",
-            "such that it moves the lightest mass by up to limits.travel in a sample, here "
-            f"{text(moved, spec.unit('m'))}: no loop stands that",
-            remedy_of(spec).most("limits.effort", spec.limits.effort * spec.limits.travel / moved),
-        )
-    if spec.drive.command_step > spec.largest_command:
-        yield wrong(
-            "drive.command_step drive.command_limit limits.effort drive.max_current",
-            f"up to the largest command, {text(spec.largest_command, 'V')}",
-            remedy_of(spec).most("drive.command_step", spec.largest_command),
-        )
+    limits, largest, remedy = spec.limits, spec.largest_command, remedy_of(spec)
+    moved = 0.5 * limits.effort / min(_ends(spec)) * spec.method.sample_period**2
+    if moved > limits.travel:
+        here = f"here {text(moved, spec.unit('m'))}: no loop stands that"
+        keys = "limits.effort mechanics.load_mass mechanics.motor_mass method.sample_period"
+        allowed = f"such that it moves the lightest mass by up to limits.travel in a sample, {here}"
+        yield wrong(keys, allowed, remedy.most("limits.effort", limits.effort * limits.travel / moved))
+    if spec.drive.command_step > largest:
+        keys = "drive.command_step drive.command_limit limits.effort drive.max_current"
+        allowed = f"up to the largest command, {text(largest, 'V')}"
+        yield wrong(keys, allowed, remedy.most("drive.command_step", largest))
 
 
 def _supervision(spec: CascadeSpec) -> Iterator[Contradiction]:
     """Limits of the loops let a move pass and end."""
     method, speed, remedy = spec.method, spec.limits.speed, remedy_of(spec)
     if method.structure == "cascade" and method.velocity_limit < speed:
-        yield wrong(
-            "method.velocity_limit limits.speed",
-            f"at least limits.speed, {text(speed, spec.unit('m/s'))}; left out it is 1.25 x limits.speed",
-            remedy.least("method.velocity_limit", speed),
-        )
+        allowed = f"at least limits.speed, {text(speed, spec.unit('m/s'))}; left out it is 1.25 x limits.speed"
+        yield wrong("method.velocity_limit limits.speed", allowed, remedy.least("method.velocity_limit", speed))
     if method.following_error <= method.in_position:
-        yield wrong(
-            "method.following_error method.in_position limits.travel encoder.resolution",
-            f"above method.in_position, {text(method.in_position, spec.unit('m'))}",
-            remedy.least("method.following_error", method.in_position * (1 + 1e-3)),
-        )
+        key, allowed = "method.following_error", f"above method.in_position, {text(method.in_position, spec.unit('m'))}"
+        more = remedy.least(key, method.in_position * (1 + 1e-3))
+        yield wrong(f"{key} method.in_position limits.travel encoder.resolution", allowed, more)
     yield from common.end_of_move(remedy, method.timeout, method.in_position_time, method.sample_period)
 
 
-RULES: tuple[Callable[[CascadeSpec], Iterator[Contradiction]], ...] = (
-    _motor,
-    _masses,
-    _gains,
-    _encoders,
-    _places,
-    _rate,
-    _drive,
-    _supervision,
-)
+RULES = (_motor, _masses, _gains, _encoders, _places, _rate, _drive, _supervision)
 """Contradictions are told in this order."""
 
 
@@ -260,30 +224,24 @@ def _loops(m: Machine) -> Iterator[Caution]:
     """The loops settle, and do not ring."""
     loop, margin = m.loop, m.loop.gain_margin
     if margin < LEAST_GAIN_MARGIN:
-        yield Caution(
-            "stability of the loops",
-            f"gain margin {margin:.3g}, spectral radius {loop.spectral_radius:.4f}",
-            f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1 the loops are unstable",
-            "the axis swings, and the swing grows until the command is limited"
-            if margin < 1
-            else "a little more gain or less mass, and the axis swings",
-            _lowered(m, margin / LEAST_GAIN_MARGIN * (1 - 1e-3))
-            if margin > 0
-            else "lower all gains, those of integrals and of the position first, or shorten the dead time",
-        )
+        value = f"gain margin {margin:.3g}, spectral radius {loop.spectral_radius:.4f}"
+        limit = f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1 the loops are unstable"
+        consequence = "the axis swings, and the swing grows until the command is limited"
+        remedy = "lower all gains, those of integrals and of the position first, or shorten the dead time"
+        if margin >= 1:
+            consequence = "a little more gain or less mass, and the axis swings"
+        if margin > 0:
+            remedy = _lowered(m, margin / LEAST_GAIN_MARGIN * (1 - 1e-3))
+        yield Caution("stability of the loops", value, limit, consequence, remedy)
         return
     for name, inner, gain in (
         ("velocity loop", loop.velocity_loop, "method.velocity_gain or method.velocity_integral"),
         ("position loop", loop.position_loop, "the outer gain or the integral"),
     ):
         if inner.crossover > 0 and inner.phase < LEAST_PHASE_MARGIN:
-            yield Caution(
-                f"phase margin of the {name}",
-                text(inner.phase, "rad", 3),
-                f"at least {text(LEAST_PHASE_MARGIN, 'rad')}",
-                "it rings after every change",
-                f"lower {gain}, or shorten the dead time of {text(dead_time(m.spec), 's', 3)}",
-            )
+            value, limit = text(inner.phase, "rad", 3), f"at least {text(LEAST_PHASE_MARGIN, 'rad')}"
+            remedy = f"lower {gain}, or shorten the dead time of {text(dead_time(m.spec), 's', 3)}"
+            yield Caution(f"phase margin of the {name}", value, limit, "it rings after every change", remedy)
 
 
 def _lowered(m: Machine, share: float) -> str:
@@ -303,55 +261,38 @@ def _bandwidth(m: Machine) -> Iterator[Caution]:
     inner, outer = loop.velocity_loop.crossover, loop.position_loop.crossover
     near = NEAR_RESONANCE * m.anti_resonance
     if 0 < inner < SLOWER * outer:
-        yield Caution(
-            "bandwidth of the position loop",
-            text(outer, "Hz"),
-            f"up to half that of the velocity loop, {text(inner / SLOWER, 'Hz')}",
-            "the velocity loop is too slow for it, and a move overshoots",
-            f"lower method.position_gain, {method.position_gain:.4g}, or raise method.velocity_gain",
-        )
+        limit = f"up to half that of the velocity loop, {text(inner / SLOWER, 'Hz')}"
+        consequence = "the velocity loop is too slow for it, and a move overshoots"
+        remedy = f"lower method.position_gain, {method.position_gain:.4g}, or raise method.velocity_gain"
+        yield Caution("bandwidth of the position loop", text(outer, "Hz"), limit, consequence, remedy)
     if inner > near > 0 and method.feedback.velocity == "motor":
-        yield Caution(
-            "bandwidth of the velocity loop",
-            text(inner, "Hz"),
-            f"up to half the anti-resonance, {text(near, 'Hz')}",
-            "it holds the motor while the load swings on its coupling, hardly damped",
-            _lowered(m, 0.99 / loop.velocity_level(near)),
-        )
+        limit = f"up to half the anti-resonance, {text(near, 'Hz')}"
+        consequence = "it holds the motor while the load swings on its coupling, hardly damped"
+        remedy = _lowered(m, 0.99 / loop.velocity_level(near))
+        yield Caution("bandwidth of the velocity loop", text(inner, "Hz"), limit, consequence, remedy)
 
 
 def _position(m: Machine) -> Iterator[Caution]:
     """Position is measured where and as finely as it is held, and a count of velocity does not shake the drive."""
     spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
-    count = spec.position_encoder.resolution
+    count = spec.encoder_of("position").resolution
     if coupling is not None and coupling.backlash > 0 and method.feedback.position == "load" and m.integrates:
-        yield Caution(
-            "backlash in the position loop",
-            text(coupling.backlash, unit),
-            "none, where the position is that of the load and there is an integral",
-            "at rest the motor hunts from flank to flank",
-            put("method.feedback.position", '"motor"'),
-        )
+        limit = "none, where the position is that of the load and there is an integral"
+        consequence, remedy = "at rest the motor hunts from flank to flank", put("method.feedback.position", '"motor"')
+        yield Caution("backlash in the position loop", text(coupling.backlash, unit), limit, consequence, remedy)
     if method.in_position < count:
-        yield Caution(
-            "method.in_position",
-            text(method.in_position, unit),
-            f"at least a count of the encoder, {text(count, unit)}",
-            "one count off, and the axis is not in position",
-            remedy_of(spec).least("method.in_position", count),
-        )
-    table, most = spec.velocity_encoder, LARGEST_JUMP * spec.largest_command
+        key, limit = "method.in_position", f"at least a count of the encoder, {text(count, unit)}"
+        consequence, remedy = "one count off, and the axis is not in position", remedy_of(spec).least(key, count)
+        yield Caution(key, text(method.in_position, unit), limit, consequence, remedy)
+    table, most = spec.encoder_of("velocity"), LARGEST_JUMP * spec.largest_command
     name = "encoder" if spec.method.feedback.velocity == "motor" else "load_encoder"
     if m.jump > most:
         span = math.ceil(table.velocity_span * m.jump / most * (1 - BARELY))
+        fits = span + table.delay <= MOST_SAMPLES
+        limit = f"up to a tenth of the largest command, {text(most, 'V')}"
+        remedy = put(f"{name}.velocity_span", span) if fits else f"state {name}.velocity_filter, or use a finer encoder"
         yield Caution(
-            "command of one count of velocity",
-            text(m.jump, "V"),
-            f"up to a tenth of the largest command, {text(most, 'V')}",
-            "the drive is noisy even at rest",
-            put(f"{name}.velocity_span", span)
-            if span + table.delay <= MOST_SAMPLES
-            else f"state {name}.velocity_filter, or use a finer encoder",
+            "command of one count of velocity", text(m.jump, "V"), limit, "the drive is noisy even at rest", remedy
         )
 
 
@@ -360,30 +301,21 @@ def _force(m: Machine) -> Iterator[Caution]:
     spec, speed, acceleration, unit = m.spec, m.speed, m.spec.limits.acceleration, m.spec.unit("N")
     loose, strongest = m.breaking(), m.available(0.0)
     hold, needed, available = m.needed(speed), m.needed(speed, acceleration), m.available(speed)
+    most = available * MOST_COMMAND
     if loose >= strongest:
-        yield Caution(
-            "friction and weight",
-            text(loose, unit),
-            f"below the largest force, {text(strongest, unit)}",
-            "there are places where the axis never breaks loose",
-            "raise limits.effort, drive.command_limit or the amplifier's limit",
-        )
-    elif hold >= available * MOST_COMMAND:
-        yield Caution(
-            "force at limits.speed",
-            text(hold, unit),
-            f"below what the drive has at that speed, {text(available, unit)}",
-            "the following error grows without end",
-            "lower limits.speed, or raise drive.command_limit or limits.effort",
-        )
-    elif needed > available * MOST_COMMAND:
-        yield Caution(
-            "force of an acceleration",
-            text(needed, unit),
-            f"up to 95 % of what the drive has at limits.speed, {text(available * MOST_COMMAND, unit)}",
-            "the command is limited and the axis falls behind as it speeds up",
-            remedy_of(spec).most("limits.acceleration", (available * MOST_COMMAND - hold) / spec.mass),
-        )
+        limit = f"below the largest force, {text(strongest, unit)}"
+        consequence = "there are places where the axis never breaks loose"
+        remedy = "raise limits.effort, drive.command_limit or the amplifier's limit"
+        yield Caution("friction and weight", text(loose, unit), limit, consequence, remedy)
+    elif hold >= most:
+        limit = f"below what the drive has at that speed, {text(available, unit)}"
+        remedy = "lower limits.speed, or raise drive.command_limit or limits.effort"
+        yield Caution("force at limits.speed", text(hold, unit), limit, "the following error grows without end", remedy)
+    elif needed > most:
+        limit = f"up to 95 % of what the drive has at limits.speed, {text(most, unit)}"
+        consequence = "the command is limited and the axis falls behind as it speeds up"
+        remedy = remedy_of(spec).most("limits.acceleration", (most - hold) / spec.mass)
+        yield Caution("force of an acceleration", text(needed, unit), limit, consequence, remedy)
 
 
 def _current(m: Machine) -> Iterator[Caution]:
@@ -404,27 +336,20 @@ def _following(m: Machine) -> Iterator[Caution]:
     """At limits.speed the axis keeps within the limits of its loops, and at rest friction does not hold it outside."""
     method, unit, speed = m.spec.method, m.spec.unit("m"), m.spec.unit("m/s")
     error, demand, remedy = m.following_error, m.velocity_demand, remedy_of(m.spec)
+    integral = "state method.integral" if method.structure == "pid" else "state method.velocity_integral"
     if error >= method.following_error:
-        yield Caution(
-            "following error at limits.speed",
-            text(error, unit),
-            f"below method.following_error, {text(method.following_error, unit)}",
-            "the drive goes off on a move at full speed",
-            remedy.least("method.following_error", 1.5 * error, "raise the feed-forward of velocity"),
-        )
+        limit = f"below method.following_error, {text(method.following_error, unit)}"
+        consequence = "the drive goes off on a move at full speed"
+        wider = remedy.least("method.following_error", 1.5 * error, "raise the feed-forward of velocity")
+        yield Caution("following error at limits.speed", text(error, unit), limit, consequence, wider)
     if demand > method.velocity_limit:
-        yield Caution(
-            "velocity demand at limits.speed",
-            text(demand, speed),
-            f"up to method.velocity_limit, {text(method.velocity_limit, speed)}",
-            "without an integral friction slows the axis below its reference, and the demand cannot make up for it",
-            remedy.least("method.velocity_limit", demand, "state method.velocity_integral"),
+        limit = f"up to method.velocity_limit, {text(method.velocity_limit, speed)}"
+        consequence = (
+            "without an integral friction slows the axis below its reference, and the demand cannot make up for it"
         )
+        wider = remedy.least("method.velocity_limit", demand, integral)
+        yield Caution("velocity demand at limits.speed", text(demand, speed), limit, consequence, wider)
     if m.resting_error > method.in_position:
-        yield Caution(
-            "error at rest",
-            text(m.resting_error, unit),
-            f"up to method.in_position, {text(method.in_position, unit)}",
-            "friction or weight may hold the axis outside, and a move then fails",
-            "state method.integral" if method.structure == "pid" else "state method.velocity_integral",
-        )
+        limit = f"up to method.in_position, {text(method.in_position, unit)}"
+        consequence = "friction or weight may hold the axis outside, and a move then fails"
+        yield Caution("error at rest", text(m.resting_error, unit), limit, consequence, integral)

@@ -10,18 +10,17 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.host import CascadeHost
-from detent.methods.cascade.panels import POINTS
+from detent.methods.cascade.page import POINTS
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
 from detent.methods.cascade.units import Units, milliseconds
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
-from detent.page.table import Cell, Table, TextTable, bar_cell
+from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, number
-from detent.planning.profile import MotionLimits, plan_move
+from detent.planning.profile import MotionLimits, Numbers, plan_move
 from detent.record.machine import Progress
 from detent.sensing.gauge import set_gauge
 
@@ -34,48 +33,22 @@ SHAPES, FEEDS = ("trapezoid", "limited jerk"), ("no feed-forward", "feed-forward
 COLOURS = dict(zip(SHAPES, ("left", "speed"), strict=True))
 DASHES = dict(zip(FEEDS, ((5, 4), None), strict=True))
 
-Numbers = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProfileCase:
-    """The move made in one way; lengths [m] or angles [rad].
+    """The move made in one way; lengths [m] or angles [rad]."""
 
-    Attributes
-    ----------
-    shape : str
-        One of `SHAPES`.
-    feed : str
-        One of `FEEDS`.
-    duration : float
-        Of the reference [s].
-    peak_following : float
-        Largest magnitude of the following error.
-    settling : float
-        From the end of the reference until the load stayed within the window [s]; NaN if it did not.
-    twist_after : float
-        Twist of the coupling after the end of the reference, peak to peak; NaN for a rigid axis.
-    peak_command : float
-        Largest magnitude of the command [V].
-    t : ndarray
-        Time since the begin of the move, at every sample [s], shape (n,).
-    speed : ndarray
-        Of the reference [m/s], shape (n,).
-    following, twist : ndarray
-        Following error, and how far the motor is ahead of the load, shape (n,).
-    """
-
-    shape: str
-    feed: str
-    duration: float
-    peak_following: float
-    settling: float
-    twist_after: float
-    peak_command: float
-    t: Numbers
-    speed: Numbers
-    following: Numbers
-    twist: Numbers
+    shape: str  #: one of `SHAPES`
+    feed: str  #: one of `FEEDS`
+    duration: float  #: of the reference [s]
+    peak_following: float  #: largest magnitude of the following error
+    settling: float  #: from the end of the reference until the load stayed within the window [s]; NaN if it did not
+    twist_after: float  #: twist of the coupling after that end, peak to peak; NaN for a rigid axis
+    peak_command: float  #: largest magnitude of the command [V]
+    t: Numbers  #: time since the begin of the move, at every sample [s], shape (n,)
+    speed: Numbers  #: of the reference [m/s], shape (n,)
+    following: Numbers  #: following error, shape (n,)
+    twist: Numbers  #: how far the motor is ahead of the load, shape (n,)
 
     @property
     def name(self) -> str:
@@ -85,35 +58,17 @@ class ProfileCase:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ProfileComparison:
-    """Result of `compare_profiles`.
+    """Result of `compare_profiles`."""
 
-    Attributes
-    ----------
-    way : float
-        Of the move [m] or [rad].
-    speed, acceleration, jerk : float
-        Its limits.
-    stated : bool
-        The jerk is that of the axis file; else the one that `smooth_jerk` proposes.
-    frequency : float
-        Of the load against a motor that is held [Hz]; NaN for a rigid axis.
-    tolerance : float
-        Error that counts as in position.
-    rotary : bool
-        Lengths are angles.
-    cases : tuple of ProfileCase
-        By shape, then by feed-forward.
-    """
-
-    way: float
-    speed: float
+    way: float  #: of the move [m] or [rad]
+    speed: float  #: and `acceleration`, `jerk`: its limits
     acceleration: float
     jerk: float
-    stated: bool
-    frequency: float
-    tolerance: float
-    rotary: bool
-    cases: tuple[ProfileCase, ...]
+    stated: bool  #: the jerk is that of the axis file; else the one that `smooth_jerk` proposes
+    frequency: float  #: of the load against a motor that is held [Hz]; NaN for a rigid axis
+    tolerance: float  #: error that counts as in position
+    rotary: bool  #: lengths are angles
+    cases: tuple[ProfileCase, ...]  #: by shape, then by feed-forward
 
     @property
     def units(self) -> Units:
@@ -206,27 +161,16 @@ def _case_panel(found: ProfileComparison, name: str, label: str, values: list[Nu
 
 
 def _table_figure(found: ProfileComparison) -> Figure:
-    longest = max(case.peak_following for case in found.cases)
-    lag = found.units.small(longest)
-    heads = [("profile", False), ("takes [ms]", True), (f"largest following error [{lag.name}]", True),
-             ("settles after [ms]", True), ("twist after it", True), ("peak command [V]", True)]  # fmt: skip
+    longest = max(case.peak_following for case in found.cases) or 1.0
     rows = [
-        [
-            Cell(text=case.name, nowrap=True),
-            number(round(case.duration * 1e3, 6)),
-            bar_cell(case.peak_following * lag.factor, longest * lag.factor or 1.0),
-            number(round(case.settling * 1e3, 6)),
-            found.units.error(case.twist_after),
-            number(case.peak_command),
-        ]
-        for case in found.cases
+        [Cell(text=name, nowrap=True), takes, Cell(text=error, bar=case.peak_following / longest), *rest]
+        for case, (name, takes, error, *rest) in zip(found.cases, found.table.rows, strict=True)
     ]
     caption = (
         "Settling counts from the end of the reference until the load stays within "
-        f"{found.units.error(found.tolerance)} of the target. Twist after it is that of the coupling after that end, "
-        "peak to peak."
+        f"{found.units.error(found.tolerance)} of the target. Twist after that is that of the coupling, peak to peak."
     )
-    return Figure(title="In figures", caption=caption, table=Table(heads=heads, rows=rows))
+    return Figure(title="In figures", caption=caption, table=Table(heads=found.table.on_page.heads, rows=rows))
 
 
 # ---- what is compared
@@ -268,13 +212,14 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
     """The move made in one way."""
     start = spec.limits.lowest + 0.25 * spec.limits.travel
     target = start + 0.5 * spec.limits.travel
-    shares: dict[str, float] = dict.fromkeys(
+    shares: dict[str, object] = dict.fromkeys(
         ("velocity", "acceleration", "viscous", "coulomb"), float(feed == FEEDS[1])
     )
     # A weight is held in both: the axis must not drop before the move.
-    method = spec.method.model_copy(update={"feed_forward": spec.method.feed_forward.model_copy(update=shares)})
-    alone = spec.model_copy(update={"method": method, "disturbance": DisturbanceTable()})
-    host = CascadeHost(alone, position=start, guarded=False)
+    method = {"feed_forward": spec.method.feed_forward.model_copy(update=shares)}
+    alone = spec.changed(method=method, disturbance=DisturbanceTable())
+    host = CascadeHost(alone, position=start)
+    host.controller.guarded = 0
     host.pass_samples(math.ceil(REST_TIME / host.period - 1e-9))
     begin, plant = host.time, host.state.plant
     profile = plan_move(start, target, limits, host.period)

@@ -7,29 +7,16 @@ answer.
 
 from detent.control.cascade_law import CascadeLaw, CascadeLawParams, CascadeReference
 from detent.control.cascade_law import control as control_law
-from detent.control.guard import (
-    Guard,
-    GuardParams,
-    await_arrival,
-    enable_guard,
-    is_overdue,
-    lasting,
-    watch,
-    weigh_effort,
-)
+from detent.control.guard import Guard, GuardParams, is_overdue, lasting, watch, weigh_effort
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i8, register, u1
 from detent.kernel.step import hot_step, step
-from detent.sensing.position_sensor import (
-    MEMORY,
-    EncoderWord,
-    PositionSensor,
-    PositionSensorParams,
-    read_word,
-    stand_sensor,
-)
+from detent.sensing.position_sensor import EncoderWord, PositionSensor, PositionSensorParams, read_word
 
 ARRIVED, FAULT = 1, 2  # events
+
+Feed = tuple[HostArray, HostArray, HostArray, HostArray]
+"""What the host lays ready, one entry per sample: a reference's position, velocity and acceleration, or a command."""
 
 
 class FeedbackParams(Registers):
@@ -101,15 +88,15 @@ class CascadeLines(Registers):
 
 
 @hot_step
-def refer(c: CascadeController, position: HostArray, velocity: HostArray, acceleration: HostArray) -> None:
+def refer(c: CascadeController, feed: Feed) -> None:
     """Take the next entry of the reference; behind the last one it stands where that is."""
-    entries = len(position)
-    if c.entry < entries:
+    position, velocity, acceleration, _ = feed
+    if c.entry < len(position):
         c.reference.position = position[c.entry]
         c.reference.velocity = velocity[c.entry]
         c.reference.acceleration = acceleration[c.entry]
         c.entry += 1
-    elif entries > 0:
+    elif len(position) > 0:
         c.reference.velocity = c.reference.acceleration = 0.0
 
 
@@ -132,34 +119,21 @@ def note_peaks(c: CascadeController) -> None:
 
 
 @step
-def beyond_ends(p: CascadeControllerParams, c: CascadeController) -> int:
-    """End of the travel that has been passed, 1 upper, -1 lower; what is no number has passed one too."""
-    place = c.load_sensor.position if p.limits.place_on_load else c.motor_sensor.position
-    if not place <= p.limits.highest:
-        return 1
-    return -1 if not place >= p.limits.lowest else 0
-
-
-@step
 def find_fault(p: CascadeControllerParams, c: CascadeController, count: int) -> int:
-    """One sample of the guard; the code of the fault, 0 while there is none."""
+    """One sample of the guard; the code of the fault, 0 for none. What is no number has passed an end too."""
     late = not abs(c.law.position_error) <= p.limits.following_error
     pushing = 0
     if abs(c.law.command) >= p.limits.breaking:
         pushing = 1 if c.law.command > 0.0 else -1
+    place, side = c.load_sensor.position if p.limits.place_on_load else c.motor_sensor.position, 0
+    if not place <= p.limits.highest:
+        side = 1
+    elif not place >= p.limits.lowest:
+        side = -1
     moved = count - c.count
     c.count = count
     weigh_effort(c.guard, c.law.command, moved)
-    return watch(p.guard, c.guard, late, beyond_ends(p, c), c.law.limited > 0, pushing, moved)
-
-
-@step
-def find_arrival(p: CascadeControllerParams, c: CascadeController) -> int:
-    """One sample of an axis that is to come into position: the event that it makes, 0 none."""
-    c.within = lasting(abs(c.law.position_error) <= p.limits.window, c.within)
-    if c.within >= p.limits.arrival:
-        return ARRIVED
-    return FAULT if is_overdue(c.guard) else 0
+    return watch(p.guard, c.guard, late, side, c.law.limited > 0, pushing, moved)
 
 
 @step
@@ -168,7 +142,11 @@ def look_after(p: CascadeControllerParams, c: CascadeController, count: int) -> 
     if find_fault(p, c, count) != 0:
         c.event = FAULT
     elif c.guard.awaited:
-        c.event = find_arrival(p, c)
+        c.within = lasting(abs(c.law.position_error) <= p.limits.window, c.within)
+        if c.within >= p.limits.arrival:
+            c.event = ARRIVED
+        elif is_overdue(c.guard):
+            c.event = FAULT
     if c.event != 0:
         c.guard.awaited = 0
     if c.event == FAULT:
@@ -176,25 +154,17 @@ def look_after(p: CascadeControllerParams, c: CascadeController, count: int) -> 
 
 
 @step
-def sample(
-    p: CascadeControllerParams,
-    c: CascadeController,
-    lines: CascadeLines,
-    position: HostArray,
-    velocity: HostArray,
-    acceleration: HostArray,
-    command: HostArray,
-) -> None:
+def sample(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, feed: Feed) -> None:
     """Read, decide, command; where there are commands, the loops are open, and 0 comes behind the last one."""
     c.samples += 1
     read_word(p.motor_sensor, c.motor_sensor, lines.motor)
     read_word(p.load_sensor, c.load_sensor, lines.load)
-    output, entries = 0.0, len(command)
-    if c.on and entries > 0:
-        output = command[c.entry] if c.entry < entries else 0.0
+    output, command = 0.0, feed[3]
+    if c.on and len(command) > 0:
+        output = command[c.entry] if c.entry < len(command) else 0.0
         c.entry += 1
     elif c.on:
-        refer(c, position, velocity, acceleration)
+        refer(c, feed)
         output = decide(p, c)
         note_peaks(c)
         if c.guarded:
@@ -205,73 +175,13 @@ def sample(
 
 @controls(CascadeControllerParams)
 @hot_step
-def control(
-    p: CascadeControllerParams,
-    c: CascadeController,
-    lines: CascadeLines,
-    position: HostArray,
-    velocity: HostArray,
-    acceleration: HostArray,
-    command: HostArray,
-) -> None:
+def control(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, *feed: HostArray) -> None:
     """One tick: a sample every so many of them."""
     if c.left > 0:
         c.left -= 1
         if c.left == 0:
             lines.sync = 1
         return
-    sample(p, c, lines, position, velocity, acceleration, command)
+    sample(p, c, lines, feed)
     c.left = p.sample_ticks - 1
     lines.sync = 1 if c.left == 0 else 0
-
-
-def check_memory(p: CascadeControllerParams) -> None:
-    """Refuse delays that are longer than what is kept."""
-    for name, s in (("motor", p.motor_sensor), ("load", p.load_sensor)):
-        if s.span < 1 or s.delay < 0 or s.delay + s.span >= MEMORY:
-            raise ValueError(
-                f"{name} sensor: span {s.span} and delay {s.delay} samples, must be 1 or more and 0 or more, "
-                f"together {MEMORY - 1} or less"
-            )
-
-
-def power_on(p: CascadeControllerParams, c: CascadeController, lines: CascadeLines, position: float) -> None:
-    """The drive comes on at rest, its reference at `position` [m]."""
-    stand_sensor(p.motor_sensor, c.motor_sensor, lines.motor)
-    stand_sensor(p.load_sensor, c.load_sensor, lines.load)
-    c.reference.position = position
-    c.count = lines.motor.count
-    c.on = lines.enable = lines.sync = 1
-
-
-def follow(c: CascadeController) -> None:
-    """What the host has laid ready is taken from its first entry on, from the next sample on."""
-    c.entry = 0
-
-
-def guard_axis(c: CascadeController) -> None:
-    """From the next sample on, faults switch off."""
-    enable_guard(c.guard)
-    c.guarded = 1
-
-
-def await_position(c: CascadeController, samples: int) -> None:
-    """The axis must be in position within so many samples, which is an event, or not, which is a fault."""
-    c.within = 0
-    await_arrival(c.guard, samples)
-
-
-def acknowledge(c: CascadeController) -> int:
-    """Take the event, 0 if there is none; the axis goes on."""
-    event, c.event = c.event, 0
-    return event
-
-
-def clear_peaks(c: CascadeController) -> None:
-    """Remember from the next sample on."""
-    c.peaks = Peaks()
-
-
-def switch_off(c: CascadeController) -> None:
-    """Take the drive's command away at the next sample; the axis coasts."""
-    c.on = 0

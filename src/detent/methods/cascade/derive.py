@@ -22,7 +22,7 @@ def dead_time(spec: CascadeSpec) -> float:
 
     Hold of a sample, delays of encoder and amplifier, half the span of the velocity and its filter.
     """
-    table = spec.velocity_encoder
+    table = spec.encoder_of("velocity")
     samples = 0.5 + spec.drive.delay + table.delay + 0.5 * table.velocity_span
     return samples * spec.method.sample_period + table.velocity_filter
 
@@ -34,6 +34,10 @@ class Machine:
         self.spec = spec
         self.speed = spec.limits.speed
         self.per_command = spec.effort_per_command
+
+    def figure(self, name: str, value: float, linear: str, formula: str) -> Derived:
+        """A figure in the unit of the axis, by that of a linear axis."""
+        return quantity_figure(name, value, self.spec.unit(linear), formula)
 
     @cached_property
     def loop(self) -> "LinearLoop":
@@ -49,10 +53,10 @@ class Machine:
 
     def needed(self, speed: float, acceleration: float = 0.0) -> float:
         """Force of the motor at a speed [m/s] and an acceleration [m/s^2] in the harder direction [N]."""
-        frictions = {sense: self.spec.friction(sense) for sense in (1, -1)}
-        weight, pendulum = self.spec.mechanics.weight, self.spec.mechanics.pendulum
-        resisting = [sense * weight + one.coulomb + one.viscous * speed for sense, one in frictions.items()]
-        return max(*resisting, 0.0) + pendulum + self.spec.mass * acceleration
+        spec, mechanics = self.spec, self.spec.mechanics
+        sides = [(sense * mechanics.weight, spec.friction(sense)) for sense in (1, -1)]
+        resisting = [weight + one.coulomb + one.viscous * speed for weight, one in sides]
+        return max(*resisting, 0.0) + mechanics.pendulum + spec.mass * acceleration
 
     def available(self, speed: float) -> float:
         """Largest force behind the transmission at a speed [m/s]; a voltage drive's falls by the back-EMF [N]."""
@@ -66,7 +70,9 @@ class Machine:
         return max(self.spec.friction(1).static + weight, self.spec.friction(-1).static - weight) + pendulum
 
     def _left(self, sense: int) -> float:
-        """Command at limits.speed that feed-forward leaves to the loops [V]."""
+        """Command at limits.speed that feed-forward leaves to the loops, and an integral does not take over [V]."""
+        if self.integrates:
+            return 0.0
         spec, shares, friction = self.spec, self.spec.method.feed_forward, self.spec.friction(sense)
         drag = spec.back_emf_drag
         force = (friction.viscous + drag) * self.speed - shares.viscous * (spec.viscous + drag) * self.speed
@@ -78,21 +84,18 @@ class Machine:
         """Largest following error at limits.speed once it is steady, pendulum aside [m]."""
         method = self.spec.method
         behind = (1 - method.feed_forward.velocity) * self.speed
-        left = [0.0] if self.integrates else [self._left(sense) for sense in (1, -1)]
+        left = [self._left(sense) for sense in (1, -1)]
         if method.structure == "cascade":
             return max(abs(behind + one / method.velocity_gain) for one in left) / method.position_gain
-        if self.integrates:
-            return 0.0
-        return max(abs(one + method.derivative * behind) / method.proportional for one in left)
+        held = [abs(one + method.derivative * behind) / method.proportional for one in left]
+        return 0.0 if self.integrates else max(held)
 
     @property
     def velocity_demand(self) -> float:
         """Largest velocity demand at limits.speed once it is steady [m/s]; of a PID, which has none, 0."""
         method = self.spec.method
-        if method.structure == "pid":
-            return 0.0
-        left = 0.0 if self.integrates else max(self._left(1), self._left(-1), 0.0)
-        return self.speed + left / method.velocity_gain
+        left = max(self._left(1), self._left(-1), 0.0)
+        return 0.0 if method.structure == "pid" else self.speed + left / method.velocity_gain
 
     @property
     def integrates(self) -> bool:
@@ -112,7 +115,7 @@ class Machine:
     @property
     def counted_velocity(self) -> float:
         """Velocity that one count in a span means [m/s]."""
-        table = self.spec.velocity_encoder
+        table = self.spec.encoder_of("velocity")
         return table.resolution / (table.velocity_span * self.spec.method.sample_period)
 
     @property
@@ -124,101 +127,86 @@ class Machine:
         return gain * self.loop.velocity_share * self.counted_velocity
 
 
-def derive(spec: CascadeSpec) -> tuple[Derived, ...]:
-    """Compute all derived figures, in the order they are read."""
+def derive(spec: CascadeSpec) -> Iterator[Derived]:
+    """All derived figures, in the order they are read."""
     machine = Machine(spec)
-    groups = (_masses, _swings, _clocks, _drive, _loops, _errors)
-    return tuple(figure for group in groups for figure in group(machine))
+    for group in (_masses, _swings, _clocks, _drive, _loops, _errors):
+        yield from group(machine)
 
 
-def _figure(machine: Machine, name: str, value: float, linear: str, formula: str) -> Derived:
-    """Figure in a unit of the axis's motion."""
-    return quantity_figure(name, value, machine.spec.unit(linear), formula)
-
-
-def _masses(machine: Machine) -> Iterator[Derived]:
+def _masses(m: Machine) -> Iterator[Derived]:
     """What moves."""
-    spec = machine.spec
-    name = "moment of inertia" if spec.axis.motion == "rotary" else "mass"
-    formula = "motor_mass + load_mass" + ("" if spec.motor is None else " + rotor / (travel per radian)^2")
-    yield _figure(machine, f"moving {name} m", spec.mass, "kg", formula)
-    if spec.mechanics.coupling is not None:
-        yield _figure(
-            machine, f"{name} on the motor's side m1", spec.motor_mass, "kg", formula.replace(" + load_mass", "")
-        )
+    name = "moment of inertia" if m.spec.axis.motion == "rotary" else "mass"
+    rotor = "" if m.spec.motor is None else " + rotor / (travel per radian)^2"
+    yield m.figure(f"moving {name} m", m.spec.mass, "kg", f"motor_mass + load_mass{rotor}")
+    if m.spec.mechanics.coupling is not None:
+        yield m.figure(f"{name} on the motor's side m1", m.spec.motor_mass, "kg", f"motor_mass{rotor}")
 
 
-def _swings(machine: Machine) -> Iterator[Derived]:
+def _swings(m: Machine) -> Iterator[Derived]:
     """Both masses on their coupling."""
-    spec, coupling = machine.spec, machine.spec.mechanics.coupling
+    spec, coupling = m.spec, m.spec.mechanics.coupling
     if coupling is None:
         return
     inverse = 1.0 / spec.motor_mass + 1.0 / spec.mechanics.load_mass
     resonance = math.sqrt(coupling.stiffness * inverse)
     damping = 0.5 * coupling.damping * inverse / resonance
-    yield quantity_figure("anti-resonance", machine.anti_resonance, "Hz", "sqrt(k / m2) / 2 pi")
-    yield quantity_figure("resonance", resonance / (2 * math.pi), "Hz", "sqrt(k (1/m1 + 1/m2)) / 2 pi")
+    yield m.figure("anti-resonance", m.anti_resonance, "Hz", "sqrt(k / m2) / 2 pi")
+    yield m.figure("resonance", resonance / (2 * math.pi), "Hz", "sqrt(k (1/m1 + 1/m2)) / 2 pi")
     formula = "d (1/m1 + 1/m2) / (2 x 2 pi resonance)"
     yield Derived("damping of the resonance", damping, "", f"{damping:.3g}", formula)
 
 
-def _clocks(machine: Machine) -> Iterator[Derived]:
+def _clocks(m: Machine) -> Iterator[Derived]:
     """Sampling and dead time."""
     formula = "T (1/2 + drive.delay + encoder's delay + velocity_span / 2) + velocity_filter"
-    yield quantity_figure("dead time of the velocity loop", dead_time(machine.spec), "s", formula)
-    if machine.spec.velocity_encoder.resolution > 0:
-        formula = "resolution / (velocity_span x T)"
-        yield _figure(machine, "velocity of one count", machine.counted_velocity, "m/s", formula)
+    yield m.figure("dead time of the velocity loop", dead_time(m.spec), "s", formula)
+    if m.spec.encoder_of("velocity").resolution > 0:
+        yield m.figure("velocity of one count", m.counted_velocity, "m/s", "resolution / (velocity_span x T)")
 
 
-def _drive(machine: Machine) -> Iterator[Derived]:
+def _drive(m: Machine) -> Iterator[Derived]:
     """What the drive can do, and what the limits need of it."""
-    spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
+    spec, speed, acceleration = m.spec, m.speed, m.spec.limits.acceleration
     if spec.motor is not None:
-        yield _figure(machine, "motor speed at limits.speed", speed / spec.radius, "rad/s", "v / travel per radian")
+        yield m.figure("motor speed at limits.speed", speed / spec.radius, "rad/s", "v / travel per radian")
     formula = "of converter, drive.max_current and limits.effort the least"
-    yield quantity_figure("largest command", spec.largest_command, "V", formula)
+    yield m.figure("largest command", spec.largest_command, "V", formula)
     what = "torque" if spec.axis.motion == "rotary" else "force"
-    yield _figure(
-        machine, f"largest {what}", spec.largest_effort, "N", "at standstill, by the largest command and current"
-    )
-    hardest = machine.needed(speed, acceleration)
-    yield _figure(machine, f"{what} of an acceleration", hardest, "N", "m a + friction at limits.speed + weight")
-    command = (hardest / (1.0 - spec.mechanics.transmission_loss) + spec.back_emf_drag * speed) / machine.per_command
-    yield quantity_figure("command of an acceleration", command, "V", "that, and back-EMF")
+    formula = "at standstill, by the largest command and current"
+    yield m.figure(f"largest {what}", spec.largest_effort, "N", formula)
+    hardest = m.needed(speed, acceleration)
+    yield m.figure(f"{what} of an acceleration", hardest, "N", "m a + friction at limits.speed + weight")
+    command = (hardest / (1.0 - spec.mechanics.transmission_loss) + spec.back_emf_drag * speed) / m.per_command
+    yield m.figure("command of an acceleration", command, "V", "that, and back-EMF")
     if spec.motor is not None and spec.drive.input == "current":
-        current = hardest / spec.force_constant
+        voltage = spec.motor.resistance * (hardest / spec.force_constant) + spec.emf_constant * speed
         formula = "R x current of an acceleration + back-EMF at limits.speed: the amplifier needs as much"
-        voltage = spec.motor.resistance * current + spec.emf_constant * speed
-        yield quantity_figure("voltage of the motor", voltage, "V", formula)
+        yield m.figure("voltage of the motor", voltage, "V", formula)
     if spec.holding > 0:
-        yield quantity_figure("command that holds the weight", spec.holding / machine.per_command, "V", "at rest")
-    yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a, jerk aside")
-    yield _figure(machine, "way of an acceleration", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk aside")
+        yield m.figure("command that holds the weight", spec.holding / m.per_command, "V", "at rest")
+    yield m.figure("time of an acceleration", speed / acceleration, "s", "v / a, jerk aside")
+    yield m.figure("way of an acceleration", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk aside")
 
 
-def _loops(machine: Machine) -> Iterator[Derived]:
+def _loops(m: Machine) -> Iterator[Derived]:
     """Bandwidths and margins of the exact linear model."""
-    loop = machine.loop
-    for name, margin in (("velocity loop", loop.velocity_loop), ("position loop", loop.position_loop)):
+    for name, margin in (("velocity loop", m.loop.velocity_loop), ("position loop", m.loop.position_loop)):
         if margin.crossover > 0:
             formula = "the open loop's gain falls below 1; dead times, filters and resonance included"
-            yield quantity_figure(f"bandwidth of the {name}", margin.crossover, "Hz", formula)
+            yield m.figure(f"bandwidth of the {name}", margin.crossover, "Hz", formula)
             text = format_quantity(margin.phase, "rad", 3)
             yield Derived(f"phase margin of the {name}", margin.phase, "rad", text, "smallest over all crossings")
     formula = "factor of the whole loop's gain at which a mode no longer decays"
-    yield Derived("gain margin", loop.gain_margin, "", f"{loop.gain_margin:.3g}", formula)
+    yield Derived("gain margin", m.loop.gain_margin, "", f"{m.loop.gain_margin:.3g}", formula)
 
 
-def _errors(machine: Machine) -> Iterator[Derived]:
+def _errors(m: Machine) -> Iterator[Derived]:
     """How the axis follows and how it rests."""
-    method = machine.spec.method
-    if method.structure == "pid":
+    formula = "((1 - share) v + command left by feed-forward / Kv, unless there is an integral) / Kp"
+    if m.spec.method.structure == "pid":
         formula = "(command left by feed-forward + Kd (1 - share) v) / proportional; 0 with an integral"
-    else:
-        formula = "((1 - share) v + command left by feed-forward / Kv, unless there is an integral) / Kp"
-    yield _figure(machine, "following error at limits.speed", machine.following_error, "m", formula)
-    if machine.integrates:
-        return
-    formula = "static friction and weight not fed forward / stiffness of the loop at rest"
-    yield _figure(machine, "error at rest", machine.resting_error, "m", f"up to: {formula}")
+    yield m.figure("following error at limits.speed", m.following_error, "m", formula)
+    if not m.integrates:
+        formula = "up to: static friction and weight not fed forward / stiffness of the loop at rest"
+        yield m.figure("error at rest", m.resting_error, "m", formula)

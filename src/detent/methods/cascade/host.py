@@ -8,20 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.control.guard import await_arrival
 from detent.kernel.loop import Bytes, Offsets, advance, until_row, write_row
 from detent.kernel.registers import Leaf, Registers
 from detent.kernel.step import step
-from detent.methods.cascade import controller
 from detent.methods.cascade.build import build_cascade
+from detent.methods.cascade.controller import Feed
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.system import Cascade, CascadeParams, Feed, along, driven, switch_on
-from detent.planning.profile import Profile
+from detent.methods.cascade.system import Cascade, CascadeParams, along, driven, switch_on
+from detent.planning.profile import Numbers, Profile
 from detent.record.machine import AnyRecorder, Machine
+from detent.record.recorder import byte_places, choose_leaves
 
-Numbers = NDArray[np.float64]
-
-Rows = NDArray[Any]
-"""Structured rows, one per sample: what its law computed, and the plant when it was over."""
+Rows = NDArray[Any]  # structured, one row per sample: what its law computed, and the plant when it was over
 
 
 class RotaryCascade(Cascade):
@@ -67,28 +66,18 @@ def advance_watched(  # noqa: PLR0913 - as `advance`, and where the rows of the 
 class CascadeHost:
     """A cascade axis at power-on, its loops closed, and the reference where it stands."""
 
-    def __init__(
-        self,
-        spec: CascadeSpec,
-        recorder: AnyRecorder | None = None,
-        position: float | None = None,
-        *,
-        guarded: bool = True,
-    ) -> None:
+    def __init__(self, spec: CascadeSpec, recorder: AnyRecorder | None = None, position: float | None = None) -> None:
         self.spec = spec
-        self.params: Any = build_cascade(spec)
         # ctypes gives every register its type at run time only.
+        self.params: Any = build_cascade(spec)
         self.state: Any = Cascade()
         self.controller: Any = self.state.controller
         start = spec.mechanics.start_position if position is None else position
         switch_on(self.params, self.state, start)
-        if guarded:
-            controller.guard_axis(self.controller)
+        self.controller.guarded = 1
         self.tick: float = self.params.plant.machine.period
         self.sample_ticks: int = self.params.controller.sample_ticks
-        self.machine: Machine[CascadeParams, Cascade] = Machine(
-            self.params, self.state, self.tick, recorder, advance=self._advance
-        )
+        self.machine = Machine[Any, Any](self.params, self.state, self.tick, recorder, advance=self._advance)
         self.feed: Feed = along(np.array([start]), np.zeros(1), np.zeros(1))
         self._seen: Bytes | None = None
 
@@ -105,12 +94,12 @@ class CascadeHost:
     def follow(self, profile: Profile) -> None:
         """Follow a reference from the next sample on; behind its end it stands."""
         self.feed = along(profile.position, profile.velocity, profile.acceleration)
-        controller.follow(self.controller)
+        self.controller.entry = 0
 
     def drive(self, command: Numbers) -> None:
         """Open the loops: the amplifier gets these commands, one per sample, and nothing behind their end."""
         self.feed = driven(command)
-        controller.follow(self.controller)
+        self.controller.entry = 0
 
     def _advance(self, p: CascadeParams, r: Cascade, ticks: int, *recording: Any) -> int:
         if self._seen is None:
@@ -120,14 +109,15 @@ class CascadeHost:
     def pass_samples(self, samples: int) -> int:
         """Let samples pass, at most to the end of the one that makes an event; which one, 0 if none did."""
         self.machine.pass_ticks(samples * self.sample_ticks)
-        event = controller.acknowledge(self.controller)
+        event, self.controller.event = self.controller.event, 0
         if event:
             self.machine.pass_ticks(self.controller.left)
         return event
 
     def arrive(self, samples: int) -> int:
         """Let samples pass until the axis is in position: that, or a fault, is the event."""
-        controller.await_position(self.controller, samples)
+        self.controller.within = 0
+        await_arrival(self.controller.guard, samples)
         return self.pass_samples(samples)
 
     def watch(self, samples: int) -> Rows:
@@ -146,6 +136,6 @@ WATCHED = (
 )  # fmt: skip
 """Registers that `watch` shows."""
 
-_LEAVES = [next(leaf for leaf in Cascade.leaves() if leaf.path == name) for name in WATCHED]
-_PICKS = np.concatenate([np.arange(x.offset, x.offset + x.width.size) for x in _LEAVES]).astype(np.int64)
+_LEAVES = choose_leaves(Cascade, WATCHED)
+_PICKS = byte_places(_LEAVES)
 _ROW: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in _LEAVES])

@@ -76,7 +76,7 @@ class LinearLoop:
         self.plant = linear_plant(machine_of(spec), (drags[0], drags[1]))
         self.gain = spec.drive.voltage_gain if spec.drive.input == "voltage" else spec.effort_per_command
         # Encoders of both loops, and the places of the positions that they read.
-        self.position_sensor, self.velocity_sensor = spec.position_encoder, spec.velocity_encoder
+        self.position_sensor, self.velocity_sensor = spec.encoder_of("position"), spec.encoder_of("velocity")
         places = {"motor": self.plant.motor, "load": self.plant.load}
         self.position_place = places[spec.method.feedback.position]
         self.velocity_place = places[spec.method.feedback.velocity]
@@ -85,6 +85,9 @@ class LinearLoop:
         self.derivative_share = smoothing(spec.method.derivative_filter, self.period)
         highest = math.log10(0.5 / self.period)
         self.frequencies = np.logspace(highest - DECADES, highest, GRID, endpoint=False)  # of the open loops [Hz]
+        self._inner, outer = self._open_loops()
+        # Margins; a PID has no velocity loop, which then never crosses a gain of 1.
+        self.velocity_loop, self.position_loop = (_margin(self.frequencies, loop) for loop in (self._inner, outer))
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
@@ -164,47 +167,26 @@ class LinearLoop:
             low, high = (middle, high) if _radius(self.transition(middle)) < 1.0 else (low, middle)
         return low
 
-    @cached_property
-    def _responses(self) -> tuple[Phasors, Phasors, Phasors]:
-        """Position and velocity read per command, and z of each frequency."""
-        z: Any = np.exp(2j * np.pi * self.frequencies * self.period)
+    def _open_loops(self) -> tuple[Phasors, Phasors]:
+        """Velocity loop, and position loop with that inside it closed; of a PID no velocity loop, and all of it."""
+        m, read, z = self.spec.method, self.velocity_sensor, np.exp(2j * np.pi * self.frequencies * self.period)
         held, driven = self.held
-        size = len(driven)
+        size, span = len(driven), float(read.velocity_span)
         through = z[:, None, None] * np.eye(size) - held
         x = np.linalg.solve(through, np.broadcast_to(driven[:, None], (GRID, size, 1)).astype(np.complex128))[:, :, 0]
         x = x * (self.gain * z ** -float(self.spec.drive.delay))[:, None]
         position = x[:, self.position_place] * z ** -float(self.position_sensor.delay)
-        read = self.velocity_sensor
-        span = float(read.velocity_span)
         velocity = x[:, self.velocity_place] * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
-        return position, velocity * _filter(z, self.velocity_share), z
-
-    @cached_property
-    def velocity_loop(self) -> Margin:
-        """Margin of the velocity loop; of a PID, which has none, a crossover of 0."""
-        m = self.spec.method
-        return _margin(self.frequencies, self._inner) if m.structure == "cascade" else Margin(0.0, math.pi)
+        velocity, summed = velocity * _filter(z, self.velocity_share), self.period * z / (z - 1.0)
+        if m.structure == "pid":
+            lead = m.derivative * _filter(z, self.derivative_share)
+            return np.zeros_like(z), (m.proportional + m.integral * summed) * position + lead * velocity
+        law = m.velocity_gain + m.velocity_integral * summed
+        return law * velocity, m.position_gain * law * position / (1.0 + law * velocity)
 
     def velocity_level(self, frequency: float) -> float:
         """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""
         return float(np.interp(frequency, self.frequencies, np.abs(self._inner)))
-
-    @cached_property
-    def position_loop(self) -> Margin:
-        """Margin of the position loop, the velocity loop inside it closed; of a PID, of all of it."""
-        m, (position, velocity, z) = self.spec.method, self._responses
-        summed = self.period * z / (z - 1.0)
-        if m.structure == "pid":
-            lead = m.derivative * _filter(z, self.derivative_share)
-            return _margin(self.frequencies, (m.proportional + m.integral * summed) * position + lead * velocity)
-        law = m.velocity_gain + m.velocity_integral * summed
-        return _margin(self.frequencies, m.position_gain * law * position / (1.0 + self._inner))
-
-    @cached_property
-    def _inner(self) -> Phasors:
-        """Open velocity loop."""
-        m, (_, velocity, z) = self.spec.method, self._responses
-        return (m.velocity_gain + m.velocity_integral * self.period * z / (z - 1.0)) * velocity
 
 
 def smoothing(time_constant: float, period: float) -> float:
@@ -234,6 +216,5 @@ def _margin(frequencies: Numbers, loop: Phasors) -> Margin:
     at = phase[places] + share * (phase[places + 1] - phase[places])
     margins = np.mod(at, 2 * np.pi) - np.pi
     first = falling[0]
-    lead = gain[first] / (gain[first] - gain[first + 1])
-    crossover = frequencies[first] * (frequencies[first + 1] / frequencies[first]) ** lead
+    crossover = frequencies[first] * (frequencies[first + 1] / frequencies[first]) ** share[places == first][0]
     return Margin(float(crossover), float(margins[np.argmin(np.abs(margins))]))

@@ -11,14 +11,8 @@ from detent.methods.method import Method, Shown, Simulated
 from detent.methods.moves.job import MoveJob, one_move
 
 if TYPE_CHECKING:
-    from detent.logs.log import Log
-    from detent.methods.cascade.replay import ReplayRun
-    from detent.methods.cascade.replay_job import ReplayJob
-    from detent.methods.cascade.run import CascadeRun
     from detent.page.frame import Page
     from detent.record.machine import AnyRecorder, Progress
-
-ROTARY: type[CascadeSpec] = rotary_model(CascadeSpec)
 
 
 class CascadeMethod(Method[CascadeSpec]):
@@ -29,7 +23,7 @@ class CascadeMethod(Method[CascadeSpec]):
     jobs = "a list of moves (.csv, .toml), or a recording to replay"
     pace = "as its file has it, every sample"
     spec = CascadeSpec
-    rotary: type[CascadeSpec] | None = ROTARY
+    rotary: type[CascadeSpec] | None = rotary_model(CascadeSpec)
     catalogue = DC_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
     refuses, warns = "checks:RULES", "checks:find_cautions"
@@ -57,7 +51,7 @@ class CascadeMethod(Method[CascadeSpec]):
             made,
             registers=self.brought("host:cascade_registers")(spec),
             every=round(spec.method.sample_period / made.tick),
-            job=(MoveJob, self.brought("replay_job:ReplayJob")),
+            job=(MoveJob, self.brought("replay:ReplayJob")),
         )
 
     def load(self, spec: CascadeSpec, path: Path) -> MoveJob:
@@ -66,7 +60,7 @@ class CascadeMethod(Method[CascadeSpec]):
 
     def run(
         self, spec: CascadeSpec, job: Any, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None
-    ) -> "CascadeRun | ReplayRun":
+    ) -> Any:
         """Moves, or a recording."""
         place = "replay:run_cascade_replay" if job.kind == "replay" else "run:run_cascade_moves"
         return self.brought(place)(spec, job, recorder=recorder, progress=progress)
@@ -83,8 +77,8 @@ class CascadeMethod(Method[CascadeSpec]):
 
     def summary(self, spec: CascadeSpec, result: Any) -> list[tuple[str, str]]:
         """Moves, errors, effort; of a replay, how far simulation and recording are apart."""
-        place = "replay_summary" if result.job.kind == "replay" else "cascade_summary"
-        return self.brought(f"summary:{place}")(spec, result)
+        place = "replay_page:replay_summary" if result.job.kind == "replay" else "page:cascade_summary"
+        return self.brought(place)(spec, result)
 
     def page(self, spec: CascadeSpec, result: Any, shown: Shown) -> "Page":
         """The report of moves or of a replay."""
@@ -92,11 +86,6 @@ class CascadeMethod(Method[CascadeSpec]):
             return self.brought("replay_page:replay_page")(spec, result, shown.settings)
         return super().page(spec, result, shown)
 
-    def recording(self, spec: CascadeSpec, log: "Log") -> "ReplayJob":
+    def recording(self, spec: CascadeSpec, log: Any) -> Any:
         """A job that replays a log on this axis."""
-        from detent.methods.cascade.replay_job import make_replay_job
-
-        signals = {role: (values, log.units[role]) for role, values in log.signals.items()}
-        notes = [str(finding) for finding in log.findings]
-        notes += [f"guessed: {'; '.join(log.guesses)}"] if log.guesses else []
-        return make_replay_job(spec, log.name, log.t, signals, notes)
+        return self.brought("replay:make_replay_job")(spec, log)

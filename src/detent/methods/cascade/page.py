@@ -2,20 +2,21 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
-from detent.methods.cascade.panels import POINTS, both_sides, command_panel, error_panel, pair_panel
 from detent.methods.cascade.run import CascadeMove, CascadeRun
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.summary import arrived, worst_rest, worst_settling
-from detent.methods.cascade.units import milliseconds, units_of
+from detent.methods.cascade.units import Scale, Units, milliseconds, units_of
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
 from detent.page.parts import Event, Numbers
 from detent.page.run_page import (
     Stretch,
+    Worst,
     happened,
     page_title,
     recorded_whole,
@@ -27,7 +28,7 @@ from detent.page.run_page import (
     worst,
 )
 from detent.page.table import Cell, bar_cell, left_out, long_table, offset_cell
-from detent.page.words import count, duration, number
+from detent.page.words import GAP, count, duration, number
 from detent.record.trace import Trace
 
 REFERENCE, REFERENCE_SPEED = "controller.reference.position", "controller.reference.velocity"
@@ -38,6 +39,11 @@ NEEDED = (REFERENCE, REFERENCE_SPEED, LOAD, LOAD_SPEED, FOLLOWING, COMMAND)
 
 REST_WINDOWS = 5  # how far from the target the figure of the end of a move begins, in windows
 AFTERWARDS = 0.02  # how long after its last event that figure ends [s]
+
+POINTS = 1500  # rows that are chosen for one curve's sake: plot areas stand above one another
+WINDOW_SHARE = 0.02  # windows and limits narrower than this share of the curves would only blacken the line at zero
+
+Named = tuple[str, Numbers]  # name of a curve, and its values in SI units
 
 
 def cascade_page(
@@ -67,6 +73,48 @@ def cascade_page(
 # ---- what came out, in one glance
 
 
+def cascade_summary(spec: CascadeSpec, run: CascadeRun) -> list[tuple[str, str]]:
+    """Name and text of each figure of a run of moves; what a run did not come to is left out."""
+    units, found = units_of(spec), _worst_figures(run)
+    after = f"from the end of the reference until within {units.error(run.tolerance)} for good"
+    figures: dict[str, tuple[str, Callable[[float], str], str]] = {
+        "settling": ("settling", milliseconds, f"worst {{}}, {after}"),
+        "peak_following": ("following error", units.error, "worst {}"),
+        "overshoot": ("overshoot", units.error, "worst {}"),
+        "rest": ("error at rest", units.error, "worst {}, of the load"),
+        "peak_speed": ("peak speed", units.speed_text, "{}"),
+        "peak_command": ("peak command", lambda value: f"{number(value)} of {number(run.max_command)} V", "{}"),
+    }
+    rows = [("moves", f"{count(arrived(run))} of {count(run.job.count)} in position")]
+    rows += [("time", duration(run.seconds))] if run.moves else []
+    for key, (name, written, text) in figures.items():
+        if one := found.get(key):
+            rows.append((name, text.format(f"{written(one.value)} ({_whose(one.of)})")))
+    return [(name, text.replace(GAP, " ")) for name, text in rows]
+
+
+def arrived(run: CascadeRun) -> int:
+    """Moves that were in position."""
+    return sum(move.in_position for move in run.moves)
+
+
+def _worst_figures(run: CascadeRun) -> dict[str, Worst[CascadeMove]]:
+    """The largest of each figure of the moves, with whose it is; what no move has is left out."""
+    settled = [move for move in run.moves if not math.isnan(move.settling)]
+    resting = [move for move in run.moves if move.in_position]
+    found = {
+        "settling": worst(settled, lambda move: move.settling),
+        "rest": worst(resting, lambda move: abs(move.error)),
+    }
+    for name in ("peak_following", "overshoot", "peak_speed", "peak_command"):
+        found[name] = worst(run.moves, attrgetter(name))
+    return {name: one for name, one in found.items() if one}
+
+
+def _whose(move: CascadeMove) -> str:
+    return f"move {count(move.number)}"
+
+
 def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
     error, asked = units_of(spec).error, count(run.job.count, "move")
     if not run.done:
@@ -91,26 +139,22 @@ def _cards(spec: CascadeSpec, run: CascadeRun) -> list[Card]:
         Card("Moves in position", count(arrived(run)), f"of {count(run.job.count)}", "", bad=not run.done),
         time_card(run.seconds, "dwells included" if run.done else "until it stopped"),
     ]
-    if found := worst_settling(run):
-        below = f"after the reference's end, within {error(run.tolerance)}; {_whose(found.of)}"
-        shown.append(card("Longest settling", milliseconds(found.value), below))
-    if found := worst(run.moves, lambda move: move.peak_following):
-        limit = spec.method.following_error
-        below = f"{_whose(found.of)}; the drive goes off at {error(limit)}"
-        shown.append(card("Largest following error", error(found.value), below, bad=found.value > limit))
-    if found := worst_rest(run):
-        below = f"of the load, {_whose(found.of)}"
-        shown.append(card("Worst error at rest", error(found.value), below, bad=found.value > run.tolerance))
-    if found := worst(run.moves, lambda move: move.peak_command):
+    found, limit = _worst_figures(run), spec.method.following_error
+    if one := found.get("settling"):
+        below = f"after the reference's end, within {error(run.tolerance)}; {_whose(one.of)}"
+        shown.append(card("Longest settling", milliseconds(one.value), below))
+    if one := found.get("peak_following"):
+        below = f"{_whose(one.of)}; the drive goes off at {error(limit)}"
+        shown.append(card("Largest following error", error(one.value), below, bad=one.value > limit))
+    if one := found.get("rest"):
+        below = f"of the load, {_whose(one.of)}"
+        shown.append(card("Worst error at rest", error(one.value), below, bad=one.value > run.tolerance))
+    if one := found.get("peak_command"):
         limited = sum(move.limited for move in run.moves)
-        below = f"of {number(run.max_command)} V, {_whose(found.of)}"
+        below = f"of {number(run.max_command)} V, {_whose(one.of)}"
         below += f"; at its limit for {milliseconds(limited)}" if limited else ""
-        shown.append(Card("Peak command", number(found.value), "V", below))
+        shown.append(Card("Peak command", number(one.value), "V", below))
     return shown
-
-
-def _whose(move: CascadeMove) -> str:
-    return f"move {count(move.number)}"
 
 
 # ---- figures over time
@@ -163,32 +207,26 @@ def _move_figures(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> li
     rows = stretch(trace, NEEDED, move.begin, run.time_end if failed else move.end)
     if rows is None:
         return []
-    events = _events(move, failed=failed)
-    caption = f"Shown is {'the move that failed' if failed else 'the fastest move'}."
-    if run.done:
-        caption += " Look for: how soon the load is at rest once its reference is, and the command where it sets off."
-    timeline = Timeline(name="move", t=rows.t, label="time since the move began", events=events)
-    charts = time_charts(timeline, _panels(spec, run, rows, "move"))
-    shown = Figure(title=f"Move {count(move.number)}", caption=caption, charts=charts, events=events)
-    rest = None if math.isnan(move.arrived) else _rest_figure(spec, run, move, rows, events)
-    return [shown, rest] if rest else [shown]
-
-
-def _events(move: CascadeMove, *, failed: bool) -> list[Event]:
-    """What happens in a move, on a clock that starts with it."""
-    texts = {
+    moments = {
         "the reference sets off": move.begin,
         "the reference has come to the target": move.arrived,
         "the load is within the window for good": move.settled,
         "in position: the loop's error was within the window for its time": move.ready,
         "the drive goes off": move.end if failed else math.nan,
     }
-    return happened({text: moment - move.begin for text, moment in texts.items()}, move.end - move.begin)
+    events = happened({text: moment - move.begin for text, moment in moments.items()}, move.end - move.begin)
+    caption = f"Shown is {'the move that failed' if failed else 'the fastest move'}."
+    if run.done:
+        caption += " Look for: how soon the load is at rest once its reference is, and the command where it sets off."
+    timeline = Timeline(name="move", t=rows.t, label="time since the move began", events=events)
+    charts = time_charts(timeline, _panels(spec, run, rows, "move"))
+    shown = Figure(title=f"Move {count(move.number)}", caption=caption, charts=charts, events=events)
+    return [shown] if math.isnan(move.arrived) else [shown, *_rest_figure(spec, run, move, rows, events)]
 
 
 def _rest_figure(
     spec: CascadeSpec, run: CascadeRun, move: CascadeMove, rows: Stretch, events: list[Event]
-) -> Figure | None:
+) -> list[Figure]:
     """The load coming to rest, from a few windows away until it is quiet."""
     units, window = units_of(spec), run.tolerance
     far = np.flatnonzero(np.abs(rows[LOAD] - move.target) > REST_WINDOWS * window)
@@ -196,29 +234,56 @@ def _rest_figure(
     marks = [moment for moment in (move.arrived, move.settled, move.ready) if not math.isnan(moment)]
     near = rows.between(begin, max(marks) - move.begin + AFTERWARDS)
     if len(near) < 3:
-        return None
+        return []
     seen = [event for event in events if begin <= event.t <= near.t[-1]]
     off = near[LOAD] - move.target
     scale = units.small(min(float(np.abs(off).max()), 20 * window))
     reach = REST_WINDOWS * window * scale.factor
-    asked = (_while_on(run, near, REFERENCE) - move.target) * scale.factor
-    panel = Panel(
-        name="move-rest",
-        label=f"position less target [{scale.name}]",
-        zero=True,
-        span=(-reach, reach),
-        curves=[
-            Curve(label="load", colour="speed", width=2.5, y=off * scale.factor, thin=POINTS),
-            Curve(label="reference", colour="left", dash=(5, 4), y=asked, thin=POINTS),
-        ],
-        levels=both_sides(window * scale.factor, "in position"),
-    )
+    asked, did = ("reference", _while_on(run, near, REFERENCE) - move.target), ("load", off)
+    panel = pair_panel("move-rest", "position less target", scale, asked, did)
+    panel = replace(panel, span=(-reach, reach), levels=both_sides(window * scale.factor, "in position"))
     caption = (
         "The end of the same move, magnified: how far the load is from the target. Between the dashed lines, "
         f"±{units.error(window)}, it counts as in position."
     )
     timeline = Timeline(name="rest", t=near.t, label="time since the move began", events=seen)
-    return Figure(title="Coming to rest", caption=caption, charts=time_charts(timeline, [panel]), events=seen)
+    return [Figure(title="Coming to rest", caption=caption, charts=time_charts(timeline, [panel]), events=seen)]
+
+
+# ---- plot areas
+
+
+def pair_panel(name: str, label: str, scale: Scale, asked: Named, did: Named) -> Panel:
+    """What was asked or measured, dashed over what the axis did."""
+    curves = [
+        Curve(label=did[0], colour="speed", width=2.5, y=did[1] * scale.factor, thin=POINTS),
+        Curve(label=asked[0], colour="left", width=1.5, dash=(5, 4), y=asked[1] * scale.factor, thin=POINTS),
+    ]
+    return Panel(name=name, label=f"{label} [{scale.name}]", zero=True, curves=curves)
+
+
+def error_panel(name: str, label: str, error: Named, units: Units, levels: tuple[tuple[float, str], ...] = ()) -> Panel:
+    """An error [m or rad] in a unit that suits it, with levels on both sides that are of its size."""
+    text, values = error
+    peak = float(np.nanmax(np.abs(values), initial=0.0))
+    scale = units.small(peak)
+    shown = [(value, word) for value, word in levels if WINDOW_SHARE * peak < value < 2 * peak]
+    marks = [mark for value, word in shown for mark in both_sides(value * scale.factor, word)]
+    curve = Curve(label=text, colour="current", y=values * scale.factor, width=1.5, thin=POINTS)
+    return Panel(name=name, label=f"{label} [{scale.name}]", height=170, zero=True, curves=[curve], levels=marks)
+
+
+def command_panel(name: str, command: Numbers, limit: float) -> Panel:
+    """The command [V] with its limit, where it comes near it."""
+    near = float(np.abs(command).max(initial=0.0)) > 0.5 * limit
+    levels, span = (both_sides(limit, "limit"), (-1.5 * limit, 1.5 * limit)) if near else ([], None)
+    curve = Curve(label="command", colour="drive", step=True, y=command, thin=POINTS)
+    return Panel(name=name, label="command [V]", height=150, zero=True, curves=[curve], levels=levels, span=span)
+
+
+def both_sides(value: float, word: str) -> list[tuple[float, str]]:
+    """Levels at a magnitude, the upper one named."""
+    return [(value, word), (-value, "")]
 
 
 # ---- table

@@ -9,44 +9,112 @@ errors of a simulation: the norm of the difference over the norm of the measurem
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.logs.log import Log
+from detent.logs.roles import EFFORTS
 from detent.methods.cascade.host import CascadeHost, Rows
-from detent.methods.cascade.replay_job import ReplayJob, recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import set_off
+from detent.planning.profile import Numbers, Profile, profile_of_recording
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
 from detent.units import format_quantity
 
 CHUNK = 8192  # samples between two words of progress
 
-Numbers = NDArray[np.float64]
+CUTOFF = 100.0
+"""Velocities that were not recorded, and accelerations, are those of positions low-passed at this frequency, both alike
+[Hz]; at most a fifth of the sample rate."""
+
+START_SPAN, START_SAMPLES = 0.012, 8  # time from which the velocity at the begin is taken [s], and its samples at least
+STILL = 5  # samples on both sides through which a recorded reference that stands does not change
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReplayJob:
+    """A recording, as far as an axis can replay it; arrays of shape (n,), n >= 3, all finite.
+
+    One with neither a reference nor an effort, or with arrays that do not fit together, is a `DetentError`.
+    """
+
+    name: str  #: name of the log
+    t: Numbers  #: time [s], strictly increasing
+    position: Numbers  #: as measured [m]; of a rotary axis [rad]
+    reference: Numbers | None = None  #: position asked for [m]; without one the recorded effort drives the axis
+    velocity: Numbers | None = None  #: as measured [m/s]
+    load_position: Numbers | None = None  #: by a second encoder [m]
+    #: what drove the axis: force [N], torque [N m], current [A], voltage [V], command [V]
+    efforts: dict[str, Numbers] = field(default_factory=dict[str, Numbers])
+    notes: tuple[str, ...] = ()  #: what was found wrong with the log, and what was guessed
+    kind: str = "replay"
+
+    def __post_init__(self) -> None:
+        """Refuse what no axis could replay."""
+        present = [self.t, self.position, *self.efforts.values()]
+        present += [x for x in (self.reference, self.velocity, self.load_position) if x is not None]
+        if len(self.t) < 3 or any(x.shape != self.t.shape for x in present):
+            shapes = ", ".join(str(x.shape) for x in present)
+            raise DetentError(f"{self.name}: came signals of shapes {shapes}; allowed: all (n,) with n 3 or more")
+        if not (np.diff(self.t) > 0).all() or not all(np.isfinite(x).all() for x in present):
+            raise DetentError(
+                f"{self.name}: came a time that does not rise, or values that are not finite; allowed: a rising time, "
+                "finite values; read the log with detent.identify first"
+            )
+        if self.reference is None and not self.efforts:
+            raise DetentError(
+                f"{self.name}: came neither a reference nor a force, current, voltage or command; allowed: one of them "
+                "beside the position; name its column: --column 'reference=COLUMN [mm]'"
+            )
+
+    @property
+    def seconds(self) -> float:
+        """Length of the recording [s]."""
+        return float(self.t[-1] - self.t[0])
+
+
+def make_replay_job(spec: CascadeSpec, log: Log) -> ReplayJob:
+    """The recording of an axis, as its job."""
+    if "position" not in log.signals:
+        came = ", ".join(log.signals) or "no signal"
+        raise DetentError(
+            f"{log.name}: came {came}; allowed: a log with a position; name its column: --column 'position=COLUMN [mm]'"
+        )
+    way = spec.unit("m")
+    example = "deg" if way == "rad" else "mm"
+    for role, unit in log.units.items():
+        kind = unit.partition("/")[0]
+        if role in log.signals and kind in {"m", "rad", "count"} and kind != way:
+            raise DetentError(
+                f"{log.name}: came {role} in {unit}; allowed: {way}, as the axis is a {spec.axis.motion} one; state "
+                f"the unit of its column, a number before it for counts: --column '{role}=COLUMN [{example}]'"
+            )
+    guessed = [f"guessed: {'; '.join(log.guesses)}"] if log.guesses else []
+    return ReplayJob(
+        name=log.name,
+        t=log.t,
+        position=log.signals["position"],
+        reference=log.signals.get("reference"),
+        velocity=log.signals.get("velocity"),
+        load_position=log.signals.get("position_load"),
+        efforts={role: log.signals[role] for role in EFFORTS if role in log.signals},
+        notes=(*map(str, log.findings), *guessed),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """One signal, as recorded and as simulated, at the instants of the recording.
+    """One signal, as recorded and as simulated, at the instants of the recording."""
 
-    Attributes
-    ----------
-    name : str
-        What it is: "position", "velocity", "force".
-    unit : str
-        SI unit.
-    measured, simulated : ndarray
-        Values [unit], shape (n,).
-    """
-
-    name: str
-    unit: str
-    measured: Numbers
-    simulated: Numbers
+    name: str  #: what it is: "position", "velocity", "force"
+    unit: str  #: SI unit
+    measured: Numbers  #: values as recorded [unit], shape (n,)
+    simulated: Numbers  #: the same as simulated
 
     @property
     def difference(self) -> Numbers:
@@ -74,35 +142,15 @@ class Compared:
 class ReplayRun(RunRecord[ReplayJob]):
     """A recording beside its simulation. Times [s] count from the recording's first sample.
 
-    Attributes
-    ----------
-    job : ReplayJob
-        The recording.
-    done : bool
-        The simulation came to the recording's end.
-    failure : str
-        Why not; empty if `done`.
-    warnings : list of str
-        What should be known about the comparison.
-    open_loop : str
-        Signal that drove the axis where there is no reference; empty where it followed one.
-    period : float
-        Time between two samples of the loops.
-    time_ready, time_end : float
-        Begin and end of the replay, in simulated time.
-    compared : list of Compared
-        Position first.
-    peak_following : float
-        Largest magnitude of the simulated following error; NaN open loop.
-    limited : float
-        Time with the simulated command at its limit [s].
+    Also `done`: the simulation came to the recording's end; `failure`: why not, empty if `done`; `warnings`: what
+    should be known about the comparison; `time_ready` and `time_end`: begin and end, in simulated time.
     """
 
-    open_loop: str = ""
-    period: float = 0.0
-    compared: list[Compared] = field(default_factory=list[Compared])
-    peak_following: float = math.nan
-    limited: float = 0.0
+    open_loop: str = ""  #: signal that drove the axis where there is no reference; empty where it followed one
+    period: float = 0.0  #: time between two samples of the loops
+    compared: list[Compared] = field(default_factory=list[Compared])  #: position first
+    peak_following: float = math.nan  #: largest magnitude of the simulated following error; NaN open loop
+    limited: float = 0.0  #: time with the simulated command at its limit [s]
 
     told: ClassVar[tuple[str, ...]] = ("open_loop", "period", "peak_following", "limited")
 
@@ -124,7 +172,8 @@ def run_cascade_replay(
     The loops follow the recorded reference; without one the amplifier gets the recorded effort. The drive does not go
     off: what it would have gone off for is a warning.
     """
-    host = CascadeHost(spec, recorder, position=float(job.position[0]), guarded=False)
+    host = CascadeHost(spec, recorder, position=float(job.position[0]))
+    host.controller.guarded = 0
     if speed := starting_velocity(job.t, job.position):
         set_off(host.params, host.state, speed)
     result = ReplayRun(job, period=host.period)
@@ -148,6 +197,49 @@ def run_cascade_replay(
     result.time_end = host.time
     _judge(spec, result, host, np.concatenate(seen))
     return result
+
+
+# ---- how it moved
+
+
+def recorded_profile(t: Numbers, reference: Numbers, period: float) -> Profile:
+    """A recorded reference at the samples of the loops, with its derivatives.
+
+    They are those of a spline, which rings by a hair where the reference stands: a feed-forward against Coulomb
+    friction would jump to and fro. Where the recording stands for `STILL` samples on both sides they are 0.
+    """
+    found = profile_of_recording(t, reference, period)
+    moves = np.convolve(np.diff(reference) != 0.0, np.ones(2 * STILL), mode="full")[STILL - 1 :][: len(reference)]
+    nearest = np.searchsorted(t, float(t[0]) + (np.arange(found.count) - 0.5) * period).clip(max=len(t) - 1)
+    stands = moves[nearest] < 0.5
+    return replace(
+        found,
+        velocity=np.where(stands, 0.0, found.velocity),
+        acceleration=np.where(stands, 0.0, found.acceleration),
+    )
+
+
+def starting_velocity(t: Numbers, position: Numbers) -> float:
+    """Velocity at the begin of a recording [m/s]."""
+    begin = float(t[0])
+    count = max(START_SAMPLES, int(np.searchsorted(t, begin + START_SPAN, side="right")))
+    if len(t) <= count:
+        return 0.0
+    at, q = t[:count] - begin, position[:count]
+    fitted, covariance = np.polyfit(at, q, 3, cov=True)
+    slope, reached = float(fitted[2]), float(np.abs(np.diff(q) / np.diff(at)).max())
+    least = max(5 * math.sqrt(max(float(covariance[2, 2]), 0.0)), 0.1 * reached)
+    return slope if abs(slope) > least else 0.0
+
+
+def smooth_velocity(t: Numbers, position: Numbers) -> Numbers:
+    """Velocity of recorded positions: low-passed forwards and backwards, then central differences [m/s]."""
+    signal: Any = import_module("scipy.signal")  # it states no types
+    rate = (len(t) - 1) / float(t[-1] - t[0])
+    numerator, denominator = signal.butter(4, min(CUTOFF, 0.2 * rate) / (0.5 * rate))
+    reach = 3 * max(len(numerator), len(denominator))
+    smooth = signal.filtfilt(numerator, denominator, position) if len(t) > reach else position
+    return np.asarray(np.gradient(smooth, t), np.float64)
 
 
 # ---- what drove the axis

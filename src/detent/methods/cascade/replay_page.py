@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from detent.methods.cascade.panels import error_panel, pair_panel
+from detent.methods.cascade.page import error_panel, pair_panel
 from detent.methods.cascade.replay import Compared, ReplayRun
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.summary import relative
 from detent.methods.cascade.units import percent, units_of
 from detent.page.chart import Chart, Panel, Timeline, time_charts
 from detent.page.figure import Figure
@@ -38,7 +37,7 @@ def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | No
             card(
                 f"{one.name}, rms difference".capitalize(),
                 written(one.rms, one.unit),
-                f"largest {written(one.peak, one.unit)}; {relative(one)}",
+                f"largest {written(one.peak, one.unit)}; {percent(one.relative)} of the recording",
             )
             for one in shown_signals(run)
         ],
@@ -136,3 +135,19 @@ def _table(spec: CascadeSpec, run: ReplayRun) -> Figure:
         "forwards and backwards."
     )
     return Figure(title="Recording less simulation", caption=caption, table=Table(heads=heads, rows=rows))
+
+
+# ---- for the terminal
+
+
+def replay_summary(spec: CascadeSpec, run: ReplayRun) -> list[tuple[str, str]]:
+    """Name and text of each figure of a replay."""
+    units = units_of(spec)
+    source = f"driven by the recorded {run.open_loop}" if run.open_loop else "along the recorded reference"
+    rows = [("recording", f"{duration(run.job.seconds)}, {count(len(run.job.t))} samples, {source}")]
+    for one in run.compared:
+        rms, peak = units.written(one.rms, one.unit), units.written(one.peak, one.unit)
+        rows.append((one.name, f"rms {rms}, largest {peak}, {percent(one.relative)} of the recording"))
+    if not math.isnan(run.peak_following):
+        rows.append(("following error", f"up to {units.error(run.peak_following)}, simulated"))
+    return [(name, text.replace(GAP, " ")) for name, text in rows]

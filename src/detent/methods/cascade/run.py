@@ -2,18 +2,18 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar
 
 from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.methods.cascade.build import motion_limits
-from detent.methods.cascade.controller import ARRIVED, FAULT, clear_peaks, switch_off
+from detent.methods.cascade.controller import ARRIVED, FAULT
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
-from detent.planning.profile import MotionLimits, plan_move
+from detent.planning.profile import plan_move
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import RunRecord
 from detent.sensing.gauge import set_gauge
@@ -33,56 +33,24 @@ CASCADE_SIGNALS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CascadeMove:
-    """How one move went; lengths [m] or angles [rad], times in seconds since power-on.
+    """How one move went; lengths [m] or angles [rad], times in seconds since power-on."""
 
-    Attributes
-    ----------
-    number : int
-        From 1.
-    label : str
-        What the move is for.
-    begin : float
-        When its reference began.
-    arrived : float
-        When its reference had come to the target; NaN if the drive went off before.
-    ready : float
-        When the axis was in position: the loop's error within the window for its time; NaN if it was not.
-    settled : float
-        When the load was outside the window for the last time; NaN if it stayed outside.
-    end : float
-        End of the dwell, or when the drive went off.
-    start, target, position : float
-        Where the load stood, where it had to go, and where it stood at the end.
-    overshoot : float
-        How far the load went beyond the target, 0 if it did not.
-    peak_speed : float
-        Largest speed of the load [m/s].
-    peak_following : float
-        Largest magnitude of the position loop's error.
-    peak_command : float
-        Largest magnitude of the command [V].
-    limited : float
-        Time with the command at its limit [s].
-    in_position : bool
-        The axis was in position in time.
-    """
-
-    number: int
-    label: str
-    begin: float
-    arrived: float
-    ready: float
-    settled: float
-    end: float
-    start: float
-    target: float
-    position: float
-    overshoot: float
-    peak_speed: float
-    peak_following: float
-    peak_command: float
-    limited: float
-    in_position: bool
+    number: int  #: from 1
+    label: str  #: what the move is for
+    begin: float  #: when its reference began
+    arrived: float  #: when its reference had come to the target; NaN if the drive went off before
+    ready: float  #: when it was in position: the loop's error within the window for its time; NaN if it was not
+    settled: float  #: when the load was outside the window for the last time; NaN if it stayed outside
+    end: float  #: end of the dwell, or when the drive went off
+    start: float  #: where the load stood
+    target: float  #: where it had to go
+    position: float  #: where it stood at the end
+    overshoot: float  #: how far the load went beyond the target, 0 if it did not
+    peak_speed: float  #: largest speed of the load [m/s]
+    peak_following: float  #: largest magnitude of the position loop's error
+    peak_command: float  #: largest magnitude of the command [V]
+    limited: float  #: time with the command at its limit [s]
+    in_position: bool  #: the axis was in position in time
 
     @property
     def error(self) -> float:
@@ -104,31 +72,15 @@ class CascadeMove:
 class CascadeRun(RunRecord[MoveJob]):
     """Outcome of a list of moves on a cascade axis. Times [s], lengths [m] or angles [rad].
 
-    Attributes
-    ----------
-    job : MoveJob
-        What was asked.
-    done : bool
-        Every move was in position in time.
-    failure : str
-        Why not, and what to do; empty if `done`. The drive is off then.
-    warnings : list of str
-        What the drive cannot see.
-    time_ready, time_off, time_end : float
-        When the axis was in position after power-on, when its drive went off (NaN if it did not), and the end of the
-        run, since power-on.
-    moves : list of CascadeMove
-        Moves made, in order; the last one may have failed.
-    tolerance : float
-        Error that counts as in position.
-    max_command : float
-        Limit of the command [V].
+    Also `done`: every move was in position in time; `failure`: why not, and what to do, empty if `done`, and the drive
+    is off then; `warnings`: what the drive cannot see; `time_ready` and `time_end`: when the axis was in position after
+    power-on, and the end of the run, since power-on.
     """
 
-    time_off: float = math.nan
-    moves: list[CascadeMove] = field(default_factory=list[CascadeMove])
-    tolerance: float = 0.0
-    max_command: float = 0.0
+    time_off: float = math.nan  #: when its drive went off; NaN if it did not
+    moves: list[CascadeMove] = field(default_factory=list[CascadeMove])  #: in order; the last one may have failed
+    tolerance: float = 0.0  #: error that counts as in position
+    max_command: float = 0.0  #: limit of the command [V]
 
     told: ClassVar[tuple[str, ...]] = (
         "time_off", "tolerance", "max_command", "worst_following", "worst_error", "worst_overshoot",
@@ -170,112 +122,94 @@ def run_cascade_moves(
     targets = check_cascade_job(spec, job)
     host = CascadeHost(spec, recorder)
     result = CascadeRun(job, tolerance=spec.method.in_position, max_command=spec.largest_command)
-    mover = _Mover(spec, host, result)
+    place = spec.mechanics.start_position
     try:
-        result.failure = mover.power_on()
-        place = spec.mechanics.start_position
+        if _arrive(host) == FAULT:
+            result.failure = f"after power-on: {_cause(host)}"
+        result.time_ready = host.time
         for done, (move, target) in enumerate(zip(job.moves, targets, strict=True), 1):
             if result.failure:
                 break
-            result.failure = mover.make(move, place, target)
+            if _make_move(host, result, move, place, target) == FAULT:
+                result.failure = f"move {move.number} to {_text(spec, target, 6)}: {_cause(host)}"
             place = target
             if progress is not None:
                 progress(done / len(targets), f"move {done} of {len(targets)}")
         if result.failure:
-            result.time_off = host.time
-            switch_off(host.controller)
+            result.time_off, host.controller.on = host.time, 0
             host.pass_samples(math.ceil(COAST / host.period))
     finally:
         host.machine.close()
-    result.time_end = host.time
-    result.done = not result.failure
+    result.time_end, result.done = host.time, not result.failure
     result.warnings += _unseen(spec, result)
     return result
 
 
-class _Mover:
-    """Makes one move after the other on a host."""
+def _make_move(host: CascadeHost, result: CascadeRun, move: Move, place: float, target: float) -> int:
+    """One move and its dwell, put into the result; the event that ended it."""
+    gauge, load, peaks = host.state.plant.gauge, host.state.plant.machine.load, host.controller.peaks
+    limits = replace(motion_limits(host.spec), speed=move.speed or host.spec.limits.speed)
+    profile = plan_move(place, target, limits, host.period)
+    begin, start, arrived, ready = host.time, load.position, math.nan, math.nan
+    peaks.following = peaks.command = peaks.limited = 0
+    set_gauge(gauge, host.state.tick, start, target, result.tolerance)
+    host.follow(profile)
+    event = host.pass_samples(profile.count - 1)
+    if not event:
+        arrived, event = host.time, _arrive(host)
+    if event == ARRIVED:
+        ready = host.time
+        event = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9)) if move.dwell > 0 else 0
+    made = CascadeMove(
+        number=move.number,
+        label=move.label,
+        begin=begin,
+        arrived=arrived,
+        ready=ready,
+        settled=math.nan if abs(target - load.position) > result.tolerance else gauge.outside * host.tick,
+        end=host.time,
+        start=start,
+        target=target,
+        position=load.position,
+        overshoot=max(float(gauge.beyond), 0.0),
+        peak_speed=float(gauge.peak_speed),
+        peak_following=peaks.following,
+        peak_command=peaks.command,
+        limited=peaks.limited * host.period,
+        in_position=not math.isnan(ready),
+    )
+    result.moves.append(made)
+    return event
 
-    def __init__(self, spec: CascadeSpec, host: CascadeHost, result: CascadeRun) -> None:
-        self.spec, self.host, self.result = spec, host, result
-        self.controller: Any = host.controller
-        self.plant: Any = host.machine.state.plant
-        self.most = math.ceil(spec.method.timeout / host.period)
 
-    def power_on(self) -> str:
-        """Wait until the axis stands in position where it was switched on; what went wrong, or nothing."""
-        event = self.host.arrive(self.most)
-        self.result.time_ready = self.host.time
-        return f"after power-on: {self._cause()}" if event == FAULT else ""
+def _arrive(host: CascadeHost) -> int:
+    """Wait for the axis as long as it may take: whether it is in position, or has a fault."""
+    return host.arrive(math.ceil(host.spec.method.timeout / host.period))
 
-    def make(self, move: Move, place: float, target: float) -> str:
-        """One move from `place` [m] and its dwell; what went wrong, or nothing."""
-        host, limits, load = self.host, motion_limits(self.spec), self.plant.machine.load
-        if move.speed is not None:
-            limits = MotionLimits(move.speed, limits.acceleration, limits.jerk)
-        profile = plan_move(place, target, limits, host.period)
-        begin, start, arrived, ready = host.time, load.position, math.nan, math.nan
-        clear_peaks(self.controller)
-        set_gauge(self.plant.gauge, host.machine.state.tick, start, target, self.result.tolerance)
-        host.follow(profile)
-        event = host.pass_samples(profile.count - 1)
-        if not event:
-            arrived, event = host.time, host.arrive(self.most)
-        if event == ARRIVED:
-            ready = host.time
-            event = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9)) if move.dwell > 0 else 0
-        self._note(move, begin=begin, arrived=arrived, ready=ready, start=start, target=target)
-        return f"move {move.number} to {self._text(target, 6)}: {self._cause()}" if event == FAULT else ""
 
-    def _note(self, move: Move, *, ready: float, target: float, **known: float) -> None:
-        """Put the move into the result."""
-        host, gauge, peaks, load = self.host, self.plant.gauge, self.controller.peaks, self.plant.machine.load
-        outside = abs(target - load.position) > self.result.tolerance
-        made = CascadeMove(
-            number=move.number,
-            label=move.label,
-            ready=ready,
-            settled=math.nan if outside else gauge.outside * host.tick,
-            end=host.time,
-            target=target,
-            position=load.position,
-            overshoot=max(float(gauge.beyond), 0.0),
-            peak_speed=float(gauge.peak_speed),
-            peak_following=peaks.following,
-            peak_command=peaks.command,
-            limited=peaks.limited * host.period,
-            in_position=not math.isnan(ready),
-            **known,
-        )
-        self.result.moves.append(made)
-
-    def _cause(self) -> str:
-        """Why the drive went off, and what to do."""
-        spec, method = self.spec, self.spec.method
-        if self.controller.guard.code == NO_ARRIVAL:
-            return self._late()
-        return describe_fault(
-            self.controller.guard,
-            spec.protection,
-            speed=format_quantity(max(spec.limits.speed, method.velocity_limit), spec.unit("m/s"), 4),
-            lower=f"{self._text(spec.limits.lowest)}, limits.lowest",
-            upper=f"{self._text(spec.highest)}, limits.lowest + limits.travel",
-            following=f"{self._text(method.following_error)}, method.following_error",
-        )
-
-    def _late(self) -> str:
-        """The axis was not in position in time."""
-        method = self.spec.method
-        error = self._text(abs(float(self.controller.law.position_error)))
+def _cause(host: CascadeHost) -> str:
+    """Why the drive went off, and what to do."""
+    spec, method, guard = host.spec, host.spec.method, host.controller.guard
+    if guard.code == NO_ARRIVAL:
+        error = _text(spec, abs(float(host.controller.law.position_error)))
         return (
             f"not in position within {format_quantity(method.timeout, 's')} of the end of the reference "
-            f"(method.timeout): its error is {error}, method.in_position is "
-            f"{self._text(method.in_position)}; the drive is off; give the velocity loop an "
-            "integral or feed-forward against what holds the axis off, or widen the window"
+            f"(method.timeout): its error is {error}, method.in_position is {_text(spec, method.in_position)}; "
+            "the drive is off; give the velocity loop an integral or feed-forward against what holds the axis off, or "
+            "widen the window"
         )
+    return describe_fault(
+        guard,
+        spec.protection,
+        speed=format_quantity(max(spec.limits.speed, method.velocity_limit), spec.unit("m/s"), 4),
+        lower=f"{_text(spec, spec.limits.lowest)}, limits.lowest",
+        upper=f"{_text(spec, spec.highest)}, limits.lowest + limits.travel",
+        following=f"{_text(spec, method.following_error)}, method.following_error",
+    )
 
-    def _text(self, value: float, digits: int = 4) -> str:
-        return format_quantity(value, self.spec.unit("m"), digits)
+
+def _text(spec: CascadeSpec, value: float, digits: int = 4) -> str:
+    return format_quantity(value, spec.unit("m"), digits)
 
 
 def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
@@ -284,11 +218,11 @@ def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
     if not off:
         return []
     worst = max(off, key=lambda move: abs(move.error))
-    text = format_quantity(abs(worst.error), spec.unit("m"), 3)
     said = (
         f"{len(off)} of {len(run.moves)} moves were in position while the load stood beside its target, move "
-        f"{worst.number} by {text}: the encoder of the position loop does not see coupling and backlash, or the "
-        'velocity loop has no integral; state method.feedback.position = "load", or widen method.in_position'
+        f"{worst.number} by {_text(spec, abs(worst.error), 3)}: the encoder of the position loop does not see coupling "
+        "and backlash, or the velocity loop has no integral; "
+        'state method.feedback.position = "load", or widen method.in_position'
     )
     return [said]
 
@@ -313,13 +247,12 @@ def check_cascade_job(spec: CascadeSpec, job: MoveJob) -> list[float]:
 
 def _refused(spec: CascadeSpec, move: Move, place: float) -> Iterator[tuple[str, str, str, str]]:
     """Key, what came, what is allowed and what to do, of each word of a move that the axis cannot do."""
-    way, speed = spec.unit("m"), spec.unit("m/s")
+    speed = spec.unit("m/s")
     low, high, slack = spec.limits.lowest, spec.highest, 1e-9 * spec.limits.travel
     if not low - slack <= place <= high + slack:
-        ends = f"{format_quantity(low, way, 5)} to {format_quantity(high, way, 5)}"
+        ends = f"{_text(spec, low, 5)} to {_text(spec, high, 5)}"
         allowed = f"a position from limits.lowest to limits.lowest + limits.travel, {ends}"
-        key = "target" if move.by is None else "by"
-        yield key, format_quantity(place, way, 6), allowed, "keep the move between the two ends"
+        yield move.place_key, _text(spec, place, 6), allowed, "keep the move between the two ends"
     if move.speed is not None and not 0 < move.speed <= spec.limits.speed * (1 + 1e-9):
         allowed = f"up to limits.speed, {format_quantity(spec.limits.speed, speed)}"
         yield "speed", format_quantity(move.speed, speed), allowed, "lower it, or raise limits.speed"

@@ -5,12 +5,20 @@ for N and kg*m^2 for kg (`axisfile.motion`): a mass is then a moment of inertia,
 """
 
 import math
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from detent.axisfile.motion import unit_in
-from detent.axisfile.tables import AxisSpec, AxisTable, MotionProtectionTable, MotorTable, PushTable, breaking_effort
+from detent.axisfile.tables import (
+    AxisSpec,
+    AxisTable,
+    MotionProtectionTable,
+    MotorTable,
+    PushTable,
+    breaking_effort,
+    usual_stiction,
+)
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
     Acceleration,
@@ -53,18 +61,14 @@ class LimitsTable(Table, frozen=True):
     lowest: Length = optional("position of the lower end", 0.0, ge=-1e5, le=1e5)
     speed: Velocity = required("largest speed ever commanded", '"0.5 m/s"', gt=0.0, le=1e4)
     acceleration: Acceleration = required("largest acceleration ever commanded", '"5 m/s^2"', gt=0.0, le=1e7)
-    jerk: Jerk | None = optional(
-        "largest jerk ever commanded; without it moves are trapezoids of the speed", None, gt=0.0, le=1e10
-    )
+    jerk: Jerk | None = optional("largest jerk ever commanded; none: trapezoids of the speed", None, gt=0.0, le=1e10)
     effort: Force = required("largest force (rotary: torque) of the drive on the axis", '"500 N"', ge=1e-9, le=1e7)
 
 
 class CascadeMotorTable(MotorTable, frozen=True):
     """Constants of the DC motor, from a catalogue or stated; the winding's inductance may be neglected."""
 
-    inductance: Inductance = optional(
-        "winding; 0 lets the current follow voltage and speed at once", 0.0, ge=0.0, le=10.0
-    )
+    inductance: Inductance = optional("winding; 0: the current follows voltage and speed at once", 0.0, ge=0.0, le=10.0)
 
 
 class DriveTable(Table, frozen=True):
@@ -84,16 +88,11 @@ class DriveTable(Table, frozen=True):
     )
 
 
-def _usual_stiction(data: dict[str, Any]) -> float:
-    """Static friction by default: 1.15 times Coulomb, as for the other axes."""
-    return 1.15 * float(data.get("coulomb", math.nan))
-
-
 class DirectionTable(Table, frozen=True):
     """Friction in one direction of motion."""
 
     coulomb: Force = optional("friction while moving, at any speed", 0.0, ge=0.0, le=1e7)
-    static: Force = optional("force that breaks loose", _usual_stiction, derived="1.15 x coulomb", ge=0.0, le=2e7)
+    static: Force = optional("force that breaks loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=2e7)
     stribeck: Velocity = optional(
         "velocity at which 1/e of the difference of both is left; 0: it ends as motion begins", 0.0, ge=0.0, le=1e3
     )
@@ -103,9 +102,7 @@ class DirectionTable(Table, frozen=True):
 class FrictionTable(Table, frozen=True):
     """Friction of one mass, each direction for itself."""
 
-    offset: Force = optional(
-        "force against the positive direction that does not turn round with the motion", 0.0, ge=-1e6, le=1e6
-    )
+    offset: Force = optional("force against the positive direction, whichever way it moves", 0.0, ge=-1e6, le=1e6)
     positive: DirectionTable = Field(default_factory=DirectionTable)
     negative: DirectionTable = Field(default_factory=DirectionTable)
 
@@ -132,15 +129,10 @@ class MechanicsTable(Table, frozen=True):
     load_mass: Mass = optional(
         "what moves on the load's side of the coupling; rotary: moment of inertia", 0.0, ge=0.0, le=1e7
     )
-    weight: Force = optional(
-        "weight of the load along the axis, positive pulls in the negative direction", 0.0, ge=-1e7, le=1e7
-    )
+    weight: Force = optional("load's weight along the axis, + pulls in the negative direction", 0.0, ge=-1e7, le=1e7)
     pendulum: Torque = optional("rotary: weight of a load that hangs down at position 0, m g l", 0.0, ge=0.0, le=1e7)
     transmission_loss: float = optional(
-        "share of the motor's force that the transmission takes as friction, in motion and at rest",
-        0.0,
-        ge=0.0,
-        le=0.95,
+        "share of the motor's force that its friction takes, in motion and at rest", 0.0, ge=0.0, le=0.95
     )
     start_position: Length = optional(
         "where the axis stands at power-on", math.nan, derived="0, or the end of the way nearest to it",
@@ -185,7 +177,7 @@ class FeedForwardTable(Table, frozen=True):
     )  # fmt: skip
     coulomb: float = optional("share of the command against Coulomb friction and its offset", 0.0, ge=0.0, le=2.0)
     dead_band: Velocity = optional(
-        "speed of the reference up to which there is none against Coulomb friction", 0.0, ge=0.0, le=1e4
+        "reference speed up to which there is none against Coulomb friction", 0.0, ge=0.0, le=1e4
     )
     weight: float = optional("share of the command that holds weight and pendulum", 0.0, ge=0.0, le=2.0)
 
@@ -193,23 +185,17 @@ class FeedForwardTable(Table, frozen=True):
 class MethodTable(Table, frozen=True):
     """Structure, gains and supervision."""
 
-    structure: Literal["cascade", "pid"] = optional(
-        "position P over velocity P or PI, or one PID of the position", "cascade"
-    )
+    structure: Literal["cascade", "pid"] = optional("position P over velocity P or PI, or one PID", "cascade")
     sample_period: Time = optional("period of the loops", 1e-3, ge=1e-6, le=0.1)
-    position_gain: float = optional(
-        "cascade: velocity demand per position error [1/s]; must be stated", 0.0, ge=0.0, le=1e6
-    )
-    velocity_gain: VoltagePerVelocity = optional(
-        "cascade: command per velocity error; must be stated", 0.0, ge=0.0, le=1e9
-    )
+    position_gain: float = optional("cascade: velocity demand per position error [1/s]; needed", 0.0, ge=0.0, le=1e6)
+    velocity_gain: VoltagePerVelocity = optional("cascade: command per velocity error; needed", 0.0, ge=0.0, le=1e9)
     velocity_integral: VoltagePerLength = optional(
-        "cascade: command per velocity error and time; 0: P, not PI", 0.0, ge=0.0, le=1e12
+        "cascade: command per velocity error and time; 0: P", 0.0, ge=0.0, le=1e12
     )
     velocity_limit: Velocity = optional(
         "cascade: largest velocity demand", math.nan, derived="1.25 x limits.speed", gt=0.0, le=1e5
     )
-    proportional: VoltagePerLength = optional("PID: command per position error; must be stated", 0.0, ge=0.0, le=1e12)
+    proportional: VoltagePerLength = optional("PID: command per position error; needed", 0.0, ge=0.0, le=1e12)
     integral: VoltagePerLengthTime = optional("PID: command per position error and time", 0.0, ge=0.0, le=1e15)
     derivative: VoltagePerVelocity = optional("PID: command per velocity error", 0.0, ge=0.0, le=1e9)
     derivative_filter: Time = optional("PID: time constant of the filter of that error; 0: none", 0.0, ge=0.0, le=10.0)
@@ -348,18 +334,10 @@ class CascadeSpec(AxisSpec, frozen=True):
             return min(limit, self.limits.effort / self.effort_per_command)
         return min(limit, self.max_current / self.drive.current_per_volt) if self.drive.input == "current" else limit
 
-    @property
-    def position_encoder(self) -> EncoderTable:
-        """Encoder of the position loop."""
-        return self._encoder(self.method.feedback.position)
-
-    @property
-    def velocity_encoder(self) -> EncoderTable:
-        """Encoder of the velocity loop."""
-        return self._encoder(self.method.feedback.velocity)
-
-    def _encoder(self, side: str) -> EncoderTable:
-        return self.encoder if side == "motor" else self.load_encoder or IDEAL_ENCODER
+    def encoder_of(self, loop: Literal["position", "velocity"]) -> EncoderTable:
+        """Encoder that a loop uses."""
+        on_load = getattr(self.method.feedback, loop) == "load"
+        return self.load_encoder or IDEAL_ENCODER if on_load else self.encoder
 
     @property
     def largest_effort(self) -> float:
@@ -370,24 +348,16 @@ class CascadeSpec(AxisSpec, frozen=True):
 
 def fill_derived(spec: CascadeSpec) -> CascadeSpec:
     """Fill the defaults that depend on another key, as their `derived` texts say."""
-    limits, mechanics, method = spec.limits, spec.mechanics, spec.method
+    limits, mechanics = spec.limits, spec.mechanics
     filled: dict[str, float] = {}
     if math.isnan(mechanics.start_position):
         filled["start_position"] = min(max(0.0, limits.lowest), spec.highest)
     if mechanics.travel_per_revolution is None and spec.motor is not None and spec.axis.motion == "rotary":
         filled["travel_per_revolution"] = 2 * math.pi
     counts = 2 * max(spec.encoder.resolution, spec.load_encoder.resolution if spec.load_encoder else 0.0)
-    derived = {
-        "velocity_limit": 1.25 * limits.speed,
-        "in_position": max(1e-4 * limits.travel, counts),
-        "following_error": 0.1 * limits.travel,
-    }
-    stated = {name: value for name, value in derived.items() if math.isnan(getattr(method, name))}
-    tables = {"mechanics": mechanics.model_copy(update=filled), "method": method.model_copy(update=stated)}
-    spec = spec.model_copy(update=tables)
-    if not math.isnan(spec.protection.stuck_effort):
-        return spec
+    window, far = max(1e-4 * limits.travel, counts), 0.1 * limits.travel
+    derived: dict[str, object] = {"velocity_limit": 1.25 * limits.speed, "in_position": window, "following_error": far}
+    spec = spec.changed(mechanics=filled).filled(method=derived)
     # What breaks the axis loose takes its weight, too.
     loose = max(spec.friction(1).static, spec.friction(-1).static) + spec.holding
-    share = breaking_effort(loose, spec.largest_effort)
-    return spec.model_copy(update={"protection": spec.protection.model_copy(update={"stuck_effort": share})})
+    return spec.filled(protection={"stuck_effort": breaking_effort(loose, spec.largest_effort)})

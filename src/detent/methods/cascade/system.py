@@ -13,22 +13,16 @@ and amplifier rest between samples.
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.drive.effort_source import MEMORY
+from detent.drive import effort_source
 from detent.kernel.elementary import one_less_exp
 from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step
-from detent.methods.cascade.controller import (
-    CascadeController,
-    CascadeControllerParams,
-    CascadeLines,
-    check_memory,
-    control,
-    power_on,
-)
+from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, Feed, control
 from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, move, sense, stand
 from detent.plant.linear_two_mass import fastest_rate
 from detent.plant.two_mass import TwoMass
+from detent.sensing import position_sensor
 
 Numbers = NDArray[np.float64]
 
@@ -53,26 +47,16 @@ class Cascade(Registers):
 
 @ticks(CascadeParams, local="plant.machine")
 @hot_step
-def tick(
-    p: CascadeParams,
-    r: Cascade,
-    machine: TwoMass,
-    position: HostArray,
-    velocity: HostArray,
-    acceleration: HostArray,
-    command: HostArray,
-) -> bool:
+def tick(p: CascadeParams, r: Cascade, machine: TwoMass, *feed: HostArray) -> bool:
     """One substep of the mechanics, on `machine` of the plant; `along` and `driven` say what the host lays ready."""
     if r.controller.event:
         return False
     sense(p.plant, r.plant, machine, r.lines)
-    control(p.controller, r.controller, r.lines, position, velocity, acceleration, command)
+    control(p.controller, r.controller, r.lines, *feed)
     move(p.plant, r.plant, machine, r.tick, r.lines)
     r.tick += 1
     return True
 
-
-Feed = tuple[HostArray, HostArray, HostArray, HostArray]
 
 _NONE = lay_ready(np.zeros(0))
 
@@ -97,9 +81,14 @@ def smoothing(time_constant: float, period: float) -> float:
 def fill_clocks(p: CascadeParams, tick: float, sample_ticks: int) -> None:
     """Set the base tick and the period of the loops, and check what depends on them."""
     c, machine, delay = p.controller, p.plant.machine, p.plant.source.delay
-    if not 0 <= delay < MEMORY:
-        raise ValueError(f"delay of the amplifier {delay} samples, must be 0 to {MEMORY - 1}")
-    check_memory(c)
+    if not 0 <= delay < effort_source.MEMORY:
+        raise ValueError(f"delay of the amplifier {delay} samples, must be 0 to {effort_source.MEMORY - 1}")
+    for name, s in (("motor", c.motor_sensor), ("load", c.load_sensor)):
+        if s.span < 1 or s.delay < 0 or s.delay + s.span >= position_sensor.MEMORY:
+            raise ValueError(
+                f"{name} sensor: span {s.span} and delay {s.delay} samples, must be 1 or more and 0 or more, "
+                f"together {position_sensor.MEMORY - 1} or less"
+            )
     if sample_ticks < 1 or tick <= 0.0:
         raise ValueError(f"tick {tick:g} s and {sample_ticks} ticks per sample, must be above 0 and 1 or more")
     if machine.stiffness == 0.0 and machine.half_gap > 0.0:
@@ -121,8 +110,12 @@ def set_count(p: CascadeParams, motor: float, load: float) -> None:
 
 def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
     """Power-on at rest with motor and load at `position` [m], where the reference stands too."""
-    stand(p.plant, r.plant, r.lines, position)
-    power_on(p.controller, r.controller, r.lines, position)
+    c, lines = r.controller, r.lines
+    stand(p.plant, r.plant, lines, position)
+    position_sensor.stand_sensor(p.controller.motor_sensor, c.motor_sensor, lines.motor)
+    position_sensor.stand_sensor(p.controller.load_sensor, c.load_sensor, lines.load)
+    c.reference.position, c.count = position, lines.motor.count
+    c.on = lines.enable = lines.sync = 1
 
 
 def set_off(p: CascadeParams, r: Cascade, velocity: float) -> None:

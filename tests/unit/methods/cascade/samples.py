@@ -8,8 +8,7 @@ import numpy as np
 
 from detent.methods.cascade.comparison import FEEDS, SHAPES, ProfileCase, ProfileComparison
 from detent.methods.cascade.page import COMMAND, FOLLOWING, LOAD, LOAD_SPEED, REFERENCE, REFERENCE_SPEED
-from detent.methods.cascade.replay import Compared, ReplayRun
-from detent.methods.cascade.replay_job import ReplayJob
+from detent.methods.cascade.replay import Compared, ReplayJob, ReplayRun
 from detent.methods.cascade.run import CascadeMove, CascadeRun
 from detent.methods.moves.job import Move, MoveJob
 from detent.record.trace import Trace

@@ -37,8 +37,8 @@ def test_the_table_of_the_page_has_a_row_for_each_way() -> None:
     table = comparison().figures()[-1].table
     assert table is not None
     rows = [[cell.text for cell, _ in table.cells(row)] for row in table.rows]
-    assert rows[0] == ["trapezoid, no feed-forward", "600", "12", "120", "4.4\u202fµm", "2.40"]
-    assert rows[3][:2] == ["limited jerk, feed-forward", "625"]
+    assert rows[0] == ["trapezoid, no feed-forward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V"]
+    assert rows[3][:2] == ["limited jerk, feed-forward", "625 ms"]
 
 
 def test_the_terminal_has_a_row_for_each_way() -> None:

@@ -7,17 +7,13 @@ import pytest
 from tests.cascade_rig import SAMPLE_TICKS, Rig, make_params
 
 import detent
-from detent.control.guard import FOLLOWING, NO_ARRIVAL, REVERSED, SATURATED, TRAVEL
+from detent.control.guard import FOLLOWING, NO_ARRIVAL, REVERSED, SATURATED, TRAVEL, await_arrival
 from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.controller import (
     ARRIVED,
     FAULT,
     CascadeController,
     CascadeControllerParams,
-    acknowledge,
-    await_position,
-    clear_peaks,
-    guard_axis,
     look_after,
     note_peaks,
 )
@@ -34,8 +30,7 @@ def guarded(**times):
     p.guard.following, p.guard.travel = 1, 1
     for name, value in times.items():
         setattr(p.guard, name, value)
-    guard_axis(c)
-    c.on = 1
+    c.guarded = c.on = 1
     return p, c
 
 
@@ -84,14 +79,15 @@ def test_saturation_is_a_fault_once_it_has_lasted():
 def test_an_axis_is_in_position_once_its_error_has_been_small_for_long_enough():
     p, c = guarded()
     look_after(p, c, 0)
-    await_position(c, 100)
+    await_arrival(c.guard, 100)
     c.law.position_error = 1e-3
     look_after(p, c, 0)
     c.law.position_error = 1e-5
     for event in (0, 0, 0, 0, ARRIVED):
         look_after(p, c, 0)
         assert c.event == event
-    assert (acknowledge(c), c.event, c.on) == (ARRIVED, 0, 1)
+    assert c.on == 1
+    c.event = 0
     look_after(p, c, 0)
     assert c.event == 0, "it is told once"
 
@@ -99,7 +95,7 @@ def test_an_axis_is_in_position_once_its_error_has_been_small_for_long_enough():
 def test_a_fault_comes_before_the_arrival():
     p, c = guarded()
     p.limits.arrival = 1
-    await_position(c, 100)
+    await_arrival(c.guard, 100)
     c.motor_sensor.position = 9.0
     look_after(p, c, 0)
     assert (c.event, c.guard.code) == (FAULT, TRAVEL)
@@ -108,21 +104,19 @@ def test_a_fault_comes_before_the_arrival():
 def test_who_does_not_arrive_in_time_has_a_fault():
     p, c = guarded()
     c.law.position_error = 1e-3
-    await_position(c, 3)
+    await_arrival(c.guard, 3)
     for event in (0, 0, FAULT):
         look_after(p, c, 0)
         assert c.event == event
     assert (c.guard.code, c.on) == (NO_ARRIVAL, 0)
 
 
-def test_peaks_are_the_largest_since_the_host_cleared_them():
+def test_peaks_are_the_largest_magnitudes():
     c = CascadeController()
     for error, command, limited in ((0.1, -2.0, 0), (-0.3, 1.0, 1), (math.nan, 1.0, 1)):
         c.law.position_error, c.law.command, c.law.limited = error, command, limited
         note_peaks(c)
     assert (c.peaks.following, c.peaks.command, c.peaks.limited) == (0.3, 2.0, 2)
-    clear_peaks(c)
-    assert (c.peaks.following, c.peaks.command, c.peaks.limited) == (0.0, 0.0, 0)
 
 
 def test_a_fault_takes_the_command_away_in_its_sample_and_the_axis_waits_for_its_host():
@@ -130,13 +124,14 @@ def test_a_fault_takes_the_command_away_in_its_sample_and_the_axis_waits_for_its
     p.controller.limits.following_error, p.controller.guard.following = 1e-3, 1
     p.controller.limits.breaking = math.inf
     rig = Rig(p)
-    guard_axis(rig.r.controller)
+    rig.r.controller.guarded = 1
     rig.r.controller.reference.position = 2e-3
     run = rig.record(10 * SAMPLE_TICKS, ["lines.enable", "lines.command", "controller.law.command"])
     assert len(run["t"]) == rig.r.tick == 1
     assert (run["lines.enable"][0], run["lines.command"][0]) == (0, 0.0)
     assert run["controller.law.command"][0] != 0.0
-    assert acknowledge(rig.r.controller) == FAULT
+    assert rig.r.controller.event == FAULT
+    rig.r.controller.event = 0
     rig.run(3 * SAMPLE_TICKS)
     assert rig.x == 0.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import detent
-from detent.methods.cascade.controller import ARRIVED, FAULT, switch_off
+from detent.methods.cascade.controller import ARRIVED, FAULT
 from detent.methods.cascade.host import WATCHED, CascadeHost, cascade_registers, rotary_unit
 from detent.methods.cascade.system import Cascade, set_off
 from detent.methods.load import load_spec
@@ -122,7 +122,7 @@ def test_a_drive_that_is_off_gets_no_command():
     host = moving()
     host.pass_samples(600)
     assert host.state.plant.source.output != 0.0
-    switch_off(host.controller)
+    host.controller.on = 0
     host.pass_samples(LINEAR.drive.delay + 1)
     assert host.state.plant.source.command == host.state.plant.source.output == 0.0
 

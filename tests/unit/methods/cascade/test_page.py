@@ -10,7 +10,7 @@ from tests.unit.methods.cascade.samples import cascade_run, comparison, failed_r
 
 import detent
 from detent.methods.cascade.host import cascade_registers
-from detent.methods.cascade.page import FOLLOWING, NEEDED, cascade_page
+from detent.methods.cascade.page import FOLLOWING, NEEDED, cascade_page, cascade_summary
 from detent.methods.cascade.run import CASCADE_SIGNALS, CascadeRun, run_cascade_moves
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.load import load_spec
@@ -240,3 +240,30 @@ def test_a_drive_that_is_off_shows_no_reference_and_no_error(failed: Played) -> 
 def test_cards_have_numbers_and_units_apart(linear: CascadeSpec) -> None:
     page = cascade_page(linear, cascade_run(), None)
     assert not any(GAP in card.value for card in page.cards)
+
+
+def test_each_figure_is_named_with_whose_it_is(linear: CascadeSpec) -> None:
+    assert dict(cascade_summary(linear, cascade_run(move(1), move(2, peak_speed=0.5)))) == {
+        "moves": "2 of 2 in position",
+        "time": "3 s",
+        "settling": "worst 40 ms (move 1), from the end of the reference until within 50 µm for good",
+        "following error": "worst 80 µm (move 2)",
+        "overshoot": "worst 4 µm (move 2)",
+        "error at rest": "worst 8.0 µm (move 2), of the load",
+        "peak speed": "500 mm/s (move 2)",
+        "peak command": "2.50 of 10 V (move 1)",
+    }
+
+
+def test_what_a_failed_run_did_not_come_to_is_left_out(linear: CascadeSpec) -> None:
+    run = failed_run()
+    run.moves = run.moves[1:]
+    rows = dict(cascade_summary(linear, run))
+    assert rows["moves"] == "0 of 2 in position"
+    assert not {"settling", "error at rest"} & set(rows)
+    run.moves.clear()
+    assert list(dict(cascade_summary(linear, run))) == ["moves"]
+
+
+def test_a_terminal_gets_plain_spaces(linear: CascadeSpec) -> None:
+    assert not any(GAP in text for _, text in cascade_summary(linear, cascade_run()))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.planned_jobs import plan_job
 
-from detent.methods.cascade.replay_job import recorded_profile, smooth_velocity, starting_velocity
+from detent.methods.cascade.replay import recorded_profile, smooth_velocity, starting_velocity
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits, plan_move
 

@@ -11,9 +11,16 @@ from tests.planned_jobs import plan_job
 
 import detent
 from detent.errors import DetentError
+from detent.logs.log import Log
 from detent.methods.cascade.host import CascadeHost
-from detent.methods.cascade.replay import at_stamps, per_command, run_cascade_replay
-from detent.methods.cascade.replay_job import ReplayJob, make_replay_job, starting_velocity
+from detent.methods.cascade.replay import (
+    ReplayJob,
+    at_stamps,
+    make_replay_job,
+    per_command,
+    run_cascade_replay,
+    starting_velocity,
+)
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import MotionLimits
@@ -195,18 +202,24 @@ def test_a_recording_that_is_none_is_refused(own, changes, told):
         replace(own, **given)
 
 
-def test_a_log_becomes_a_job_if_it_fits_the_axis():
+def log_of(**units):
+    """A log of some roles, with the units of their values."""
     t = np.arange(10) * 1e-3
+    signals = dict.fromkeys(units, t)
+    return Log("log", t, signals, {"time": "s", **units}, {}, np.arange(10), guesses=("position", "the rest"))
+
+
+def test_a_log_becomes_a_job_if_it_fits_the_axis():
     spec = linear()
-    good = {"position": (t, "m"), "reference": (t, "m"), "force": (t, "N"), "temperature": (t, "K")}
-    job = make_replay_job(spec, "log", t, good, ["note"])
-    assert (list(job.efforts), job.notes, job.velocity) == (["force"], ("note",), None)
+    good = {"position": "m", "reference": "m", "force": "N", "temperature": "K"}
+    job = make_replay_job(spec, log_of(**good))
+    assert (list(job.efforts), job.notes, job.velocity) == (["force"], ("guessed: position; the rest",), None)
     with pytest.raises(DetentError, match="came reference; allowed: a log with a position"):
-        make_replay_job(spec, "log", t, {"reference": (t, "m")})
+        make_replay_job(spec, log_of(reference="m"))
     with pytest.raises(DetentError, match=r"came velocity in rad/s; allowed: m, as the axis is a linear one"):
-        make_replay_job(spec, "log", t, good | {"velocity": (t, "rad/s")})
+        make_replay_job(spec, log_of(**good, velocity="rad/s"))
     with pytest.raises(DetentError, match=r"came position in count; .*--column 'position=COLUMN \[mm\]'"):
-        make_replay_job(spec, "log", t, {"position": (t, "count"), "reference": (t, "m")})
+        make_replay_job(spec, log_of(position="count", reference="m"))
 
 
 def test_the_figures_go_into_json_without_the_curves(own):

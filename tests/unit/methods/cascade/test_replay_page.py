@@ -1,5 +1,6 @@
 """The page about a replayed recording: how far apart, where most, and from what it was driven."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,10 @@ import pytest
 from tests.unit.methods.cascade.samples import compared, replay_run
 
 import detent
-from detent.methods.cascade.replay_page import magnified, replay_page
+from detent.methods.cascade.replay_page import magnified, replay_page, replay_summary
 from detent.methods.load import load_spec
 from detent.page.frame import Page
+from detent.page.words import GAP
 
 WHOLE = ["whole-0", "whole-0-off", "whole-1", "whole-2"]
 NEAR = [name.replace("whole", "near") for name in WHOLE]
@@ -96,3 +98,15 @@ def test_the_table_has_every_signal_and_a_recording_of_zeros_a_dash(linear: Any)
     assert [row[0] for row in rows] == ["position", "velocity", "acceleration", "force", "command"]
     assert rows[2][1:3] == ["0.0250 m/s²", "0.100 m/s²"]
     assert rows[4][1:] == ["0 V", "0 V", "–"]
+
+
+def test_a_replay_is_told_signal_by_signal(linear: Any) -> None:
+    rows = dict(replay_summary(linear, replay_run()))
+    assert list(rows) == ["recording", "position", "velocity", "acceleration", "force", "following error"]
+    assert rows["recording"] == "20 s, 2 001 samples, along the recorded reference"
+    assert rows["position"] == "rms 5.0 µm, largest 20.0 µm, 0.0071 % of the recording"
+    assert rows["following error"] == "up to 1 mm, simulated"
+    open_loop = dict(replay_summary(linear, replay_run(open_loop="force", peak_following=math.nan)))
+    assert open_loop["recording"].endswith("driven by the recorded force")
+    assert "following error" not in open_loop
+    assert not any(GAP in text for text in (*rows.values(), *open_loop.values()))

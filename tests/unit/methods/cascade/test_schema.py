@@ -97,10 +97,10 @@ def test_limits_of_a_voltage_drive(load_text, rotary_text):
 
 def test_a_missing_encoder_of_the_load_reads_without_error(load_text, short_text):
     spec = load_text(short_text).spec
-    assert spec.position_encoder is spec.encoder
+    assert spec.encoder_of("position") is spec.encoder
     loaded = load_text(short_text, "load_encoder.resolution=5 um", "method.feedback.position=load").spec
-    assert loaded.position_encoder is loaded.load_encoder
-    assert loaded.velocity_encoder is loaded.encoder
+    assert loaded.encoder_of("position") is loaded.load_encoder
+    assert loaded.encoder_of("velocity") is loaded.encoder
 
 
 def test_defaults_of_single_keys_are_inside_their_own_bounds(load_text, good_text):
