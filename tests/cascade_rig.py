@@ -7,17 +7,12 @@ from typing import Any
 import numpy as np
 
 from detent.kernel.loop import advance
-from detent.methods.cascade.system import (
-    STANDING,
-    Cascade,
-    CascadeParams,
-    along,
-    driven,
-    fill_clocks,
-    switch_on,
-)
+from detent.methods.cascade.system import Cascade, CascadeParams, along, driven, fill_clocks, switch_on
 from detent.planning.profile import Profile
 from detent.plant.stribeck import StribeckFriction
+
+STANDING = along(*np.zeros((3, 0)))
+"""Feed of an axis whose reference stands in its registers."""
 
 NO_TRACE = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
 

@@ -61,9 +61,9 @@ class ProfileComparison:
     """Result of `compare_profiles`."""
 
     way: float  #: of the move [m] or [rad]
-    speed: float  #: and `acceleration`, `jerk`: its limits
-    acceleration: float
-    jerk: float
+    speed: float  #: limit of its speed
+    acceleration: float  #: limit of its acceleration
+    jerk: float  #: limit of its jerk
     stated: bool  #: the jerk is that of the axis file; else the one that `smooth_jerk` proposes
     frequency: float  #: of the load against a motor that is held [Hz]; NaN for a rigid axis
     tolerance: float  #: error that counts as in position

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 
 def dead_time(spec: CascadeSpec) -> float:
-    """Time from a motion until the drive acts on its velocity [s].
-
-    Hold of a sample, delays of encoder and amplifier, half the span of the velocity and its filter.
-    """
+    """Time from a motion until the drive acts on its velocity [s]: hold, delays, half the velocity's span, filter."""
     table = spec.encoder_of("velocity")
     samples = 0.5 + spec.drive.delay + table.delay + 0.5 * table.velocity_span
     return samples * spec.method.sample_period + table.velocity_filter

@@ -33,11 +33,7 @@ class RotaryCascade(Cascade):
 
 
 def rotary_unit(unit: str) -> str:
-    """Unit of an axis that turns, for that of one that moves straight.
-
-    >>> [rotary_unit(unit) for unit in ("m/s", "V, N", "V.s2/m", "tick")]
-    ['rad/s', 'V, N.m', 'V.s2/rad', 'tick']
-    """
+    """Unit of an axis that turns, "V.s2/rad", for that of one that moves straight, "V.s2/m"."""
     words = {"m": "rad", "N": "N.m", "kg": "kg.m2"}
     return re.sub("[A-Za-z]+", lambda match: words.get(match[0], match[0]), unit)
 

@@ -14,11 +14,10 @@ hangs does so near its lowest place.
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +56,7 @@ def machine_of(spec: CascadeSpec) -> Any:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Margin:
+class Margin(NamedTuple):
     """Where an open loop crosses a gain of 1."""
 
     crossover: float  # frequency at which the gain first falls below 1 [Hz]; 0 where it never does

@@ -7,7 +7,7 @@ from detent.kernel.registers import Registers, block, f8, register, u1
 from detent.kernel.step import hot_step, step
 from detent.methods.cascade.controller import CascadeLines
 from detent.plant.push import Push, push_force
-from detent.plant.two_mass import TwoMass, TwoMassParams, stand_masses
+from detent.plant.two_mass import TwoMass, TwoMassParams
 from detent.plant.two_mass_motion import move_masses
 from detent.sensing.gauge import Gauge, read_gauge
 from detent.sensing.position_sensor import EncoderWord
@@ -66,9 +66,3 @@ def move(p: CascadePlantParams, plant: CascadePlant, machine: TwoMass, tick: int
     machine.external = push_force(p.push, tick)
     move_masses(p.machine, machine)
     read_gauge(plant.gauge, tick + 1, machine.load.position, machine.load.velocity)
-
-
-def stand(p: CascadePlantParams, plant: CascadePlant, lines: CascadeLines, position: float) -> None:
-    """At rest with motor and load at `position` [m]."""
-    stand_masses(plant.machine, position)
-    latch_both(p, plant.machine, lines)

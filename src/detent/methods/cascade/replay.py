@@ -28,9 +28,9 @@ from detent.units import format_quantity
 
 CHUNK = 8192  # samples between two words of progress
 
+# Velocities that were not recorded, and accelerations, are those of positions low-passed at this frequency, both alike
+# [Hz]; at most a fifth of the sample rate.
 CUTOFF = 100.0
-"""Velocities that were not recorded, and accelerations, are those of positions low-passed at this frequency, both alike
-[Hz]; at most a fifth of the sample rate."""
 
 START_SPAN, START_SAMPLES = 0.012, 8  # time from which the velocity at the begin is taken [s], and its samples at least
 STILL = 5  # samples on both sides through which a recorded reference that stands does not change

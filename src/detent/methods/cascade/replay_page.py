@@ -17,8 +17,7 @@ from detent.page.run_page import page_title, warnings
 from detent.page.table import Table, bar_cell
 from detent.page.words import GAP, count, duration, number
 
-ZOOM_SHARE, ZOOM_LEAST = 0.04, 0.4
-"""Part of a recording that is shown around its largest difference, and the shortest such stretch [s]."""
+ZOOM_SHARE, ZOOM_LEAST = 0.04, 0.4  # part of a recording shown around its largest difference, at least so long [s]
 
 
 def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | None = None) -> Page:
@@ -113,9 +112,8 @@ def _charts(name: str, spec: CascadeSpec, run: ReplayRun, rows: slice) -> list[C
         pair = pair_panel(f"{name}-{index}", one.name, units.of(one.unit), recorded, simulated)
         panels.append(replace(pair, about=f"{one.name}, recorded and simulated, over time"))
         if one.unit in {"m", "rad"}:
-            off = error_panel(
-                f"{name}-{index}-off", "difference", ("recorded less simulated", one.difference[rows]), units
-            )
+            less = ("recorded less simulated", one.difference[rows])
+            off = error_panel(f"{name}-{index}-off", "difference", less, units)
             panels.append(replace(off, about=f"{one.name}, recorded less simulated, over time"))
     t = run.job.t[rows] - run.job.t[0]
     return time_charts(Timeline(name=name, t=t, label="time since the recording began", unit="s"), panels)

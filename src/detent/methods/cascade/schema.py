@@ -152,8 +152,8 @@ class EncoderTable(Table, frozen=True):
     velocity_filter: Time = optional("time constant of the filter behind it; 0: none", 0.0, ge=0.0, le=10.0)
 
 
+# What reads the position itself, in the place of an encoder that is not there.
 IDEAL_ENCODER = EncoderTable.model_validate({"resolution": "0 m"})
-"""What reads the position itself, in the place of an encoder that is not there."""
 
 
 class FeedbackTable(Table, frozen=True):

@@ -19,9 +19,9 @@ from detent.kernel.loop import HostArray, lay_ready, ticks
 from detent.kernel.registers import Registers, block, i8, register
 from detent.kernel.step import hot_step
 from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines, Feed, control
-from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, move, sense, stand
+from detent.methods.cascade.plant import CascadePlant, CascadePlantParams, latch_both, move, sense
 from detent.plant.linear_two_mass import fastest_rate
-from detent.plant.two_mass import TwoMass
+from detent.plant.two_mass import TwoMass, stand_masses
 from detent.sensing import position_sensor
 
 Numbers = NDArray[np.float64]
@@ -59,8 +59,6 @@ def tick(p: CascadeParams, r: Cascade, machine: TwoMass, *feed: HostArray) -> bo
 
 
 _NONE = lay_ready(np.zeros(0))
-
-STANDING: Feed = (_NONE, _NONE, _NONE, _NONE)  # feed of an axis whose reference stands in its registers
 
 
 def along(position: Numbers, velocity: Numbers, acceleration: Numbers) -> Feed:
@@ -111,7 +109,8 @@ def set_count(p: CascadeParams, motor: float, load: float) -> None:
 def switch_on(p: CascadeParams, r: Cascade, position: float) -> None:
     """Power-on at rest with motor and load at `position` [m], where the reference stands too."""
     c, lines = r.controller, r.lines
-    stand(p.plant, r.plant, lines, position)
+    stand_masses(r.plant.machine, position)
+    latch_both(p.plant, r.plant.machine, lines)
     position_sensor.stand_sensor(p.controller.motor_sensor, c.motor_sensor, lines.motor)
     position_sensor.stand_sensor(p.controller.load_sensor, c.load_sensor, lines.load)
     c.reference.position, c.count = position, lines.motor.count

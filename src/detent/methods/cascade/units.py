@@ -40,11 +40,7 @@ class Units:
         return Scale(1e6, "µm") if abs(peak) < MICRO else self.place
 
     def error(self, value: float) -> str:
-        """Write an error with its unit.
-
-        >>> Units(rotary=False).error(5.69e-6).replace(GAP, " "), Units(rotary=True).error(0.1).replace(GAP, " ")
-        ('5.7 µm', '5.73 deg')
-        """
+        """Write an error with its unit: 5.7 µm, 5.73 deg."""
         if math.isnan(value):
             return "\u2013"
         return angle(value) if self.rotary else length(value)
@@ -86,11 +82,7 @@ def milliseconds(seconds: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Write a share in percent, with three digits.
-
-    >>> percent(1.556e-5).replace(GAP, " "), percent(0.0574).replace(GAP, " ")
-    ('0.0016 %', '5.74 %')
-    """
+    """Write a share in percent, with three digits: 5.74 %, and two where it is small."""
     if math.isnan(share):
         return "\u2013"
     value = 100 * share

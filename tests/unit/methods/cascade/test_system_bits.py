@@ -8,11 +8,11 @@ import sys
 import numba
 import numpy as np
 import pytest
-from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, T_SAMPLE, TICK, Rig, make_params, set_friction
+from tests.cascade_rig import MASS, NO_TRACE, SAMPLE_TICKS, STANDING, T_SAMPLE, TICK, Rig, make_params, set_friction
 from tests.places import ROOT
 
 from detent.kernel.loop import advance
-from detent.methods.cascade.system import STANDING, Cascade, CascadeParams, along, fill_clocks, set_count
+from detent.methods.cascade.system import Cascade, CascadeParams, along, fill_clocks, set_count
 from detent.planning.profile import MotionLimits, plan_move
 
 MOVE = MotionLimits(speed=0.5, acceleration=5.0, jerk=100.0)
