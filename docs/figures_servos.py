@@ -68,8 +68,7 @@ def absolute_word() -> None:
     """Absolute word, and the error made of it, against the displacement from a positioning point."""
     from detent.methods.phase_servo.build import build_phase_servo
     from detent.methods.phase_servo.controller import Converters, run_converters
-    from detent.sensing.absolute_converter import absolute_error
-    from detent.sensing.carrier import reset_carrier
+    from detent.sensing.phase_converters import absolute_error, reset_carrier
 
     spec = phase_axis().spec
     n, p = spec.detector.counts, build_phase_servo(spec)
@@ -228,7 +227,7 @@ def filter_answer() -> None:
     """One window that counts a pulse too many, and the filter's gain over frequency."""
     from detent.analysis.first_order_filter import cutoff_hz
     from detent.methods.filtered_servo.build import build_filtered_servo
-    from detent.sensing.speed_filter import SpeedFilter, filter_speed
+    from detent.sensing.counted_speed import SpeedFilter, filter_speed
 
     spec = slide().spec
     p, r, method = build_filtered_servo(spec).controller.filter, SpeedFilter(), spec.method

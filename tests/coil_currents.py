@@ -1,6 +1,6 @@
 """What the switches of the carrier mean: currents of both coils (phase-servo specification 3.2, block 461)."""
 
-from detent.sensing.carrier import Carrier
+from detent.sensing.phase_converters import Carrier
 
 LARGE = 3.0  # current through the small resistor R461, in units of the other's (1/R462): about 3
 

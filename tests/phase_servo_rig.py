@@ -22,10 +22,9 @@ from detent.methods.phase_servo.controller import (
 )
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready, switch_on
-from detent.sensing.absolute_converter import AbsoluteConverter
-from detent.sensing.carrier import count_carrier, reset_carrier
 from detent.sensing.gauge import set_gauge
 from detent.sensing.interference import plan_next
+from detent.sensing.phase_converters import AbsoluteConverter, count_carrier, reset_carrier
 from detent.sensing.phase_detector import Detector, DetectorParams, compare
 
 EXAMPLE = Path(str(files("detent") / "examples" / "phase_servo.toml"))

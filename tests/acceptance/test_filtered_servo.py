@@ -23,15 +23,25 @@ from tests.filtered_servo_rig import (
 
 from detent.analysis.sampled_loop import SampledLoop
 from detent.analysis.transfer_function import ServoTransfer
+from detent.control.clocks import SampleClock, count_clock
 from detent.control.deviation_counter import RUN, Deviation, count_deviation
 from detent.control.pulse_generator import FULL, PER_PULSE, PulseGenerator, clock_generator
-from detent.control.sample_clock import SampleClock, count_clock
 from detent.methods.filtered_servo.controller import CLOCKS, set_period
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.counted_speed import (
+    FIXED,
+    FLOAT,
+    NONE,
+    PulseCounter,
+    PulseCounterParams,
+    SpeedFilter,
+    SpeedFilterParams,
+    add_pulses,
+    close_window,
+    filter_speed,
+)
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, preset_decoder
-from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
 
 FORWARD = [(0, 0), (1, 0), (1, 1), (0, 1)]
 """Levels (A, B) of the quarters of a cycle: A leads."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.coil_currents import LARGE, coil_currents
 from tests.phase_servo_rig import START, ConverterBench, Rig
 
-from detent.control.clock_chain import ClockChain, next_period
+from detent.control.clocks import ClockChain, SawtoothParams, SawtoothPwm, count_sawtooth, next_period
 from detent.control.phase_law import Law, LawParams, drive_word, shape
 from detent.control.phase_sequencer import (
     HOLD,
@@ -25,12 +25,17 @@ from detent.control.phase_sequencer import (
     count_pulses,
     take_command,
 )
-from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.methods.phase_servo.plant import move
-from detent.sensing.absolute_converter import absolute_error, count_absolute
-from detent.sensing.carrier import Carrier, CarrierParams, count_carrier, reset_carrier
+from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.interference import INSERT_MINUS, INSERT_PLUS
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.phase_converters import (
+    Carrier,
+    CarrierParams,
+    absolute_error,
+    count_absolute,
+    count_carrier,
+    reset_carrier,
+)
 
 N = 64
 SAMPLE_TICKS = 2048

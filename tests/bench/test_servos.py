@@ -6,8 +6,8 @@ from tests.filtered_servo_rig import EXAMPLE as SLIDE
 from tests.filtered_servo_rig import NO_TRACE
 from tests.phase_servo_rig import START, Rig
 
+from detent.control.clocks import SawtoothPwm, count_sawtooth
 from detent.control.pulse_generator import PER_PULSE
-from detent.control.sawtooth_pwm import SawtoothPwm, count_sawtooth
 from detent.drive.split_bridge import SplitBridge, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import advance

@@ -11,8 +11,18 @@ from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
 from detent.methods.filtered_servo.controller import CLOCKS, set_period
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
-from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilter, SpeedFilterParams, filter_speed
+from detent.sensing.counted_speed import (
+    FIXED,
+    FLOAT,
+    NONE,
+    PulseCounter,
+    PulseCounterParams,
+    SpeedFilter,
+    SpeedFilterParams,
+    add_pulses,
+    close_window,
+    filter_speed,
+)
 
 RECORDED = (
     "controller.generator.command", "controller.deviation.position", "controller.deviation.deviation",

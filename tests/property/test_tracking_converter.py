@@ -6,9 +6,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.phase_servo_rig import ConverterBench
 
-from detent.sensing.absolute_converter import absolute_error
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses
-from detent.sensing.tracking_converter import TrackingConverter, TrackingParams, count_reference, emit_pulse
+from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses
+from detent.sensing.phase_converters import (
+    TrackingConverter,
+    TrackingParams,
+    absolute_error,
+    count_reference,
+    emit_pulse,
+)
 
 sizes = st.sampled_from([16, 64, 256])
 """Steps per pitch N."""

@@ -6,7 +6,7 @@ from detent.axisfile.blocks import fill_guard, fill_interference, fill_push, fil
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
-from detent.sensing.speed_filter import FIXED, FLOAT, NONE, SpeedFilterParams
+from detent.sensing.counted_speed import FIXED, FLOAT, NONE, SpeedFilterParams
 
 GUARD_PERIOD = 1e-3  # time between two looks of the guard [s]
 

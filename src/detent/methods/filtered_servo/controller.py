@@ -4,6 +4,7 @@ It sees the encoder as a synchronous circuit does: ten clocks in a tick of 10 us
 Clocks in which nothing happens, or nothing whose moment matters, are skipped.
 """
 
+from detent.control.clocks import SampleClock, count_clock
 from detent.control.deviation_counter import (
     FAULT,
     GUARDED,
@@ -23,14 +24,20 @@ from detent.control.pulse_generator import (
     is_between_pulses,
     steer_rate,
 )
-from detent.control.sample_clock import SampleClock, count_clock
 from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, f8, i1, i8, register, u1, u2, u4
 from detent.kernel.step import hot_step, step
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.counted_speed import (
+    PulseCounter,
+    PulseCounterParams,
+    SpeedFilter,
+    SpeedFilterParams,
+    add_pulses,
+    close_window,
+    filter_speed,
+)
 from detent.sensing.quadrature import ClockedDecoder, clock_decoder, edge_direction, is_settled, preset_decoder
-from detent.sensing.speed_filter import SpeedFilter, SpeedFilterParams, filter_speed
 
 CLOCKS = 10  # decoder clocks of 1 us in a tick
 LEVELS = (1 << CLOCKS) - 1  # a channel that is high in all clocks of a tick

@@ -5,9 +5,12 @@ samples. The words of the logic are combinational; they are worked out in the ti
 has changed. The clocks' own divider keeps the time.
 """
 
-from detent.control.clock_chain import (
+from detent.control.clocks import (
     ClockChain,
     ClockParams,
+    SawtoothParams,
+    SawtoothPwm,
+    count_sawtooth,
     integrate_strobe,
     next_period,
     reference_period,
@@ -30,19 +33,24 @@ from detent.control.phase_sequencer import (
     setpoint,
     take_command,
 )
-from detent.control.sawtooth_pwm import SawtoothParams, SawtoothPwm, count_sawtooth
 from detent.kernel.compiled import copy_back, local_copy, unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
-from detent.sensing.absolute_converter import AbsoluteConverter, AbsoluteParams, absolute_error, count_absolute
-from detent.sensing.carrier import Carrier, CarrierParams, count_carrier, reset_carrier
-from detent.sensing.pulse_counter import PulseCounter, PulseCounterParams, add_pulses, close_window
-from detent.sensing.tracking_converter import (
+from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses, close_window
+from detent.sensing.phase_converters import (
+    AbsoluteConverter,
+    AbsoluteParams,
+    Carrier,
+    CarrierParams,
     TrackingConverter,
     TrackingParams,
+    absolute_error,
+    count_absolute,
+    count_carrier,
     count_reference,
     emit_pulse,
+    reset_carrier,
     shift_samples,
 )
 

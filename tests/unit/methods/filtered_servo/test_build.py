@@ -17,7 +17,7 @@ from detent.methods.filtered_servo.controller import acknowledge, go_to
 from detent.methods.filtered_servo.host import filtered_servo_machine
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
-from detent.sensing.speed_filter import FIXED, FLOAT, NONE
+from detent.sensing.counted_speed import FIXED, FLOAT, NONE
 
 pytestmark = pytest.mark.compiled
 

@@ -1,10 +1,38 @@
-"""First-order low-pass on the counted speed, in floating or fixed point (filtered-servo specification 3.4; block 9).
+"""Speed by counting (the M method): a signed pulse counter over a fixed window, and a first-order low-pass behind it.
 
-Clocked by the same strobe as the counter: ``y += A (B n - y)`` with the count of the window that has just closed.
+Counter: block 350 of the phase servo (specification 3.6) and 8 of the filtered servo (3.3). Filter: its block 9 (3.4),
+clocked by the same strobe: ``y += A (B n - y)`` with the count of the window that has just closed.
 """
 
-from detent.kernel.registers import Registers, f8, i4, register, u1
-from detent.kernel.step import step
+from detent.kernel.registers import Registers, f8, i2, i4, i8, register, u1
+from detent.kernel.step import hot_step, step
+
+
+class PulseCounterParams(Registers):
+    """Width of the counter."""
+
+    half: i8 = register("half the range of the counter, 2^(bits - 1)", unit="count")
+
+
+class PulseCounter(Registers):
+    """Up/down counter with a latch; both wrap as a circuit of this width does."""
+
+    count: i2 = register("pulses since the window opened, forward less backward", unit="count")
+    word: i2 = register("pulses of the last closed window", unit="count")
+
+
+@hot_step
+def add_pulses(p: PulseCounterParams, r: PulseCounter, pulses: int) -> None:
+    """Count signed pulses."""
+    r.count = ((r.count + pulses + p.half) & (2 * p.half - 1)) - p.half
+
+
+@hot_step
+def close_window(r: PulseCounter) -> None:
+    """Strobe: latch, then clear, so that no pulse is lost or counted twice."""
+    r.word = r.count
+    r.count = 0
+
 
 NONE, FLOAT, FIXED = 0, 1, 2
 
