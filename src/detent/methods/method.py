@@ -91,7 +91,7 @@ class Shown:
     settings: dict[str, str] = field(default_factory=dict[str, str])  # small print: file, seed, command
 
 
-def _untold(share: float, text: str) -> None:
+def untold(share: float, text: str) -> None:
     """The progress of what nobody watches."""
 
 
@@ -244,7 +244,7 @@ class Method(Protocol[SpecT]):
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""
-        return tuple(self.brought(place)(spec, progress=progress or _untold) for place in self.compares)
+        return tuple(self.brought(place)(spec, progress=progress or untold) for place in self.compares)
 
     # ---- what people see
 

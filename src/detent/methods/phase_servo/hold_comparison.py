@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.axisfile.tables import PushTable
+from detent.methods.method import untold
 from detent.methods.phase_servo.derive import PhaseFigures
-from detent.methods.phase_servo.phase_bench import UNDISTURBED, PhaseBench
+from detent.methods.phase_servo.host import UNDISTURBED, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
@@ -50,31 +51,25 @@ class HoldCase:
     word: Whole  #: drive word [count]; shape (n,)
 
     @property
-    def _last(self) -> int:
-        """Row with which the last 0.1 s begin."""
-        return int(np.count_nonzero(self.t < self.t[-1] - LAST))
+    def _last(self) -> slice:
+        """Rows of the last 0.1 s."""
+        return slice(int(np.count_nonzero(self.t < self.t[-1] - LAST)), None)
 
     @property
     def swing(self) -> float:
         """Peak to peak of the displacement in the last 0.1 s [steps]."""
-        last = self.displacement[self._last :]
-        return float(last.max() - last.min())
+        return float(np.ptp(self.displacement[self._last]))
 
     @property
     def rest(self) -> float:
         """Mean displacement in the last 0.1 s [steps]."""
-        return float(np.mean(self.displacement[self._last :]))
+        return float(np.mean(self.displacement[self._last]))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: everything but the curves."""
-        integral = self.integral[self._last :]
-        return {
-            "name": self.name,
-            "about": self.about,
-            "swing": self.swing,
-            "rest": self.rest,
-            "integral": [int(integral.min()), int(integral.max())],
-        }
+        integral = self.integral[self._last]
+        found: dict[str, Any] = {name: getattr(self, name) for name in ("name", "about", "swing", "rest")}
+        return found | {"integral": [int(integral.min()), int(integral.max())]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +108,8 @@ class HoldComparison:
             "alone makes too little drive to push back; the integral counts up until the motor holds the force. "
             f"Where it stands at the end, in steps right of the target: {', '.join(rests)}."
         )
-        events = _events(self)
+        push = f"a force of {number(self.push)}{GAP}N pushes from now on"
+        events = happened({push: self.push_at, "stop: dead band and integrator take over": self.stop_at}, math.inf)
         return (
             Figure(title="Standing still", caption=still, charts=_still_charts(self)),
             Figure(title="Under load", caption=loaded, charts=_loaded_charts(self, events), events=events),
@@ -176,31 +172,21 @@ def _since(case: HoldCase, moment: float) -> slice:
     return slice(int(np.searchsorted(case.t, (float(case.t[0]) + moment) / 2)), None)
 
 
-def _events(found: HoldComparison) -> list[Event]:
-    push = f"a force of {number(found.push)}{GAP}N pushes from now on"
-    texts = {push: found.push_at, "stop: dead band and integrator take over": found.stop_at}
-    return happened(texts, math.inf)
-
-
-def compare_hold(spec: PhaseServoSpec, *, progress: Progress | None = None) -> HoldComparison:
+def compare_hold(spec: PhaseServoSpec, *, progress: Progress = untold) -> HoldComparison:
     """Record how the axis stands at its target, still and pushed, with and without dead band and integrator."""
-    cases = len(STILL) + len(LOADED)
     stopping = spec.changed(method={"stop_always_off": False})
-
-    def record(done: int, variant: Variant, disturbance: DisturbanceTable) -> HoldCase:
-        """Tell the progress and record one variant."""
-        if progress is not None:
-            progress(done / cases, variant[0])
-        return _record(stopping, variant, disturbance)
-
-    still = tuple(record(k, variant, UNDISTURBED) for k, variant in enumerate(STILL))
     arrived = _arrive(PhaseBench(stopping, PITCHES))
     stop_at = arrived + spec.method.stop_time
     push_at = PUSH_AT if arrived < PUSH_AT < stop_at else (arrived + stop_at) / 2
     push = push_force(spec)
     # Values in SI already: nothing is to be read from text. It lasts longer than any record.
     pushed = DisturbanceTable(push=PushTable.model_construct(force=push, at=push_at, duration=1e5))
-    loaded = tuple(record(len(STILL) + k, variant, pushed) for k, variant in enumerate(LOADED))
+    planned = [*((variant, UNDISTURBED) for variant in STILL), *((variant, pushed) for variant in LOADED)]
+    cases: list[HoldCase] = []
+    for variant, disturbance in planned:
+        progress(len(cases) / len(planned), variant[0])
+        cases.append(_record(stopping, variant, disturbance))
+    still, loaded = tuple(cases[: len(STILL)]), tuple(cases[len(STILL) :])
     return HoldComparison(still=still, loaded=loaded, push=push, push_at=push_at, stop_at=stop_at, step=spec.step)
 
 

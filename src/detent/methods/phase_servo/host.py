@@ -1,23 +1,31 @@
-"""The host of a phase servo: set strobe with direction and distance, ready, stop."""
+"""The host of a phase servo: set strobe with direction and distance, ready, stop; and a bench for its comparisons."""
 
 import math
 
 from detent.axisfile.blocks import describe_fault
 from detent.control.guard import NO_ARRIVAL
+from detent.control.phase_sequencer import POSITION_MODE
 from detent.errors import AxisError
 from detent.methods.moves.host import Destination, Host, Wrong, refused_words
 from detent.methods.moves.job import Move
 from detent.methods.phase_servo import system as phase_servo
 from detent.methods.phase_servo.build import build_phase_servo
 from detent.methods.phase_servo.controller import arrive_within, command, take_ready
-from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.record.machine import AnyRecorder, Machine
+from detent.record.recorder import Recorder
 from detent.units import format_quantity
 
 ACQUISITION = 0.5  # longest time that a phase servo may take to lock and settle after power-on [s]
 
 GRID_TOLERANCE = 0.05
 """How far a target may be from a positioning point, in pitches: what a decimal figure of a length misses."""
+
+START = 0.25e-3  # time of the set strobe on the bench, as in the tests of specification 6 [s]
+ROOM = 8  # pitches of free way on both sides of its move
+LOOK = 1e-3  # how often it looks whether position mode has been entered [s]
+
+UNDISTURBED = DisturbanceTable()
 
 
 def phase_servo_machine(
@@ -103,3 +111,55 @@ class PhaseHost(Host):
     def switched(self) -> float:
         """When position mode was entered [s]."""
         return self.controller.sequencer.switched * self.machine.tick
+
+
+class PhaseBench:
+    """An axis that stands at a positioning point, locked and ready, before a move by whole pitches.
+
+    Of ``[disturbance]`` only what is chosen is left, and the way is as long as the move needs, so that two runs differ
+    in what is compared and in nothing else.
+    """
+
+    def __init__(
+        self,
+        spec: PhaseServoSpec,
+        pitches: int,
+        disturbance: DisturbanceTable = UNDISTURBED,
+        recorder: Recorder | None = None,
+    ) -> None:
+        begin = ROOM if pitches > 0 else ROOM - pitches
+        self.spec = spec.changed(
+            limits={"travel": (abs(pitches) + 2 * ROOM) * spec.pitch},
+            mechanics={"start_position": begin * spec.pitch},
+            disturbance=disturbance,
+        )
+        self.pitches, self.target = pitches, (begin + pitches) * spec.pitch
+        self.machine: Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo] = phase_servo_machine(
+            self.spec, recorder
+        )
+        phase_servo.be_ready(self.machine.params, self.machine.state)
+
+    @property
+    def displacement(self) -> float:
+        """Position less target [steps]."""
+        return (self.machine.state.plant.train.position - self.target) / self.spec.step
+
+    def run_until(self, moment: float) -> None:
+        """Let time pass up to a moment since power-on [s], whatever the axis says."""
+        left = round(moment / self.machine.tick) - self.machine.state.tick
+        while left > 0:
+            left -= self.machine.pass_ticks(left)
+            take_ready(self.machine.state.controller)
+
+    def move(self) -> float:
+        """Make the move up to the beginning of position mode; gives its time [s], NaN where it is not reached."""
+        self.run_until(START)
+        c = self.machine.state.controller
+        command(c, abs(self.pitches) * self.spec.detector.counts, int(self.pitches < 0))
+        way, a = abs(self.pitches) * self.spec.pitch, self.spec.method.table_acceleration
+        limit = START + 0.5 + 3 * (way / self.spec.limits.speed + 2 * math.sqrt(way / a))
+        while self.machine.time < limit:
+            self.run_until(self.machine.time + LOOK)
+            if c.sequencer.mode == POSITION_MODE:
+                return c.sequencer.switched * self.machine.tick
+        return math.nan

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from detent.axisfile.tables import BurstTable, InterferenceTable
 from detent.errors import DetentError
-from detent.methods.phase_servo.phase_bench import START, UNDISTURBED, PhaseBench
+from detent.methods.method import untold
+from detent.methods.phase_servo.host import START, UNDISTURBED, PhaseBench
 from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
 from detent.page.chart import Chart, Curve, Panel, line_chart
 from detent.page.figure import Figure
@@ -84,18 +85,10 @@ class NoiseComparison:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``: a row for each number of pulses, sign and direction."""
-        rows = [
-            {
-                "pulses": pulses,
-                "sign": sign,
-                "direction": direction,
-                "absolute": float(self.absolute[k, i, j]),
-                "incremental": float(self.incremental[k, i, j]),
-            }
-            for k, pulses in enumerate(self.pulses)
-            for i, sign in enumerate(SIGNS)
-            for j, direction in enumerate(DIRECTIONS)
-        ]
+        keys = ("pulses", "sign", "direction", "absolute", "incremental")
+        places = product(self.pulses, SIGNS, DIRECTIONS)
+        rests = zip(self.absolute.ravel().tolist(), self.incremental.ravel().tolist(), strict=True)
+        rows = [dict(zip(keys, (*place, *rest), strict=True)) for place, rest in zip(places, rests, strict=True)]
         return {name: getattr(self, name) for name in ("step", "counts", "margin", "pitches")} | {"rest": rows}
 
 
@@ -115,16 +108,12 @@ def _rest_charts(found: NoiseComparison) -> list[Chart]:
         return np.concatenate(([np.nan], rest[:0:-1, 1, direction], rest[:, 0, direction], [np.nan]))
 
     # The lines are straight by their nature; what lies between two points of this servo nobody has tried.
-    counted = [
-        Curve(label="only incremental, moving right", colour="muted", width=2, y=against(found.incremental, 0)),
-        Curve(
-            label="only incremental, moving left", colour="muted", width=2, dash=(8, 4), y=against(found.incremental, 1)
-        ),
-    ]
-    stops = [
-        Curve(label="this servo, moving right", colour="right", rings=11, y=against(found.absolute, 0)),
-        Curve(label="this servo, moving left", colour="left", rings=6, y=against(found.absolute, 1)),
-    ]
+    counted: list[Curve] = []
+    stops: list[Curve] = []
+    for k, (way, dash, rings) in enumerate((("right", None, 11), ("left", (8, 4), 6))):
+        place = against(found.incremental, k)
+        counted.append(Curve(label=f"only incremental, moving {way}", colour="muted", width=2, dash=dash, y=place))
+        stops.append(Curve(label=f"this servo, moving {way}", colour=way, rings=rings, y=against(found.absolute, k)))
     label, levels = "right of the target [step]", [(side * NOISE_BAND, "") for side in (-1, 1)]
     panels = [
         Panel(name="noise", label=label, height=300, zero=True, curves=[*counted, *stops]),
@@ -137,33 +126,28 @@ def _rest_charts(found: NoiseComparison) -> list[Chart]:
     return [line_chart(panel, x, "− pulses put in   [pulse]   + pulses put in") | marks for panel in panels]
 
 
-def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress | None = None) -> NoiseComparison:
+def compare_noise(spec: PhaseServoSpec, *, pitches: int = 6, progress: Progress = untold) -> NoiseComparison:
     """Find where the axis stops after spurious pulses, and where it would stop by counted pulses."""
-    most = MOST_STEPS // spec.detector.counts
+    counts = spec.detector.counts
+    most = MOST_STEPS // counts
     if not 1 <= pitches <= most:
         raise DetentError(
             f"comparison of noise: came a move of {pitches} pitches; allowed: 1 to {most}; choose another"
         )
     servos = [spec.changed(method={"final": final}) for final in ("absolute", "incremental")]
-    margin = spec.detector.counts // 2 - spec.method.threshold
+    margin = counts // 2 - spec.method.threshold
     pulses = pulse_counts(margin)
     begin = _first_pulse(servos[0], pitches)
-    rest = np.zeros((2, len(pulses), 2, 2))
-    runs = product(range(2), range(len(pulses)), range(2), range(2))
-    for done, (servo, k, sign, side) in enumerate(runs):
-        if progress is not None:
-            progress(done / rest.size, f"{pulses[k]} spurious pulses")
-        way = pitches if side == 0 else -pitches
-        rest[servo, k, sign, side] = rest_point(servos[servo], way, pulses[k], SIGNS[sign], begin)
+    runs = list(product(servos, pulses, SIGNS, (pitches, -pitches)))
+    rests: list[float] = []
+    for servo, spurious, sign, way in runs:
+        progress(len(rests) / len(runs), f"{spurious} spurious pulses")
+        rests.append(rest_point(servo, way, spurious, sign, begin))
+    absolute, incremental = np.reshape(rests, (2, len(pulses), 2, 2))
     return NoiseComparison(
-        pulses=pulses,
-        absolute=rest[0],
-        incremental=rest[1],
-        step=spec.step,
-        counts=spec.detector.counts,
-        margin=margin,
+        pulses=pulses, absolute=absolute, incremental=incremental, step=spec.step, counts=counts, margin=margin,
         pitches=pitches,
-    )
+    )  # fmt: skip
 
 
 def pulse_counts(margin: int) -> tuple[int, ...]:
@@ -191,8 +175,8 @@ def rest_point(spec: PhaseServoSpec, pitches: int, count: int, sign: str, begin:
         return bench.displacement
     end = entered + min(spec.method.stop_time, LONGEST_STOP) + SETTLING
     readings: list[float] = []
-    for k in range(READINGS):
-        bench.run_until(end - (READINGS - 1 - k) * READING)
+    for k in reversed(range(READINGS)):
+        bench.run_until(end - k * READING)
         readings.append(bench.displacement)
     return float(np.mean(readings))
 
