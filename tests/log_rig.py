@@ -3,7 +3,7 @@
 import numpy as np
 
 from detent.logs.log import Log
-from detent.logs.mapping import Choice, ColumnMapping
+from detent.logs.mapping import Choice, ColumnMapping, parse_options
 from detent.logs.read_log import read_log
 from tests.places import DATA
 
@@ -42,7 +42,9 @@ def assert_covers(hits: list[bool], least: float = 0.91, most: float = 0.99) -> 
     assert least <= share <= most, f"{share:.3f} of {len(hits)} intervals hold the true value"
 
 
+GTAU = ColumnMapping({"force": Choice(column="vir", unit="N", factor="gtau")})
+
+
 def read_emps() -> Log:
     """That recording, with its force in newtons."""
-    force = Choice("vir", "N", factor="gtau")
-    return read_log(EMPS, ColumnMapping({"time": Choice("t", "s"), "position": Choice("qm", "m"), "force": force}))
+    return read_log(EMPS, parse_options(["time=t [s]", "position=qm [m]"]).overridden(GTAU))

@@ -9,8 +9,7 @@ import math
 import numpy as np
 
 from detent.logs.differences import Likeness, correlate, grain, likeness, paired_changes, peaks_of, runs_of
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, Severity
+from detent.logs.log import Action, Draft, Kind, Severity
 
 OPPOSED = -0.7  # correlation below which two signals that should agree have opposite signs
 ALIKE = 0.9  # correlation above which their factor is a unit's and not the noise's

@@ -6,8 +6,7 @@ import numpy as np
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import did_you_mean, short
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, Severity, Source, Values
+from detent.logs.log import Action, Draft, Kind, Severity, Source, Values
 from detent.logs.log_units import Conversion, bits_of, find_conversion, split_heading
 from detent.logs.mapping import Choice, ColumnMapping
 from detent.logs.raw_table import RawTable, tell
@@ -123,7 +122,7 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
     units = _find_units(table, chosen, mapping, draft)
     for role in sorted(chosen, key=list(ROLES).index):
         name, (unit, conversion) = chosen[role], units[role]
-        choice = mapping.columns.get(role, Choice(name))
+        choice = mapping.columns.get(role, Choice(column=name))
         factor = choice.sign * _number_of(table.file, role, choice.factor, constants)
         # Behind the border: unit factor * (sign * factor * number + offset) + unit offset.
         total = conversion.factor * choice.offset + conversion.offset

@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.draft import Draft, tell_count
-from detent.logs.log import Action, Kind, Values
+from detent.logs.log import Action, Draft, Kind, Values, tell_count
 
 WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
 POSITIONS = ("position", "position_load", "reference")  # signals that come from counters

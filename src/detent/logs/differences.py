@@ -1,17 +1,25 @@
-"""What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are."""
+"""What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are.
 
-from typing import NamedTuple
+SciPy is loaded only where a part of it is used.
+"""
+
+from importlib import import_module
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.logs.log import Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import parabolas, scipy
 
 QUANTA = 20.0  # times its grain by which a position should change over a window for rounding and noise not to count
 FARTHEST = 200  # rows up to which a shift is looked for
 FEWEST_WINDOWS = 20  # windows that a recording is divided into at least
+
+
+def scipy(part: str) -> Any:
+    """A part of SciPy, loaded where it is used; it states no types."""
+    return import_module(f"scipy.{part}")
 
 
 class Likeness(NamedTuple):
@@ -125,3 +133,29 @@ def equal_runs(values: Values, fewest: int) -> NDArray[np.int64]:
     same = runs_of(np.diff(values) == 0)
     runs = np.column_stack([same[:, 0], same[:, 1] + 1])
     return runs[runs[:, 1] - runs[:, 0] >= fewest]
+
+
+def spread(values: Values, rows: int) -> Values:
+    """Largest less smallest value in the window of some rows about each sample, shape (n,)."""
+    images = scipy("ndimage")
+    return np.asarray(images.maximum_filter1d(values, rows) - images.minimum_filter1d(values, rows), dtype=np.float64)
+
+
+def fill_holes(mask: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
+    """The mask with stretches of False of up to some rows between True made True."""
+    padded = np.pad(mask, rows)
+    return np.asarray(scipy("ndimage").binary_closing(padded, structure=np.ones(rows + 1)), dtype=np.bool_)[rows:-rows]
+
+
+def parabolas(values: Values, period: float, rows: int) -> NDArray[np.float64]:
+    """Value, slope and curvature, in the middle, of the parabola nearest to each window.
+
+    Savitzky and Golay, Analytical Chemistry 36 (1964) 1627.
+
+    >>> parabolas(np.arange(7.0) ** 2, 1.0, 5).round(6)
+    array([[ 4.,  9., 16.],
+           [ 4.,  6.,  8.],
+           [ 2.,  2.,  2.]])
+    """
+    kernels = [scipy("signal").savgol_coeffs(rows, 2, deriv=order, delta=period, use="dot") for order in (0, 1, 2)]
+    return np.array([np.correlate(values, np.asarray(kernel), mode="valid") for kernel in kernels])

@@ -23,7 +23,7 @@ A signal is ``(sign * factor * number + offset)`` in the unit. The unit may carr
 
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -37,49 +37,16 @@ from detent.files.quantities import Time
 from detent.files.read import read_tables
 from detent.files.source import Source, parse_source
 from detent.files.text import decode_utf8, did_you_mean, read_bytes, short
-from detent.logs.csv_layout import SEPARATORS, FileOptions
 from detent.logs.log_units import find_conversion
 from detent.logs.roles import ROLES
 
 MAX_BYTES = 100_000  # largest mapping file read; a real one has a few hundred bytes
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
+"""Separators by the words that name them in options."""
+
 _DECIMALS = {"point": ".", "comma": ","}
 _OPTION = re.compile(r"\s*([A-Za-z_]+)\s*=\s*(.*)", re.DOTALL)
 _MOST_BITS = 63
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Which column a signal comes from, and how its numbers become values."""
-
-    column: str  # name of the column, or its number from 1; empty where the signal is not to be read
-    unit: str = ""  # unit of the column, with a number before it or without; empty: that of the heading, or guessed
-    # what the numbers are multiplied with, or the name of a constant of the file or of the mapping
-    factor: float | str = 1.0
-    offset: float = 0.0  # what is added then, in `unit`
-    sign: int = 1  # 1 or -1
-    bits: int | None = None  # width of the counter behind the numbers, where it wraps at another than 16 or 32
-    delay: float = 0.0  # by how much the signal was recorded too late [s]
-
-
-@dataclass(frozen=True)
-class ColumnMapping:
-    """What the user says about a recording."""
-
-    # from a role of `roles.ROLES` to the choice of its column
-    columns: dict[str, Choice] = field(default_factory=dict[str, Choice])
-    file: FileOptions = field(default_factory=FileOptions)  # how the file is laid out
-    constants: dict[str, float] = field(default_factory=dict[str, float])  # numbers by names, for `Choice.factor`
-
-    def overridden(self, other: "ColumnMapping") -> "ColumnMapping":
-        """Give the mapping with what another says in place of what it says."""
-        default = asdict(FileOptions())
-        stated = {key: value for key, value in asdict(other.file).items() if value != default[key]}
-        return ColumnMapping(
-            self.columns | other.columns, replace(self.file, **stated), self.constants | other.constants
-        )
-
-
-# ---------------------------------------------------------------------------------------------- what the file holds
 
 
 def _word_of(words: dict[str, str], value: object) -> str:
@@ -121,8 +88,8 @@ def _check_unit(role: str, unit: str) -> str:
     return unit
 
 
-class LogTable(Table, frozen=True):
-    """How the file is laid out; each key only where the guess is wrong."""
+class FileOptions(Table, frozen=True):
+    """How the file is laid out, whatever its kind; each key only where the guess is wrong."""
 
     separator: Annotated[str, PlainValidator(partial(_word_of, SEPARATORS))] = optional(
         "what stands between cells", "", allowed=", ".join(SEPARATORS)
@@ -135,7 +102,7 @@ class LogTable(Table, frozen=True):
     period: Time | None = optional("time between two rows of a file without a column for the time", None, gt=0)
 
 
-class ColumnTable(Table, frozen=True):
+class Choice(Table, frozen=True):
     """Where a signal comes from; in short a text: the column, its unit in brackets, a minus that turns it round."""
 
     column: Annotated[str, PlainValidator(_read_column)] = required(
@@ -162,6 +129,21 @@ class ColumnTable(Table, frozen=True):
         return {"column": column.strip(), "unit": unit, "sign": 1 if name == value else -1}
 
 
+@dataclass(frozen=True)
+class ColumnMapping:
+    """What the user says about a recording."""
+
+    # from a role of `roles.ROLES` to the choice of its column; one without a name is not to be read
+    columns: dict[str, Choice] = field(default_factory=dict[str, Choice])
+    file: FileOptions = field(default_factory=FileOptions)  # how the file is laid out
+    constants: dict[str, float] = field(default_factory=dict[str, float])  # numbers by names, for `Choice.factor`
+
+    def overridden(self, other: "ColumnMapping") -> "ColumnMapping":
+        """Give the mapping with what another says in place of what it says."""
+        file = self.file.model_copy(update=other.file.model_dump(exclude_unset=True))
+        return ColumnMapping(self.columns | other.columns, file, self.constants | other.constants)
+
+
 @cache
 def mapping_model() -> type[Table]:
     """Model of a mapping file: its signals are those of `ROLES`, each with units of its own."""
@@ -169,10 +151,10 @@ def mapping_model() -> type[Table]:
     for name, role in ROLES.items():
         allowed = f"a unit of {' or '.join(target or 'a pure number' for target in role.units)}"
         unit: Any = (Annotated[str, AfterValidator(partial(_check_unit, name))], optional("unit", "", allowed=allowed))
-        column: Any = create_model(f"{name}_column", __base__=ColumnTable, unit=unit)
+        column: Any = create_model(f"{name}_column", __base__=Choice, unit=unit)
         columns[name] = (column | None, optional(role.meaning, None))
     tables: dict[str, Any] = {
-        "log": (LogTable, optional("how the file is laid out", LogTable())),
+        "log": (FileOptions, optional("how the file is laid out", FileOptions())),
         "columns": (model := create_model("Columns", __base__=Table, **columns), optional("signals", model())),
         "constants": (dict[str, float], optional("constants", {}, allowed="a number, by name")),
     }
@@ -188,9 +170,9 @@ def load_mapping(path: str | Path) -> ColumnMapping:
 def _to_mapping(source: Source) -> ColumnMapping:
     """What the tables of a mapping say."""
     found: Any = read_tables(source, mapping_model())
-    choices = {role: getattr(found.columns, role) for role in source.tables.get("columns", {})}
-    columns = {role: Choice(**choice.model_dump()) for role, choice in choices.items()}
-    return ColumnMapping(columns, FileOptions(**found.log.model_dump()), found.constants)
+    stated = source.tables.get("columns", {})
+    columns = {role: Choice.model_construct(**dict(getattr(found.columns, role))) for role in stated}
+    return ColumnMapping(columns, found.log, found.constants)
 
 
 def parse_options(options: Sequence[str]) -> ColumnMapping:
@@ -220,8 +202,8 @@ def _read_option(option: str) -> ColumnMapping:
         allowed = "a signal and its column, as in position=qm [m]"
         raise InputError.of_file("option", f'"{short(option)}"', allowed, "write SIGNAL=COLUMN [UNIT]")
     key, value = match[1], match[2].strip()
-    if key not in ROLES and key not in LogTable.model_fields:
-        known = (*ROLES, *LogTable.model_fields)
+    if key not in ROLES and key not in FileOptions.model_fields:
+        known = (*ROLES, *FileOptions.model_fields)
         remedy = did_you_mean(key, known, "remove it")
         raise InputError.of_file("option", f'the unknown key "{short(key)}"', ", ".join(known), remedy)
     is_number = key == "header" and value.isascii() and value.isdigit() and len(value) < 9

@@ -1,6 +1,11 @@
-"""Recordings as text tables: comma-separated values in all their dialects."""
+"""Recordings as text tables: comma-separated values in all their dialects, and what cells say."""
 
 import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -9,15 +14,47 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import read_bytes, short
-from detent.logs.csv_layout import CsvLayout, FileOptions, guess_layout, is_telling, read_cell, split_lines
-from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size
+from detent.logs.log import tell_count
+from detent.logs.log_units import is_unit, split_heading
+from detent.logs.mapping import SEPARATORS, FileOptions
+from detent.logs.raw_table import LARGEST_EXACT, BrokenRow, Item, RawTable, check_size
 
 MAX_BYTES = 200_000_000  # longest text table read, unpacked: two hours of ten signals, 200 times a second, are 150 MB
 ALLOWED = "a table as text: CSV, packed with gzip or not"
-
 BLOCK_ROWS = 16384  # rows whose cells are in memory as text at once
 _MOST_BROKEN = 0.2
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
+SAMPLE_LINES = 200  # lines that say something from which the layout is guessed
+_TRIED = ("\t", ";", ",", "|", " ")
+_COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
+MISSING = frozenset({"", "-", "--", "?", "na", "n/a", "nan", "-nan", "null", "none", "nil", "inf", "-inf", "+inf"})
+"""Texts, in small letters, with which programs say that there is no value."""
+
+_WORDS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eEdD][+-]?[0-9]{1,3})?")
+_MOMENT = re.compile(
+    r"([0-9]{4}-[0-9]{2}-[0-9]{2})[T ]([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?)(?:Z|[+-][0-9:]{4,6})?"
+)
+
+
+@dataclass(slots=True)
+class CsvLayout:
+    """How one text table is laid out."""
+
+    separator: str  # and decimal: as of `FileOptions`, both stated
+    decimal: str
+    first: int  # index of the first line of numbers
+    width: int  # cells of a usual row; less than there are columns where the last are always empty
+    # names, units: per column, from the header; a unit is empty where none is stated
+    names: list[str] = field(default_factory=list[str])
+    units: list[str] = field(default_factory=list[str])
+    # text_columns, moment_columns: columns that hold words, and those that hold dates with times of day
+    text_columns: set[int] = field(default_factory=set[int])
+    moment_columns: set[int] = field(default_factory=set[int])
+
+    def read(self, index: int, cells: Sequence[str]) -> tuple[NDArray[np.generic], set[int]]:
+        """Numbers or moments of a piece of a column, and the indices of the cells that are none."""
+        return read_moments(cells) if index in self.moment_columns else read_column(cells, self.decimal)
 
 
 def read_csv(path: Path, options: FileOptions) -> RawTable:
@@ -109,3 +146,199 @@ def _break(table: RawTable, layout: CsvLayout, cells: list[str], row: int, reaso
     """Put a row aside."""
     telling = tuple(read_cell(cell, layout.decimal) for cell in cells if cell)
     table.broken.append(BrokenRow(row, telling, reason))
+
+
+# ---- what cells say
+
+
+def is_number(cell: str) -> bool:
+    """True for a cell that is a number, with a decimal point or comma, or a truth value."""
+    return _NUMBER.fullmatch(cell) is not None or cell.lower() in _WORDS
+
+
+def is_moment(cell: str) -> bool:
+    """True for a cell that is a date with a time of day, such as ``2024-10-26T12:23:27.5``."""
+    return _MOMENT.fullmatch(cell) is not None
+
+
+def read_cell(cell: str, decimal: str) -> float | None:
+    """Number of one cell: NaN where it says nothing, None where it is no number.
+
+    >>> read_cell("1,5", ","), read_cell("n/a", ","), read_cell("1.2.3", ",")
+    (1.5, nan, None)
+    """
+    if cell.lower() in MISSING:
+        return np.nan
+    if cell.lower() in _WORDS:
+        return _WORDS[cell.lower()]
+    if not _NUMBER.fullmatch(cell) or ("," in cell and decimal != ","):
+        return None
+    # Fortran writes double precision with a D.
+    return float(cell.replace(",", ".").replace("D", "e").replace("d", "e"))
+
+
+def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64] | NDArray[np.int64], set[int]]:
+    """Numbers of a piece of a column, and the indices of the cells that are no numbers (NaN there).
+
+    Whole numbers beyond what a float holds exactly stay whole numbers.
+    """
+    try:
+        values = np.array(cells, dtype=np.float64)
+    except ValueError:
+        found = [read_cell(cell, decimal) for cell in cells]
+        wrong = {index for index, value in enumerate(found) if value is None}
+        values = np.array([np.nan if value is None else value for value in found])
+        return values, wrong
+    if len(values) and np.all(np.abs(values) > LARGEST_EXACT):
+        with suppress(ValueError, OverflowError):
+            return np.array([int(cell) for cell in cells], dtype=np.int64), set()
+    return values, set()
+
+
+def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]]:
+    """Moments of a piece of a column of dates and times, and the indices of the cells that are none.
+
+    The difference to universal time is left out: it is the same for all.
+    """
+    found = [_MOMENT.fullmatch(cell) for cell in cells]
+    texts = [f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT" for match in found]
+    try:
+        return np.array(texts, dtype="datetime64[ns]"), {index for index, match in enumerate(found) if match is None}
+    except ValueError:  # a month 13, or a year beyond what nanoseconds can count
+        return np.full(len(cells), np.datetime64("NaT"), dtype="datetime64[ns]"), set(range(len(cells)))
+
+
+def is_telling(line: str) -> bool:
+    """True for a line that is neither empty nor a comment."""
+    return bool(line.strip()) and not _COMMENT.match(line)
+
+
+def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
+    """Cells of lines, without the blanks around them."""
+    if separator == " ":
+        yield from (line.split() for line in lines)
+    else:
+        reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+        yield from ([cell.strip() for cell in cells] for cells in reader)
+
+
+def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) -> CsvLayout:
+    """Find out how a text table is laid out; what was guessed is among the notes of the table.
+
+    The separator is the one that gives the most cells that are numbers in rows of one width. The first such row is the
+    first row of numbers; the header is the line above it, which may be a comment; a line of nothing but units may stand
+    between them.
+    """
+    begin = options.header or 0
+    sample = [index for index in range(begin, len(lines)) if is_telling(lines[index])][:SAMPLE_LINES]
+    separator = options.separator or _guess_separator([lines[index] for index in sample])
+    rows = list(split_lines([lines[index] for index in sample], separator))
+    width = _width(rows)
+    place = _first_data(rows, width)
+    if place is None:
+        came = short(lines[sample[0]].strip()) if sample else "no lines below the header"
+        allowed = "a table: a header such as t [s],position [mm], then lines of numbers"
+        remedy = "state separator=, decimal= or header= (its line), or name another file"
+        raise InputError.of_file(table.file, came, allowed, remedy)
+    # Lines may end in separators behind which nothing ever stands.
+    while width > 1 and not any(cells[width - 1 : width] != [""] for cells in rows[place:] if len(cells) >= width):
+        width -= 1
+    # The decimal sign is a comma where numbers have one and it does not separate cells, or stands in quotes.
+    signed = [cell for cells in rows[place:] for cell in cells if is_number(cell)]
+    commas, points = sum("," in cell for cell in signed), sum("." in cell for cell in signed)
+    decimal = options.decimal or ("," if commas and (separator != "," or commas > points) else ".")
+    layout = CsvLayout(separator, decimal, sample[place], width)
+    _read_header(table, lines, layout, options.header)
+    _find_texts(rows[place:], layout)
+    if not options.separator and separator != ",":
+        table.notes.append(f"separator {next(word for word, value in SEPARATORS.items() if value == separator)}")
+    if not options.decimal and layout.decimal == ",":
+        table.notes.append("decimal comma")
+    return layout
+
+
+def _guess_separator(lines: Sequence[str]) -> str:
+    """Separator that leaves the most cells of one width that are numbers."""
+    scores: dict[str, tuple[float, int]] = {}  # rows whose cells are numbers or nothing, and how many cells they have
+    for separator in _TRIED:
+        rows = list(split_lines(lines, separator))
+        width = _width(rows)
+        whole = (cells for cells in rows if len(cells) == width > 1)
+        known = (_numbers(cells) + sum(cell.lower() in MISSING for cell in cells) for cells in whole)
+        scores[separator] = sum(count / width for count in known), width
+    best = max(_TRIED, key=lambda separator: scores[separator])
+    return best if scores[best][0] else ","
+
+
+def _width(rows: Sequence[Sequence[str]]) -> int:
+    """Commonest number of cells among the rows that hold numbers."""
+    widths = Counter(len(cells) for cells in rows if any(is_number(cell) for cell in cells))
+    return widths.most_common(1)[0][0] if widths else 0
+
+
+def _first_data(rows: Sequence[Sequence[str]], width: int) -> int | None:
+    """Index of the first row of numbers: of the usual width, as is the next; numbers alone may be fewer before it."""
+    data = [len(cells) == width and _numbers(cells) >= max(1, width / 2) for cells in rows]
+    place = next((place for place, ok in enumerate(data) if ok and all(data[place + 1 : place + 2])), None)
+    while place and len(rows[place - 1]) >= width / 2 and _numbers(rows[place - 1]) == len(rows[place - 1]):
+        place -= 1
+    return place
+
+
+def _numbers(cells: Sequence[str]) -> int:
+    """How many cells are numbers."""
+    return sum(is_number(cell) or is_moment(cell) for cell in cells)
+
+
+def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, stated: int | None) -> None:
+    """Names and units of the columns."""
+    width = layout.width
+    above = [index for index in range(layout.first) if lines[index].strip()]
+    if stated is not None:
+        if stated > len(lines):
+            raise InputError.of_file(table.file, f"header={stated}", f"a line from 1 to {len(lines)}", "state its line")
+        above = [stated - 1] if stated else []
+    rows = [_cells(lines[index], layout.separator) for index in above]
+    units: list[str] = []
+    if stated is None and len(rows) > 1 and _is_units(rows[-1]) and len(rows[-2]) >= len(rows[-1]) > 1:
+        units = [cell.strip("[]() ") for cell in rows.pop()]
+    # A line above the numbers that is much narrower than they are is no header but a remark.
+    names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
+    passed = len(rows) - bool(names)
+    if passed:
+        table.notes.append(f"{tell_count(passed, 'line')} above the header passed over")
+    if names and len(names) < width:
+        table.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last have no name")
+    if not names:
+        table.notes.append("no header: columns are called by their numbers")
+    for index in range(max(len(names), width)):
+        name = names[index] if index < len(names) else ""
+        layout.names.append(name or f"column {index + 1}")
+        layout.units.append(split_heading(name)[1] or (units[index] if index < len(units) else ""))
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Cells of a line above the numbers; a mark of a comment before them is left out."""
+    match = _COMMENT.match(line)
+    text = line[match.end() :] if match else line
+    cells = next(split_lines([text], separator), list[str]())
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """True for a row of nothing but units, such as ``[s];[mm]``; some columns may have none."""
+    telling = [cell for cell in cells if cell.strip("[]() -")]
+    return bool(telling) and all(is_unit(cell.strip("[]() ")) for cell in telling)
+
+
+def _find_texts(rows: Sequence[Sequence[str]], layout: CsvLayout) -> None:
+    """Find the columns of words and those of dates: at least half of their cells are no numbers."""
+    for index in range(len(layout.names)):
+        cells = [row[index] for row in rows if index < len(row) and row[index].lower() not in MISSING]
+        moments = sum(map(is_moment, cells))
+        if moments > len(cells) / 2:
+            layout.moment_columns.add(index)
+        elif sum(map(is_number, cells)) < len(cells) / 2:
+            layout.text_columns.add(index)

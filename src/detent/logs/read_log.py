@@ -11,18 +11,14 @@ from detent.files.text import kind_of, short
 from detent.logs.agreement import find_disagreements
 from detent.logs.choose import choose_columns, make_draft
 from detent.logs.counters import mend_counters
-from detent.logs.csv_layout import FileOptions
-from detent.logs.draft import Draft, tell_count
-from detent.logs.effort import find_wrong_effort
-from detent.logs.log import Action, Finding, Kind, Log, Severity, row_ranges
-from detent.logs.mapping import ColumnMapping, load_mapping, parse_options
+from detent.logs.effort import find_shifts, find_wrong_effort
+from detent.logs.log import Action, Draft, Finding, Kind, Log, Severity, row_ranges, tell_count
+from detent.logs.mapping import ColumnMapping, FileOptions, load_mapping, parse_options
 from detent.logs.raw_table import RawTable
-from detent.logs.read_arrays import read_mat, read_npz, read_parquet
+from detent.logs.read_arrays import read_hdf5, read_mat, read_npz, read_parquet
 from detent.logs.read_csv import read_csv
-from detent.logs.read_hdf5 import read_hdf5
 from detent.logs.read_json import read_json
 from detent.logs.rotation import mend_rotation
-from detent.logs.shifts import find_shifts
 from detent.logs.stamps import look_at_clock, mend_clock
 from detent.logs.stuck import find_saturation, find_stuck
 
@@ -36,7 +32,6 @@ READERS: dict[str, Callable[[Path, FileOptions], RawTable]] = {
 """Reader of each kind of file, by the ending of its name."""
 
 _TEXTS = frozenset(kind for kind, reader in READERS.items() if reader in {read_csv, read_json})
-
 _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 SLOW = frozenset({"supply", "temperature", "enabled"})  # recorded only now and then: they keep their last value
 MOST = 0.1  # share of empty cells from which a signal is left out: with more, too many rows would go with them

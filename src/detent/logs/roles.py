@@ -8,7 +8,6 @@ from functools import lru_cache
 from detent.logs.log_units import split_heading
 
 _MOTION = (("m", "rad", "count"), ("m/s", "rad/s", "count/s"), ("m/s^2", "rad/s^2", "count/s^2"))
-
 EFFORTS = ("force", "torque", "current", "voltage", "command")  # what can drive an axis, nearest to its mechanics first
 
 

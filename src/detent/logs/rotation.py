@@ -6,12 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.files.text import short
-from detent.logs.differences import runs_of
-from detent.logs.draft import tell_count
-from detent.logs.log import Action, Finding, Kind, Values, row_ranges
+from detent.logs.differences import fill_holes, runs_of
+from detent.logs.log import Action, Finding, Kind, Values, row_ranges, tell_count
 from detent.logs.raw_table import BrokenRow, RawTable
 from detent.logs.roles import words_of
-from detent.logs.windows import fill_holes
 
 SHORTEST = 10
 """Rows in which a column must run like a clock to be taken for one: a signal that happens to rise as evenly as a clock

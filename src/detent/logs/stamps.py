@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.logs.counters import unwrap_clock
-from detent.logs.draft import Draft, tell_count
-from detent.logs.log import Action, Kind, Severity, Values
+from detent.logs.log import Action, Draft, Kind, Severity, Values, tell_count
 
 FEWEST = 10  # samples that a recording must have
 COARSE = 0.05  # share of repeated stamps from which the stamps are coarse: below it, rows were written twice

@@ -6,10 +6,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.logs.differences import correlate, equal_runs, grain, integral, likeness, resolution, runs_of, window_rows
-from detent.logs.draft import Draft, tell_count
-from detent.logs.log import Action, Kind, Severity, Values
-from detent.logs.windows import spread
+from detent.logs.differences import (
+    correlate,
+    equal_runs,
+    grain,
+    integral,
+    likeness,
+    resolution,
+    runs_of,
+    spread,
+    window_rows,
+)
+from detent.logs.log import Action, Draft, Kind, Severity, Values, tell_count
 
 MOST_RUNS = 200  # runs of equal numbers that are looked at, the longest first
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from detent.logs.counters import find_wraps, mend_counters, unwrap
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, Source, row_ranges
+from detent.logs.log import Action, Draft, Kind, Source, row_ranges
 
 T = np.arange(400.0)
 SWING = np.round(30_000 * np.sin(T / 40))

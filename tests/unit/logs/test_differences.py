@@ -6,15 +6,17 @@ import pytest
 from detent.logs.differences import (
     correlate,
     equal_runs,
+    fill_holes,
     grain,
     integral,
     likeness,
     paired_changes,
+    parabolas,
     resolution,
     runs_of,
+    spread,
     window_rows,
 )
-from detent.logs.windows import fill_holes, parabolas, spread
 
 RNG = np.random.default_rng(1)
 T = np.arange(500) * 0.01

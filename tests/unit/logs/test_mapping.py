@@ -3,8 +3,7 @@
 import pytest
 
 from detent.errors import InputError
-from detent.logs.csv_layout import FileOptions
-from detent.logs.mapping import Choice, ColumnMapping, load_mapping, parse_options
+from detent.logs.mapping import Choice, ColumnMapping, FileOptions, load_mapping, parse_options
 
 WHOLE = """
 [log]
@@ -46,12 +45,12 @@ def problems_of(call, *arguments):
 def test_mapping_file(write):
     assert load_mapping(write(WHOLE)) == ColumnMapping(
         columns={
-            "time": Choice("t", "ms"),
-            "position": Choice("qm", "0.3125 um", offset=2.0, sign=-1, bits=16, delay=0.003),
-            "force": Choice("4", "N", "gtau"),
-            "velocity": Choice(""),
+            "time": Choice(column="t", unit="ms"),
+            "position": Choice(column="qm", unit="0.3125 um", offset=2.0, sign=-1, bits=16, delay="3 ms"),
+            "force": Choice(column="4", unit="N", factor="gtau"),
+            "velocity": Choice(column=""),
         },
-        file=FileOptions(";", ",", 3, "run1", 0.001),
+        file=FileOptions(separator=";", decimal=",", header=3, table="run1", period="1 ms"),
         constants={"gtau": 35.0},
     )
 
@@ -59,17 +58,20 @@ def test_mapping_file(write):
 @pytest.mark.parametrize(
     ("option", "mapping"),
     [
-        ("position=qm [m]", ColumnMapping({"position": Choice("qm", "m")})),
-        (" position = motor angle[ 1.8 deg ] ", ColumnMapping({"position": Choice("motor angle", "1.8 deg")})),
-        ("force=-vir [35.15 N]", ColumnMapping({"force": Choice("vir", "35.15 N", sign=-1)})),
-        ("position=enc(steps)", ColumnMapping({"position": Choice("enc(steps)")})),
-        ("velocity=", ColumnMapping({"velocity": Choice("")})),
-        ("time=2", ColumnMapping({"time": Choice("2")})),
+        ("position=qm [m]", ColumnMapping({"position": Choice(column="qm", unit="m")})),
+        (
+            " position = motor angle[ 1.8 deg ] ",
+            ColumnMapping({"position": Choice(column="motor angle", unit="1.8 deg")}),
+        ),
+        ("force=-vir [35.15 N]", ColumnMapping({"force": Choice(column="vir", unit="35.15 N", sign=-1)})),
+        ("position=enc(steps)", ColumnMapping({"position": Choice(column="enc(steps)")})),
+        ("velocity=", ColumnMapping({"velocity": Choice(column="")})),
+        ("time=2", ColumnMapping({"time": Choice(column="2")})),
         ("separator=tab", ColumnMapping(file=FileOptions(separator="\t"))),
         ("separator=;", ColumnMapping(file=FileOptions(separator=";"))),
         ("decimal=comma", ColumnMapping(file=FileOptions(decimal=","))),
         ("header=0", ColumnMapping(file=FileOptions(header=0))),
-        ("period=1 ms", ColumnMapping(file=FileOptions(period=0.001))),
+        ("period=1 ms", ColumnMapping(file=FileOptions(period="1 ms"))),
         ("table=a/b", ColumnMapping(file=FileOptions(table="a/b"))),
     ],
 )
@@ -79,9 +81,9 @@ def test_options(option, mapping):
 
 def test_options_override_the_mapping(write):
     mapping = load_mapping(write(WHOLE)).overridden(parse_options(["force=x [N]", "decimal=point", "header=0"]))
-    assert mapping.columns["force"] == Choice("x", "N")
-    assert mapping.columns["time"] == Choice("t", "ms")
-    assert mapping.file == FileOptions(";", ".", 0, "run1", 0.001)
+    assert mapping.columns["force"] == Choice(column="x", unit="N")
+    assert mapping.columns["time"] == Choice(column="t", unit="ms")
+    assert mapping.file == FileOptions(separator=";", decimal=".", header=0, table="run1", period="1 ms")
 
 
 @pytest.mark.parametrize(

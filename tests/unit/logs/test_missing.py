@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Severity
+from detent.logs.log import Action, Draft, Severity
 from detent.logs.read_log import mend_missing
 
 NAN = np.nan

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from detent.errors import InputError
-from detent.logs.csv_layout import FileOptions, is_moment, is_number, read_cell, read_column, read_moments
-from detent.logs.read_csv import read_csv
+from detent.logs.mapping import FileOptions
+from detent.logs.read_csv import is_moment, is_number, read_cell, read_column, read_csv, read_moments
 from detent.logs.read_log import read_table
 
 

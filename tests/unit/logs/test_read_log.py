@@ -89,7 +89,7 @@ def test_time_since_1970_counts_from_the_first_sample(write):
 
 
 def test_a_mapping_may_be_made_in_the_program(write):
-    mapping = ColumnMapping({"position": Choice("enc", "0.5 um"), "current": Choice("")})
+    mapping = ColumnMapping({"position": Choice(column="enc", unit="0.5 um"), "current": Choice(column="")})
     log = read_log(write(table(ROWS)), mapping)
     assert list(log.signals) == ["position"]
 

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from detent.errors import DetentError, InputError
-from detent.logs.csv_layout import FileOptions
+from detent.logs.mapping import FileOptions
 from detent.logs.read_log import READERS, read_table
 from detent.record.trace import Trace
 from detent.record.trace_files import save_trace

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, Severity, Source
+from detent.logs.log import Action, Draft, Kind, Severity, Source
 from detent.logs.stuck import find_saturation
 
 T = np.arange(2000) * 0.001

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from tests.synthetic_logs import Recording, kinds
 
+from detent.logs.effort import find_lag
 from detent.logs.log import Action, Kind
-from detent.logs.shifts import find_lag
 
 N = 2400
 DT = 0.001

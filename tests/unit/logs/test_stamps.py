@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from detent.errors import InputError
-from detent.logs.draft import Draft
-from detent.logs.log import Action, Kind, Severity
+from detent.logs.log import Action, Draft, Kind, Severity
 from detent.logs.stamps import look_at_clock, mend_clock, stretches
 
 

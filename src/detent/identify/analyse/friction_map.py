@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
 from detent.identify.fit.steady import find_steady, find_velocity
-from detent.logs.differences import grain, smooth, window_rows
+from detent.logs.differences import grain, scipy, smooth, window_rows
 from detent.logs.log import Log, Values
-from detent.logs.windows import scipy
 
 FEWEST_WINDOWS = 5.0  # independent windows of a bin, at least
 MEMORIES = 10  # length of a window, in memories of the residual

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.logs.differences import scipy
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import scipy
 
 WEAKEST_BAND = 1e-4  # power density of an excited frequency, as a part of the strongest
 OVERLAP = 0.5  # overlap of two windows

@@ -23,8 +23,8 @@ from detent.identify.analyse.measure_response import FrequencyResponse
 from detent.identify.analyse.response_fit import Fit, Lines, fit_model, take_lines
 from detent.identify.analyse.two_mass_response import LoadModel, RigidModel, TwoMassModel, constants_of
 from detent.identify.fit.estimate import Estimate, estimate
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 COHERENT = 0.5  # coherence that the lines about a resonance must have on average for it to be trusted
 SHARP = 0.03  # standard error of a frequency, as a part of it, above which it is not trusted

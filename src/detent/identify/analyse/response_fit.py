@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts
 from detent.identify.analyse.two_mass_response import Complex, ResponseModel, laplace, respond_sampled
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 MOST_DEVIATION = 0.3  # standard deviation of a line from which it is left out: the response there is noise
 LINES_PER_PARAMETER = 2  # lines below which a fit says nothing

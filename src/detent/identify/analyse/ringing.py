@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from detent.identify.fit.coloured import known_noise_covariance
 from detent.identify.fit.estimate import Estimate, estimate
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 FEWEST_SWINGS = 2  # swings, at least: two give one ratio
 FAINT = 0.05  # part of the first swing below which the decay is not fitted

@@ -24,9 +24,8 @@ from detent.identify.analyse.ringing import Ringing, fit_ringing
 from detent.identify.fit.coloured import known_noise_covariance
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.steady import mean_error
-from detent.logs.differences import resolution, runs_of
+from detent.logs.differences import fill_holes, resolution, runs_of
 from detent.logs.log import Log, Values
-from detent.logs.windows import fill_holes
 
 STILL = 1e-4  # change of the reference from sample to sample, as a part of its range, up to which it rests
 PAUSE = 10  # samples of a rest of the reference, at least; a shorter one is part of the step

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.steady import SteadyStretch, find_steady, find_velocity, measure_stretch, unit_per_speed
+from detent.logs.differences import scipy
 from detent.logs.log import Log, Values
-from detent.logs.windows import scipy
 
 APART = 0.1  # difference of the highest and lowest speed, at least, as a part of the highest
 ROUNDS = 3  # times that weights and line are computed in turn: the errors of the stretches depend on the slope

@@ -25,9 +25,9 @@ import numpy as np
 
 from detent.identify.fit.coloured import coloured_covariance, known_noise_covariance
 from detent.identify.fit.estimate import Estimate, estimate, quantile
+from detent.logs.differences import scipy
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches
-from detent.logs.windows import scipy
 
 EVEN = 0.1  # largest deviation of a time step from their mean, as a part of it
 TOGETHER = 0.95  # correlation of two constants from which they may be inseparable

@@ -22,8 +22,8 @@ longer series, made from white noise by an autoregressive filter (Yule and Walke
 
 import numpy as np
 
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 RANK = 1e-10
 """Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding

@@ -18,10 +18,9 @@ import numpy as np
 
 from detent.errors import DetentError
 from detent.identify.fit.estimate import Estimate, estimate
-from detent.logs.differences import window_rows
+from detent.logs.differences import parabolas, window_rows
 from detent.logs.effort import Motion, terms
 from detent.logs.log import Values
-from detent.logs.windows import parabolas
 
 LONGEST = 40  # samples up to which a dead time is looked for
 EXPLAINED = 0.7  # share of the effort's variance that the motion must explain

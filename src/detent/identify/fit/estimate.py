@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 LEVEL = 0.95  # share of intervals that hold the true value
 

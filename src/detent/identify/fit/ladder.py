@@ -28,16 +28,14 @@ from detent.identify.fit.regression import (
     make_effort,
     solve,
 )
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 STRETCHES = 8  # parts of a log that are held out one after the other
 CLEAR = 0.0  # mean gain of a rung in standard errors over the stretches, from which it is taken
-
 ALIKE = 1e-8  # gain, in parts of the mean square, up to which only rounding tells two rungs apart
 SLOWEST = 0.002  # least Stribeck velocity tried, in parts of the top speed
 FINER = 1.6  # ratio of neighbouring Stribeck velocities tried, at most
-
 AT_BOUND = 0.01  # a bend this near to the least or the largest tried, in parts of it, is a bound and no value
 
 LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95])

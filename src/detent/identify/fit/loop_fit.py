@@ -20,8 +20,8 @@ import numpy as np
 
 from detent.identify.fit.estimate import rms, significant
 from detent.identify.fit.prepare import Run
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 SPANS = (1, 2, 3, 4, 6, 8, 12)  # samples that the velocity may be a difference over
 SEEN = 0.7  # part of the log that is fitted; the rest tests

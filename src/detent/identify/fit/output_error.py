@@ -23,8 +23,8 @@ from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.free_run import Plant, start_velocities
 from detent.identify.fit.prepare import Run
+from detent.logs.differences import scipy
 from detent.logs.log import Values
-from detent.logs.windows import scipy
 
 STRETCH = 2.0  # length of a simulated stretch [s]
 MOST_ROUNDS = 40  # rounds of the search, at most
@@ -33,7 +33,6 @@ MEANT = 0.98  # share of a stretch's samples that must mean something
 SLOWEST = 0.1  # least Stribeck velocity in parts of that of the start: towards 0 the plant's rate has no bound
 _FREE = frozenset({"offset", "pendulum", "pendulum.across"})  # searched constants that may be below 0
 _FORCES = frozenset({"coulomb", "offset", "static", "pendulum"})
-
 MOST_LOST = 0.95  # share of the effort that a transmission may lose, at most
 
 

@@ -33,7 +33,6 @@ WIDER = 2.5  # width of the windows that are instruments where there is no refer
 ENDS = 0.1  # share of a run that half of such a window takes at most: rows closer to the ends are lost
 ROUNDS = 8  # rounds in which the delay of the effort is found, at most
 SHARED = 1e-3  # part of a constant in a sum that nothing tells, from which on it is not told
-
 UNKNOWN = 1e6  # standard error, in largest efforts, of a constant that nothing in the log excites
 
 

@@ -19,7 +19,6 @@ LEAST_MOTION = 1.0  # time in which the axis really moves [s], at least
 LEAST_EACH_WAY = 0.05  # share of this time in each direction, at least
 MOST_SATURATED = 0.3  # share of saturated samples, at most
 MOST_STUCK = 0.05  # share of samples with a stuck signal, at most
-
 MOST_LEFT_BEHIND = 0.6  # share of the reference's way while the position stands still, at most: friction may hold it
 WIDEST_MASS = 0.2  # half of the interval of the mass over the mass, at most
 WIDEST_FORCE = 0.15  # half of the interval of a friction or a weight over the effort that moves the axis, at most
@@ -27,7 +26,6 @@ SAME_SPEED = 0.6  # tenth over ninth decile of the speeds of a direction, from w
 WIDEST_DELAY = 10.0  # half of the interval of the delay, in samples, at most
 WORST_PREDICTION = 0.35  # error of the prediction of stretches not seen over the effort, at most
 WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocity of the start, at most
-
 _WAYS = ("positive", "negative")
 _FRICTIONS = tuple(f"{kind}.{way}" for kind in ("coulomb", "viscous", "static") for way in _WAYS)
 FORCES = (*_FRICTIONS, "pendulum", "pendulum.across")

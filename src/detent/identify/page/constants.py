@@ -26,9 +26,7 @@ from detent.page.table import Table
 from detent.page.words import GAP, further, number
 
 WIDTH, HEIGHT = 170.0, 18.0  # of the drawing of an interval [px]
-
 REACHES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # ends of the scale of intervals, over the value
-
 UNSCALED = ("delay", "stribeck", "loss")  # near 0 or hardly ever known well: these do not set the scale
 ALIKE = 0.9  # correlation of two constants from which on the data hardly separate them
 MOST_PAIRS = 4  # pairs told in words

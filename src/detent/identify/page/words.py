@@ -32,7 +32,6 @@ _CONSTANTS = {
 
 _WAYS = {"positive": "in positive direction", "negative": "in negative direction"}
 SINCE = "time since the recording began"
-
 _SMALL_EFFORTS = {"N": "mN", "N*m": "mN*m", "A": "mA", "V": "mV"}
 
 

@@ -24,7 +24,6 @@ from detent.methods.load import axis_of
 from detent.units import format_quantity
 
 CLEAR = 0.3  # angle of the velocity loop's crossover frequency over its dead time [rad]: 17 degrees of phase
-
 FASTEST = 2 * math.pi * 40  # largest bandwidth chosen for a velocity loop [rad/s]: no log shows what may swing above it
 STEADY = 0.02  # velocity of one count of the encoder over the top speed, at most
 LONGEST = 5e-3  # longest stretch that the velocity is a difference over [s]

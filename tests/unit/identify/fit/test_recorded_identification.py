@@ -29,10 +29,10 @@ SEEN = 0.75
 def found():
     """Its record: 25 s at 1 kHz, to and fro at three speeds, under a cascade."""
     columns = {
-        "time": Choice("t", "s"),
-        "position": Choice("qm", "m"),
-        "reference": Choice("qg", "m"),
-        "force": Choice("vir", "N", factor="gtau"),
+        "time": Choice(column="t", unit="s"),
+        "position": Choice(column="qm", unit="m"),
+        "reference": Choice(column="qg", unit="m"),
+        "force": Choice(column="vir", unit="N", factor="gtau"),
     }
     return identify([read_log(EMPS, ColumnMapping(columns))])
 
