@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from detent.identify.analyse.measure_response import FrequencyResponse, noise_parts, response_deviation
-from detent.identify.analyse.two_mass_response import TwoMassModel, respond_sampled
+from detent.identify.analyse.response_fit import TwoMassModel, respond_sampled
 from detent.methods.cascade.system import set_count
 from tests.cascade_rig import SAMPLE_TICKS, T_SAMPLE, Rig, make_params, set_friction
 

@@ -10,21 +10,10 @@ import numpy as np
 
 from detent.errors import InputError
 from detent.files.text import check_file
+from detent.logs import raw_table
 from detent.logs.differences import scipy
 from detent.logs.log_units import split_heading
 from detent.logs.mapping import FileOptions
-from detent.logs.raw_table import (
-    MAX_CELLS,
-    MAX_COLUMNS,
-    MAX_CONSTANTS,
-    Item,
-    RawTable,
-    check_size,
-    no_table,
-    table_of,
-    tell,
-    whole,
-)
 
 MAX_COLUMNAR = 2_000_000_000  # largest HDF5 or Parquet file read; what counts is how many numbers are taken from it
 MAX_BYTES = 500_000_000  # largest file of arrays read, HDF5 and Parquet aside
@@ -37,34 +26,37 @@ _DEEPEST_GROUP = 6
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")
 
 
-def read_mat(path: Path, options: FileOptions) -> RawTable:
+def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read a MATLAB file: version 4 to 7 with SciPy, version 7.3, which is HDF5, as such.
 
     Fields of structures give names joined by points; ``table`` names the structure to read.
     """
     check_file(path, MAX_BYTES, ALLOWED_MAT)
-    with whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
+    with raw_table.whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
         try:
             cells = sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy("io").whosmat(path))
-            if cells > MAX_CELLS:
-                raise _too_much(path, f"{cells} numbers", f"{ALLOWED_MAT}, up to {MAX_CELLS} numbers")
+            if cells > raw_table.MAX_CELLS:
+                raise _too_much(path, f"{cells} numbers", f"{ALLOWED_MAT}, up to {raw_table.MAX_CELLS} numbers")
             found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
             return read_hdf5(path, options)
     items = [item for name, value in found.items() if not name.startswith("__") for item in _fields(name, value, 0)]
-    return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
+    return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_MAT)
 
 
-def read_npz(path: Path, options: FileOptions) -> RawTable:
+def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read arrays saved by NumPy, as NPZ or as one structured or plain NPY; pickled objects are refused."""
     check_file(path, MAX_BYTES, ALLOWED_NPZ)
-    items: list[Item] = []
-    with whole(path, "NPZ", ALLOWED_NPZ, "save it again with numpy.savez, or as CSV"), path.open("rb") as stream:
+    items: list[raw_table.Item] = []
+    with (
+        raw_table.whole(path, "NPZ", ALLOWED_NPZ, "save it again with numpy.savez, or as CSV"),
+        path.open("rb") as stream,
+    ):
         if zipfile.is_zipfile(stream):
             with zipfile.ZipFile(path) as archive:
                 size = sum(entry.file_size for entry in archive.infolist())
-            if size > 8 * MAX_CELLS:
-                most = f"up to {8 * MAX_CELLS // 1_000_000} MB unpacked"
+            if size > 8 * raw_table.MAX_CELLS:
+                most = f"up to {8 * raw_table.MAX_CELLS // 1_000_000} MB unpacked"
                 raise _too_much(path, f"{size // 1_000_000} MB unpacked", most)
             with np.load(path, allow_pickle=False) as arrays:
                 for name in arrays.files:
@@ -73,10 +65,10 @@ def read_npz(path: Path, options: FileOptions) -> RawTable:
             stream.seek(0)  # whether it is an archive was asked at its end
             array = np.load(stream, allow_pickle=False)
             items = list(_fields("" if array.dtype.names else "column", array, 0))
-    return table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
+    return raw_table.table_of(str(path), _inside(str(path), items, options.table), ALLOWED_NPZ)
 
 
-def read_parquet(path: Path, options: FileOptions) -> RawTable:
+def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit."""
     del options
     check_file(path, MAX_COLUMNAR, ALLOWED_PARQUET)
@@ -86,13 +78,13 @@ def read_parquet(path: Path, options: FileOptions) -> RawTable:
         remedy = 'pip install "detent[parquet]", or save the recording as CSV or HDF5'
         came = "a file that needs pyarrow, which is not installed"
         raise InputError.of_file(str(path), came, ALLOWED_PARQUET, remedy) from None
-    with whole(path, "Parquet", ALLOWED_PARQUET), parquet.ParquetFile(path) as file:
-        check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
+    with raw_table.whole(path, "Parquet", ALLOWED_PARQUET), parquet.ParquetFile(path) as file:
+        raw_table.check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
         items = [_column(field, values) for field, values in zip(file.schema_arrow, file.read().columns, strict=True)]
-    return table_of(str(path), items, ALLOWED_PARQUET)
+    return raw_table.table_of(str(path), items, ALLOWED_PARQUET)
 
 
-def _column(field: Any, column: Any) -> Item:
+def _column(field: Any, column: Any) -> raw_table.Item:
     """A column of a Parquet file with its unit; one of anything but numbers and moments has no value."""
     metadata: dict[bytes, bytes] = field.metadata or {}
     unit = metadata.get(b"unit", b"").decode("utf-8", "replace") or split_heading(field.name)[1]
@@ -102,7 +94,7 @@ def _column(field: Any, column: Any) -> Item:
             values = values.astype(np.float64)
         except (ValueError, TypeError):
             values = None
-    return Item(field.name, values, unit)
+    return raw_table.Item(field.name, values, unit)
 
 
 def _load_member(arrays: Any, name: str) -> Any:
@@ -120,7 +112,7 @@ def _too_much(path: Path, came: str, allowed: str) -> InputError:
     return InputError.of_file(str(path), came, allowed, "cut the recording into pieces")
 
 
-def _fields(name: str, value: Any, depth: int) -> Iterator[Item]:
+def _fields(name: str, value: Any, depth: int) -> Iterator[raw_table.Item]:
     """What a value of a MATLAB file holds: fields of a structure under names joined by points."""
     kind: np.dtype[Any] | None = getattr(value, "dtype", None)
     if kind is not None and kind.names:
@@ -130,23 +122,23 @@ def _fields(name: str, value: Any, depth: int) -> Iterator[Item]:
         for field in kind.names:
             yield from _fields(f"{name}.{field}" if name else field, record[field], depth + 1)
     else:
-        yield Item(name, value, split_heading(name)[1])
+        yield raw_table.Item(name, value, split_heading(name)[1])
 
 
-def _inside(file: str, items: list[Item], table: str) -> list[Item]:
+def _inside(file: str, items: list[raw_table.Item], table: str) -> list[raw_table.Item]:
     """Items of one structure, or all."""
     if not table:
         return items
     found = [item for item in items if item.name == table or item.name.startswith(f"{table}.")]
     if not found:
-        raise no_table(file, table, sorted({item.name.partition(".")[0] for item in items}))
+        raise raw_table.no_table(file, table, sorted({item.name.partition(".")[0] for item in items}))
     return [item._replace(name=item.name.removeprefix(f"{table}.")) for item in found]
 
 
 # ---- HDF5: detent's own traces, MATLAB 7.3, and what other programs write
 
 
-def read_hdf5(path: Path, options: FileOptions) -> RawTable:
+def read_hdf5(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read the datasets of an HDF5 file; links out of the file are not followed.
 
     Of a file with several groups that hold vectors, the one with the most is read unless ``table`` names another.
@@ -155,14 +147,14 @@ def read_hdf5(path: Path, options: FileOptions) -> RawTable:
     import h5py
 
     check_file(path, MAX_COLUMNAR, ALLOWED_HDF5)
-    with whole(path, "HDF5", ALLOWED_HDF5), h5py.File(path, "r") as file:
+    with raw_table.whole(path, "HDF5", ALLOWED_HDF5), h5py.File(path, "r") as file:
         items, notes = _read_file(str(path), file, options.table.strip("/"))
-    table = table_of(str(path), items, ALLOWED_HDF5)
+    table = raw_table.table_of(str(path), items, ALLOWED_HDF5)
     table.notes += notes
     return table
 
 
-def _read_file(path: str, file: Any, wanted: str) -> tuple[list[Item], list[str]]:
+def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item], list[str]]:
     """Datasets of the chosen group with their names inside it, and what had to be chosen."""
     h5py: Any = importlib.import_module("h5py")
     found = list(_datasets(file, 0, {int(h5py.h5o.get_info(file.id).addr)}))
@@ -174,18 +166,20 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[Item], list[str]
         # The columns of a run stand side by side; single values may stand anywhere.
         chosen = max(groups, key=lambda name: sum(_is_vector(dataset) for dataset in groups[name]))
         others = [name or "/" for name, sets in groups.items() if name != chosen and any(map(_is_vector, sets))]
-        notes = [f"group {chosen or '/'} read, not {tell(others)}"] if others else []
+        notes = [f"group {chosen or '/'} read, not {raw_table.tell(others)}"] if others else []
     below = [dataset for dataset in found if f"{dataset.name.strip('/')}/".startswith(f"{chosen}/" if chosen else "")]
     if wanted and not below:
-        raise no_table(path, wanted, (name or "/" for name in groups), "none: it holds no datasets")
+        raise raw_table.no_table(path, wanted, (name or "/" for name in groups), "none: it holds no datasets")
     taken = below if wanted else groups.get(chosen, [])
-    singles = [dataset for dataset in found if dataset.size == 1 and dataset not in taken][:MAX_CONSTANTS]
+    singles = [dataset for dataset in found if dataset.size == 1 and dataset not in taken][: raw_table.MAX_CONSTANTS]
     cells = sum(int(dataset.size) for dataset in taken)
-    if cells > MAX_CELLS or len(taken) > MAX_COLUMNS:
+    if cells > raw_table.MAX_CELLS or len(taken) > raw_table.MAX_COLUMNS:
         came = f"{len(taken)} datasets of {cells} numbers"
         remedy = "state one group as table=, or cut the recording into pieces"
-        raise InputError.of_file(path, came, f"up to {MAX_COLUMNS} datasets, {MAX_CELLS} numbers", remedy)
-    attributes = [Item(str(name), value) for name, value in file.attrs.items()]
+        raise InputError.of_file(
+            path, came, f"up to {raw_table.MAX_COLUMNS} datasets, {raw_table.MAX_CELLS} numbers", remedy
+        )
+    attributes = [raw_table.Item(str(name), value) for name, value in file.attrs.items()]
     return [*_in_order(file, chosen, taken), *map(_item, singles), *attributes], notes
 
 
@@ -211,7 +205,7 @@ def _is_vector(dataset: Any) -> bool:
     return int(dataset.size) > 1 and (dataset.dtype.names is not None or dataset.dtype.kind in "biuf")
 
 
-def _in_order(file: Any, group: str, datasets: list[Any]) -> list[Item]:
+def _in_order(file: Any, group: str, datasets: list[Any]) -> list[raw_table.Item]:
     """Items of datasets, in the order of the group's attribute ``columns``, as in detent's traces, if there is one."""
     prefix = f"{group}/" if group else ""
     items = {dataset.name.strip("/").removeprefix(prefix): dataset for dataset in datasets}
@@ -222,7 +216,7 @@ def _in_order(file: Any, group: str, datasets: list[Any]) -> list[Item]:
     return [_item(items[name])._replace(name=name) for name in dict.fromkeys([*order, *items])]
 
 
-def _item(dataset: Any) -> Item:
+def _item(dataset: Any) -> raw_table.Item:
     """A dataset with its unit."""
     name = dataset.name.strip("/")
     units = (dataset.attrs.get(key) for key in _UNIT_NAMES)
@@ -230,4 +224,4 @@ def _item(dataset: Any) -> Item:
     if isinstance(unit, bytes):
         unit = unit.decode("utf-8", "replace")
     value = dataset[()] if dataset.dtype.kind in "biufVSO" else None
-    return Item(name, value, str(unit) if isinstance(unit, str) else split_heading(name)[1])
+    return raw_table.Item(name, value, str(unit) if isinstance(unit, str) else split_heading(name)[1])

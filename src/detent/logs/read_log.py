@@ -10,7 +10,6 @@ from detent.errors import InputError
 from detent.files.text import kind_of, short
 from detent.logs.agreement import find_disagreements
 from detent.logs.choose import choose_columns, make_draft
-from detent.logs.counters import mend_counters
 from detent.logs.effort import find_shifts, find_wrong_effort
 from detent.logs.log import Action, Draft, Finding, Kind, Log, Severity, row_ranges, tell_count
 from detent.logs.mapping import ColumnMapping, FileOptions, load_mapping, parse_options
@@ -19,7 +18,7 @@ from detent.logs.read_arrays import read_hdf5, read_mat, read_npz, read_parquet
 from detent.logs.read_csv import read_csv
 from detent.logs.read_json import read_json
 from detent.logs.rotation import mend_rotation
-from detent.logs.stamps import look_at_clock, mend_clock
+from detent.logs.stamps import look_at_clock, mend_clock, mend_counters
 from detent.logs.stuck import find_saturation, find_stuck
 
 EPOCH = 1e8  # a time from which on it counts from some year, and is counted from the first sample instead [s]

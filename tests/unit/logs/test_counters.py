@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from detent.logs.counters import find_wraps, mend_counters, unwrap
 from detent.logs.log import Action, Draft, Kind, Source, row_ranges
+from detent.logs.stamps import find_wraps, mend_counters, unwrap
 
 T = np.arange(400.0)
 SWING = np.round(30_000 * np.sin(T / 40))

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.identify.analyse.encoder_resolution import estimate_resolution
 from detent.identify.analyse.friction_map import map_friction
 from detent.identify.analyse.measure_response import response_of
 from detent.identify.analyse.resonances import fit_resonances
+from detent.identify.analyse.sensors import estimate_resolution, find_dead_time
 from detent.identify.analyse.step_metrics import measure_steps
 from detent.identify.analyse.two_speeds import fit_two_speeds
 from detent.identify.analyse.winding import fit_winding
-from detent.identify.fit.dead_time import find_dead_time
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.log import Log
 from detent.logs.roles import EFFORTS

@@ -2,7 +2,7 @@
 
 What remains of the effort of an axis when ``mass * acceleration`` is taken away is friction, whatever its law. It is
 averaged in bins of speed, finer towards rest, where friction changes most. Without a mass only steady stretches are
-used (`detent.identify.fit.steady`).
+used (`detent.identify.analyse.two_speeds`).
 
 The residual about such an average is coloured: friction depends on the position, and filters smear noise. The recording
 is therefore cut into windows much longer than its residual remembers; what one window adds to a bin counts as one
@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.identify.analyse.two_speeds import find_steady, find_velocity
 from detent.identify.fit.estimate import LEVEL, Estimate, estimate, quantile
-from detent.identify.fit.steady import find_steady, find_velocity
 from detent.logs.differences import grain, scipy, smooth, window_rows
 from detent.logs.log import Log, Values
 

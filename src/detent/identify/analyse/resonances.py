@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.identify.analyse import response_fit
 from detent.identify.analyse.measure_response import FrequencyResponse
-from detent.identify.analyse.response_fit import Fit, Lines, fit_model, take_lines
-from detent.identify.analyse.two_mass_response import LoadModel, RigidModel, TwoMassModel, constants_of
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.differences import scipy
 from detent.logs.log import Values
@@ -78,14 +77,14 @@ def fit_resonances(
     if not responses:
         raise DetentError("identify: came no frequency response; allowed: that of the motor, of the load, or of both")
     outputs = tuple(name for name, response in (("motor", motor), ("load", load)) if response is not None)
-    lines = take_lines(responses)
+    lines = response_fit.take_lines(responses)
     low = 2 * np.pi * lines.frequency[0]
     frictions = [np.array([low * part]) for part in (0.1, 1.0, 10.0, 100.0)]
-    rigid = fit_model(RigidModel(len(outputs)), lines, frictions, hold)
+    rigid = response_fit.fit_model(response_fit.RigidModel(len(outputs)), lines, frictions, hold)
     if motor is None:
-        fit = fit_model(LoadModel(), lines, _load_starts(lines), hold)
+        fit = response_fit.fit_model(response_fit.LoadModel(), lines, _load_starts(lines), hold)
     else:
-        fit = fit_model(TwoMassModel(len(outputs)), lines, _two_mass_starts(lines), hold)
+        fit = response_fit.fit_model(response_fit.TwoMassModel(len(outputs)), lines, _two_mass_starts(lines), hold)
     why = _is_no_better(fit, rigid, lines)
     reasons = [why] if why else _doubts(fit, responses)
     fit = rigid if why else fit
@@ -102,7 +101,7 @@ def fit_resonances(
 # -- starts ---------------------------------------------------------------------------------------------------
 
 
-def _frequencies(lines: Lines, *, deepest: bool) -> list[float]:
+def _frequencies(lines: response_fit.Lines, *, deepest: bool) -> list[float]:
     """Where a resonance may be: a grid over the band, and the highest (deepest) lines of the acceleration [rad/s]."""
     low, high = math.log(lines.frequency[0]), math.log(lines.frequency[-1])
     grid = np.exp(low + (high - low) * np.arange(1, 25, dtype=np.float64) / 25)
@@ -111,7 +110,7 @@ def _frequencies(lines: Lines, *, deepest: bool) -> list[float]:
     return (2 * np.pi * np.r_[grid, lines.frequency[order[:3]]]).tolist()
 
 
-def _two_mass_starts(lines: Lines) -> list[Values]:
+def _two_mass_starts(lines: response_fit.Lines) -> list[Values]:
     """A grid over anti-resonance, ratio of the masses, damping and friction."""
     low = 2 * np.pi * lines.frequency[0]
     zeros, poles = (_frequencies(lines, deepest=deepest) for deepest in (True, False))
@@ -125,7 +124,7 @@ def _two_mass_starts(lines: Lines) -> list[Values]:
     ]
 
 
-def _load_starts(lines: Lines) -> list[Values]:
+def _load_starts(lines: response_fit.Lines) -> list[Values]:
     """A grid over resonance, damping and friction."""
     low = 2 * np.pi * lines.frequency[0]
     return [
@@ -139,10 +138,10 @@ def _load_starts(lines: Lines) -> list[Values]:
 # -- doubts ---------------------------------------------------------------------------------------------------
 
 
-def _is_no_better(fit: Fit, rigid: Fit, lines: Lines) -> str:
+def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: response_fit.Lines) -> str:
     """Why the axis is taken for rigid; empty where two masses explain it better (F test on the same weights)."""
 
-    def squares(one: Fit) -> float:
+    def squares(one: response_fit.Fit) -> float:
         misfit = np.log(np.where(lines.used, lines.measured / one.fitted, 1.0))
         return float(np.sum(np.abs(fit.weights * misfit) ** 2))
 
@@ -160,7 +159,7 @@ def _is_no_better(fit: Fit, rigid: Fit, lines: Lines) -> str:
     return ""
 
 
-def _doubts(fit: Fit, responses: Sequence[FrequencyResponse]) -> list[str]:
+def _doubts(fit: response_fit.Fit, responses: Sequence[FrequencyResponse]) -> list[str]:
     """Why the frequencies found are not to be trusted."""
     found = fit.spread(fit.model.tell)
     doubts: list[str] = []
@@ -210,22 +209,24 @@ def _doubts_of(
 # -- estimates ------------------------------------------------------------------------------------------------
 
 
-def _tell(fit: Fit, parameters: Values, *, is_force: bool) -> dict[str, float]:
+def _tell(fit: response_fit.Fit, parameters: Values, *, is_force: bool) -> dict[str, float]:
     """What is told of a fit with any parameters: what its model tells, gain and delay [s]; of a force the masses."""
     told = fit.model.tell(parameters) | {"gain": fit.sign * float(np.exp(parameters[-2]))}
-    if not isinstance(fit.model, LoadModel):
+    if not isinstance(fit.model, response_fit.LoadModel):
         # With the load alone it is less the advance that the coupling's damping makes.
         told["delay"] = float(parameters[-1])
     total = float(np.exp(-parameters[-2]))
     if is_force:
         told["mass.total"] = total
-        if isinstance(fit.model, TwoMassModel):
+        if isinstance(fit.model, response_fit.TwoMassModel):
             parts = ("mass.motor", "mass.load", "stiffness", "damping")
-            told |= {name: part * total for name, part in zip(parts, constants_of(parameters), strict=False)}
+            told |= {
+                name: part * total for name, part in zip(parts, response_fit.constants_of(parameters), strict=False)
+            }
     return told
 
 
-def _estimates(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
+def _estimates(fit: response_fit.Fit, response: FrequencyResponse) -> dict[str, Estimate]:
     """Everything that a fit tells, with its intervals; masses, stiffness and damping where the effort is a force."""
     effort = f"({response.input_unit})" if "*" in response.input_unit else response.input_unit or "1"
     gain_unit = f"{response.output_unit or '1'}/s^2/{effort}"
@@ -234,7 +235,7 @@ def _estimates(fit: Fit, response: FrequencyResponse) -> dict[str, Estimate]:
     if is_force:
         mass, units["stiffness"], units["damping"] = _MECHANICAL[response.output_unit]
         units |= {"mass.total": mass, "mass.motor": mass, "mass.load": mass}
-    method = "one mass fitted to the frequency response" if isinstance(fit.model, RigidModel) else _METHOD
+    method = "one mass fitted to the frequency response" if isinstance(fit.model, response_fit.RigidModel) else _METHOD
     found = fit.spread(lambda parameters: _tell(fit, parameters, is_force=is_force))
     return {
         name: estimate(name, value, units.get(name, "1"), error, method, fit.degrees)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.coloured import known_noise_covariance
-from detent.identify.fit.estimate import Estimate, estimate
+from detent.identify.fit.estimate import Estimate, estimate, known_noise_covariance
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError
 from detent.identify.analyse.ringing import Ringing, fit_ringing
-from detent.identify.fit.coloured import known_noise_covariance
-from detent.identify.fit.estimate import Estimate, estimate
-from detent.identify.fit.steady import mean_error
+from detent.identify.analyse.two_speeds import mean_error
+from detent.identify.fit.estimate import Estimate, estimate, known_noise_covariance
 from detent.logs.differences import fill_holes, resolution, runs_of
 from detent.logs.log import Log, Values
 

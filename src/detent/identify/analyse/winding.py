@@ -23,8 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from detent.identify.fit.coloured import coloured_covariance, known_noise_covariance
-from detent.identify.fit.estimate import Estimate, estimate, quantile
+from detent.identify.fit.estimate import Estimate, coloured_covariance, estimate, known_noise_covariance, quantile
 from detent.logs.differences import scipy
 from detent.logs.log import Log, Values
 from detent.logs.stamps import stretches

@@ -17,23 +17,13 @@ import numpy as np
 
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
-from detent.identify.fit.equations import fine_kernel
+from detent.identify.fit.equations import fine_kernel, make_kernel
 from detent.identify.fit.estimate import rms
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.prepare import Run
-from detent.identify.fit.weights import make_kernel
 from detent.kernel.loop import advance
 from detent.logs.log import Values
-from detent.methods.cascade.system import (
-    MAX_RATE,
-    Cascade,
-    CascadeParams,
-    along,
-    driven,
-    fill_clocks,
-    set_count,
-    switch_on,
-)
+from detent.methods.cascade import system as cascade
 from detent.planning.profile import profile_of_recording
 from detent.plant.linear_two_mass import fastest_rate
 from detent.record.recorder import byte_places, choose_leaves
@@ -42,7 +32,7 @@ from detent.sensing.position_sensor import MEMORY
 HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
 SUBSTEPS = 4  # ticks of the plant per sample of the log
 MOST_STARTS = 60  # stretches simulated per horizon at most, evenly spread over the log
-_LOOP_PICKS = byte_places(choose_leaves(Cascade, ["plant.machine.motor.position", "controller.law.command"]))
+_LOOP_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position", "controller.law.command"]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +55,8 @@ class Plant:
 
     def __init__(self, constants: Constants, step: float) -> None:
         p = plant_registers(constants)
-        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * step / MAX_RATE))
-        fill_clocks(p, step / self.ticks, 1)
+        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * step / cascade.MAX_RATE))
+        cascade.fill_clocks(p, step / self.ticks, 1)
         self._params = p
         self._late = round(constants.value("delay") / step * self.ticks)
         self._hanging = hanging_position(constants)
@@ -74,22 +64,22 @@ class Plant:
 
     def run(self, effort: Values, begin: int, samples: int, position: float, velocity: float) -> Values:
         """Positions at samples under a recorded effort, loops open."""
-        r = Cascade()
-        switch_on(self._params, r, position - self._hanging)
+        r = cascade.Cascade()
+        cascade.switch_on(self._params, r, position - self._hanging)
         r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
         ticks = (samples - 1) * self.ticks
         at = np.arange(ticks) + begin * self.ticks - self._late
         command = effort[np.clip(at // self.ticks, 0, len(effort) - 1)]
         rows = np.zeros((samples, 8), np.uint8)
-        advance(self._params, r, ticks, rows, _PICKS, self.ticks, *driven(command))
+        advance(self._params, r, ticks, rows, _PICKS, self.ticks, *cascade.driven(command))
         moved = rows.view(np.float64)[:, 0] + self._hanging
         moved[0] = position
         return moved
 
 
-def plant_registers(constants: Constants) -> CascadeParams:
+def plant_registers(constants: Constants) -> cascade.CascadeParams:
     """Registers of a plant that is driven by the effort itself."""
-    p = CascadeParams()
+    p = cascade.CascadeParams()
     p.plant.machine.motor.mass = constants.value("mass")
     offset = 0.5 * (constants.value("coulomb.positive") - constants.value("coulomb.negative"))
     friction = p.plant.machine.motor.friction
@@ -108,7 +98,7 @@ def plant_registers(constants: Constants) -> CascadeParams:
     return p
 
 
-_PICKS = byte_places(choose_leaves(Cascade, ["plant.machine.motor.position"]))
+_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position"]))
 
 
 def start_velocities(run: Run) -> Values:
@@ -217,7 +207,7 @@ def _share(error: Values, signal: Values) -> float:
     return float(np.linalg.norm(error)) / size if size > 0.0 else math.nan
 
 
-def _params(constants: Constants, loops: Loops, run: Run) -> CascadeParams:
+def _params(constants: Constants, loops: Loops, run: Run) -> cascade.CascadeParams:
     """Plant and loops; the velocity is the difference that the log's loops took."""
     p = plant_registers(constants)
     law, feed = p.controller.law, p.controller.law.feed_forward
@@ -227,17 +217,17 @@ def _params(constants: Constants, loops: Loops, run: Run) -> CascadeParams:
     feed.coulomb_positive = feed.coulomb_negative = loops.feed_coulomb
     p.plant.source.delay = min(max(round(constants.value("delay") / run.step), 0), MEMORY - 1)
     p.controller.motor_sensor.span = loops.span
-    set_count(p, run.resolution, 0.0)
-    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * run.step / MAX_RATE))
-    fill_clocks(p, run.step / ticks, ticks)
+    cascade.set_count(p, run.resolution, 0.0)
+    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * run.step / cascade.MAX_RATE))
+    cascade.fill_clocks(p, run.step / ticks, ticks)
     return p
 
 
-def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
+def _start(p: cascade.CascadeParams, r: cascade.Cascade, loops: Loops, run: Run) -> None:
     """Where the log says the axis was, as fast, and with the integral that its effort shows."""
     velocity = float(start_velocities(run)[well_known_from(run)])
     place = float(run.position[0])
-    switch_on(p, r, place)
+    cascade.switch_on(p, r, place)
     r.plant.machine.motor.velocity = r.plant.machine.load.velocity = velocity
     r.controller.motor_sensor.memory[:] = [place - (MEMORY - k) * velocity * run.step for k in range(MEMORY)]
     r.controller.motor_sensor.place = MEMORY - 1
@@ -250,14 +240,14 @@ def _start(p: CascadeParams, r: Cascade, loops: Loops, run: Run) -> None:
 
 def _follow(constants: Constants, loops: Loops, run: Run) -> tuple[Values, Values]:
     """Position at each sample, and the effort commanded there."""
-    p, r = _params(constants, loops, run), Cascade()
+    p, r = _params(constants, loops, run), cascade.Cascade()
     _start(p, r, loops, run)
     reference = run.reference if run.reference is not None else run.position
     asked = profile_of_recording(run.t, reference, run.step)
     samples = len(run.position)
     rows = np.zeros((samples + 1, 16), np.uint8)
     every = p.controller.sample_ticks
-    feed = along(asked.position, asked.velocity, asked.acceleration)
+    feed = cascade.along(asked.position, asked.velocity, asked.acceleration)
     advance(p, r, samples * every, rows, _LOOP_PICKS, every, *feed)
     table = rows.view(np.float64)
     return np.concatenate([run.position[:1], table[1:samples, 0]]), table[1 : samples + 1, 1].copy()

@@ -10,7 +10,7 @@ import numpy as np
 from detent.errors import InputError
 from detent.identify.fit import untold
 from detent.identify.fit.constants import Constants, constants_of
-from detent.identify.fit.equations import LOSS
+from detent.identify.fit.equations import LOSS, make_kernel
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
 from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
@@ -18,7 +18,6 @@ from detent.identify.fit.output_error import STRETCH, fit_output_error
 from detent.identify.fit.prepare import Run, make_run
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
-from detent.identify.fit.weights import make_kernel
 from detent.logs.log import Log
 
 Report = Callable[[str, float], None]

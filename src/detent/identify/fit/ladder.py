@@ -16,18 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit import Report, untold
+from detent.identify.fit import Report, regression, untold
 from detent.identify.fit.equations import LOSS, is_bent, terms_of
-from detent.identify.fit.regression import (
-    Fit,
-    Prepared,
-    bend_correction,
-    combine,
-    fit_equations,
-    make_columns,
-    make_effort,
-    solve,
-)
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
@@ -83,7 +73,7 @@ class Climb:
     gain: float  # mean gain over the rung chosen so far, in standard errors; nan for the first
     taken: bool  # True where it was climbed
     possible: bool  # False where its friction falls towards standstill
-    fit: Fit  # to all of the log
+    fit: regression.Fit  # to all of the log
 
 
 def extended(rung: Rung, extra: Sequence[str]) -> Rung:
@@ -91,7 +81,7 @@ def extended(rung: Rung, extra: Sequence[str]) -> Rung:
     return Rung(rung.name, rung.text, (*rung.terms, *extra))
 
 
-def stribeck_speeds(parts: Sequence[Prepared]) -> Values:
+def stribeck_speeds(parts: Sequence[regression.Prepared]) -> Values:
     """Stribeck velocities that the log could show, from the slow end of its motion to half its top speed."""
     speed = np.abs(np.concatenate([p.motion.velocity for p in parts]))
     top, low = float(np.quantile(speed, 0.98)), float(np.quantile(speed, 0.02))
@@ -99,18 +89,18 @@ def stribeck_speeds(parts: Sequence[Prepared]) -> Values:
     return np.geomspace(least, most, 1 + math.ceil(math.log(most / least) / math.log(FINER)))
 
 
-def bends_tried(parts: Sequence[Prepared], names: Sequence[str]) -> Values:
+def bends_tried(parts: Sequence[regression.Prepared], names: Sequence[str]) -> Values:
     """Stribeck velocities, or shares lost, among which the best is looked for."""
     return LOSSES if LOSS in names else stribeck_speeds(parts)
 
 
-def is_at_bound(parts: Sequence[Prepared], fit: Fit) -> bool:
+def is_at_bound(parts: Sequence[regression.Prepared], fit: regression.Fit) -> bool:
     """True where the bend of a fit is the least or the largest that was tried: the log says no more than a bound."""
     tried = bends_tried(parts, fit.model)
     return not (1.0 + AT_BOUND) * tried[0] < fit.bend < (1.0 - AT_BOUND) * tried[-1]
 
 
-def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, float]:
+def best_bend(parts: Sequence[regression.Prepared], names: Sequence[str]) -> tuple[float, float]:
     """Stribeck velocity, or share lost: what the instruments say, and that with the smallest residual, near it.
 
     The smallest residual alone answers to the noise in the columns: intervals around it held the truth in 86 % of the
@@ -118,12 +108,12 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, f
     """
     tried = bends_tried(parts, names)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
-    effort = make_effort(parts, fit_equations(parts, plain).value("delay"))
+    effort = regression.make_effort(parts, regression.fit_equations(parts, plain).value("delay"))
 
     def miss(bend: float) -> float:
         """Sum of the squared residuals."""
-        columns, ideal = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
-        residual = effort - combine(columns, solve(ideal, columns, effort))
+        columns, ideal = (regression.make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
+        residual = effort - regression.combine(columns, regression.solve(ideal, columns, effort))
         return float(np.sum(residual**2))
 
     best = int(np.argmin([miss(float(bend)) for bend in tried]))
@@ -133,7 +123,7 @@ def best_bend(parts: Sequence[Prepared], names: Sequence[str]) -> tuple[float, f
     return _refined_bend(parts, names, found, tried), found
 
 
-def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float, tried: Values) -> float:
+def _refined_bend(parts: Sequence[regression.Prepared], names: Sequence[str], start: float, tried: Values) -> float:
     """The bend at which the instruments ask for no other; the start where there is none within the range tried.
 
     What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
@@ -141,7 +131,7 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
 
     def asked(bend: float) -> float:
         """What the instruments want the bend changed by."""
-        return bend_correction(parts, fit_equations(parts, names, bend))
+        return regression.bend_correction(parts, regression.fit_equations(parts, names, bend))
 
     near = start
     wanted = asked(near)
@@ -156,7 +146,9 @@ def _refined_bend(parts: Sequence[Prepared], names: Sequence[str], start: float,
     return start
 
 
-def climb(parts: Sequence[Prepared], rungs: Sequence[Rung] = RUNGS, report: Report = untold) -> tuple[Climb, ...]:
+def climb(
+    parts: Sequence[regression.Prepared], rungs: Sequence[Rung] = RUNGS, report: Report = untold
+) -> tuple[Climb, ...]:
     """Hold every rung to stretches it did not see."""
     climbs: list[Climb] = []
     best: Climb | None = None
@@ -184,16 +176,16 @@ def chosen_rung(climbs: Sequence[Climb]) -> Rung:
     return next(c.rung for c in reversed(climbs) if c.taken)
 
 
-def fit_rung(parts: Sequence[Prepared], rung: Rung) -> Fit:
+def fit_rung(parts: Sequence[regression.Prepared], rung: Rung) -> regression.Fit:
     """Fit the model of a rung, its Stribeck velocity or loss included.
 
     Where two ways to that number differ by more than noise, the model is to blame; no residual shows it, so that the
     difference counts as an error.
     """
     if not rung.is_bent:
-        return fit_equations(parts, rung.terms)
+        return regression.fit_equations(parts, rung.terms)
     bend, other = best_bend(parts, rung.terms)
-    fit = fit_equations(parts, rung.terms, bend)
+    fit = regression.fit_equations(parts, rung.terms, bend)
     fit.covariance[-1, -1] += (bend - other) ** 2
     return fit
 
@@ -201,7 +193,7 @@ def fit_rung(parts: Sequence[Prepared], rung: Rung) -> Fit:
 Mask = NDArray[np.bool_]
 
 
-def hold_out(parts: Sequence[Prepared]) -> Iterator[tuple[Mask, Mask]]:
+def hold_out(parts: Sequence[regression.Prepared]) -> Iterator[tuple[Mask, Mask]]:
     """Windows of each stretch, and those that share no sample with it."""
     for stretch in range(STRETCHES):
         inside: list[Mask] = []
@@ -215,11 +207,11 @@ def hold_out(parts: Sequence[Prepared]) -> Iterator[tuple[Mask, Mask]]:
         yield np.concatenate(inside), np.concatenate(apart)
 
 
-def _held_out(parts: Sequence[Prepared], fit: Fit) -> Values:
+def _held_out(parts: Sequence[regression.Prepared], fit: regression.Fit) -> Values:
     """Mean squares of the prediction of each stretch."""
-    columns, ideal = (make_columns(parts, fit.model, fit.bend, ideal=ideal) for ideal in (False, True))
+    columns, ideal = (regression.make_columns(parts, fit.model, fit.bend, ideal=ideal) for ideal in (False, True))
     squares: list[float] = []
     for inside, apart in hold_out(parts):
-        theta = solve(ideal[apart], columns[apart], fit.effort[apart])
-        squares.append(float(np.mean((fit.effort[inside] - combine(columns[inside], theta)) ** 2)))
+        theta = regression.solve(ideal[apart], columns[apart], fit.effort[apart])
+        squares.append(float(np.mean((fit.effort[inside] - regression.combine(columns[inside], theta)) ** 2)))
     return np.array(squares)

@@ -20,11 +20,9 @@ from typing import Literal
 
 import numpy as np
 
-from detent.identify.fit.coloured import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows
-from detent.identify.fit.equations import LOSS, Motion, is_bent, make_motion, model_columns, terms_of, usable_rows
-from detent.identify.fit.estimate import rms
+from detent.identify.fit import equations
+from detent.identify.fit.estimate import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows, rms
 from detent.identify.fit.prepare import Run
-from detent.identify.fit.weights import Kernel, make_kernel
 from detent.logs.log import Values
 
 Instruments = Literal["reference", "position", "none"]
@@ -41,10 +39,10 @@ class Prepared:
     """A run with its windows, of which the columns of any model are made."""
 
     run: Run
-    motion: Motion  # of the measured position
+    motion: equations.Motion  # of the measured position
     # what instruments are made of: the motion of the reference, as late as the axis follows it; that of the position by
     # wider windows; or `motion` itself, which is least squares
-    ideal: Motion
+    ideal: equations.Motion
     instruments: Instruments  # which of these: "reference", "position" or "none"
 
 
@@ -67,7 +65,7 @@ class Fit:
     @property
     def bend(self) -> float:
         """Stribeck velocity, or share lost; 1 for a model with neither."""
-        return float(self.values[-1]) if is_bent(self.model) else 1.0
+        return float(self.values[-1]) if equations.is_bent(self.model) else 1.0
 
     def value(self, name: str) -> float:
         """Constant of a term; 0 where the model does not have it."""
@@ -98,19 +96,19 @@ def residuals_of(fit: Fit) -> Residuals:
     return Residuals(size, relative, float(np.abs(e).max()), neighbours, independent_rows(e), len(e))
 
 
-def prepare(run: Run, kernel: Kernel, instruments: Instruments) -> Prepared:
+def prepare(run: Run, kernel: equations.Kernel, instruments: Instruments) -> Prepared:
     """Make the windows of a run."""
-    rows, n = usable_rows(run, kernel), len(run.position)
+    rows, n = equations.usable_rows(run, kernel), len(run.position)
     if instruments == "position":
-        wide = make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
+        wide = equations.make_kernel(max(min(round(WIDER * kernel.half), round(ENDS * n)), kernel.half), run.step)
         rows = rows[(rows > wide.half) & (rows < n - wide.half)]
-        ideal = make_motion(run.position, run.effort, wide, rows)
-        return Prepared(run, make_motion(run.position, run.effort, kernel, rows), ideal, instruments)
-    motion = ideal = make_motion(run.position, run.effort, kernel, rows)
+        ideal = equations.make_motion(run.position, run.effort, wide, rows)
+        return Prepared(run, equations.make_motion(run.position, run.effort, kernel, rows), ideal, instruments)
+    motion = ideal = equations.make_motion(run.position, run.effort, kernel, rows)
     if instruments == "reference" and run.reference is not None:
         lag = lag_of(run.reference, run)
         delayed = np.concatenate([np.full(lag, run.reference[0]), run.reference[: n - lag]])
-        ideal = make_motion(delayed, run.effort, kernel, rows)
+        ideal = equations.make_motion(delayed, run.effort, kernel, rows)
     return Prepared(run, motion, ideal, instruments)
 
 
@@ -126,7 +124,7 @@ def lag_of(reference: Values, run: Run) -> int:
 def make_columns(parts: Sequence[Prepared], names: Sequence[str], bend: float, *, ideal: bool = False) -> Values:
     """Columns of a model over all windows, shape (m, k)."""
     motions = [p.ideal if ideal else p.motion for p in parts]
-    return np.concatenate([model_columns(m, names, bend) for m in motions])
+    return np.concatenate([equations.model_columns(m, names, bend) for m in motions])
 
 
 def make_effort(parts: Sequence[Prepared], delay: float) -> Values:
@@ -159,9 +157,9 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
     unknown = np.flatnonzero((np.abs(ways[singular <= RANK * singular[0]]) > SHARED).any(axis=0))
     covariance[unknown, unknown] = (UNKNOWN * float(np.abs(y).max())) ** 2
     singular = np.linalg.svd(columns / column_sizes(columns), compute_uv=False)
-    bends = ("loss" if LOSS in names else "stribeck",) if is_bent(names) else ()
+    bends = ("loss" if equations.LOSS in names else "stribeck",) if equations.is_bent(names) else ()
     return Fit(
-        (*terms_of(names), "delay", *bends),
+        (*equations.terms_of(names), "delay", *bends),
         np.concatenate([theta, [late], [bend] if bends else []]),
         covariance,
         carried_degrees(x, residual, z, cosines),
@@ -182,7 +180,7 @@ def _with_delay(  # noqa: PLR0913 - all that a model consists of
     if ideal is columns:
         return x, x
     # What the instruments say of the effort's derivative, once mass and viscous friction are roughly known.
-    known = dict(zip(terms_of(names), theta.tolist(), strict=True))
+    known = dict(zip(equations.terms_of(names), theta.tolist(), strict=True))
     mass, viscous = known["mass"] or 1.0, max(known.get("viscous", known.get("viscous.positive", 0.0)), 0.0)
     motions = [p.ideal for p in parts]
     tool = np.concatenate([mass * m.kernel.jerk(m.places, m.rows) + viscous * m.acceleration for m in motions])
@@ -193,7 +191,7 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
     parts: Sequence[Prepared], names: Sequence[str], theta: Values, bend: float, x: Values, z: Values
 ) -> tuple[Values, Values]:
     """Columns and instruments with that of the bend: what is not known of it widens the limits of the others."""
-    if not is_bent(names):
+    if not equations.is_bent(names):
         return x, z
     slopes: list[Values] = []  # change of the effort with the bend, by the motion and by the instruments
     for ideal in (False, z is not x):
@@ -204,7 +202,7 @@ def _with_bend(  # noqa: PLR0913 - all that a model consists of
 
 def bend_correction(parts: Sequence[Prepared], fit: Fit) -> float:
     """By how much the bend misses what the instruments say of it, to first order."""
-    names, theta, bend = fit.model, fit.values[: len(terms_of(fit.model))], fit.bend
+    names, theta, bend = fit.model, fit.values[: len(equations.terms_of(fit.model))], fit.bend
     columns, tools = (make_columns(parts, names, bend, ideal=ideal) for ideal in (False, True))
     x, z = _with_bend(parts, names, theta, bend, columns, tools)
     return float(solve(z, x, fit.residual)[-1])

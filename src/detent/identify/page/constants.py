@@ -9,16 +9,7 @@ from markupsafe import Markup
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
-from detent.identify.page.words import (
-    UNKNOWN,
-    constant_name,
-    is_known,
-    long_bar,
-    meaning_of,
-    relative_half,
-    sentence,
-    written,
-)
+from detent.identify.page import words
 from detent.methods.cascade.units import percent
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
@@ -36,7 +27,7 @@ def constant_figures(found: Identification) -> list[Figure]:
     """Every constant with its limits, and whether it is trusted."""
     if not found.estimates:
         return []
-    reach = reach_of([e for e in found.trusted or found.estimates if is_known(e) and not e.holds(0.0)])
+    reach = reach_of([e for e in found.trusted or found.estimates if words.is_known(e) and not e.holds(0.0)])
     heads = [
         ("constant", False), ("value and 95 % limits", True), (f"interval, scale ±{percent(reach)}", False),
         ("", True), ("trusted", False),
@@ -54,11 +45,15 @@ def constant_figures(found: Identification) -> list[Figure]:
 
 def _constant_row(found: Identification, e: Estimate, reach: float) -> list[str]:
     trusted = e in found.trusted
-    name = Markup("{} <code>{}</code>").format(constant_name(e.name, e.unit), e.name)
-    if meaning := meaning_of(e.name):
+    name = Markup("{} <code>{}</code>").format(words.constant_name(e.name, e.unit), e.name)
+    if meaning := words.meaning_of(e.name):
         name += Markup('<br><small style="color:var(--soft)">{}</small>').format(meaning)
-    value = str(written(e)) if is_known(e) else "not known"
-    share = f"±{GAP}{percent(relative_half(e))}" if is_known(e) and relative_half(e) < UNKNOWN else "\u2013"
+    value = str(words.written(e)) if words.is_known(e) else "not known"
+    share = (
+        f"±{GAP}{percent(words.relative_half(e))}"
+        if words.is_known(e) and words.relative_half(e) < words.UNKNOWN
+        else "\u2013"
+    )
     if trusted:
         said = '<span style="color:var(--good)" class="nowrap">✔ yes</span>{}'
         why = ", but may be 0" if e.holds(0.0) else ""
@@ -71,16 +66,16 @@ def _constant_row(found: Identification, e: Estimate, reach: float) -> list[str]
 
 def reach_of(estimates: Sequence[Estimate]) -> float:
     """End of the scale on which all intervals are drawn: as wide as the widest needs, delays and the like left out."""
-    halves = [relative_half(one) for one in estimates if one.name not in UNSCALED]
+    halves = [words.relative_half(one) for one in estimates if one.name not in UNSCALED]
     widest = max(halves, default=REACHES[-1])
     return next((reach for reach in REACHES if reach >= widest), REACHES[-1])
 
 
 def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> Markup:
     """Draw an interval about its value, on a scale that all constants of a table share."""
-    if not is_known(found):
+    if not words.is_known(found):
         return Markup('<span style="color:var(--bad)">from nothing to anything</span>')
-    half = relative_half(found) / reach
+    half = words.relative_half(found) / reach
     colour = "good" if trusted else "bad"
     middle, room = WIDTH / 2, WIDTH / 2 - 8
     x = min(half, 1.0) * room
@@ -92,7 +87,7 @@ def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> Markup:
         '<rect x="{:.1f}" width="{:.1f}" y="4" height="10" rx="2" style="fill:var(--{});opacity:.55"/>'
         '<line x1="{:.0f}" x2="{:.0f}" y1="1" y2="17" style="stroke:var(--ink);stroke-width:2"/>{}</svg>'
     ).format(
-        WIDTH, HEIGHT, number(100 * relative_half(found), 2), WIDTH - 4, middle - x, max(2 * x, 1.5), colour,
+        WIDTH, HEIGHT, number(100 * words.relative_half(found), 2), WIDTH - 4, middle - x, max(2 * x, 1.5), colour,
         middle, middle, Markup().join(arrows),
     )  # fmt: skip
 
@@ -108,9 +103,9 @@ def ladder_figures(found: Identification) -> list[Figure]:
     rows: list[list[str]] = []
     for climb in found.climbs:
         chosen = climb.rung is found.rung
-        bar = long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
+        bar = words.long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
         told = _step_text(climb.gain, possible=climb.possible, chosen=chosen)
-        rows.append([sentence(climb.rung.text), bar, told])
+        rows.append([words.sentence(climb.rung.text), bar, told])
     caption = (
         "Each model is fitted to all of the recording but one stretch and foretells that one, stretch by stretch. A "
         "larger model is taken only if it foretells better; a better fit alone would not do."
@@ -138,11 +133,11 @@ def correlation_figures(constants: Constants | None, estimates: Sequence[Estimat
     """Which constants the recording hardly tells apart; nothing of fewer than two known ones."""
     if constants is None:
         return []
-    units = {e.name: e.unit for e in estimates if is_known(e)}
+    units = {e.name: e.unit for e in estimates if words.is_known(e)}
     kept = [k for k, name in enumerate(constants.names) if name in units]
     if len(kept) < 2:
         return []
-    names = [constant_name(constants.names[k], units[constants.names[k]]) for k in kept]
+    names = [words.constant_name(constants.names[k], units[constants.names[k]]) for k in kept]
     r = constants.correlation[np.ix_(kept, kept)]
     caption = (
         "Errors of two constants with a correlation near 1 or \u22121 go together: the recording tells their sum or "

@@ -2,19 +2,24 @@
 
 from collections.abc import Sequence
 
+from markupsafe import Markup
+
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.identification import Identification, Verdict
+from detent.identify.fit.prepare import Run
+from detent.identify.page import words
+from detent.identify.page.compared import effort_figures, friction_figures, hold_out, simulated_figures, windows_of
 from detent.identify.page.constants import constant_figures, correlation_figures, ladder_figures
-from detent.identify.page.effort import effort_figures, friction_figures, windows_of
-from detent.identify.page.recordings import recording_figures, refused_figures
 from detent.identify.page.response import response_figures
-from detent.identify.page.simulated import hold_out, simulated_figures
-from detent.identify.page.words import Ways, constant_name, is_known, relative_half, sentence, written
+from detent.logs.log import Action, Log, Severity, tell_rows
 from detent.methods.cascade.units import percent
+from detent.page.chart import Band, Chart, Panel, Timeline, spans_of, time_charts
+from detent.page.figure import Figure
 from detent.page.frame import Card, Headline, Level, Page, Section, card
 from detent.page.parts import Note
-from detent.page.words import GAP, count, number
+from detent.page.table import Table
+from detent.page.words import GAP, count, duration, further, number
 
 LOOKS: dict[Verdict, Level] = {"trusted": "good", "partly trusted": "warn", "refused": "bad"}
 
@@ -28,7 +33,7 @@ def identify_page(found: Identification) -> Page:
     """Put the page together; figures over time are of the log that is simulated worst."""
     held, windows = hold_out(found), windows_of(found)
     shown = max(range(len(held)), key=lambda k: held[k].rms_restarted) if held else 0
-    ways, effort_unit = Ways(found.runs[0].position_unit), found.runs[0].effort_unit
+    ways, effort_unit = words.Ways(found.runs[0].position_unit), found.runs[0].effort_unit
     first, more = found.logs[0].name, len(found.logs) - 1
     title = f"{first} and {more} more" if more else first
     # What concerns all constants stands right below the verdict.
@@ -37,14 +42,15 @@ def identify_page(found: Identification) -> Page:
         title=f"{title}: {found.verdict}",
         headline=_headline(found, title, ways),
         cards=_cards(found, ways),
-        notes=[Note("error", f"{sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in general],
+        notes=[Note("error", f"{words.sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in general],
         sections=[
             Section("Constants", constant_figures(found)),
             Section("What was found in the log", recording_figures(found, shown, simulated=bool(held))),
             Section("What to record instead", refused_figures(found)),
             Section("Measured and simulated", simulated_figures(found, held, shown)),
             Section(
-                f"{sentence(found.runs[0].effort_name)}, measured and fitted", effort_figures(found, windows, shown)
+                f"{words.sentence(found.runs[0].effort_name)}, measured and fitted",
+                effort_figures(found, windows, shown),
             ),
             Section("Friction over the speed", friction_figures(found.constants, windows, effort_unit, ways)),
             Section("Which model", ladder_figures(found)),
@@ -58,13 +64,13 @@ def identify_page(found: Identification) -> Page:
 # ---- what came out, in one glance
 
 
-def _headline(found: Identification, title: str, ways: Ways) -> Headline:
+def _headline(found: Identification, title: str, ways: words.Ways) -> Headline:
     kicker = f"Constants of an axis, identified from {count(len(found.logs), 'recording')}"
-    verdict = sentence(found.verdict)
+    verdict = words.sentence(found.verdict)
     return Headline(level=LOOKS[found.verdict], verdict=verdict, name=title, kicker=kicker, lead=_lead(found, ways))
 
 
-def _lead(found: Identification, ways: Ways) -> str:
+def _lead(found: Identification, ways: words.Ways) -> str:
     if found.verdict == "refused":
         general = [r for r in found.refusals if not r.constants]
         subjects = dict.fromkeys(r.subject for r in general or found.refusals)
@@ -94,19 +100,19 @@ def _missing(found: Identification) -> list[str]:
     kinds = [e.name.partition(".")[0] for e in left]
     both = {kind for kind in kinds if kind != "pendulum" and kinds.count(kind) > 1}
     names = [
-        f"{constant_name(kind)} in both directions" if kind in both else constant_name(e.name, e.unit)
+        f"{words.constant_name(kind)} in both directions" if kind in both else words.constant_name(e.name, e.unit)
         for kind, e in zip(kinds, left, strict=True)
     ]
     return list(dict.fromkeys(names))
 
 
-def _listed(words: list[str]) -> str:
-    if len(words) > 3:
-        return f"{', '.join(words[:3])} and {len(words) - 3} more"
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+def _listed(names: list[str]) -> str:
+    if len(names) > 3:
+        return f"{', '.join(names[:3])} and {len(names) - 3} more"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _cards(found: Identification, ways: Ways) -> list[Card]:
+def _cards(found: Identification, ways: words.Ways) -> list[Card]:
     if found.verdict == "refused" or found.fit is None:
         return []
     shown = [_constant_card(e, trusted=e in found.trusted) for e in found.estimates if e.name in ON_CARDS]
@@ -117,14 +123,14 @@ def _cards(found: Identification, ways: Ways) -> list[Card]:
 
 
 def _constant_card(e: Estimate, *, trusted: bool) -> Card:
-    text = written(e)
-    name = constant_name(e.name, e.unit)
+    text = words.written(e)
+    name = words.constant_name(e.name, e.unit)
     if e.name.partition(".")[2]:
         sign = "+" if e.name.endswith("positive") else "\u2212"
         name = f"{name.partition(' in ')[0]} {sign}"
-    below = f"±{GAP}{percent(relative_half(e))}" if is_known(e) else ""
+    below = f"±{GAP}{percent(words.relative_half(e))}" if words.is_known(e) else ""
     below = below if trusted else f"{below} not trusted".strip()
-    return Card(sentence(name), text.value if is_known(e) else "\u2013", text.unit, below, bad=not trusted)
+    return Card(words.sentence(name), text.value if words.is_known(e) else "\u2013", text.unit, below, bad=not trusted)
 
 
 def _settings(found: Identification) -> dict[str, str]:
@@ -137,3 +143,136 @@ def _settings(found: Identification) -> dict[str, str]:
         told["degrees of freedom"] = f"{min(degrees):.0f} to {max(degrees):.0f} behind an interval"
         told["condition number"] = number(found.fit.condition)
     return told
+
+
+# ---- what the recordings hold, what is wrong with them, what to record
+
+
+MOST_LOGS = 30  # recordings listed one by one
+MOST_FINDINGS = 60  # findings listed one by one
+MOST_BANDS = 200  # stretches marked in a chart; closer ones are drawn as one
+TALL = 12  # rows from which on a table scrolls inside
+_COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "soft"}
+
+
+def recording_figures(found: Identification, shown: int, *, simulated: bool) -> list[Figure]:
+    """What one log holds over time, the faults of all, what was read from which column."""
+    run, log = found.runs[shown], found.logs[shown]
+    share = 1.0 - float(run.usable.mean())
+    used = f"Shaded: {share:.0%} of the samples, which are not used." if share > 0.0 else "Every sample is used."
+    caption = f"{log.name}: {duration(float(run.t[-1]))} at {1.0 / run.step:.4g} Hz. {used}"
+    listed = [_log_figure(found.logs, shown, simulated=simulated)] if len(found.logs) > 1 else []
+    return [
+        Figure(title="What was recorded", caption=caption, charts=recorded_charts(run)),
+        _fault_figure(found),
+        *listed,
+        _column_figure(log),
+    ]
+
+
+# ---- over time
+
+
+def recorded_charts(run: Run) -> list[Chart]:
+    """Draw what was recorded: position with its reference, and effort; samples that are not used are marked."""
+    place, scale = words.Ways(run.position_unit).place, words.effort_scale(run.effort_unit, words.peak_of(run.effort))
+    curves = [words.scaled("position", "speed", run.position, place)]
+    if run.reference is not None:
+        curves.append(words.scaled("reference", "left", run.reference, place, dash=(5, 4)))
+    effort = [words.scaled(run.effort_name, "drive", run.effort, scale)]
+    unused: list[tuple[float, float]] = []
+    for begin, end in spans_of(run.t, ~run.usable):
+        # Stretches closer together than can be seen are one.
+        near = unused and begin - unused[-1][1] < float(run.t[-1]) / MOST_BANDS
+        unused.append((unused.pop()[0] if near else begin, end))
+    bands = [Band(label="not used", colour="brake", spans=unused)]
+    above, below = words.label_of("position", place.name), words.label_of(run.effort_name, scale.name)
+    return time_charts(Timeline(name="recorded", t=run.t, label=words.SINCE, unit="s", bands=bands), [
+        Panel(name="recorded-position", label=above, curves=curves, zero=True),
+        Panel(name="recorded-effort", label=below, curves=effort, height=170, zero=True),
+    ])  # fmt: skip
+
+
+# ---- faults
+
+
+def _fault_figure(found: Identification) -> Figure:
+    several = len(found.logs) > 1
+    told = [(log, finding) for severity in _COLOURS for log in found.logs for finding in log.findings
+            if finding.severity is severity]  # fmt: skip
+    if not told:
+        more = "what the motion itself tells stands below" if found.refusals else "no gaps, jumps, wrong signs or units"
+        return Figure(title="Faults", drawing=Markup("<p>None found in the file: {}.</p>").format(more))
+    heads = [("", False), ("rows", False), ("signal", False), ("what", False), ("what was done", False), ("do", False)]
+    rows: list[list[str]] = []
+    for log, finding in told[:MOST_FINDINGS]:
+        look = Markup('<b style="color:var(--{})">{}</b>').format(_COLOURS[finding.severity], finding.severity.value)
+        what = Markup("<b>{}</b>: {}").format(finding.kind.value, finding.text)
+        done = "left as it is" if finding.action is Action.LEFT else finding.action.value
+        where = f"{log.name}: {tell_rows(finding.rows)}" if several else tell_rows(finding.rows)
+        rows.append([look, where, finding.signal or "all", what, done, finding.advice or "nothing"])
+    return Figure(
+        title="Faults",
+        caption="Rows are counted from 1 below the header of the file.",
+        table=Table(heads=heads, rows=rows, tall=len(rows) > TALL),
+        hint=_not_listed(len(told) - MOST_FINDINGS, "finding"),
+    )
+
+
+def _not_listed(left: int, word: str) -> str:
+    return f"{further(left, word)} not listed." if left > 0 else ""
+
+
+# ---- recordings and columns
+
+
+def _log_figure(logs: Sequence[Log], shown: int, *, simulated: bool) -> Figure:
+    heads = [("recording", False), ("samples", True), ("time", True), ("faults", True)]
+    rows = [
+        [log.name, count(len(log)), duration(float(log.t[-1] - log.t[0])), count(len(log.findings))]
+        for log in logs[:MOST_LOGS]
+    ]
+    worst = ", whose last quarter is simulated worst" if simulated else ""
+    return Figure(
+        title="Recordings",
+        caption=f"All are fitted together. Figures over time show {logs[shown].name}{worst}.",
+        table=Table(heads=heads, rows=rows, tall=len(rows) > TALL),
+        hint=_not_listed(len(logs) - MOST_LOGS, "recording"),
+    )
+
+
+def _column_figure(log: Log) -> Figure:
+    heads = [("signal", False), ("column", False), ("unit in the file", False), ("used as", False)]
+    rows = [
+        [role, Markup("<code>{}</code>").format(source.column), words.unit_text(source.unit),
+         words.unit_text(log.units.get(role, ""))]
+        for role, source in log.columns.items()
+    ]  # fmt: skip
+    guessed = Markup().join(Markup("<li>{}</li>").format(text) for text in log.guesses)
+    return Figure(
+        title="Columns",
+        caption="What was read, and what had to be guessed because the file does not say it. State it if a guess is "
+        "wrong.",
+        drawing=Markup("<ul>{}</ul>").format(guessed) if guessed else None,
+        table=Table(heads=heads, rows=rows),
+    )
+
+
+# ---- what to record
+
+
+def refused_figures(found: Identification) -> list[Figure]:
+    """What is not trusted, why, and what would tell it."""
+    if not found.refusals:
+        return []
+    units = {e.name: e.unit for e in found.estimates}
+    heads = [("what is wrong", False), ("what was found", False), ("do instead", False), ("not trusted for it", False)]
+    bold = Markup("<b>{}</b>")
+    rows: list[list[str]] = []
+    for r in found.refusals:
+        lost = "; ".join(words.constant_name(name, units.get(name, "")) for name in r.constants)
+        rows.append([bold.format(r.subject), r.text, bold.format(r.record), lost or "all constants"])
+    caption = (
+        "A constant that the recording does not tell is refused rather than guessed. Each row says what would tell it."
+    )
+    return [Figure(title="Refused", caption=caption, table=Table(heads=heads, rows=rows))]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from detent.errors import DetentError
+from detent.identify.fit.equations import make_kernel
 from detent.identify.fit.prepare import Run
-from detent.identify.fit.weights import make_kernel
 
 WINDOW = 0.02  # half of the window of velocities and accelerations [s]
 NEARLY_ALL = 0.999  # share of the samples whose speed and acceleration count: the rest may be noise

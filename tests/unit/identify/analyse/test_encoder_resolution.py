@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.places import DATA
 
-from detent.identify.analyse.encoder_resolution import estimate_resolution
+from detent.identify.analyse.sensors import estimate_resolution
 from detent.logs.read_log import read_log
 
 

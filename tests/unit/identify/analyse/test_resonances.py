@@ -12,8 +12,7 @@ from tests.synthetic_responses import noisy_responses, random_axis, record_casca
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import FrequencyResponse, average_windows, measure_response, response_of
 from detent.identify.analyse.resonances import fit_resonances
-from detent.identify.analyse.response_fit import fit_model, take_lines
-from detent.identify.analyse.two_mass_response import RigidModel, TwoMassModel, respond_sampled
+from detent.identify.analyse.response_fit import RigidModel, TwoMassModel, fit_model, respond_sampled, take_lines
 from detent.logs.read_log import read_log
 
 LSB250 = DATA / "lsb250_two_mass/exp1.npz"

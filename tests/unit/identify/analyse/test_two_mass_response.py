@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from detent.identify.analyse.two_mass_response import (
+from detent.identify.analyse.response_fit import (
     LoadModel,
     RigidModel,
     TwoMassModel,

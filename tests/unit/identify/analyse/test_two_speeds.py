@@ -5,8 +5,7 @@ import pytest
 from tests.log_rig import EMPS, assert_covers, coloured, make_log, quantised, read_emps
 
 from detent.errors import DetentError
-from detent.identify.analyse.two_speeds import fit_two_speeds
-from detent.identify.fit.steady import find_steady, unit_per_speed
+from detent.identify.analyse.two_speeds import find_steady, fit_two_speeds, unit_per_speed
 
 DT = 1e-3
 MASS, TRUE = 2.0, {

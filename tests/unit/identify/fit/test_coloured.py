@@ -5,15 +5,15 @@ import pytest
 from scipy.signal import lfilter
 from tests.identify_rig import binomial_bounds
 
-from detent.identify.fit.coloured import (
+from detent.identify.fit.estimate import (
     carried_degrees,
     coloured_covariance,
     count_cosines,
     fallen_density,
     independent_rows,
     long_run_variance,
+    quantile,
 )
-from detent.identify.fit.estimate import quantile
 
 
 def autoregressive(rng, shape, memory):

@@ -11,13 +11,13 @@ from detent.identify.fit.equations import (
     TERMS,
     fine_kernel,
     is_bent,
+    make_kernel,
     make_motion,
     model_columns,
     standstill_velocity,
     terms_of,
     usable_rows,
 )
-from detent.identify.fit.weights import make_kernel
 
 KERNEL = make_kernel(10, 2e-3)
 

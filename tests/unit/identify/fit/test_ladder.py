@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.identify_rig import SYMMETRIC, TRUTH, Recorder
 
+from detent.identify.fit.equations import make_kernel
 from detent.identify.fit.ladder import RUNGS, best_bend, chosen_rung, climb, extended, hold_out, stribeck_speeds
 from detent.identify.fit.regression import prepare
-from detent.identify.fit.weights import make_kernel
 
 WITHOUT_VISCOUS = SYMMETRIC | {"viscous.positive": 0.0, "viscous.negative": 0.0}
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from tests.identify_rig import TRUTH, Recorder
 
-from detent.identify.fit.equations import LOSS
+from detent.identify.fit.equations import LOSS, make_kernel
 from detent.identify.fit.ladder import best_bend
 from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import WIDER, fit_equations, lag_of, make_columns, prepare, solve
-from detent.identify.fit.weights import make_kernel
 
 NAMES = tuple(TRUTH)
 HALF = 10

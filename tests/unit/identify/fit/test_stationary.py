@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.log_rig import coloured
 
-from detent.identify.fit.coloured import coloured_covariance, known_noise_covariance
+from detent.identify.fit.estimate import coloured_covariance, known_noise_covariance
 
 
 def test_a_mean_of_a_few_rows_has_the_error_of_the_noise():

@@ -5,12 +5,12 @@ import pytest
 from tests.identify_rig import Recorder, make_log
 
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import make_kernel
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import RUNGS, Climb
 from detent.identify.fit.prepare import make_run
 from detent.identify.fit.regression import prepare
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
-from detent.identify.fit.weights import make_kernel
 from detent.logs.log import Action, Finding, Kind, Severity
 
 RUN = Recorder(seconds=6.0).run()

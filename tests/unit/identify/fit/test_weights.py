@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from detent.identify.fit.weights import make_kernel
+from detent.identify.fit.equations import make_kernel
 
 STEP = 1e-3
 ROWS = np.arange(40, 260)

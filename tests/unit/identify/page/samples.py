@@ -14,7 +14,7 @@ from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.fit.verdict import Refusal
-from detent.identify.page.effort import Windows
+from detent.identify.page.compared import Windows
 from detent.logs.log import Action, Finding, Kind, Severity
 from detent.logs.read_log import read_log
 

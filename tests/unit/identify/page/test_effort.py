@@ -7,7 +7,7 @@ import pytest
 from tests.unit.identify.page.samples import identified, windows
 
 from detent.identify.fit.identification import prepare_all
-from detent.identify.page.effort import (
+from detent.identify.page.compared import (
     Windows,
     autocorrelation,
     effort_charts,

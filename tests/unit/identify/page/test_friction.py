@@ -7,7 +7,7 @@ import pytest
 from tests.unit.identify.page.samples import constants, windows
 
 from detent.identify.fit.estimate import quantile
-from detent.identify.page.effort import friction_at, friction_chart, friction_limits
+from detent.identify.page.compared import friction_at, friction_chart, friction_limits
 from detent.identify.page.words import Ways
 
 

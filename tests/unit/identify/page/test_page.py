@@ -15,8 +15,8 @@ from detent.errors import DetentError
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.identified import Identified
 from detent.identify.page import response as response_module
+from detent.identify.page.compared import hold_out
 from detent.identify.page.page import identify_page
-from detent.identify.page.simulated import hold_out
 from detent.logs.read_log import read_log
 from detent.page.figure import Figure
 from detent.page.frame import Page

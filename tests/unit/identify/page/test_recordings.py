@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.identify.page.samples import DROPPED, FLIPPED, identified, refused, trusted, unfitted
 
-from detent.identify.page.recordings import recorded_charts, recording_figures, refused_figures
+from detent.identify.page.page import recorded_charts, recording_figures, refused_figures
 from detent.page.figure import Figure
 
 pytestmark = pytest.mark.compiled

@@ -7,7 +7,7 @@ import pytest
 from tests.unit.identify.page.samples import identified, unfitted
 
 from detent.identify.fit.estimate import rms
-from detent.identify.page.simulated import HeldOut, held_charts, hold_out
+from detent.identify.page.compared import HeldOut, held_charts, hold_out
 from detent.identify.page.words import Ways
 
 pytestmark = pytest.mark.compiled

@@ -1,4 +1,7 @@
-"""Figures of the report of an identification: what drove the axis, by the model too, what is left, and friction."""
+"""Figures of the report of an identification: the model beside the recording.
+
+The position of a part that the fit did not see; the effort, what of it is left unexplained, and friction.
+"""
 
 import math
 from collections.abc import Sequence
@@ -10,25 +13,137 @@ from markupsafe import Markup
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.equations import HOPS
 from detent.identify.fit.estimate import quantile, rms
-from detent.identify.fit.identification import Identification, prepare_all
+from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
+from detent.identify.fit.identification import HELD_OUT, Identification, prepare_all
 from detent.identify.fit.prepare import Run
-from detent.identify.page.words import SINCE, Ways, digits_for, effort_scale, label_of, peak_of, scaled
+from detent.identify.page.words import SINCE, Ways, digits_for, effort_scale, label_of, long_bar, peak_of, scaled
 from detent.methods.cascade.units import percent
-from detent.page.chart import (
-    POINTS,
-    Chart,
-    Curve,
-    Heap,
-    Panel,
-    Timeline,
-    histogram_chart,
-    line_chart,
-    thin_indices,
-    time_charts,
-)
+from detent.page import chart
 from detent.page.figure import Figure
 from detent.page.parts import Numbers
-from detent.page.words import number
+from detent.page.table import Table
+from detent.page.words import count, duration, number
+
+RESTART = 1.0  # time after which the simulation starts again from the recording [s]
+SPREAD = 0.5  # room about a measured position for a simulated one that runs away, over its range
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """A log's last part beside its simulation with constants from the first, in SI units, arrays of shape (n,)."""
+
+    t: Numbers  # time since the log's begin [s]
+    measured: Numbers  # position of the log
+    restarted: Numbers  # and free: simulated position: from the recording again after each `restart`, and in one piece
+    free: Numbers
+    restart: float  # time between two restarts [s]
+
+    @property
+    def rms_restarted(self) -> float:
+        """Root mean square of what the restarted simulation is off."""
+        return rms(self.restarted - self.measured)
+
+
+def hold_out(found: Identification) -> tuple[HeldOut, ...]:
+    """Simulate the last part of each log with constants from the first parts, as the table of horizons does."""
+    constants = found.seen
+    if constants is None or not found.horizons:
+        return ()
+    return tuple(_simulated(constants, run, round((1.0 - HELD_OUT) * len(run.position))) for run in found.runs)
+
+
+def _simulated(constants: Constants, run: Run, cut: int) -> HeldOut:
+    unseen = run.part(cut, len(run.position))
+    free = free_run(constants, unseen)
+    begin = len(unseen.position) - len(free)
+    # A second, or the longest of the usual horizons that goes twice into a shorter stretch.
+    fitting = (h for h in HORIZONS if h <= RESTART and 2.0 * h <= len(free) * run.step)
+    samples = max(round(max(fitting, default=min(HORIZONS)) / run.step), 2)
+    plant, velocity = Plant(constants, run.step), start_velocities(unseen)
+    pieces: list[Numbers] = []
+    for start in range(begin, len(unseen.position), samples):
+        number = min(samples, len(unseen.position) - start)
+        at, speed = float(unseen.position[start]), float(velocity[start])
+        pieces.append(plant.run(unseen.effort, start, number, at, speed) if number > 1 else np.array([at]))
+    t = (cut + begin + np.arange(len(free))) * run.step
+    return HeldOut(t, unseen.position[begin:], np.concatenate(pieces), free, samples * run.step)
+
+
+# ---- figures
+
+
+def simulated_figures(found: Identification, held: Sequence[HeldOut], shown: int) -> list[Figure]:
+    """The simulation of one log over time, and how far that of all can be trusted."""
+    ways = Ways(found.runs[0].position_unit)
+    horizons = [_horizon_figure(found.horizons, ways)] if found.horizons else []
+    if not held:
+        return horizons
+    one = held[shown]
+    worst = (
+        f"Of {count(len(held), 'recording')} the one with the largest errors, {found.logs[shown].name}. "
+        if len(held) > 1
+        else ""
+    )
+    caption = Markup(
+        "{}A simulated axis with constants from the first three quarters of the recording, along its last quarter. It "
+        "gets the recorded effort and nothing else; no controller holds it, so every error adds up. <b>Restarted every "
+        "{}\u202fs it is {} off on average (rms), in one piece {}.</b> Where the curves lie on one another the model "
+        "does what the axis did."
+    ).format(worst, f"{one.restart:.3g}", ways.error(one.rms_restarted), ways.error(rms(one.free - one.measured)))
+    title = "On the part that the fit did not see"
+    return [Figure(title=title, caption=caption, charts=held_charts(one, ways)), *horizons]
+
+
+def held_charts(held: HeldOut, ways: Ways) -> list[chart.Chart]:
+    """Draw the held-out part: recorded and simulated position, and both differences."""
+    place, again = ways.place, f"simulated, from the recording again every {held.restart:.3g} s"
+    curves = [
+        scaled(again, "speed", held.restarted, place, width=2.5),
+        scaled("simulated in one piece", "drive", held.free, place),
+        scaled("recorded", "left", held.measured, place, dash=(5, 4)),
+    ]
+    label = label_of("position", place.name)
+    # A simulation that runs away must not squeeze the rest.
+    room = SPREAD * float(np.ptp(held.measured))
+    low, high = float(held.measured.min()) - room, float(held.measured.max()) + room
+    leaves = bool(np.any((held.free < low) | (held.free > high)))
+    span = (low * place.factor, high * place.factor) if leaves else None
+    return chart.time_charts(chart.Timeline(name="held", t=held.t, label=SINCE, unit="s"), [
+        chart.Panel(name="held-position", label=label, curves=curves, span=span),
+        _off_panel("held-restarted", again, "speed", held.measured - held.restarted, ways),
+        _off_panel("held-free", "simulated in one piece", "drive", held.measured - held.free, ways),
+    ])  # fmt: skip
+
+
+def _off_panel(name: str, label: str, colour: str, off: Numbers, ways: Ways) -> chart.Panel:
+    scale = ways.small(peak_of(off))
+    curve = scaled(f"recorded less {label}", colour, off, scale)
+    return chart.Panel(name=name, label=label_of("difference", scale.name), height=150, zero=True, curves=[curve])
+
+
+def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
+    heads = [
+        ("simulated for", False), ("starts", True), ("simulated, rms", True), ("largest", True),
+        ("without a model, rms", True), ("simulated over without a model", False), ("way of the axis, rms", True),
+    ]  # fmt: skip
+    caption = Markup(
+        "How far off the axis is at the end of a simulated stretch that starts where the recording says it was. "
+        "<b>Without a model</b> it would go on with the velocity it started with: a model that is worth something is "
+        "far below 100\u202f%. One step shows little but the noise of the encoder; the free run is one stretch, and "
+        "its errors are over all of it."
+    )
+    rows: list[list[str]] = []
+    for h in horizons:
+        share = h.rms / h.naive if h.naive > 0.0 else math.nan
+        name = f"free run, {duration(float(h.duration))}" if h.name == "free run" else h.name
+        bar = long_bar(share / 1.5, percent(share), chosen=share < 1.0)
+        errors = [ways.error(value) for value in (h.rms, h.largest, h.naive)]
+        rows.append([name, count(h.starts), *errors, bar, ways.error(h.moved)])
+    return Figure(title="How far it can be foretold", caption=caption, table=Table(heads=heads, rows=rows))
+
+
+# ---- the effort
+
 
 LAGS = 60  # lags of the autocorrelation, in rows of the regression
 DOTS = 1500  # windows drawn in the friction map
@@ -118,13 +233,15 @@ def effort_figures(found: Identification, windows: Sequence[Windows], shown: int
     ]
 
 
-def effort_charts(windows: Windows, run: Run) -> list[Chart]:
+def effort_charts(windows: Windows, run: Run) -> list[chart.Chart]:
     """Draw what drove the axis, measured and by the model, and what is left."""
     gaps = np.flatnonzero(np.diff(windows.place) > 1) + 1
     series = [windows.effort, windows.fitted, windows.residual]
     # Rows that draw like all of them, with a gap in every curve before some rows: the chart's own thinning looks for
     # extremes, and would drop the gaps.
-    kept = np.unique(np.concatenate([gaps, *(thin_indices(curve, POINTS) for curve in series)])).astype(np.intp)
+    kept = np.unique(np.concatenate([gaps, *(chart.thin_indices(curve, chart.POINTS) for curve in series)])).astype(
+        np.intp
+    )
     holes = np.searchsorted(kept, gaps)
     t = np.insert(windows.t[kept], holes, 0.5 * (windows.t[gaps - 1] + windows.t[gaps]))
     effort, fitted, residual = (np.insert(curve[kept], holes, np.nan) for curve in series)
@@ -134,45 +251,45 @@ def effort_charts(windows: Windows, run: Run) -> list[Chart]:
         scaled("recorded", "left", effort, scale, dash=(5, 4), thin=len(t)),
     ]
     left = scaled("recorded less model", "current", residual, scale, thin=len(t))
-    return time_charts(Timeline(name="effort", t=t, label=SINCE, unit="s"), [
-        Panel(name="effort-both", label=label_of(run.effort_name, scale.name), curves=curves, zero=True),
-        Panel(name="effort-left", label=label_of("residual", scale.name), curves=[left], zero=True, height=150),
+    return chart.time_charts(chart.Timeline(name="effort", t=t, label=SINCE, unit="s"), [
+        chart.Panel(name="effort-both", label=label_of(run.effort_name, scale.name), curves=curves, zero=True),
+        chart.Panel(name="effort-left", label=label_of("residual", scale.name), curves=[left], zero=True, height=150),
     ])  # fmt: skip
 
 
-def residual_chart(windows: Sequence[Windows], unit: str) -> Chart:
+def residual_chart(windows: Sequence[Windows], unit: str) -> chart.Chart:
     """Count residuals by their size."""
     residual = np.concatenate([one.residual for one in windows])
     # A few far ones must not squeeze all others into one bar; they stand at its end.
     reach = 4.0 * rms(residual) or 1.0
     scale = effort_scale(unit, reach)
     at = np.clip(residual, -reach, reach) * scale.factor
-    heap = Heap(label="windows", colour="speed", at=at, counts=np.ones(len(at)))
+    heap = chart.Heap(label="windows", colour="speed", at=at, counts=np.ones(len(at)))
     labels = (label_of("recorded less model", scale.name), "windows")
-    chart = histogram_chart("residual-sizes", [heap], labels, finest=1e-3 * reach * scale.factor)
-    return chart | {"title": "How large residuals are"}
+    drawn = chart.histogram_chart("residual-sizes", [heap], labels, finest=1e-3 * reach * scale.factor)
+    return drawn | {"title": "How large residuals are"}
 
 
-def memory_chart(windows: Sequence[Windows]) -> Chart:
+def memory_chart(windows: Sequence[Windows]) -> chart.Chart:
     """Draw how much a residual resembles those before it, with the bounds of residuals that do not."""
     correlation, pairs = autocorrelation(windows)
     one = windows[0]
     lag = np.arange(len(correlation)) * one.hop * 1e3
     bound = 1.96 / math.sqrt(max(pairs[0], 1.0))
-    panel = Panel(
+    panel = chart.Panel(
         name="residual-memory",
         label="correlation",
         title="How much they resemble earlier ones",
         height=260,
         zero=True,
         span=(min(-0.4, float(np.nanmin(correlation)) - 0.05), 1.05),
-        curves=[Curve(label="with the residual so much earlier", colour="speed", y=correlation)],
+        curves=[chart.Curve(label="with the residual so much earlier", colour="speed", y=correlation)],
         levels=[(bound, "95 % of white noise"), (-bound, "")],
     )
-    chart = line_chart(panel, lag, "earlier by [ms]")
-    chart["series"][0]["bars"] = 0
+    drawn = chart.line_chart(panel, lag, "earlier by [ms]")
+    drawn["series"][0]["bars"] = 0
     overlap = {"spans": [[0.0, round(one.width * 1e3, 3)]], "colour": "brake", "label": "windows overlap"}
-    return chart | {"bands": [overlap]}
+    return drawn | {"bands": [overlap]}
 
 
 # ---- friction over the speed, by the model and window by window
@@ -190,11 +307,11 @@ def friction_figures(
         "friction of the model, with its 95\u202f% interval. Rings that leave the line together, at low speeds above "
         "all, tell of a friction that the model lacks."
     )
-    chart = friction_chart(constants, windows, effort_unit, ways)
-    return [Figure(title="Measured and by the model", caption=caption, charts=[chart])]
+    charts = [friction_chart(constants, windows, effort_unit, ways)]
+    return [Figure(title="Measured and by the model", caption=caption, charts=charts)]
 
 
-def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit: str, ways: Ways) -> Chart:
+def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit: str, ways: Ways) -> chart.Chart:
     """Draw friction over the velocity: windows, the model's curve and its limits."""
     velocity = np.concatenate([one.velocity for one in windows])
     residual = np.concatenate([one.residual for one in windows])
@@ -211,16 +328,18 @@ def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit
     half = friction_limits(constants, x)
     half = np.where(half < 2.0 * peak_of(friction), half, np.nan)
     scale, speed = effort_scale(effort_unit, peak_of(friction)), ways.speed
-    rings = Curve(label="measured, window by window", colour="left", y=dots * scale.factor, rings=5)
+    rings = chart.Curve(label="measured, window by window", colour="left", y=dots * scale.factor, rings=5)
     curves = [
         replace(rings, digits=digits_for(peak_of(rings.y))),
         scaled("by the model", "speed", curve, scale, width=2.0),
         scaled("95 % above", "ink", curve + half, scale, width=1.0, dash=(3, 3)),
         scaled("95 % below", "ink", curve - half, scale, width=1.0, dash=(3, 3)),
     ]
-    panel = Panel(name="friction-map", label=label_of("friction", scale.name), height=320, zero=True, curves=curves)
+    panel = chart.Panel(
+        name="friction-map", label=label_of("friction", scale.name), height=320, zero=True, curves=curves
+    )
     places = x * speed.factor
-    return line_chart(panel, places, label_of("velocity", speed.name), digits=digits_for(peak_of(places)))
+    return chart.line_chart(panel, places, label_of("velocity", speed.name), digits=digits_for(peak_of(places)))
 
 
 def friction_at(constants: Constants, values: Numbers, velocity: Numbers) -> Numbers:

@@ -10,7 +10,7 @@ from tests.synthetic_responses import noisy_responses, record_cascade
 from detent.errors import DetentError
 from detent.identify.analyse.measure_response import measure_response
 from detent.identify.analyse.resonances import fit_resonances
-from detent.identify.fit.dead_time import find_dead_time
+from detent.identify.analyse.sensors import find_dead_time
 from detent.methods.cascade.system import set_count
 
 pytestmark = pytest.mark.compiled
