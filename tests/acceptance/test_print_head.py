@@ -48,6 +48,7 @@ from detent.drive.h_bridge import Bridge, BridgeLines, decode, steer, terminal_v
 from detent.drive.pwm_timer import CLOCKS_PER_PERIOD, PwmTimer, clock, trigger
 from detent.kernel.step import step
 from detent.methods.print_head.comparison import DriveComparison, DriveConstants, MeasuringBench, compare_drives
+from detent.methods.print_head.controller import PrintHeadLines
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, fill_period
 from detent.plant.switched_motor import Scratch, SwitchedParams, fill_pulse_table, move_switched
 
@@ -70,9 +71,9 @@ Q1, Q2, Q3, Q4 = 1, 2, 4, 8
     ],
 )
 def test_01_high_time_and_mean_voltage_of_a_count(count, high_us, volts):
-    timer = PwmTimer(count=count)
+    timer = PwmTimer()
     for _ in range(3):
-        high = sum(high_clocks(timer))
+        high = sum(high_clocks(timer, count))
         assert high == count  # exact to one clock, and here to none: 0 is permanently low, 300 permanently high
         assert high / 7.5 == pytest.approx(high_us, abs=5e-4)
         assert 38.0 * high / CLOCKS_PER_PERIOD == pytest.approx(volts, abs=5e-4)
@@ -81,30 +82,28 @@ def test_01_high_time_and_mean_voltage_of_a_count(count, high_us, volts):
     assert bridge.mean_positive == pytest.approx(volts, abs=5e-4)
 
 
-def high_clocks(timer: PwmTimer) -> Iterator[int]:
+def high_clocks(timer: PwmTimer, count: int) -> Iterator[bool]:
     """PWM line at each clock of one period."""
-    trigger(timer)
+    trigger(timer, count)
     for _ in range(CLOCKS_PER_PERIOD):
-        yield timer.output
+        yield timer.counter > 0
         clock(timer)
 
 
 def test_02_a_count_written_in_mid_period_waits_for_the_next_trigger():
-    timer = PwmTimer(count=100)
-    trigger(timer)
+    timer, lines = PwmTimer(), PrintHeadLines(count=100)
     high = 0
-    for k in range(CLOCKS_PER_PERIOD):
+    for k, level in enumerate(high_clocks(timer, lines.count)):
         if k == 50:
-            timer.count = 200
-        high += timer.output
-        clock(timer)
+            lines.count = 200
+        high += level
     assert high == 100
-    assert sum(high_clocks(timer)) == 200
+    assert sum(high_clocks(timer, lines.count)) == 200
 
 
 @given(value=st.integers(-300, 300), braking=st.booleans(), direction=st.sampled_from((RIGHT, LEFT)))
 def test_03_the_timer_never_gets_a_negative_number(value, braking, direction):
-    p, c, timer = HeadParams(drive_limit=300, transition=1), HeadComputer(direction=direction), PwmTimer()
+    p, c = HeadParams(drive_limit=300, transition=1), HeadComputer(direction=direction)
     before = c.out.right_left
     if braking:
         c.drive = value
@@ -113,15 +112,14 @@ def test_03_the_timer_never_gets_a_negative_number(value, braking, direction):
     else:
         put_drive(p, c, value)
         signed = value
-    timer.count = c.out.count
-    assert 0 <= timer.count <= 300
+    assert 0 <= c.out.count <= 300
     assert c.drive_cmd == signed
     if signed:
         assert c.out.right_left == (1 if signed > 0 else 0)
     elif not braking:
         assert c.out.right_left == before  # no drive, no direction: the line stays
     # In transition mode the modulator is the complement, so that the mean terminal voltage stays the drive value.
-    assert timer.count == (300 - value if braking and value > 0 else abs(value))
+    assert c.out.count == (300 - value if braking and value > 0 else abs(value))
 
 
 def test_04_decoder_table():

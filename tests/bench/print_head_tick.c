@@ -63,22 +63,26 @@ static inline void pass_edge(const EncoderParams *p, Encoder *e, bool rightward)
     if (rightward) {
         e->edge++;
         e->below = e->above;
+        e->next_left = e->next_right;
         e->above = fresh_jitter(p, e);
+        e->next_right = ((double)(e->edge + 1) + e->above) * p->edge_pitch + p->origin;
     } else {
         e->edge--;
         e->above = e->below;
+        e->next_right = e->next_left;
         e->below = fresh_jitter(p, e);
+        e->next_left = ((double)e->edge + e->below) * p->edge_pitch + p->origin;
     }
-    e->next_right = ((double)(e->edge + 1) + e->above) * p->edge_pitch + p->origin;
-    e->next_left = ((double)e->edge + e->below) * p->edge_pitch + p->origin;
-    unsigned quarter = (unsigned)e->edge & 3u;
-    bool a = quarter < 2u;
-    if (!a)
-        e->masked = 0;
-    else if (!e->channel_a && !e->masked && p->missing > 0.0)
-        e->masked = uniform(&e->noise) < p->missing;
-    e->channel_a = a && !e->masked;
-    e->channel_b = quarter == 1u || quarter == 2u;
+    unsigned a = ~(unsigned)e->edge >> 1 & 1u;
+    if (p->missing > 0.0) {
+        if (!a)
+            e->masked = 0;
+        else if (!e->channel_a && !e->masked)
+            e->masked = uniform(&e->noise) < p->missing;
+        a -= e->masked;
+    }
+    e->channel_a = (uint8_t)a;
+    e->channel_b = (uint8_t)(((unsigned)e->edge + 1u) >> 1 & 1u);
 }
 
 static inline int count_edge(Quadrature *q, unsigned a, unsigned b)
@@ -590,8 +594,7 @@ static void steer(Bridge *b, const BridgeLines *lines, unsigned pulse, double su
 
 static inline void take_over(const PrintHeadPlantParams *p, PrintHeadPlant *r, const PrintHeadLines *lines)
 {
-    r->timer.count = r->timer.pulse = r->timer.counter = lines->count;
-    r->timer.output = lines->count > 0;
+    r->timer.pulse = r->timer.counter = lines->count;
     if (lines->count != r->bridge.pulse || lines->right_left != r->latch.right_left ||
         lines->transition != r->latch.transition) {
         r->latch.right_left = lines->right_left;
@@ -664,16 +667,16 @@ static inline void move(const DriveTrainParams *p, DriveTrain *t, double u_posit
 static inline void sense(const EncoderParams *p, Encoder *e, PrintHeadLines *lines, double start, double x)
 {
     unsigned k = 0;
+    double pace = x != start ? PERIOD_US / (x - start) : 0.0;
     for (;;) {
         bool rightward = x >= e->next_right;
         double edge = rightward ? e->next_right : e->next_left;
         if (!rightward && x >= edge)
             break;
         pass_edge(p, e, rightward);
-        double share = x != start ? (edge - start) / (x - start) : 0.0;
         if (k == EDGES)
             k -= 4;
-        lines->when_us[k] = (uint8_t)least(most((int64_t)(share * PERIOD_US), 0), PERIOD_US - 1);
+        lines->when_us[k] = (uint8_t)least(most((int64_t)((edge - start) * pace), 0), PERIOD_US - 1);
         lines->levels[k] = (uint8_t)(e->channel_a | e->channel_b << 1);
         k++;
     }

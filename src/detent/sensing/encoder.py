@@ -34,23 +34,29 @@ class Encoder(Registers):
 
 
 @hot_step
-def place_edges(p: EncoderParams, r: Encoder) -> None:
-    """Positions of the two neighbouring edges."""
+def place_right(p: EncoderParams, r: Encoder) -> None:
+    """Position of the next edge to the right."""
     r.next_right = (r.edge + 1 + r.above) * p.edge_pitch + p.origin
+
+
+@hot_step
+def place_left(p: EncoderParams, r: Encoder) -> None:
+    """Position of the next edge to the left."""
     r.next_left = (r.edge + r.below) * p.edge_pitch + p.origin
 
 
 @hot_step
 def set_channels(p: EncoderParams, r: Encoder) -> None:
     """Levels after an edge: A is high in quarters 0 and 1, B in quarters 1 and 2, so A leads moving right."""
-    quarter = r.edge & 3
-    a = 1 if quarter < 2 else 0
-    if a == 0:
-        r.masked = 0
-    elif r.channel_a == 0 and r.masked == 0 and p.missing > 0.0:
-        r.masked = 1 if uniform(r.noise) < p.missing else 0
-    r.channel_a = 0 if r.masked else a
-    r.channel_b = 1 if quarter in (1, 2) else 0
+    a = 1 - (r.edge >> 1 & 1)
+    if p.missing > 0.0:
+        if a == 0:
+            r.masked = 0
+        elif r.channel_a == 0 and r.masked == 0:
+            r.masked = 1 if uniform(r.noise) < p.missing else 0
+        a -= r.masked
+    r.channel_a = a
+    r.channel_b = r.edge + 1 >> 1 & 1
 
 
 @hot_step
@@ -66,8 +72,9 @@ def pass_right(p: EncoderParams, r: Encoder) -> None:
     """The carriage has passed the next edge to the right."""
     r.edge += 1
     r.below = r.above
+    r.next_left = r.next_right
     r.above = fresh_jitter(p, r)
-    place_edges(p, r)
+    place_right(p, r)
     set_channels(p, r)
 
 
@@ -76,8 +83,9 @@ def pass_left(p: EncoderParams, r: Encoder) -> None:
     """The carriage has passed the next edge to the left."""
     r.edge -= 1
     r.above = r.below
+    r.next_right = r.next_left
     r.below = fresh_jitter(p, r)
-    place_edges(p, r)
+    place_left(p, r)
     set_channels(p, r)
 
 
@@ -102,5 +110,6 @@ def stand_at(p: EncoderParams, r: Encoder, position: float, seed: int) -> None:
     r.noise.state = seed
     r.edge = math.floor((position - p.origin) / p.edge_pitch)
     r.above = r.below = 0.0
-    place_edges(p, r)
+    place_right(p, r)
+    place_left(p, r)
     set_channels(p, r)

@@ -61,9 +61,9 @@ def take_emitter(p: HeadParams, c: PrintHeadController, cycle: int, when: int) -
 
 
 @hot_step
-def fire_until(c: PrintHeadController, lines: PrintHeadLines, last: int) -> None:
-    """Fire the columns due up to `last` [us]."""
-    columns, begin = c.head.columns, c.head.now_us - PERIOD_US
+def fire_until(c: PrintHeadController, lines: PrintHeadLines, begin: int, last: int) -> None:
+    """Fire the columns due up to `last` [us] in the period that began at `begin`."""
+    columns = c.head.columns
     while columns.fire_us <= last:
         k = min(lines.fired, FIRES - 1)
         lines.fired_us[k] = columns.fire_us - begin
@@ -87,12 +87,13 @@ def take_edge(p: HeadParams, c: PrintHeadController, levels: int, when: int) -> 
 @hot_step
 def take_events(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) -> None:
     """Edges and due columns of the last period, in order of time."""
+    begin = c.head.now_us - PERIOD_US
     lines.fired = 0
     for k in range(lines.edges):
-        when = c.head.now_us - PERIOD_US + lines.when_us[k]
-        fire_until(c, lines, when)
+        when = begin + lines.when_us[k]
+        fire_until(c, lines, begin, when)
         take_edge(p, c, lines.levels[k], when)
-    fire_until(c, lines, c.head.now_us - 1)
+    fire_until(c, lines, begin, begin + PERIOD_US - 1)
 
 
 @controls(HeadParams)

@@ -59,16 +59,15 @@ class PrintHeadPlant(Registers):
 
 
 @hot_step
-def report_edge(r: PrintHeadPlant, lines: PrintHeadLines, end: float, edge: float) -> None:
-    """An edge at `edge`, passed on the way from the last sample to `end`: its time and the levels after it.
+def report_edge(r: PrintHeadPlant, lines: PrintHeadLines, edge: float, pace: float) -> None:
+    """An edge at `edge`, with the carriage on its way at `pace` [us/m]: its time and the levels after it.
 
     More than the lines can carry loses whole cycles, so that the levels stay in their sequence.
     """
-    way, k = end - r.sampled, lines.edges
-    share = (edge - r.sampled) / way if way != 0.0 else 0.0
+    k = lines.edges
     if k == EDGES:
         k -= CYCLE
-    lines.when_us[k] = min(max(int(share * PERIOD_US), 0), PERIOD_US - 1)
+    lines.when_us[k] = min(max(int((edge - r.sampled) * pace), 0), PERIOD_US - 1)
     lines.levels[k] = r.encoder.channel_a | r.encoder.channel_b << 1
     lines.edges = k + 1
 
@@ -78,14 +77,17 @@ def sense(p: PrintHeadPlantParams, r: PrintHeadPlant, train: DriveTrain, lines: 
     """What the encoder saw in the last period."""
     e, x = r.encoder, train.position
     lines.edges = 0
+    if e.next_left <= x < e.next_right:
+        return
+    pace = PERIOD_US / (x - r.sampled) if x != r.sampled else 0.0
     while x >= e.next_right:
         edge = e.next_right
         pass_right(p.encoder, e)
-        report_edge(r, lines, x, edge)
+        report_edge(r, lines, edge, pace)
     while x < e.next_left:
         edge = e.next_left
         pass_left(p.encoder, e)
-        report_edge(r, lines, x, edge)
+        report_edge(r, lines, edge, pace)
 
 
 @step
@@ -109,8 +111,7 @@ def observe(p: PrintHeadPlantParams, r: PrintHeadPlant, train: DriveTrain, lines
 @hot_step
 def take_over(p: PrintHeadPlantParams, r: PrintHeadPlant, lines: PrintHeadLines) -> None:
     """25 kHz trigger: timer and decoder take over what the computer put out; the bridge follows."""
-    r.timer.count = lines.count
-    trigger(r.timer)
+    trigger(r.timer, lines.count)
     changed = r.timer.pulse != r.bridge.pulse or lines.right_left != r.latch.right_left
     if changed or lines.transition != r.latch.transition:
         r.latch.right_left = lines.right_left
