@@ -168,7 +168,7 @@ def _table_figure(found: ProfileComparison) -> Figure:
     ]
     caption = (
         "Settling counts from the end of the reference until the load stays within "
-        f"{found.units.error(found.tolerance)} of the target. Twist after that is that of the coupling, peak to peak."
+        f"{found.units.error(found.tolerance)} of the target. Twist: of the coupling after that end, peak to peak."
     )
     return Figure(title="In figures", caption=caption, table=Table(heads=found.table.on_page.heads, rows=rows))
 

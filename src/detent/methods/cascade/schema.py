@@ -132,7 +132,7 @@ class MechanicsTable(Table, frozen=True):
     weight: Force = optional("load's weight along the axis, + pulls in the negative direction", 0.0, ge=-1e7, le=1e7)
     pendulum: Torque = optional("rotary: weight of a load that hangs down at position 0, m g l", 0.0, ge=0.0, le=1e7)
     transmission_loss: float = optional(
-        "share of the motor's force that its friction takes, in motion and at rest", 0.0, ge=0.0, le=0.95
+        "share of the motor's force lost as friction of the transmission, moving or at rest", 0.0, ge=0.0, le=0.95
     )
     start_position: Length = optional(
         "where the axis stands at power-on", math.nan, derived="0, or the end of the way nearest to it",
@@ -185,7 +185,7 @@ class FeedForwardTable(Table, frozen=True):
 class MethodTable(Table, frozen=True):
     """Structure, gains and supervision."""
 
-    structure: Literal["cascade", "pid"] = optional("position P over velocity P or PI, or one PID", "cascade")
+    structure: Literal["cascade", "pid"] = optional("position P over velocity P or PI, or a position PID", "cascade")
     sample_period: Time = optional("period of the loops", 1e-3, ge=1e-6, le=0.1)
     position_gain: float = optional("cascade: velocity demand per position error [1/s]; needed", 0.0, ge=0.0, le=1e6)
     velocity_gain: VoltagePerVelocity = optional("cascade: command per velocity error; needed", 0.0, ge=0.0, le=1e9)
