@@ -35,11 +35,11 @@ from detent import example
 from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
-from detent.control.step_timer import reload_values
 from detent.kernel.loop import advance
 from detent.methods.load import load_spec
 from detent.methods.stepper_envelope.build import changed, stepper_motor
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory
+from detent.planning.step_ramp import StepRamp
 
 TOP = len(RAMP) - 1
 L = len(RAMP)
@@ -719,8 +719,8 @@ def test_30_geometry(steps_per_turn, travel):
 
 
 def test_31_reload_values():
-    assert reload_values([400.0, 4000.0], RELOAD_CLOCK_HZ).tolist() == [2500, 250]
-    reloads = reload_values(RAMP.hz, RELOAD_CLOCK_HZ)
+    assert StepRamp(np.array([400.0, 4000.0])).words(RELOAD_CLOCK_HZ, reload=True).tolist() == [2500, 250]
+    reloads = RAMP.words(RELOAD_CLOCK_HZ, reload=True)
     assert np.abs(RELOAD_CLOCK_HZ / reloads / RAMP.hz - 1).max() <= 0.0020001
     assert len(np.unique(reloads)) < L  # neighbouring top entries share a value
     assert (np.diff(reloads) <= 0).all()  # larger is slower
@@ -734,5 +734,5 @@ def test_31_the_same_motion_with_reload_values():
     # Compared as reloads instead of indices, some of the "less" become "equal", and the motion stays.
     literal = Rig(reload=True, literal=True).start().course()
     assert (literal.hz == in_ticks.hz).all()
-    assert (literal.relation[:L] == -1).sum() == len(np.unique(reload_values(RAMP.hz, RELOAD_CLOCK_HZ)))
+    assert (literal.relation[:L] == -1).sum() == len(np.unique(RAMP.words(RELOAD_CLOCK_HZ, reload=True)))
     assert CLOCK_HZ > RELOAD_CLOCK_HZ

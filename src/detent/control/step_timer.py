@@ -1,8 +1,5 @@
 """Step timer and phase sequencer of a stepper: one pulse per period (stepper-envelope specification 2.2, block B5)."""
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from detent.kernel.registers import Registers, i8, register, u1
 from detent.kernel.step import hot_step
 
@@ -38,8 +35,3 @@ def pulse(r: StepTimer, direction: int) -> None:
     """Step pulse: the coil pattern moves on by one place."""
     r.phase = (r.phase + direction) & 3
     r.pulses += 1
-
-
-def reload_values(hz: ArrayLike, clock_hz: int) -> NDArray[np.int64]:
-    """Period of each frequency in whole ticks, shape as `hz` [tick]."""
-    return np.rint(clock_hz / np.asarray(hz, float)).astype(np.int64)

@@ -168,9 +168,9 @@ class StepRamp:
         """Smallest index whose frequency reaches `hz` [Hz]; the last one where none does."""
         return min(int(np.searchsorted(self.hz, hz)), len(self.hz) - 1)
 
-    def words(self) -> NDArray[np.uint16]:
-        """The list as the control unit stores it, in whole Hz, shape (L,)."""
-        return np.rint(self.hz).astype(np.uint16)
+    def words(self, clock_hz: int, *, reload: bool) -> NDArray[np.int64]:
+        """The list as the control unit stores it: periods of its timer [tick], or whole Hz, shape (L,)."""
+        return np.rint(clock_hz / self.hz if reload else self.hz).astype(np.int64)
 
 
 def make_ramp(start_hz: float, max_hz: float, acceleration: Callable[[float], float]) -> StepRamp:

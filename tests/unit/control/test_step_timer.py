@@ -1,7 +1,6 @@
-import numpy as np
 import pytest
 
-from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, reload_values
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse
 
 
 @pytest.mark.parametrize(("hz", "period"), [(400, 2500), (3000, 333), (3999, 250), (3, 333_333), (1_000_000, 1)])
@@ -26,8 +25,3 @@ def test_pulses_move_the_coil_pattern_by_direction():
         phases.append(r.phase)
     assert phases == [1, 2, 3, 0, 1, 0, 3, 2]
     assert r.pulses == 8
-
-
-def test_reload_values_of_a_list():
-    assert reload_values([400, 4000, 3000], 1_000_000).tolist() == [2500, 250, 333]
-    assert reload_values(np.array([3.0]), 8).dtype == np.int64

@@ -8,6 +8,7 @@ from tests.stepper_rig import LOAD, MOTOR, Rig, heavier
 from detent.planning.step_ramp import (
     FirstOrderPullOut,
     MeasuredPullOut,
+    StepRamp,
     WindingPullOut,
     make_ramp,
     natural_frequency,
@@ -119,8 +120,9 @@ def test_index_of_a_frequency():
     assert ramp.index_of(1.0) == ramp.index_of(100.0) == 0
     assert ramp.index_of(100.1) == 1
     assert ramp.index_of(1000.0) == ramp.index_of(9999.0) == len(ramp) - 1
-    assert ramp.words().dtype == np.uint16
-    assert np.abs(ramp.words() - ramp.hz).max() <= 0.5
+    words = ramp.words(8, reload=False)
+    assert words.dtype == np.int64
+    assert np.abs(words - ramp.hz).max() <= 0.5
 
 
 @pytest.mark.parametrize(("start", "top"), [(0, 100), (200, 100), (100, 65536), (math.nan, 100), (100, math.inf)])
@@ -144,3 +146,7 @@ def test_the_unloaded_start_frequency_of_the_default_motor_is_three_times_its_na
     natural = natural_frequency(200, MOTOR.holding_torque, MOTOR.rotor_inertia)
     assert natural == pytest.approx(290.6, abs=0.1)
     assert MOTOR.unloaded_start_hz / natural == pytest.approx(3.1, abs=0.01)
+
+
+def test_reload_values_are_the_nearest_periods():
+    assert StepRamp(np.array([400.0, 3000.0, 4000.0])).words(1_000_000, reload=True).tolist() == [2500, 333, 250]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
-from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, reload_values
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4
 from detent.kernel.step import hot_step, step
@@ -106,9 +106,9 @@ def load_rule(
 ) -> None:
     """Put ramp list and zone limits into the control unit, in the words of its timer."""
     bounds = np.asarray(limits, float)
-    words = reload_values(ramp.hz, clock_hz) if reload else ramp.words()
+    words = ramp.words(clock_hz, reload=reload)
     bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)
-    p.rule.ramp[: len(words)] = [int(word) for word in words]
+    p.rule.ramp[: len(words)] = words.tolist()
     p.rule.limit[: len(bounds)] = [int(word) for word in bound_words]
     p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
     p.rule.reload = p.timer.reload = int(reload)
