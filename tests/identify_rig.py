@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from detent.identify.fit.prepare import Run
+from detent.identify.fit.equations import Run
 from detent.logs.log import Finding, Log
 
 STEP = 2e-3

@@ -5,11 +5,10 @@ from tests.bench.race import Race, timed
 from tests.published_recipe import fit_inverse_dynamics
 
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.equations import make_kernel, make_motion, usable_rows
+from detent.identify.fit.equations import make_kernel, make_motion, make_run, usable_rows
 from detent.identify.fit.identification import WINDOW, choose_windows, identify
 from detent.identify.fit.ladder import RUNGS
 from detent.identify.fit.output_error import fit_output_error
-from detent.identify.fit.prepare import make_run
 from detent.identify.fit.regression import fit_equations
 from detent.logs.log import Log, Source
 

@@ -11,9 +11,8 @@ from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
 from detent.identify.fit.verdict import Refusal
-from detent.identify.write.axis_output import axis_toml, cascade_spec
-from detent.identify.write.excitation import excitation_job
 from detent.identify.write.file_numbers import Contrast, contrasts
+from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec

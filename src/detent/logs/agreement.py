@@ -1,7 +1,8 @@
 """Signals that say the same motion, held against one another: wrong signs and units wrong by a factor.
 
 The position is the anchor. The velocity must be its derivative, the acceleration that of the velocity; the reference
-and a second encoder must go where it goes.
+and a second encoder must go where it goes. A sign is turned and a known factor taken out, as both are certain once the
+signals are alike in everything else; a factor that is none of `FACTORS` is told and left.
 """
 
 import math
@@ -19,32 +20,16 @@ NEAR_REFERENCE = 0.12  # the same for a reference
 TOLERATED = 0.25  # relative deviation of a factor from 1 that a filter or a calibration may make
 
 FACTORS: dict[str, dict[float, str]] = {
-    "m": {
-        1000.0: "thousandths: mm for m, or ms for s",
-        1e6: "millionths: um for m, or us for s",
-        60.0: "minutes for seconds",
-        60e3: "mm/min for m/s",
-        1000 / 25.4: "inches for m",
-        1 / 25.4: "inches for mm",
-        100.0: "hundredths: cm for m",
-        4.0: "four edges counted per line of the encoder, or one",
-    },
-    "rad": {
-        180 / math.pi: "degrees for radians",
-        60 / math.tau: "revolutions per minute for rad/s",
-        1 / math.tau: "turns for radians",
-        360.0: "degrees for turns",
-        1000.0: "thousandths: mrad for rad, or ms for s",
-        1e6: "millionths: us for s",
-        4.0: "four edges counted per line of the encoder, or one",
-    },
-    "count": {
-        1000.0: "thousandths: ms for s",
-        1e6: "millionths: us for s",
-        60.0: "minutes for seconds",
-        4.0: "four edges counted per line of the encoder, or one",
-    },
-}
+    "m": {1000.0: "thousandths: mm for m, or ms for s", 1e6: "millionths: um for m, or us for s",
+          60.0: "minutes for seconds", 60e3: "mm/min for m/s", 1000 / 25.4: "inches for m", 1 / 25.4: "inches for mm",
+          100.0: "hundredths: cm for m", 4.0: "four edges counted per line of the encoder, or one"},
+    "rad": {180 / math.pi: "degrees for radians", 60 / math.tau: "revolutions per minute for rad/s",
+            1 / math.tau: "turns for radians", 360.0: "degrees for turns",
+            1000.0: "thousandths: mrad for rad, or ms for s", 1e6: "millionths: us for s",
+            4.0: "four edges counted per line of the encoder, or one"},
+    "count": {1000.0: "thousandths: ms for s", 1e6: "millionths: us for s", 60.0: "minutes for seconds",
+              4.0: "four edges counted per line of the encoder, or one"},
+}  # fmt: skip
 """Factors between units that are mixed up, as numbers of the wrong unit per number of the right one, with meanings; by
 the unit of positions. No two of them are near one another."""
 
@@ -57,11 +42,7 @@ _SAID = {"velocity": "d(position)/dt", "acceleration": "d(velocity)/dt", "refere
 
 
 def find_disagreements(draft: Draft) -> None:
-    """Find signals of the same motion with another sign or another unit than the position, and put them right.
-
-    A sign is turned and a known factor taken out, as both are certain once the signals are alike in everything else;
-    a factor that is none of `FACTORS` is told and left. Where both units were guessed nothing is changed.
-    """
+    """Find signals of the same motion with another sign or unit than the position, and put right what is certain."""
     position = draft.values.get("position")
     if position is None or np.ptp(position) <= 5 * grain(position):
         return
@@ -89,11 +70,9 @@ def _compare(draft: Draft, role: str) -> Likeness:
 
 
 def _before_position(draft: Draft) -> Likeness:
-    """A reference beside the position that follows it: where they are most alike, at the shortest delay of those.
-
-    Without the delay of the loop a fast motion would lie crosswise to its reference, or even against it. Of a sine,
-    half a period of delay and a wrong sign look the same: then the sign is believed.
-    """
+    """A reference beside the position that follows it: where they are most alike, at the shortest delay of those."""
+    # Without the delay of the loop a fast motion would lie crosswise to its reference. Of a sine, half a period of
+    # delay and a wrong sign look the same: then the sign is believed.
     reference, position, enabled = draft.values["reference"], draft.values["position"], draft.values.get("enabled")
     if enabled is not None and np.any(enabled):  # the longest stretch in which the drive is on
         runs = runs_of(enabled > 0.5)

@@ -6,21 +6,18 @@ import numpy as np
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import did_you_mean, short
-from detent.logs.log import Action, Draft, Kind, Severity, Source, Values
-from detent.logs.log_units import Conversion, bits_of, find_conversion, split_heading
+from detent.logs.headings import BITS, ROLES, Conversion, find_conversion, rank, split_heading, words_of
+from detent.logs.log import Action, Draft, Kind, Severity, Source
 from detent.logs.mapping import Choice, ColumnMapping
 from detent.logs.raw_table import RawTable, tell
-from detent.logs.roles import ROLES, rank, words_of
 
+# Signals that a unit alone tells.
 _BY_UNIT = ("force", "torque", "current", "voltage", "temperature", "acceleration", "velocity")
-"""Signals that a unit alone tells."""
-
 _MOTION = ("position", "reference", "position_load", "velocity", "acceleration")
 _ANGLE_WORDS = frozenset({"angle", "theta", "phi", "rpm", "omega", "rad", "deg", "turn", "turns"})
 _TIME_UNITS = (("s", 1e-7, 0.2), ("ms", 0.2, 200.0), ("us", 200.0, 2e5), ("ns", 2e5, 2e8))
 """Time between two rows, in numbers of a column without a unit, from which to which a unit is believed: recordings of
 servos are made with 5 to 5000 rows a second, seldom more."""
-
 
 Chosen = dict[str, str]  # from a role to the name of its column
 
@@ -29,10 +26,10 @@ def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
     """Find the column of each signal; what was guessed is among the notes of the table."""
     chosen: Chosen = {}
     problems: list[FileProblem] = []
-    held = f"columns {table.told_columns()}"
+    held = f"columns {tell([short(name) for name in table.columns])}"
     silent = {role for role, choice in mapping.columns.items() if not choice.column}
     for role, choice in mapping.columns.items():
-        name = None if role in silent else find_column(table, choice.column)
+        name = find_column(table, choice.column) if role not in silent else None
         if name is not None:
             chosen[role] = name
         elif role not in silent:
@@ -115,10 +112,8 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
     draft.guesses = [*table.notes]
     constants = {**table.constants, **mapping.constants}
     if "time" not in chosen and mapping.file.period is not None:
-        period = mapping.file.period
         draft.t = (table.rows - 1).astype(np.float64)
-        draft.units["time"] = "s"
-        draft.sources["time"] = Source("", "rows", period)
+        draft.units["time"], draft.sources["time"] = "s", Source("", "rows", mapping.file.period)
     units = _find_units(table, chosen, mapping, draft)
     for role in sorted(chosen, key=list(ROLES).index):
         name, (unit, conversion) = chosen[role], units[role]
@@ -135,9 +130,8 @@ def make_draft(table: RawTable, chosen: Chosen, mapping: ColumnMapping) -> Draft
         draft.bits |= {role: choice.bits} if choice.bits else {}
         draft.delays |= {role: choice.delay} if choice.delay else {}
     for role in [role for role in draft.values if role not in mapping.columns]:  # what the user states is believed
-        bits = bits_of(table.units[chosen[role]])
-        if bits is not None:
-            _check_width(draft, role, chosen[role], bits)
+        if match := BITS.fullmatch(table.units[chosen[role]].strip()):  # a width for a unit, as ``8bits``
+            _check_width(draft, role, chosen[role], int(match[1]))
     return draft
 
 
@@ -157,10 +151,7 @@ def _number_of(file: str, role: str, factor: float | str, constants: dict[str, f
 def _find_units(
     table: RawTable, chosen: Chosen, mapping: ColumnMapping, draft: Draft
 ) -> dict[str, tuple[str, Conversion]]:
-    """Unit of each signal, guessed where neither user nor heading states it, with how it becomes SI.
-
-    Signals of a motion without a unit follow those with one.
-    """
+    """Unit of each signal, guessed where none is stated, those of a motion alike; with how it becomes SI."""
     found: dict[str, tuple[str, Conversion]] = {}
     for role, name in chosen.items():
         stated = (mapping.columns[role].unit if role in mapping.columns else "", table.units[name])
@@ -196,7 +187,9 @@ def _guess_unit(table: RawTable, chosen: Chosen, role: str, base: str) -> tuple[
         return "degC" if role == "temperature" else units[0], ""
     if base:
         return units[turns.get(base, 0)], f", as the other signals in {base}"
-    if _are_counts(values) and role not in {"velocity", "acceleration"}:
+    known = values[np.isfinite(values)]
+    is_count = len(known) > 0 and bool(np.all(known == np.rint(known))) and float(np.ptp(known)) > 20
+    if is_count and role not in {"velocity", "acceleration"}:
         return "count", f": whole numbers; say how long one is, as in {role}={short(name)} [0.5 um]"
     is_angle = bool(_ANGLE_WORDS & set(words_of(name))) or "torque" in chosen
     other = "moves straight" if is_angle else "turns"
@@ -204,20 +197,13 @@ def _guess_unit(table: RawTable, chosen: Chosen, role: str, base: str) -> tuple[
     return units[1 if is_angle else 0], said
 
 
-def _are_counts(values: Values) -> bool:
-    """True for whole numbers that go through more than a few."""
-    known = values[np.isfinite(values)]
-    return bool(len(known)) and bool(np.all(known == np.rint(known))) and float(np.ptp(known)) > 20
-
-
 def _check_width(draft: Draft, role: str, name: str, bits: int) -> None:
     """Leave out words whose heading states a width in bits that they do not fit: they are something else."""
-    values = draft.values[role]
+    values, unit = draft.values[role], draft.units.get("position", "m")
     beyond = np.flatnonzero(np.abs(values) >= 2**bits)
     if len(beyond):
         low, high = np.nanmin(values), np.nanmax(values)
         text = f"the heading says {bits} bits, but the numbers go from {low:g} to {high:g}: they are something else"
-        unit = draft.units.get("position", "m")
         example = {"count": "steps", "m": "mm"}.get(unit, unit)
         advice = f"state what the column is, as in reference={short(name)} [{example}]"
         draft.note(Kind.WRONG_UNIT, role, beyond, text, Action.LEFT_OUT, advice, Severity.WARNING)

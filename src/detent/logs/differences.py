@@ -1,7 +1,4 @@
-"""What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are.
-
-SciPy is loaded only where a part of it is used.
-"""
+"""What the physics checks compare: changes of a signal over windows, derivatives, and how alike two series are."""
 
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -30,20 +27,15 @@ class Likeness(NamedTuple):
 
 
 def resolution(values: Values) -> float:
-    """Smallest step between two different values; 0 for a constant.
-
-    Steps below a billionth of the range are rounding of the file, not of the sensor.
-    """
+    """Smallest step between two different values but for rounding, a billionth of the range; 0 for a constant."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-9 * float(np.ptp(values))]
     return float(steps.min()) if len(steps) else 0.0
 
 
 def grain(values: Values) -> float:
-    """Smallest difference that means something: the resolution, or the noise (standard deviation) if that is more.
-
-    The noise is taken from second differences, in which a smooth motion leaves next to nothing.
-    """
+    """Smallest difference that means something: the resolution, or the noise (standard deviation) if that is more."""
+    # The noise is taken from second differences, in which a smooth motion leaves next to nothing.
     bends = np.abs(np.diff(values, 2))
     noise = 1.4826 * float(np.median(bends)) / np.sqrt(6.0) if len(bends) else 0.0
     return max(resolution(values), noise)
@@ -58,10 +50,8 @@ def window_rows(position: Values) -> int:
 
 
 def smooth(values: Values, t: Values, rows: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Samples whose window of some rows has no gap, and value, slope and curvature there, shapes (m,) and (3, m).
-
-    Uneven stamps are noise here, so the period is the mean.
-    """
+    """Samples whose window of some rows has no gap, and value, slope and curvature there, shapes (m,) and (3, m)."""
+    # Uneven stamps are noise here, so the period is the mean.
     parts = [part for part in stretches(t) if part.stop - part.start > rows]
     index = [np.arange(part.start + rows // 2, part.stop - rows // 2, dtype=np.int64) for part in parts]
     periods = [float(t[part][-1] - t[part][0]) / (part.stop - part.start - 1) for part in parts]
@@ -75,11 +65,8 @@ def integral(values: Values, t: Values) -> Values:
 
 
 def paired_changes(position: Values, velocity: Values, t: Values) -> tuple[Values, Values]:
-    """Changes of a position over windows, measured and by the velocity.
-
-    Over a window the change of the position is the integral of the velocity, whatever the stamps; both see the same
-    window, so that neither is delayed against the other, and rounding counts once per window.
-    """
+    """Changes of a position over windows, measured, and by the integral of the velocity."""
+    # Both see the same window, whatever its stamps: neither is delayed, and rounding counts once per window.
     rows = window_rows(position)
     path = integral(velocity, t)
     step = max(1, rows // 2)
@@ -102,10 +89,7 @@ def likeness(ours: Values, theirs: Values, *, is_centred: bool = False) -> Liken
 
 
 def correlate(ours: Values, theirs: Values) -> Values:
-    """Correlation of two series, about their means, for each shift of the first by up to a quarter of its rows.
-
-    Shape (2 most + 1,); the value at ``most + k`` is that of the first taken from k rows later.
-    """
+    """Correlation of two series about their means by the rows from which the first is later, -most..most."""
     most = min(FARTHEST, len(ours) // 4)
     ours, theirs = ours - ours.mean(), theirs - theirs.mean()
     # Only what lies in the middle takes part, so that each shift compares as many samples.

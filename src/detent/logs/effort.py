@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.logs.differences import correlate, grain, peaks_of, smooth, window_rows
+from detent.logs.headings import EFFORTS
 from detent.logs.log import Action, Draft, Kind, Severity, Values
-from detent.logs.roles import EFFORTS
 
 EXPLAINED = 0.3  # share of the variance of an effort that the motion must explain before its sign is judged
 AGAINST = -0.3  # sum of the shares (standardised) of inertia and friction below which an effort has the wrong sign
@@ -54,12 +54,8 @@ def smoothed(values: Values, draft: Draft, motion: Motion) -> Values:
 
 
 def find_wrong_effort(draft: Draft) -> None:
-    """Find efforts that work against the motion they should cause, and efforts without their sign.
-
-    The effort is fitted by the terms of the equation above. Its sign is wrong where the parts of inertia and friction
-    are negative together; friction that feeds an axis does not exist. An effort is left as it is: which of the two,
-    effort or position, counts the other way the recording does not tell.
-    """
+    """Find efforts whose parts of inertia and friction are negative together, and efforts without their sign."""
+    # They are left as they are: which of the two, effort or position, counts the other way the recording does not tell.
     motion = find_motion(draft)
     if motion is None:
         return
@@ -115,10 +111,9 @@ def _find_lost_sign(draft: Draft, role: str, effort: Values, motion: Motion) -> 
 def find_shifts(draft: Draft) -> None:
     """Find signals that lie beside one another in time.
 
-    A velocity that comes later or earlier than the derivative of the position is moved by whole rows. A second encoder
-    is left where it is. A position that runs ahead of its reference, and a force, torque or current that comes after
-    the acceleration that it makes, are against nature: then one of the two was recorded with a delay. That a position
-    follows its reference with a delay is what loops do, and no finding.
+    A velocity that comes later or earlier than the derivative of the position is moved by whole rows. A position that
+    runs ahead of its reference, and an effort that comes after the acceleration that it makes, are against nature: one
+    of the two was recorded with a delay. That a position follows its reference with a delay is what loops do.
     """
     motion = find_motion(draft)
     if motion is None or len(draft) < _FEWEST_SHIFTED:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import InputError
-from detent.logs.roles import EFFORTS
+from detent.logs.headings import EFFORTS
 
 Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
 Rows = NDArray[np.int64]  # numbers of rows of a file, from 1, header lines not counted, shape (n,)

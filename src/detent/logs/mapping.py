@@ -37,31 +37,31 @@ from detent.files.quantities import Time
 from detent.files.read import read_tables
 from detent.files.source import Source, parse_source
 from detent.files.text import decode_utf8, did_you_mean, read_bytes, short
-from detent.logs.log_units import find_conversion
-from detent.logs.roles import ROLES
+from detent.logs.headings import ROLES, find_conversion
 
 MAX_BYTES = 100_000  # largest mapping file read; a real one has a few hundred bytes
+# Separators by the words that name them in options.
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "bar": "|"}
-"""Separators by the words that name them in options."""
-
 _DECIMALS = {"point": ".", "comma": ","}
 _OPTION = re.compile(r"\s*([A-Za-z_]+)\s*=\s*(.*)", re.DOTALL)
 _MOST_BITS = 63
+
+
+def _refused(remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("refused", "no value of the key", {"remedy": remedy})
 
 
 def _word_of(words: dict[str, str], value: object) -> str:
     """The sign that a word stands for, or the sign itself."""
     if isinstance(value, str) and (value in words or value in words.values()):
         return words.get(value, value)
-    raise PydanticCustomError("refused", "none of the words", {"remedy": "write one of these words in quotes"})
+    raise _refused("write one of these words in quotes")
 
 
 def _read_column(value: object) -> str:
-    if isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**6:
+    if isinstance(value, str) or (type(value) is int and 0 < value < 10**6):
         return str(value)
-    if isinstance(value, str):
-        return value
-    raise PydanticCustomError("refused", "no column", {"remedy": 'write column = "NAME"'})
+    raise _refused('write column = "NAME"')
 
 
 def _read_factor(value: object) -> float | str:
@@ -69,13 +69,13 @@ def _read_factor(value: object) -> float | str:
         return value
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 < abs(value) < 1e300:
         return float(value)
-    raise PydanticCustomError("refused", "no factor", {"remedy": "write a number without quotes, or a name"})
+    raise _refused("write a number without quotes, or a name")
 
 
 def _check_sign(sign: int) -> int:
-    if abs(sign) != 1:
-        raise PydanticCustomError("refused", "no sign", {"remedy": "write sign = -1 to turn the signal round"})
-    return sign
+    if abs(sign) == 1:
+        return sign
+    raise _refused("write sign = -1 to turn the signal round")
 
 
 def _check_unit(role: str, unit: str) -> str:
@@ -84,7 +84,7 @@ def _check_unit(role: str, unit: str) -> str:
     if unit and not any(find_conversion(unit, target) for target in wanted):
         example = {"": "%", "K": "degC"}.get(wanted[0], f"m{wanted[0]}" if wanted[0] != "N*m" else "mN*m")
         remedy = f"write a unit as in [{example}]" + (", or one of counts" if "count" in "".join(wanted) else "")
-        raise PydanticCustomError("refused", "no unit of the signal", {"remedy": remedy})
+        raise _refused(remedy)
     return unit
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from detent.errors import InputError
 from detent.files.text import short
+from detent.logs.headings import rank, split_heading
 from detent.logs.log import Finding, Rows, Values
-from detent.logs.roles import is_time
 
 MAX_CELLS = 50_000_000  # most numbers read from one file: 400 MB of them
 MAX_COLUMNS = 2000  # most columns read from one file
@@ -56,10 +56,6 @@ class RawTable:
     broken: list[BrokenRow] = field(default_factory=list[BrokenRow])  # rows that are not among the columns
     findings: list[Finding] = field(default_factory=list[Finding])  # what was found and done so far
 
-    def told_columns(self) -> str:
-        """Names of the columns for a message."""
-        return tell([short(name) for name in self.columns])
-
     def add(self, item: Item) -> None:
         """Add a column of numbers under a name of its own."""
         name = item.name
@@ -86,10 +82,8 @@ class RawTable:
         return True
 
     def _as_floats(self, name: str, values: NDArray[Any]) -> tuple[Values, str]:
-        """Numbers of a column as floats, and their unit if their type says it.
-
-        Whole numbers beyond what a float holds exactly, such as nanoseconds since 1970, are counted from the first.
-        """
+        """Numbers of a column as floats, and their unit if their type says it."""
+        # Whole numbers beyond what a float holds exactly, such as nanoseconds since 1970, are counted from the first.
         unit, absent = "", np.zeros(len(values), dtype=np.bool_)
         if values.dtype.kind in "mM":
             absent = np.isnat(values)
@@ -124,7 +118,7 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
             passed.append(short(item.name))
     # Rows of the table: those of the time if there is one, otherwise those that most vectors have.
     lengths = [len(item.value) for item in vectors]
-    timed = [len(item.value) for item in vectors if is_time(item.name)]
+    timed = [len(item.value) for item in vectors if rank(split_heading(item.name)[0], "time") is not None]
     common = Counter(timed or lengths).most_common()
     length = max((length for length, count in common if count == common[0][1]), default=0)
     check_size(file, length, len(vectors))

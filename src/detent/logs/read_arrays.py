@@ -12,7 +12,7 @@ from detent.errors import InputError
 from detent.files.text import check_file
 from detent.logs import raw_table
 from detent.logs.differences import scipy
-from detent.logs.log_units import split_heading
+from detent.logs.headings import split_heading
 from detent.logs.mapping import FileOptions
 
 MAX_COLUMNAR = 2_000_000_000  # largest HDF5 or Parquet file read; what counts is how many numbers are taken from it
@@ -27,16 +27,14 @@ _UNIT_NAMES = ("unit", "units", "Unit", "Units")
 
 
 def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
-    """Read a MATLAB file: version 4 to 7 with SciPy, version 7.3, which is HDF5, as such.
-
-    Fields of structures give names joined by points; ``table`` names the structure to read.
-    """
+    """Read a MATLAB file, of version 7.3 as HDF5; names in structures, or in that of ``table``, joined by points."""
     check_file(path, MAX_BYTES, ALLOWED_MAT)
     with raw_table.whole(path, "MATLAB", ALLOWED_MAT, "save it again with save -v7, or as CSV"):
         try:
             cells = sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy("io").whosmat(path))
             if cells > raw_table.MAX_CELLS:
-                raise _too_much(path, f"{cells} numbers", f"{ALLOWED_MAT}, up to {raw_table.MAX_CELLS} numbers")
+                most = f"{ALLOWED_MAT}, up to {raw_table.MAX_CELLS} numbers"
+                raise InputError.of_file(str(path), f"{cells} numbers", most, "cut the recording into pieces")
             found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
             return read_hdf5(path, options)
@@ -57,7 +55,8 @@ def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
                 size = sum(entry.file_size for entry in archive.infolist())
             if size > 8 * raw_table.MAX_CELLS:
                 most = f"up to {8 * raw_table.MAX_CELLS // 1_000_000} MB unpacked"
-                raise _too_much(path, f"{size // 1_000_000} MB unpacked", most)
+                came = f"{size // 1_000_000} MB unpacked"
+                raise InputError.of_file(str(path), came, most, "cut the recording into pieces")
             with np.load(path, allow_pickle=False) as arrays:
                 for name in arrays.files:
                     items += _fields(name, _load_member(arrays, name), 0)
@@ -105,11 +104,6 @@ def _load_member(arrays: Any, name: str) -> Any:
         if "pickle" in str(error):
             return None
         raise
-
-
-def _too_much(path: Path, came: str, allowed: str) -> InputError:
-    """What would fill the memory, before it is read."""
-    return InputError.of_file(str(path), came, allowed, "cut the recording into pieces")
 
 
 def _fields(name: str, value: Any, depth: int) -> Iterator[raw_table.Item]:

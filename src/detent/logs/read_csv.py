@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import read_bytes, short
+from detent.logs.headings import is_unit, split_heading
 from detent.logs.log import tell_count
-from detent.logs.log_units import is_unit, split_heading
 from detent.logs.mapping import SEPARATORS, FileOptions
 from detent.logs.raw_table import LARGEST_EXACT, BrokenRow, Item, RawTable, check_size
 
@@ -27,9 +27,8 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 SAMPLE_LINES = 200  # lines that say something from which the layout is guessed
 _TRIED = ("\t", ";", ",", "|", " ")
 _COMMENT = re.compile(r"\s*(#|%|//|\*)\s?")
+# Texts, in small letters, with which programs say that there is no value.
 MISSING = frozenset({"", "-", "--", "?", "na", "n/a", "nan", "-nan", "null", "none", "nil", "inf", "-inf", "+inf"})
-"""Texts, in small letters, with which programs say that there is no value."""
-
 _WORDS = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eEdD][+-]?[0-9]{1,3})?")
 _MOMENT = re.compile(
@@ -52,16 +51,9 @@ class CsvLayout:
     text_columns: set[int] = field(default_factory=set[int])
     moment_columns: set[int] = field(default_factory=set[int])
 
-    def read(self, index: int, cells: Sequence[str]) -> tuple[NDArray[np.generic], set[int]]:
-        """Numbers or moments of a piece of a column, and the indices of the cells that are none."""
-        return read_moments(cells) if index in self.moment_columns else read_column(cells, self.decimal)
-
 
 def read_csv(path: Path, options: FileOptions) -> RawTable:
-    """Read a text table.
-
-    Rows that do not fit the header, or hold what is no number in a column of numbers, are put aside as broken.
-    """
+    """Read a text table; rows that do not fit the header or their columns of numbers are put aside as broken."""
     table = RawTable(str(path))
     lines = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table).splitlines()
     try:
@@ -108,7 +100,8 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
         for index in columns:
             column = [block[row][index] for row in fitting]
-            values, bad = layout.read(index, column)
+            dated = index in layout.moment_columns
+            values, bad = read_moments(column) if dated else read_column(column, layout.decimal)
             found.append(values)
             wrong = {fitting[place]: column[place] for place in bad} | wrong
         for row, cell in wrong.items():
@@ -148,9 +141,6 @@ def _break(table: RawTable, layout: CsvLayout, cells: list[str], row: int, reaso
     table.broken.append(BrokenRow(row, telling, reason))
 
 
-# ---- what cells say
-
-
 def is_number(cell: str) -> bool:
     """True for a cell that is a number, with a decimal point or comma, or a truth value."""
     return _NUMBER.fullmatch(cell) is not None or cell.lower() in _WORDS
@@ -178,10 +168,8 @@ def read_cell(cell: str, decimal: str) -> float | None:
 
 
 def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64] | NDArray[np.int64], set[int]]:
-    """Numbers of a piece of a column, and the indices of the cells that are no numbers (NaN there).
-
-    Whole numbers beyond what a float holds exactly stay whole numbers.
-    """
+    """Numbers of a piece of a column, and the indices of the cells that are no numbers (NaN there)."""
+    # Whole numbers beyond what a float holds exactly stay whole numbers.
     try:
         values = np.array(cells, dtype=np.float64)
     except ValueError:
@@ -196,10 +184,7 @@ def read_column(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.float64]
 
 
 def read_moments(cells: Sequence[str]) -> tuple[NDArray[np.datetime64], set[int]]:
-    """Moments of a piece of a column of dates and times, and the indices of the cells that are none.
-
-    The difference to universal time is left out: it is the same for all.
-    """
+    """Moments of a piece of a column of dates, their difference to UTC left out, and the indices of what is none."""
     found = [_MOMENT.fullmatch(cell) for cell in cells]
     texts = [f"{match[1]}T{match[2].replace(',', '.')}" if match else "NaT" for match in found]
     try:
@@ -225,9 +210,8 @@ def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
 def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) -> CsvLayout:
     """Find out how a text table is laid out; what was guessed is among the notes of the table.
 
-    The separator is the one that gives the most cells that are numbers in rows of one width. The first such row is the
-    first row of numbers; the header is the line above it, which may be a comment; a line of nothing but units may stand
-    between them.
+    The first row of numbers is the first of the usual width; the header is the line above it, which may be a comment,
+    or the line before that where it holds nothing but units.
     """
     begin = options.header or 0
     sample = [index for index in range(begin, len(lines)) if is_telling(lines[index])][:SAMPLE_LINES]
@@ -300,7 +284,10 @@ def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, state
         above = [stated - 1] if stated else []
     rows = [_cells(lines[index], layout.separator) for index in above]
     units: list[str] = []
-    if stated is None and len(rows) > 1 and _is_units(rows[-1]) and len(rows[-2]) >= len(rows[-1]) > 1:
+    # A row of nothing but units, such as ``[s];[mm]``; some columns may have none.
+    telling = [cell.strip("[]() ") for cell in (rows[-1] if rows else ()) if cell.strip("[]() -")]
+    is_units = bool(telling) and all(map(is_unit, telling))
+    if stated is None and len(rows) > 1 and is_units and len(rows[-2]) >= len(rows[-1]) > 1:
         units = [cell.strip("[]() ") for cell in rows.pop()]
     # A line above the numbers that is much narrower than they are is no header but a remark.
     names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
@@ -325,12 +312,6 @@ def _cells(line: str, separator: str) -> list[str]:
     while cells and not cells[-1]:
         cells.pop()
     return cells
-
-
-def _is_units(cells: Sequence[str]) -> bool:
-    """True for a row of nothing but units, such as ``[s];[mm]``; some columns may have none."""
-    telling = [cell for cell in cells if cell.strip("[]() -")]
-    return bool(telling) and all(is_unit(cell.strip("[]() ")) for cell in telling)
 
 
 def _find_texts(rows: Sequence[Sequence[str]], layout: CsvLayout) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
 from detent.files.text import decode_utf8, kind_of, read_bytes, short
-from detent.logs.log_units import split_heading
+from detent.logs.headings import split_heading
 from detent.logs.mapping import FileOptions
 from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size, flatten, no_table, table_of, tell
 from detent.logs.read_csv import is_moment, read_cell, read_moments
@@ -24,10 +24,9 @@ _MOST_BROKEN = 0.2
 
 
 def read_json(path: Path, options: FileOptions) -> RawTable:
-    """Read a recording in JSON.
+    """Read records, objects or lists of equal length, or an object with a list of them beside constants.
 
-    Records are objects, or lists of equal length; objects in them give names joined by points. A list of records may
-    stand in an object, whose other values are constants; of several such lists ``table`` names one.
+    Objects in records give names joined by points; of several lists of records ``table`` names one.
     """
     file = str(path)
     text = decode_utf8(path, read_bytes(path, MAX_BYTES, ALLOWED))
@@ -117,9 +116,8 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
     table.broken += [BrokenRow(int(rows[place]), (), f'"{short(cell)}" is no number') for place, cell in wrong.items()]
     table.broken.sort()
     if len(table.broken) > max(2, _MOST_BROKEN * len(records)) or not columns or not keep.any():
-        came = (
-            f"{len(table.broken)} of {len(records)} records that are none" if table.broken else "no records of numbers"
-        )
+        some = f"{len(table.broken)} of {len(records)} records that are none"
+        came = some if table.broken else "no records of numbers"
         raise InputError.of_file(file, came, ALLOWED, "name another file, or another list of it with table=NAME")
     table.rows = rows[keep]
     for name, values in columns.items():
@@ -129,10 +127,7 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
 
 
 def _flatten(table: RawTable, records: list[Any]) -> dict[int, Record]:
-    """Records by their row, each flat; those that are none become broken rows.
-
-    The first of records that are lists may hold the names.
-    """
+    """Records by their row, each flat, the names in the first of lists; those that are none become broken rows."""
     names: list[str] = []
     if records and isinstance(records[0], list):
         first = cast("list[Any]", records[0])

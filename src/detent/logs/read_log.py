@@ -44,7 +44,12 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     chosen = choose_columns(table, stated)
     if "time" in chosen:
         mend_rotation(table, chosen["time"])
-    _tell_broken(table)
+    if table.broken:
+        reasons = list(dict.fromkeys(broken.reason for broken in table.broken))
+        more = f" and {len(reasons) - 3} more reasons" if len(reasons) > 3 else ""
+        text = f"{tell_count(len(table.broken), 'row')} cannot be read: {'; '.join(reasons[:3])}{more}"
+        rows = row_ranges([broken.row for broken in table.broken])
+        table.findings.append(Finding(Kind.BROKEN_ROWS, "", rows, text, Action.REMOVED))
     draft = make_draft(table, chosen, stated)
     if not draft.values:
         raise InputError.of_file(str(path), _nothing_left(draft), "at least one signal", "state what the columns are")
@@ -67,11 +72,8 @@ def read_table(path: str | Path, options: FileOptions | None = None) -> RawTable
 
 
 def clean(draft: Draft) -> None:
-    """Find and mend what is wrong with a recording: the clock, the cells, the counters, then what physics says.
-
-    Each check works on what the ones before have mended. Those up to the counters need the numbers of the file, as
-    counters wrap and clocks tick in these; the others need SI units.
-    """
+    """Find and mend what is wrong with a recording: the clock, the cells, the counters, then what physics says."""
+    # Each check works on what the ones before have mended. Counters wrap and clocks tick in the numbers of the file.
     mend_clock(draft)
     mend_missing(draft)
     mend_counters(draft)
@@ -99,11 +101,9 @@ def take_out_delays(draft: Draft) -> None:
 
 
 def mend_missing(draft: Draft) -> None:
-    """Deal with empty cells.
-
-    A signal of `SLOW` keeps its last value. Of other signals one with more than `MOST` of its cells empty is left out;
-    rows with empty cells of the rest are removed, so that what is left was measured.
-    """
+    """Deal with empty cells."""
+    # A signal of `SLOW` keeps its last value. Of others one with more than `MOST` of its cells empty is left out; rows
+    # with empty cells of the rest are removed, so that what is left was measured.
     absent = {role: np.isnan(values) for role, values in draft.values.items()}
     for role, gone in absent.items():
         if not gone.any():
@@ -125,16 +125,6 @@ def mend_missing(draft: Draft) -> None:
     left = [absent[role] for role in draft.values if role not in SLOW]
     if left:
         draft.keep(~np.logical_or.reduce(left))
-
-
-def _tell_broken(table: RawTable) -> None:
-    """Note the rows that could not be read."""
-    if table.broken:
-        rows = [broken.row for broken in table.broken]
-        reasons = list(dict.fromkeys(broken.reason for broken in table.broken))
-        more = f" and {len(reasons) - 3} more reasons" if len(reasons) > 3 else ""
-        text = f"{tell_count(len(rows), 'row')} cannot be read: {'; '.join(reasons[:3])}{more}"
-        table.findings.append(Finding(Kind.BROKEN_ROWS, "", row_ranges(rows), text, Action.REMOVED))
 
 
 def _nothing_left(draft: Draft) -> str:

@@ -1,15 +1,13 @@
 """Columns that are rotated against the header: found by the column in which the clock really runs, and put right."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.files.text import short
 from detent.logs.differences import fill_holes, runs_of
+from detent.logs.headings import words_of
 from detent.logs.log import Action, Finding, Kind, Values, row_ranges, tell_count
 from detent.logs.raw_table import BrokenRow, RawTable
-from detent.logs.roles import words_of
 
 SHORTEST = 10
 """Rows in which a column must run like a clock to be taken for one: a signal that happens to rise as evenly as a clock
@@ -23,50 +21,41 @@ _WHOLE = 0.95
 _COUNTERS = frozenset({"sample", "index", "row", "number", "line"})
 
 
-class Rotation(NamedTuple):
-    """Cells stand `shift` columns to the right of their headings in some rows."""
-
-    shift: int
-    where: NDArray[np.bool_]
+Rotation = tuple[int, NDArray[np.bool_]]  # by how many columns cells stand right of their headings, in which rows
 
 
 def mend_rotation(table: RawTable, time: str) -> None:
     """Find rows whose cells are rotated against the header, and put the cells where they belong.
 
-    The clock of a recording runs evenly. Where the column called time does not run at all or jumps about, and another
-    column runs like a clock for at least `SHORTEST` rows, the cells are rotated by the distance of the two. If the
-    first row lacks as many cells as the others have too many in front, the lines of the file are broken in the wrong
-    places: then the first cells of a line belong to the row before. Otherwise the cells of each row belong together.
+    Where the column called time does not run at all or jumps about, and another runs like a clock for `SHORTEST` rows,
+    the cells are rotated by the distance of the two. If the first row lacks as many cells as the others have too many
+    in front, the lines of the file are broken in the wrong places: the first cells of a line belong to the row before.
     """
     if len(table.rows) < SHORTEST:
         return
     names = list(table.columns)
     matrix = np.column_stack([table.columns[name] for name in names])
-    found = _find(matrix, names, names.index(time))
+    # A clock that runs in most rows tells the step that it has in the others. One that does not is asked elsewhere.
+    ours: Values = matrix[:, names.index(time)]
+    own = _usual_step(ours)
+    runs, back = np.mean(np.abs(np.diff(ours) - own) <= _EVEN * own), np.mean(np.diff(ours) < 0)
+    found = _best_rotation(matrix, names, names.index(time), own) if runs > _HALF else None
+    if found is None and (runs <= _HALF or back > _MANY):
+        found = _best_rotation(matrix, names, names.index(time), None)
     if found is None:
         return
-    whole = found.where.mean() > _WHOLE
-    head = _head(table, matrix, names.index(time), found.shift) if whole else None
-    column, unit = names[(names.index(time) + found.shift) % len(names)], tell_count(found.shift, "column")
+    shift, where = found
+    head = _head(table, matrix, names.index(time), shift) if where.mean() > _WHOLE else None
+    column, unit = names[(names.index(time) + shift) % len(names)], tell_count(shift, "column")
     text = f'the clock runs in "{short(column)}", not in "{short(time)}": cells stand {unit} too far right'
     if head is None:
-        matrix[found.where] = np.roll(matrix[found.where], -found.shift, axis=1)
-        rows = table.rows[found.where]
+        matrix[where] = np.roll(matrix[where], -shift, axis=1)
+        rows = table.rows[where]
     else:
-        matrix = _reflow(table, matrix, found.shift, head)
+        matrix = _reflow(table, matrix, shift, head)
         rows, text = table.rows, f"{text}; lines are broken in the wrong places"
     table.columns = {name: matrix[:, index] for index, name in enumerate(names)}
     table.findings.append(Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text, Action.REORDERED))
-
-
-def _find(matrix: Values, names: list[str], clock: int) -> Rotation | None:
-    """The rotation that the most rows have; None where the clock is where the header says."""
-    ours: Values = matrix[:, clock]
-    own = _usual_step(ours)
-    # A clock that runs in most rows tells the step that it has in the others. One that does not is asked elsewhere.
-    runs, back = np.mean(np.abs(np.diff(ours) - own) <= _EVEN * own), np.mean(np.diff(ours) < 0)
-    best = _best_rotation(matrix, names, clock, own) if runs > _HALF else None
-    return best or (_best_rotation(matrix, names, clock, None) if runs <= _HALF or back > _MANY else None)
 
 
 def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | None) -> Rotation | None:
@@ -79,8 +68,8 @@ def _best_rotation(matrix: Values, names: list[str], clock: int, step: float | N
             theirs: Values = matrix[:, column]
             usual = _usual_step(theirs) if step is None else step
             where = _rotated_rows(ours, theirs, usual, is_partial=step is not None)
-            if where.any() and (best is None or where.sum() > best.where.sum()):
-                best = Rotation(shift, where)
+            if where.any() and (best is None or where.sum() > best[1].sum()):
+                best = shift, where
     return best
 
 
@@ -116,11 +105,9 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
 
 
 def _edges(theirs: Values, ours: Values) -> tuple[int, int]:
-    """First step of a stretch that is rotated, and the one behind its last.
-
-    A column may run evenly by chance where the clock is in its place. So both ends are cut where the least is missed:
-    by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
-    """
+    """First step of a stretch that is rotated, and the one behind its last."""
+    # A column may run evenly by chance where the clock is in its place. So both ends are cut where the least is missed:
+    # by the column within, by the clock outside, and by both in the step into a rotated row and in the one out of it.
     n, cut = len(theirs), 1.0 - np.minimum(theirs, ours)
     inside, outside = np.r_[0.0, np.cumsum(theirs)], np.r_[0.0, np.cumsum(ours), float(ours.sum())]
     last = n - int(np.argmin((inside + np.r_[cut, 0.0] + outside[n] - outside[1:])[::-1]))

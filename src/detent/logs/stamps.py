@@ -20,15 +20,19 @@ FARTHEST = 50  # rows by which a row out of order is put back into its place
 _HOLE = 1.4  # usual steps between two rows from which a third is missing there
 JITTER = 0.05  # deviation of a step from the usual one, as its share, from which it is irregular
 _ODD = 0.25  # deviation of a single step worth a note
+WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
+POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
+
+# Step across the end of a counter, as a share of its range, up to which it is a wrap: with more than an eighth of the
+# range from row to row the direction of a motion could hardly be told. And in steps of the rows around: a counter that
+# was set to zero steps by any amount.
+SMALL, USUAL = 1 / 8, 3.0
+AROUND = 5  # rows to either side whose steps are the usual ones
+_FREE = 8.0  # step that is believed whatever the rows around do [numbers of the file]: an axis may start right there
 
 
 def mend_clock(draft: Draft) -> None:
-    """Make the time strictly rising.
-
-    In this order: rows without a time are removed; a clock that wraps is unwrapped; rows that are in the file twice are
-    removed; of a clock that starts again the longest stretch is kept; rows out of order are put into their place or
-    removed; repeated stamps are spread out if they are many, otherwise their rows are removed.
-    """
+    """Make the time strictly rising: each step works on what the ones before it have left."""
     absent = np.isnan(draft.t)
     if absent.any():
         text = f"{tell_count(int(absent.sum()), 'row')} without a time"
@@ -68,11 +72,8 @@ def _remove_twins(draft: Draft) -> None:
 
 
 def _keep_longest(draft: Draft) -> None:
-    """Keep the longest stretch of a clock that starts again.
-
-    It does where it goes back and the rows behind lie before those in front, by their medians: a single row with a
-    wrong stamp does not change these.
-    """
+    """Keep the longest stretch of a clock that starts again."""
+    # It goes back, and the rows behind lie before those in front by their medians, which no single wrong stamp changes.
     t = draft.t
     firsts = [0]
     for cut in (np.flatnonzero(np.diff(t) < 0) + 1).tolist():
@@ -168,12 +169,9 @@ def _spread_stamps(draft: Draft) -> None:
 
 
 def look_at_clock(draft: Draft) -> None:
-    """Find rows that are missing, and a clock that runs unevenly.
-
-    Steps count in usual steps (the median). A recording is irregular if more than `JITTER` of its steps deviate from a
-    whole number of usual ones by more than `JITTER`. Of an even recording, a step of 1.5 or more is rows missing; of an
-    irregular one, a step of 2.5 or more, as a late row does not yet mean a lost one.
-    """
+    """Find rows that are missing, and a clock that runs unevenly: `JITTER` of its steps deviate by more than that."""
+    # Of an even recording, a step of 1.5 usual ones (the median) is rows missing; of an irregular one, a step of 2.5,
+    # as a late row does not yet mean a lost one.
     steps = np.diff(draft.t)
     usual = float(np.median(steps))
     ratio = steps / usual
@@ -182,9 +180,8 @@ def look_at_clock(draft: Draft) -> None:
     gaps = np.flatnonzero(ratio >= (2.5 if is_uneven else 1.5))
     if is_uneven:
         low, high = np.percentile(ratio, [1, 99])
-        text = (
-            f"steps from {low:.2f} to {high:.2f} of the usual {usual * 1e3:.4g} ms (1 of 100 beyond); stamps are used"
-        )
+        step = f"the usual {usual * 1e3:.4g} ms"
+        text = f"steps from {low:.2f} to {high:.2f} of {step} (1 of 100 beyond); stamps are used"
         draft.note(Kind.IRREGULAR_TIME, "time", [], text, Action.LEFT, "", Severity.NOTE)
     else:
         odd = np.flatnonzero((deviation > _ODD) & (ratio < 1.5))
@@ -208,26 +205,8 @@ def stretches(t: Values) -> list[slice]:
 # ---- counters that wrap, and signed numbers that were read as unsigned
 
 
-WIDTHS = (16, 32)  # bits of counters that are tried where none are stated
-POSITIONS = ("position", "position_load", "reference")  # signals that come from counters
-
-SMALL = 1 / 8
-"""Step across the end of a counter, as a share of its range, up to which it is a wrap: an axis moves less than an
-eighth of the range from row to row, or the direction of its motion could hardly be told either."""
-
-USUAL = 3.0
-"""Step across the end of a counter, in steps of the rows around, up to which it is a wrap: a counter that was set to
-zero steps by any amount."""
-
-AROUND = 5  # rows to either side whose steps are the usual ones
-_FREE = 8.0  # step that is believed whatever the rows around do [numbers of the file]: an axis may start right there
-
-
 def unwrap_clock(draft: Draft) -> None:
-    """Undo the wraps of a clock that counts whole milliseconds or microseconds in 16 or 32 bits.
-
-    It goes back by nearly the whole range, and the step is a usual one then.
-    """
+    """Undo the wraps of a clock of whole milli- or microseconds in 16 or 32 bits: back by all but a usual step."""
     steps = np.diff(draft.t)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     is_count = _are_whole(draft.t) and draft.t.min() >= 0
@@ -307,11 +286,8 @@ def unwrap(values: Values, where: NDArray[np.intp], modulus: float) -> Values:
 
 
 def _mend_unsigned(draft: Draft, role: str) -> None:
-    """Give numbers their sign back that were written with one and read without.
-
-    Such numbers lie near zero and near the top of 16 or 32 bits, with nothing between: none in the middle half of the
-    range. With only two or less different numbers they could be a switch, and are left.
-    """
+    """Give numbers their sign back that were written with one and read without."""
+    # They lie near zero and near the top of 16 or 32 bits, none in the middle half; of only two it could be a switch.
     values = draft.values[role]
     widths = [draft.bits[role]] if role in draft.bits else WIDTHS
     bits = next((width for width in widths if values.max() < 2.0**width), None)

@@ -34,10 +34,8 @@ FEWEST = 10  # rows with the same number from which a sensor can be stuck
 TRACKS = 0.9  # correlation from which two series are taken for the same motion
 _FEWEST_WINDOWS = 20
 _SMALL_WINDOW = 4
-
+# Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus.
 LIMITED = ("command", "voltage", "current", "force", "torque")
-"""Signals that a limit can cut off. Positions rest where they are told to, and a velocity has plateaus."""
-
 PLATEAU = 3  # rows at the extreme value from which it is a plateau
 FEWEST_CUT = 10  # rows at the extreme value, in plateaus, from which the signal is cut off there
 FEWEST_LEVELS = 20  # different numbers below which a signal is one of levels, such as a square wave or a staircase
@@ -93,10 +91,7 @@ def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
 
 
 def _aligned(ours: Values, theirs: Values) -> Values:
-    """The second series, taken from as much earlier as the first follows it.
-
-    How much that is, is asked with the stretches bridged in which the first stays the same.
-    """
+    """The second series, taken from as much earlier as the first, its still stretches bridged, follows it."""
     index = np.arange(len(ours), dtype=np.float64)
     free = _free(ours)
     bridged = np.interp(index, index[free], ours[free]) if free.any() else ours
@@ -106,10 +101,8 @@ def _aligned(ours: Values, theirs: Values) -> Values:
 
 
 def _scale(ours: Values, theirs: Values, values: Values) -> float | None:
-    """Factor of the changes of two series over windows; None where they are not alike.
-
-    Where the sensor's numbers stay the same, and where they jump behind that, the changes say nothing.
-    """
+    """Factor of the changes of two series over windows; None where they are not alike."""
+    # Where the sensor's numbers stay the same, and where they jump behind that, the changes say nothing.
     free = _free(values)
     rows = min(max(window_rows(ours), window_rows(theirs)), len(ours) // 4)
     for size in (rows, _SMALL_WINDOW):
@@ -132,10 +125,9 @@ def _free(values: Values) -> NDArray[np.bool_]:
 def find_stuck(draft: Draft) -> None:
     """Find signals that never change, and stretches in which one stays the same though the axis moves.
 
-    A signal that never changes was not recorded: it is left out, unless it is the position. Within a recording a run of
-    equal numbers alone proves nothing, since an axis may rest. It is held against a twin: a position against the
-    integral of the velocity, the other encoder or the reference, a velocity against the position. Of a noisy signal
-    without a twin, such as a current, a run must be longer than chance allows while the axis moves.
+    Within a recording a run of equal numbers alone proves nothing, since an axis may rest. A position is held against
+    the integral of the velocity, the other encoder or the reference, a velocity against the position. Of a noisy signal
+    without such a twin, a run must be longer than chance allows while the axis moves.
     """
     for role in [role for role in draft.values if role in _MEASURED or role == "command"]:
         _find_constant(draft, role)
@@ -149,8 +141,7 @@ def _find_constant(draft: Draft, role: str) -> None:
     values = draft.values[role]
     if np.ptp(values) > 0 or (role == "command" and values[0] != 0):
         return
-    unit = draft.units[role]
-    text = f"{values[0]:g} {unit}".rstrip() + f" in each of {len(draft)} rows"
+    text = f"{values[0]:g} {draft.units[role]}".rstrip() + f" in each of {len(draft)} rows"
     if role == "position":
         advice = "record a run in which the axis moves"
         draft.note(Kind.STUCK, role, [], f"{text}: the axis or its sensor stands", Action.LEFT, advice, Severity.ERROR)
@@ -209,8 +200,8 @@ def _find_by_chance(draft: Draft, role: str) -> None:
     ]
     if runs:
         most = max(last - first for first, last in runs)
-        places = tell_count(len(runs), "place")
-        _tell(draft, role, runs, f"the same number for up to {most} rows while the axis moves, at {places}")
+        where = f"while the axis moves, at {tell_count(len(runs), 'place')}"
+        _tell(draft, role, runs, f"the same number for up to {most} rows {where}")
 
 
 def _tell(draft: Draft, role: str, runs: list[tuple[int, int]], text: str) -> None:
@@ -235,16 +226,9 @@ def _is_unlikely(values: Values, first: int, last: int, moving: int) -> bool:
     return moving >= needed and bool(chance < np.log(CHANCE))
 
 
-# ---- drives at their limit, and sensors at the end of their range
-
-
 def find_saturation(draft: Draft) -> None:
-    """Find signals that stay at their largest or smallest value.
-
-    A cut-off signal piles up at one number: it stays there for `PLATEAU` rows and more, and is there far more often
-    than at any number beside it. That it is cut off, and not commanded so, is certain where the number is a full scale
-    (255, 1023, 100) or both ends lie at the same distance from zero; otherwise it is noted only.
-    """
+    """Find signals that pile up at their largest or smallest value, far more often than at any number beside it."""
+    # Cut off, and not commanded so, is certain where that is a full scale or both ends lie as far from zero.
     for role in LIMITED:
         if role in draft.values and len(np.unique(draft.values[role])) >= FEWEST_LEVELS:
             _find_plateau(draft, role, 1.0)

@@ -5,7 +5,7 @@ import pytest
 
 from detent.errors import InputError
 from detent.logs.choose import choose_columns, find_column, make_draft
-from detent.logs.log_units import split_heading
+from detent.logs.headings import split_heading
 from detent.logs.mapping import ColumnMapping, parse_options
 from detent.logs.raw_table import RawTable
 

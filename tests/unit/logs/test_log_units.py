@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from detent.logs.log_units import Conversion, bits_of, find_conversion, is_unit, split_heading
+from detent.logs.headings import BITS, Conversion, find_conversion, is_unit, split_heading
 
 
 @pytest.mark.parametrize(
@@ -55,4 +55,5 @@ def test_rows_of_units():
 
 
 def test_bits():
-    assert [bits_of(text) for text in ("8bits", "16 bit", "bits", "mm")] == [8, 16, None, None]
+    widths = [BITS.fullmatch(text) for text in ("8bits", "16 bit", "bits", "mm")]
+    assert [width and int(width[1]) for width in widths] == [8, 16, None, None]

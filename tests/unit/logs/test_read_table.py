@@ -210,7 +210,7 @@ def test_matlab_of_version_7_3_is_hdf5(tmp_path):
 def test_matlab_that_would_fill_the_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.mat"
     scipy.io.savemat(path, {"t": np.arange(1000.0)})
-    monkeypatch.setattr("detent.logs.read_arrays.MAX_CELLS", 999)
+    monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 999)
     assert refusal(path).came == "1000 numbers"
 
 
@@ -247,7 +247,7 @@ def test_npz_of_moments(tmp_path):
 def test_npz_that_would_fill_the_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.npz"
     np.savez_compressed(path, t=np.zeros(100_000))
-    monkeypatch.setattr("detent.logs.read_arrays.MAX_CELLS", 50_000)
+    monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 50_000)
     assert refusal(path).came == "0 MB unpacked"
 
 

@@ -15,8 +15,10 @@ from detent.identify.analyse.step_metrics import measure_steps
 from detent.identify.analyse.two_speeds import fit_two_speeds
 from detent.identify.analyse.winding import fit_winding
 from detent.identify.fit.estimate import Estimate, estimate
+from detent.logs.headings import EFFORTS
 from detent.logs.log import Log
-from detent.logs.roles import EFFORTS
+
+Found = tuple[tuple[Estimate, ...], str, tuple[str, ...], dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,25 +38,19 @@ class Analysis:
         return {"analysis": self.name, "log": self.log, "reason": self.reason, **self.details}
 
 
-Found = tuple[tuple[Estimate, ...], str, tuple[str, ...], dict[str, Any]]
-
-
 def _two_speeds(log: Log, effort: str, _: float) -> Found:
     found = fit_two_speeds(log, effort)
-    notes = (*found.positive.notes, *found.negative.notes)
-    partly = tuple(f"{line.direction}: {line.reason}" for line in (found.positive, found.negative) if line.reason)
-    return found.estimates, found.reason, notes if found.reason else (*partly, *notes), asdict(found)
+    lines = (found.positive, found.negative)
+    partly = [f"{line.direction}: {line.reason}" for line in lines if line.reason and not found.reason]
+    return found.estimates, found.reason, (*partly, *lines[0].notes, *lines[1].notes), asdict(found)
 
 
 def _friction_map(log: Log, effort: str, mass: float) -> Found:
     found = map_friction(log, effort, mass)
+    method, columns = "mean of a bin of the speed", (found.speed, found.friction, found.error, found.windows)
     bins = tuple(
-        estimate(
-            f"at {speed:.4g} {found.speed_unit}", friction, found.unit, error, "mean of a bin of the speed", windows
-        )
-        for speed, friction, error, windows in zip(
-            found.speed.tolist(), found.friction.tolist(), found.error.tolist(), found.windows.tolist(), strict=True
-        )
+        estimate(f"at {speed:.4g} {found.speed_unit}", friction, found.unit, error, method, windows)
+        for speed, friction, error, windows in zip(*(column.tolist() for column in columns), strict=True)
     )
     dips = tuple(
         f"{dip.direction}: friction falls by {dip.depth.value:.3g} {found.unit} from the lowest speed "
@@ -73,12 +69,9 @@ def _winding(log: Log, _: str, __: float) -> Found:
 
 def _steps(log: Log, _: str, __: float) -> Found:
     found = measure_steps(log)
-    named = tuple(
-        replace(one, name=f"step {number}, {one.name}")
-        for number, step in enumerate(found.steps, 1)
-        for one in step.estimates
-    )
-    notes = tuple(note for step in found.steps for note in step.notes)
+    pairs = [(number, one) for number, step in enumerate(found.steps, 1) for one in step.estimates]
+    named = tuple(replace(one, name=f"step {number}, {one.name}") for number, one in pairs)
+    notes = (note for step in found.steps for note in step.notes)
     return named, found.reason, (*found.notes, *notes), asdict(found)
 
 

@@ -1,19 +1,14 @@
 """Friction over the speed: effort less its inertia part, averaged per bin of speed and direction.
 
-What remains of the effort of an axis when ``mass * acceleration`` is taken away is friction, whatever its law. It is
-averaged in bins of speed, finer towards rest, where friction changes most. Without a mass only steady stretches are
-used (`detent.identify.analyse.two_speeds`).
+What remains of the effort of an axis when ``mass * acceleration`` is taken away is friction, whatever its law, with any
+constant force. It is averaged in bins of speed, finer towards rest, where friction changes most. Without a mass only
+steady stretches are used (`two_speeds`).
 
 The residual about such an average is coloured: friction depends on the position, and filters smear noise. The recording
 is therefore cut into windows much longer than its residual remembers; what one window adds to a bin counts as one
 observation, and the interval of the bin comes from the scatter of the windows (ratio estimator of cluster sampling:
-Cochran, Sampling Techniques, 3rd ed. 1977, 6.3). A bin with too few windows is refused.
-
-Stribeck's dip (friction that falls from its value at the lowest speed before it rises) is told where the lowest bin
-lies above another by more than chance would make any of them.
-
-Assumptions: the velocity is known well enough that samples fall in their own bin; a constant force is part of the
-friction of both directions, with opposite signs.
+Cochran, Sampling Techniques, 3rd ed. 1977, 6.3). Stribeck's dip (friction that falls from its value at the lowest speed
+before it rises) is told where the lowest bin lies above another by more than chance would make any of them.
 """
 
 from dataclasses import dataclass, replace
@@ -166,10 +161,7 @@ def _averages(moving: _Moving, bins: int) -> list[_Bin]:
 
 
 def memory_rows(residual: Values, place: NDArray[np.int64]) -> float:
-    """Rows over which a residual remembers: integral of its correlation, over the log, gaps left out.
-
-    ``1 + 2 sum rho_k``, the sum up to the first lag beyond five times itself (Sokal's window); at least 1.
-    """
+    """Rows that a residual remembers: ``1 + 2 sum rho_k`` up to a lag of five times itself (Sokal's window)."""
     power = float(residual @ residual)
     if not len(residual) or power <= 0.0:
         return 1.0

@@ -1,16 +1,13 @@
 """Frequency response from a recording: what an axis answers to each frequency.
 
-A periodic excitation is averaged over its periods (`average_periods`), any other over windows
-(`average_windows`). Both assume an axis that stays as it is through the recording. Dry friction and
-backlash are no noise: they come back in each period, so that neither coherence nor scatter show them.
+A periodic excitation is averaged over its periods, any other over windows. Dry friction and backlash are no noise: they
+come back in each period, so that neither coherence nor scatter show them.
 
 Of windows ``H1 = S_uy / S_uu`` (J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, chapters 9 and 11).
 Noise of the excitation makes the response too small, and a loop that feeds the position back draws it towards the
-negative inverse of the controller: a periodic excitation is better wherever one can be recorded.
-
-Of periods it is the ratio of the means at the lines that are excited, and the scatter between the periods is its noise
-(R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., Wiley 2012, chapter 2).
-Nothing leaks, and noise that a loop feeds back into the excitation averages out as well.
+negative inverse of the controller. Of periods it is the ratio of the means at the lines that are excited, and the
+scatter between the periods is its noise (R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain
+Approach", 2nd ed., Wiley 2012, chapter 2): nothing leaks, and noise that a loop feeds back averages out as well.
 """
 
 from collections.abc import Sequence
@@ -110,12 +107,9 @@ def _summit(curve: Values, top: int) -> float:
 
 
 def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) -> Periods | None:
-    """Cut signals along the periods of the first of them.
-
-    A periodic excitation repeats in the clock of the machine that made it. The stamps of a recording are those of
-    another clock as a rule, or jitter about the ticks; so both are tried, the rows as they are and the stamps, and that
-    is taken in which the excitation repeats best.
-    """
+    """Cut signals along the periods of the first of them."""
+    # The excitation repeats in the clock of the machine that made it, which is not that of the stamps, or these jitter:
+    # rows as they are and stamps are tried, and that is taken in which it repeats best.
     mean = float(t[-1] - t[0]) / (len(t) - 1)
     even, said = count_samples(t)
     # By counting the samples, and by their stamps where these are uneven.
@@ -187,22 +181,15 @@ def response_deviation(coherence: Values, averages: float) -> Values:
     return np.sqrt((1.0 - safe) / (2.0 * averages * safe))
 
 
-def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
-    """Response by the mean over periods, noise by the scatter between them.
+def average_periods(periods: Periods) -> FrequencyResponse:
+    """Response by the mean over periods but the first, in which the axis settles; noise by the scatter between them.
 
-    ``G = mean(Y) / mean(U)`` and ``var(G) = mean |Y_p - G U_p|^2 / ((P - 1) |mean(U)|^2)`` per line, p = 1..P; the
-    variance of the noise is taken from neighbouring lines together, as noise of the sensor that is the same in all of
-    them, and a disturbance that the axis answers to as it does to the excitation. A drift from period to period is
-    taken out first.
+    ``G = mean(Y) / mean(U)`` and ``var(G) = mean |Y_p - G U_p|^2 / ((P - 1) |mean(U)|^2)`` per line, p = 1..P, without
+    a drift from period to period; the variance of the noise is that of neighbouring lines together (`noise_parts`).
     """
-    kept = len(periods.signals[0]) - settle
-    if settle < 0 or kept < 2:
-        raise DetentError(
-            f"identify: came {len(periods.signals[0])} periods, {settle} of them to settle; allowed: two or more "
-            "behind those, and 0 or more to settle; record more periods"
-        )
+    kept = len(periods.signals[0]) - 1
     # Spectra of the periods at the excited lines, shape (periods, lines).
-    spectra = [np.fft.rfft(_without_drift(values[settle:]))[:, 1:] for values in periods.signals[:2]]
+    spectra = [np.fft.rfft(_without_drift(values[1:]))[:, 1:] for values in periods.signals[:2]]
     chosen = _excited_lines(spectra[0], periods.signals[0].shape[1])
     excitation, answer = (values[:, chosen] for values in spectra)
     mean = excitation.mean(axis=0)
@@ -211,18 +198,10 @@ def average_periods(periods: Periods, settle: int = 1) -> FrequencyResponse:
     power = np.abs(response * mean) ** 2
     level, slope = noise_parts(noise, power, max(_FEWEST_LINES, -(-_FREEDOM // (kept - 1))))
     coherence = 1.0 / (1.0 + level / power + slope)
-    said = (
-        f"mean of {kept} periods of {periods.duration:.6g} s behind {settle} to settle, {len(response)} excited lines"
-    )
-    return FrequencyResponse(
-        np.asarray((chosen + 1.0) / periods.duration, dtype=np.float64),
-        response,
-        coherence,
-        response_deviation(coherence, kept),
-        kept,
-        0.0,
-        f"{said}; {periods.grid}" if periods.grid else said,
-    )
+    said = f"mean of {kept} periods of {periods.duration:.6g} s behind 1 to settle, {len(response)} excited lines"
+    frequency, deviation = np.asarray((chosen + 1.0) / periods.duration, float), response_deviation(coherence, kept)
+    said = f"{said}; {periods.grid}" if periods.grid else said
+    return FrequencyResponse(frequency, response, coherence, deviation, kept, 0.0, said)
 
 
 def _excited_lines(excitation: Complex, size: int) -> NDArray[np.intp]:
@@ -257,11 +236,9 @@ def _without_drift(values: Values) -> Values:
 
 
 def noise_parts(noise: Values, power: Values, reach: int) -> tuple[Values, Values]:
-    """Noise by ``a + b |Y|^2``, a and b not negative, fitted to each line and its neighbours.
-
-    Noise of the sensor is alike in neighbouring lines; a disturbance is answered as the excitation is. About a
-    resonance that noise is as narrow as the resonance, and a mean over lines would blur it.
-    """
+    """Noise by ``a + b |Y|^2``, a and b not negative, fitted to each line and its neighbours."""
+    # Noise of the sensor is alike in neighbouring lines; a disturbance is answered as the excitation is, and about a
+    # resonance as narrow as that: a mean over lines would blur it.
     unit = float(power.max())
     noise, power = noise / unit, power / unit
     level, slope = _smooth(noise, reach), np.zeros_like(noise)
@@ -287,10 +264,7 @@ def _smooth(values: Values, half: int) -> Values:
 
 
 def measure_response(t: Values, excitation: Values, answer: Values) -> FrequencyResponse:
-    """Measure a frequency response in the longest part without a gap.
-
-    By periods where the excitation has some, otherwise by windows.
-    """
+    """Measure a response in the longest part without a gap, by periods of the excitation or else by windows."""
     if not len(t) == len(excitation) == len(answer) or len(t) < FEWEST_ROWS:
         raise DetentError(
             f"identify: came {len(t)} times, {len(excitation)} values of the input, {len(answer)} of the output; "
@@ -335,27 +309,12 @@ def average_windows(t: Values, excitation: Values, answer: Values, step_hz: floa
     cross = scipy("signal").csd(excitation, answer, **how)[1]
     chosen = (power > WEAKEST_BAND * power.max()) & (frequency > 0) & (frequency < 0.5 / mean)
     coherence = np.abs(cross[chosen]) ** 2 / np.maximum(power[chosen] * power_out[chosen], 1e-300)
-    averages = independent_windows(len(excitation), rows)
+    # Neighbours that overlap by half share a sixth of their values' products (P. D. Welch, IEEE Transactions on Audio
+    # and Electroacoustics 15 (1967) 70).
+    count = (len(excitation) - rows) // (rows - int(OVERLAP * rows)) + 1
+    averages = count / (1.0 + 2.0 * (count - 1) / count / 36.0)
     said = f"H1 by Welch: Hann windows of {rows * mean:.4g} s, overlap {OVERLAP:.0%}, {averages:.1f} independent ones"
-    return FrequencyResponse(
-        np.asarray(frequency[chosen], dtype=np.float64),
-        np.asarray(cross[chosen] / power[chosen], dtype=np.complex128),
-        np.minimum(coherence, 1.0),
-        response_deviation(coherence, averages),
-        averages,
-        1.5 / (rows * mean),
-        f"{said}; {uneven}{INTERPOLATED}" if uneven else said,
-    )
-
-
-def independent_windows(rows: int, window: int) -> float:
-    """Independent averages in Hann windows that overlap by half.
-
-    P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70, equation for the variance with overlap:
-    neighbours share a sixth of their values' products.
-
-    >>> round(independent_windows(1000, 125), 1)
-    13.3
-    """
-    count = (rows - window) // (window - int(OVERLAP * window)) + 1
-    return count / (1.0 + 2.0 * (count - 1) / count / 36.0)
+    said = f"{said}; {uneven}{INTERPOLATED}" if uneven else said
+    frequency, response = np.asarray(frequency[chosen], dtype=np.float64), np.asarray(cross[chosen] / power[chosen])
+    deviation, width = response_deviation(coherence, averages), 1.5 / (rows * mean)
+    return FrequencyResponse(frequency, response, np.minimum(coherence, 1.0), deviation, averages, width, said)

@@ -3,8 +3,7 @@
 The encoder of the motor shows the anti-resonance ``wz^2 = k / m2``, at which the load swings against the standing
 motor, and the resonance ``wp^2 = k (1 / m1 + 1 / m2)``; the encoder of the load shows the resonance alone. With the
 total mass, which the gain gives where the effort is a force, they make both masses and the stiffness. The fit takes
-the equations of `two_mass_response` with their dampings as they are, so that these relations hold
-without the approximation of small damping.
+the equations with their dampings as they are, not the approximation of small damping.
 
 Assumed: linear friction, a coupling without backlash, one resonance in the band, encoders in the same unit. Backlash
 and dry friction move a resonance with the amplitude; the frequencies are then those of the recorded amplitude.
@@ -86,19 +85,9 @@ def fit_resonances(
     else:
         fit = response_fit.fit_model(response_fit.TwoMassModel(len(outputs)), lines, _two_mass_starts(lines), hold)
     why = _is_no_better(fit, rigid, lines)
-    reasons = [why] if why else _doubts(fit, responses)
+    reason = why or "; ".join(_doubts(fit, responses))
     fit = rigid if why else fit
-    return Resonances(
-        estimates=_estimates(fit, responses[0]),
-        frequency=lines.frequency,
-        fitted=fit.fitted,
-        outputs=outputs,
-        scatter=fit.scatter,
-        reason="; ".join(reasons),
-    )
-
-
-# -- starts ---------------------------------------------------------------------------------------------------
+    return Resonances(_estimates(fit, responses[0]), lines.frequency, fit.fitted, outputs, fit.scatter, reason)
 
 
 def _frequencies(lines: response_fit.Lines, *, deepest: bool) -> list[float]:
@@ -135,9 +124,6 @@ def _load_starts(lines: response_fit.Lines) -> list[Values]:
     ]
 
 
-# -- doubts ---------------------------------------------------------------------------------------------------
-
-
 def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: response_fit.Lines) -> str:
     """Why the axis is taken for rigid; empty where two masses explain it better (F test on the same weights)."""
 
@@ -149,11 +135,10 @@ def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: respons
     gain = (squares(rigid) - squares(fit)) / more
     ratio = gain / (squares(fit) / fit.freedom)
     if float(scipy("stats").f.sf(ratio, more, fit.freedom)) > NO_BETTER:
-        return (
-            f"one rigid mass explains the response as well as two (F = {ratio:.2g}): no resonance from "
-            f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz stands out; excite higher frequencies, or take "
-            "the axis for rigid"
-        )
+        rigid_too = f"one rigid mass explains the response as well as two (F = {ratio:.2g})"
+        band = f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz"
+        advice = "excite higher frequencies, or take the axis for rigid"
+        return f"{rigid_too}: no resonance from {band} stands out; {advice}"
     if not np.isfinite(fit.covariance).all() or "resonance" not in fit.model.tell(fit.parameters):
         return "the damping found leaves no resonance; take the axis for rigid"
     return ""
@@ -187,26 +172,17 @@ def _doubts_of(
         distance = np.abs(response.frequency - value)
         count = max(3, int(np.sum(distance <= max(width, _NEAR * value))))
         near.append(response.coherence[np.argsort(distance)[:count]].mean())
+    advice, resolution = "excite it more, or record more periods", responses[0].resolution
     if max(near) < COHERENT:
-        doubts.append(
-            f"the coherence about the {name} of {value:.4g} Hz is {max(near):.2f}, below {COHERENT}: the response "
-            "there is noise; excite it more, or record more periods"
-        )
+        below = f"is {max(near):.2f}, below {COHERENT}: the response there is noise"
+        doubts.append(f"the coherence about the {name} of {value:.4g} Hz {below}; {advice}")
     if error > SHARP * value:
-        doubts.append(
-            f"the {name} is {value:.4g} Hz with a standard error of {error:.2g} Hz, above {SHARP:.0%} of it; excite it "
-            "more, or record more periods"
-        )
-    resolution = responses[0].resolution
+        above = f"a standard error of {error:.2g} Hz, above {SHARP:.0%} of it"
+        doubts.append(f"the {name} is {value:.4g} Hz with {above}; {advice}")
     if resolution > 0 and 2 * width < NARROW * resolution:
-        doubts.append(
-            f"the {name} of {value:.4g} Hz is {2 * width:.2g} Hz wide, the windows see {resolution:.2g} Hz: its "
-            "damping comes out too large; record a periodic multisine, or a longer chirp"
-        )
+        wide = f"is {2 * width:.2g} Hz wide, the windows see {resolution:.2g} Hz: its damping comes out too large"
+        doubts.append(f"the {name} of {value:.4g} Hz {wide}; record a periodic multisine, or a longer chirp")
     return doubts
-
-
-# -- estimates ------------------------------------------------------------------------------------------------
 
 
 def _tell(fit: response_fit.Fit, parameters: Values, *, is_force: bool) -> dict[str, float]:

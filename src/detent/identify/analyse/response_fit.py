@@ -38,6 +38,15 @@ from detent.logs.log import Values
 Complex = NDArray[np.complex128]
 
 ALIASES = 3  # multiples of the sample rate, to both sides, that are counted
+MOST_DEVIATION = 0.3  # standard deviation of a line from which it is left out: the response there is noise
+LINES_PER_PARAMETER = 2  # lines below which a fit says nothing
+_COARSE = 0.02
+_NEIGHBOURS = 5
+_ROUNDS = 4
+_DELAYS = 33
+_TRIED = 3
+_FARTHEST_LINE = 10
+_LEAST_FREE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +106,9 @@ class TwoMassModel:
 
 @dataclass(frozen=True, slots=True)
 class LoadModel:
-    """Two masses seen by the encoder of the load alone: ``(1 + s d / k) / (s (s + a) (s^2 / w^2 + 2 z s / w + 1))``.
+    """Two masses seen by the encoder of the load alone: ``(1 + s d / k) / (s (s + a) (s^2 / w^2 + 2 z s / w + 1))``."""
 
-    The advance d / k and the delay can hardly be told apart below the resonance; neither is told of this model.
-    """
+    # Advance d / k and delay can hardly be told apart below the resonance; neither is told of this model.
 
     # the real pole [1/s], the logarithm of the resonance [rad/s], its damping ratio, advance [s]
     count: ClassVar[int] = 4
@@ -117,12 +125,10 @@ class LoadModel:
         return {"resonance": float(np.exp(log_omega)) / (2 * np.pi), "resonance.damping": ratio, "viscous": pole}
 
 
+# Model of the answers of some outputs to one effort: `respond` gives responses up to the gain, shape (outputs, n), at
+# complex frequencies [rad/s], shape (n,); `tell` what a person is told: frequencies [Hz], damping and mass ratios,
+# friction per mass [1/s].
 ResponseModel = RigidModel | TwoMassModel | LoadModel
-"""Model of the answers of some outputs to one effort.
-
-`respond` gives responses up to the gain, shape (outputs, n), at complex frequencies [rad/s], shape (n,). `tell` gives
-what a person is told: frequencies [Hz], damping ratios, ratio of the masses, friction per mass [1/s].
-"""
 
 
 def constants_of(parameters: Values) -> tuple[float, float, float, float, float, float]:
@@ -152,17 +158,6 @@ def respond_sampled(model: ResponseModel, parameters: Values, frequency: Values,
 
 
 # ---- the fit
-
-
-MOST_DEVIATION = 0.3  # standard deviation of a line from which it is left out: the response there is noise
-LINES_PER_PARAMETER = 2  # lines below which a fit says nothing
-_COARSE = 0.02
-_NEIGHBOURS = 5
-_ROUNDS = 4
-_DELAYS = 33
-_TRIED = 3
-_FARTHEST_LINE = 10
-_LEAST_FREE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,16 +300,9 @@ def _refine(problem: _Problem, parameters: Values) -> Fit:
         if total > freedom * (1.0 + 4.0 * np.sqrt(2.0 / freedom)):
             excess = np.where(lines.used, squares - noise**2, 0.0)
             extra = np.sqrt(np.maximum(_local(excess.T).T, 0.0))
-    return Fit(
-        model=problem.model,
-        parameters=parameters,
-        sign=problem.sign,
-        covariance=_covariance(problem.residual(weights, parameters).T, problem.slopes(weights, parameters)),
-        freedom=freedom,
-        scatter=float(np.median(extra[lines.used])),
-        weights=weights,
-        fitted=problem.fitted(parameters),
-    )
+    covariance = _covariance(problem.residual(weights, parameters).T, problem.slopes(weights, parameters))
+    scatter, fitted = float(np.median(extra[lines.used])), problem.fitted(parameters)
+    return Fit(problem.model, parameters, problem.sign, covariance, freedom, scatter, weights, fitted)
 
 
 def _best_starts(model: ResponseModel, lines: Lines, starts: Sequence[Values]) -> list[Values]:
@@ -354,9 +342,9 @@ def _covariance(misfits: Values, slopes: Values) -> Values:
     """Covariance of the parameters from slopes and misfits.
 
     ``B^-1 (sum over k, l of J_k' R_kl J_l) B^-1`` with ``B = sum of J_k' J_k``: R, the covariance of the weighted
-    misfits, is a mean over neighbours for a line itself, and over all pairs for lines some lines apart, up to the first
-    distance at which it is not significant. The misfits are those that each line would have if it were left out of the
-    fit (J. G. MacKinnon, H. White, Journal of Econometrics 29 (1985) 305): a resonance rests on few lines.
+    misfits, is a mean over neighbours for a line itself, and over all pairs for lines apart, up to the first distance
+    at which it is not significant. The misfits are those of each line if it were left out of the fit (J. G. MacKinnon,
+    H. White, Journal of Econometrics 29 (1985) 305): a resonance rests on few lines.
     """
     if not (np.isfinite(slopes).all() and np.isfinite(misfits).all()):
         return np.full((slopes.shape[2], slopes.shape[2]), np.nan)

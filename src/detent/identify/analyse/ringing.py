@@ -99,7 +99,5 @@ def _fit_decay(t: Values, y: Values, start: Values, noise: tuple[Values, float])
     slope = np.array([omega**2, -sigma * omega]) / size**3
     error = float(np.sqrt(slope @ covariance[:2, :2] @ slope))
     period_error = period / omega * float(np.sqrt(covariance[1, 1]))
-    return (
-        estimate("ringing_period", period, "s", period_error, METHOD, degrees),
-        estimate("damping_ratio", sigma / size, "", error, METHOD, degrees),
-    )
+    damping_ratio = estimate("damping_ratio", sigma / size, "", error, METHOD, degrees)
+    return estimate("ringing_period", period, "s", period_error, METHOD, degrees), damping_ratio

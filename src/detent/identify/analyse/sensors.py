@@ -1,18 +1,14 @@
 """Resolution of an encoder, and dead time between the effort and the motion that it makes.
 
-Positions of an encoder lie on a grid, however many counts lie between two of them. The grid is the largest step of
-which the differences between positions are whole multiples: their greatest common divisor, with an allowance for
-rounding. Candidates are small differences and their whole fractions; each is then fitted to larger and larger
-differences, so that a small error of the step cannot add up to a count.
+Positions of an encoder lie on a grid: the largest step of which the differences between positions are whole multiples,
+with an allowance for rounding. Candidates are small differences and their whole fractions; each is then fitted to
+larger and larger differences, so that a small error of the step cannot add up to a count.
 
 An effort acts after the dead time of amplifier and bus, and, where it is held between samples, on average half a sample
-later. `find_dead_time` looks for the shift at which the effort is explained best by acceleration, velocity, its sign,
-position and a constant, the equation of a rigid axis, where the axis moves one way. It is the peak of a correlation
-through filters (C. H. Knapp, G. C. Carter, "The generalized correlation method for estimation of time delay", IEEE
-Transactions on Acoustics, Speech, and Signal Processing 24 (1976) 320); effort and motion pass the same windows, which
-delay neither. Where a resonance is part of the model, the phase of a frequency response tells it (`resonances`).
-
-Assumed: an axis that is rigid below the frequencies that the windows let pass, and stays as it is.
+later. `find_dead_time` looks for the shift at which the equation of a rigid axis explains the effort best where the
+axis moves one way: the peak of a correlation through filters (C. H. Knapp, G. C. Carter, "The generalized correlation
+method for estimation of time delay", IEEE Transactions on Acoustics, Speech, and Signal Processing 24 (1976) 320).
+Where a resonance is part of the model, the phase of a frequency response tells it (`resonances`).
 """
 
 import math
@@ -43,6 +39,13 @@ _EXACT = 1e-3
 _VARIED = 0.8
 _MANY = 50
 _SAME = 1e-3
+LONGEST = 40  # samples up to which a dead time is looked for
+EXPLAINED = 0.7  # share of the effort's variance that the motion must explain
+BLOCKS = 8  # parts of the recording whose dead times are compared
+_FEWEST_ROWS = 4
+_PARABOLA = 0.01
+_ONE_WAY = 0.999
+_ENOUGH = 0.2
 
 
 class _Grid(NamedTuple):
@@ -90,11 +93,9 @@ def estimate_resolution(position: Values) -> Resolution:
 
 def _is_believed(position: Values, grid: _Grid, exact: float) -> bool:
     """False for a grid that few positions or an even travel make: nearly the same way in each sample."""
-    if grid.error <= max(exact, _EXACT * grid.step):
-        return True
-    counts = np.rint(np.abs(np.diff(position)) / grid.step).tolist()
-    moved = [count for count in counts if count > 0]
-    return len(moved) >= _MANY and moved.count(median(moved)) < _VARIED * len(moved)
+    moved = [count for count in np.rint(np.abs(np.diff(position)) / grid.step).tolist() if count > 0]
+    is_varied = len(moved) >= _MANY and moved.count(median(moved)) < _VARIED * len(moved)
+    return is_varied or grid.error <= max(exact, _EXACT * grid.step)
 
 
 def _grid(position: Values, step: float) -> _Grid:
@@ -144,18 +145,6 @@ def _fit(differences: Values, start: float) -> float:
         reach *= 10.0
 
 
-# ---- dead time
-
-
-LONGEST = 40  # samples up to which a dead time is looked for
-EXPLAINED = 0.7  # share of the effort's variance that the motion must explain
-BLOCKS = 8  # parts of the recording whose dead times are compared
-_FEWEST_ROWS = 4
-_PARABOLA = 0.01
-_ONE_WAY = 0.999
-_ENOUGH = 0.2
-
-
 @dataclass(frozen=True, slots=True)
 class DeadTime:
     """A dead time."""
@@ -164,24 +153,10 @@ class DeadTime:
     step: float  # time between two samples [s]
     reason: str = ""  # why it is not to be trusted; empty where it is
 
-    @property
-    def samples(self) -> float:
-        """Dead time in samples."""
-        return self.estimate.value / self.step
-
-    @property
-    def whole(self) -> int:
-        """Whole samples, the nearest."""
-        return round(self.samples)
-
-    @property
-    def fraction(self) -> float:
-        """What is left beside the whole samples, -0.5..0.5."""
-        return self.samples - self.whole
-
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {**asdict(self), "samples": self.samples, "whole": self.whole, "fraction": self.fraction}
+        """Plain data for JSON: the dead time in samples too, and the nearest whole ones with what is left beside."""
+        samples = self.estimate.value / self.step
+        return {**asdict(self), "samples": samples, "whole": round(samples), "fraction": samples - round(samples)}
 
 
 def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float | None = None) -> DeadTime:
@@ -203,7 +178,14 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     error = step * float(np.hypot(np.std(parts, ddof=1) / np.sqrt(BLOCKS), _PARABOLA))
     value = step * shift - 0.5 * (step if hold is None else hold)
     found = estimate("delay", value, "s", error, "shift of the effort that the motion explains best", BLOCKS - 1)
-    return DeadTime(found, step, _doubt(shift, explained))
+    doubt = ""
+    if explained < EXPLAINED:
+        advice = "record a run with more acceleration, or take the delay from a frequency response"
+        doubt = f"the motion explains {explained:.0%} of the effort at best, less than {EXPLAINED:.0%}; {advice}"
+    elif not -0.5 < shift < LONGEST - 0.5:
+        advice = "check the sign and the clock of the effort"
+        doubt = f"no dead time from 0 to {LONGEST} samples explains the motion; {advice}"
+    return DeadTime(found, step, doubt)
 
 
 def _columns(position: Values, step: float, rows: int) -> Values:
@@ -242,17 +224,3 @@ def _share(basis: Values, values: Values) -> float:
     along = basis.T @ values
     centred = float(np.sum((values - values.mean()) ** 2))
     return 1.0 - float(values @ values - along @ along) / centred if centred > 0 else 0.0
-
-
-def _doubt(shift: float, explained: float) -> str:
-    """Why a shift is not to be trusted."""
-    if explained < EXPLAINED:
-        return (
-            f"the motion explains {explained:.0%} of the effort at best, less than {EXPLAINED:.0%}; record a run with "
-            "more acceleration, or take the delay from a frequency response"
-        )
-    if not -0.5 < shift < LONGEST - 0.5:
-        return (
-            f"no dead time from 0 to {LONGEST} samples explains the motion; check the sign and the clock of the effort"
-        )
-    return ""

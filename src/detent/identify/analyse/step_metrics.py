@@ -4,13 +4,8 @@ A step is a change of the reference between two rests, sudden or along a profile
 leaves its rest. Words as usual in control (K. Ogata, Modern Control Engineering, 5th ed. 2010, 5-3): rise from 10 to
 90 % of the way between the rests of the position, settling for good within 2 or 5 % of the size of the step about the
 rest of the position. Overshoot counts from the reference, since the axis may rest elsewhere; how far off is the rest
-error, reference less position. Ringing is told by `ringing`.
-
-Each number that noise makes uncertain has an interval: a rest is a mean, peak and crossings are polynomials fitted
-about them. The noise is that of the position at rest, with its colour, and that of rounding to counts of the encoder.
-
-Assumptions: the reference holds still (to 1/10000 of its range) before and after a step; position and reference are
-recorded at the same moment.
+error, reference less position. A rest is a mean, peak and crossings are polynomials fitted about them; their noise is
+that of the position at rest, with its colour, and that of rounding to counts of the encoder.
 """
 
 from dataclasses import dataclass
@@ -66,9 +61,8 @@ class LocalPolynomial:
     def solve(self, level: float) -> float:
         """Time nearest to its place at which it has a value; that of the nearest value where it does not reach it."""
         times = self._inside(np.polynomial.Polynomial(self.coefficients) - level)
-        if times:
-            return min(times, key=abs)
-        return min((self.low, 0.0, self.high), key=lambda time: abs(self.at(time) - level))
+        ends = (self.low, 0.0, self.high)
+        return min(times, key=abs) if times else min(ends, key=lambda time: abs(self.at(time) - level))
 
     def _inside(self, curve: np.polynomial.Polynomial) -> list[float]:
         """Roots of a polynomial within the range."""
@@ -108,10 +102,8 @@ class StepMetrics:
     rise_time: Estimate | None
     overshoot: Estimate | None  # farthest position beyond the target; None where none stands out of noise
     peak_time: Estimate | None  # of the farthest position, from `begin` [s]
-    # settling_2, settling_5: from `begin` until the position stays within 2 or 5 % of the size of the step about its
-    # rest [s]; infinite where it does not in this record
-    settling_2: float
-    settling_5: float  # [s]
+    settling_2: float  # from `begin` until the position stays within 2 % of the step about its rest [s]; inf for never
+    settling_5: float  # the same for 5 % [s]
     rest_error: Estimate  # reference less position at rest
     ringing: Ringing | None  # None where there are not enough swings
     notes: tuple[str, ...] = ()  # what to know about it
@@ -185,11 +177,12 @@ def find_steps(reference: Values) -> list[Move]:
 
 
 class _Level(NamedTuple):
-    """A value and its standard error, with its degrees of freedom."""
+    """A position at rest, or the time at which one is first crossed: standard error, degrees of freedom, slope."""
 
     value: float
     error: float
     degrees: float
+    slope: float = 0.0
 
 
 class _Noise(NamedTuple):
@@ -218,21 +211,13 @@ def _measure(log: Log, move: Move, unit: str) -> StepMetrics:
     overshoot, peak_time, peak = _peak(since, (y - move.target) * np.sign(size), noise, unit)
     ringing = fit_ringing(since[peak:], y[peak:], least, *noise) if overshoot else None
     settling_2, settling_5 = (_settling(since, y - rest.value, share * abs(size)) for share in (0.02, 0.05))
+    rise, off = _rise(since, y, (home, rest), noise), move.target - rest.value
+    rest_error = estimate("rest_error", off, unit, rest.error, "mean of the last quarter", rest.degrees)
     note = "not settled within 2 % when the record of the step ends: rest and rest error are means"
-    return StepMetrics(
-        float(t[move.first]),
-        float(t[move.arrived] - t[move.first]),
-        move.start,
-        move.target,
-        _rise(since, y, (home, rest), noise),
-        overshoot,
-        peak_time,
-        settling_2,
-        settling_5,
-        estimate("rest_error", move.target - rest.value, unit, rest.error, "mean of the last quarter", rest.degrees),
-        ringing,
-        (note,) if np.isinf(settling_2) else (),
-    )
+    notes = (note,) if np.isinf(settling_2) else ()
+    begin, duration = float(t[move.first]), float(t[move.arrived] - t[move.first])
+    found = (rise, overshoot, peak_time, settling_2, settling_5, rest_error, ringing, notes)
+    return StepMetrics(begin, duration, move.start, move.target, *found)
 
 
 def _rest(x: Values, noise: _Noise) -> _Level:
@@ -264,11 +249,8 @@ def _peak(t: Values, beyond: Values, noise: _Noise, unit: str) -> tuple[Estimate
     method = "polynomial about the peak"
     place = fit.summit()
     late = fit.error_at(place, 1) / max(abs(fit.at(place, 2)), 1e-300)
-    return (
-        estimate("overshoot", fit.at(place), unit, fit.error_at(place), method, fit.degrees),
-        estimate("peak_time", place + float(t[top]), "s", late, method, fit.degrees),
-        top,
-    )
+    overshoot = estimate("overshoot", fit.at(place), unit, fit.error_at(place), method, fit.degrees)
+    return overshoot, estimate("peak_time", place + float(t[top]), "s", late, method, fit.degrees), top
 
 
 def _coarse_peak(t: Values, beyond: Values, top: int, least: float, unit: str) -> tuple[Estimate, Estimate]:
@@ -281,10 +263,8 @@ def _coarse_peak(t: Values, beyond: Values, top: int, least: float, unit: str) -
     place = -0.5 * slope / bend if bend < 0 else 0.0
     gain = 0.5 * slope * place
     method = "parabola through three samples"
-    return (
-        estimate("overshoot", float(beyond[top]) + gain, unit, float(np.hypot(gain, least)), method),
-        estimate("peak_time", float(t[top]) + place, "s", 0.125 * (behind - before), method),
-    )
+    overshoot = estimate("overshoot", float(beyond[top]) + gain, unit, float(np.hypot(gain, least)), method)
+    return overshoot, estimate("peak_time", float(t[top]) + place, "s", 0.125 * (behind - before), method)
 
 
 def _rise(t: Values, y: Values, rests: tuple[_Level, _Level], noise: _Noise) -> Estimate | None:
@@ -302,19 +282,10 @@ def _rise(t: Values, y: Values, rests: tuple[_Level, _Level], noise: _Noise) -> 
     by_home = (0.1 / high.slope - 0.9 / low.slope) * home.error / way
     by_rest = (0.9 / high.slope - 0.1 / low.slope) * rest.error / way
     error = float(np.linalg.norm([low.error, high.error, by_home, by_rest]))
-    return estimate("rise_time", high.time - low.time, "s", error, "10 to 90 % of the way between rests", low.degrees)
+    return estimate("rise_time", high.value - low.value, "s", error, "10 to 90 % of the way between rests", low.degrees)
 
 
-class _Crossing(NamedTuple):
-    """Time at which a level is first crossed, its standard error, the slope there, degrees of freedom."""
-
-    time: float
-    error: float
-    slope: float
-    degrees: float
-
-
-def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Crossing | None:
+def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Level | None:
     """Where a level is first crossed, by a polynomial fitted to the samples about it."""
     above = np.flatnonzero(share >= level)
     if not len(above) or above[0] == 0:
@@ -326,10 +297,10 @@ def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Crossin
         return _between(t, share, level, k, noise.size)
     place = fit.solve(level)
     slope = fit.at(place, 1)
-    return _Crossing(place + float(t[k]), fit.error_at(place) / abs(slope), slope, fit.degrees)
+    return _Level(place + float(t[k]), fit.error_at(place) / abs(slope), fit.degrees, slope)
 
 
-def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _Crossing:
+def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _Level:
     """Crossing between two samples by a line and the bend of the four about it, whose change is part of the error."""
     step = float(t[k] - t[k - 1])
     slope = float(share[k] - share[k - 1]) / step
@@ -339,7 +310,7 @@ def _between(t: Values, share: Values, level: float, k: int, noise: float) -> _C
     below = 0.5 * part * (1.0 - part)
     # Both samples together are less noisy than one, by as much as the bend adds.
     error = float(np.hypot(noise, below * doubt)) / slope
-    return _Crossing(float(t[k - 1]) + part * step + below * sag / slope, error, slope, np.inf)
+    return _Level(float(t[k - 1]) + part * step + below * sag / slope, error, np.inf, slope)
 
 
 def _around(mask: NDArray[np.bool_], place: int) -> slice:

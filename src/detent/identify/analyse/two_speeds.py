@@ -1,19 +1,15 @@
 """Slope and friction per direction from runs at two steady speeds or more.
 
 An axis that moves at a steady speed needs no effort for its mass: what is left is friction and what grows with the
-speed. Two speeds of a direction give both,
+speed. Two speeds of a direction give both, the claim of the print head (US 4,775,945),
 
-    slope = (F1 - F2) / (v1 - v2),    coulomb = direction * (F1 - slope * v1),
+    slope = (F1 - F2) / (v1 - v2),    coulomb = direction * (F1 - slope * v1).
 
-the claim of the print head (US 4,775,945), which measures the effort in counts of its modulator. More speeds give the
-line through all stretches, each weighted by its length. What the slope is depends on the effort: viscous friction of a
-force or torque; of a current, that over the torque constant; of a voltage or a duty cycle, the back-EMF constant and
-the resistance's share of viscous friction. The friction of a direction holds any constant force (gravity, an offset of
-the amplifier) in it.
-
-Assumptions: acceleration is negligible in the stretches taken (see `identify.fit.steady`), and friction between the
-speeds is a line. The error of each stretch is that of its mean with coloured residuals; where more than two stretches
-scatter about the line by more than that, the scatter between stretches is added, and said.
+More speeds give the line through all stretches, each weighted by its length. What the slope is depends on the effort:
+viscous friction of a force or torque; of a current, that over the torque constant; of a voltage or a duty cycle, the
+back-EMF constant and the resistance's share of viscous friction. The friction of a direction holds any constant force
+in it. The error of each stretch is that of its mean with coloured residuals; where more than two stretches scatter
+about the line by more than that, the scatter between stretches is added, and said.
 """
 
 from dataclasses import dataclass
@@ -34,6 +30,10 @@ TOLERANCE = 0.05  # difference of the speeds of a steady stretch, as a part of t
 SLOWEST = 0.003  # speeds below this part of the highest are rest
 DRIFT = 0.1  # difference of the mean speeds of both halves of a stretch that is none, as a part of the tolerance
 STANDS_OUT = 3.0  # standard deviations by which the first or last block differs where the speed is still settling there
+APART = 0.1  # difference of the highest and lowest speed, at least, as a part of the highest
+ROUNDS = 3  # times that weights and line are computed in turn: the errors of the stretches depend on the slope
+UNLIKELY = 0.05  # probability of the scatter about the line below which it is more than the errors of the stretches
+DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,23 +62,12 @@ def find_velocity(log: Log) -> tuple[Values, str, float]:
     return np.gradient(position, log.t), f"{log.units['position']}/s", grain(position)
 
 
-def unit_per_speed(effort: str, speed: str) -> str:
-    """Unit of an effort per speed.
-
-    >>> unit_per_speed("V", "rad/s"), unit_per_speed("N", "m/s"), unit_per_speed("", "m/s")
-    ('V*s/rad', 'N*s/m', 's/m')
-    """
-    length = speed.removesuffix("/s")
-    return f"{effort}*s/{length}" if effort else f"s/{length}"
-
-
 def find_steady(t: Values, velocity: Values, step: float = 0.0) -> list[slice]:
     """Find the stretches of a recording in which the axis moves at a steady speed.
 
-    The recording is divided into short blocks. A stretch is as many of them in a row whose mean speeds stay within the
-    tolerance; blocks at its ends that stand out are left out, and one whose halves differ is no stretch. What is left
-    is searched again with blocks twice as long, in which the grain of an encoder counts less; neighbours that are
-    steady as one become one.
+    A stretch is as many short blocks in a row whose mean speeds stay within the tolerance, without those at its ends
+    that stand out; one whose halves differ is none. What is left is searched again with blocks twice as long, in which
+    the grain of an encoder counts less; neighbours that are steady as one become one.
     """
     if len(t) < 2:
         return []
@@ -117,7 +106,11 @@ def _search(velocity: Values, free: slice, block: int, slowest: float) -> list[s
     found: list[slice] = []
     first = 0
     while first + BLOCKS + 2 <= len(speeds):
-        stop = _reach(speeds, first)
+        # The first block behind `first` that is not of the same speed as those before it.
+        rest = speeds[first:]
+        spread = np.maximum.accumulate(rest) - np.minimum.accumulate(rest)
+        is_other = spread > TOLERANCE * np.abs(np.cumsum(rest)) / np.arange(1, len(rest) + 1)
+        stop = first + (int(np.argmax(is_other)) if is_other.any() else len(rest))
         kept = _trimmed(speeds, first, stop) if abs(speeds[first]) > slowest else None
         if kept is None:
             first += max(1, (stop - first) // BLOCKS)
@@ -132,14 +125,6 @@ def _block_means(velocity: Values, part: slice, block: int) -> Values:
     return velocity[part][: count * block].reshape(count, block).mean(axis=1)
 
 
-def _reach(speeds: Values, first: int) -> int:
-    """First block behind `first` that is not of the same speed as those before it."""
-    rest = speeds[first:]
-    spread = np.maximum.accumulate(rest) - np.minimum.accumulate(rest)
-    is_other = spread > TOLERANCE * np.abs(np.cumsum(rest)) / np.arange(1, len(rest) + 1)
-    return first + (int(np.argmax(is_other)) if is_other.any() else len(rest))
-
-
 def _trimmed(speeds: Values, first: int, stop: int) -> tuple[int, int] | None:
     """First block and block behind the last of the steady part of a run; None where nothing long enough is left."""
     while stop - first > BLOCKS and _stands_out(speeds[first], speeds[first + 1 : stop]):
@@ -148,9 +133,7 @@ def _trimmed(speeds: Values, first: int, stop: int) -> tuple[int, int] | None:
         stop -= 1
     # Within the tolerance, the blocks at the ends may still hold the edge of a ramp with its effort of acceleration.
     first, stop = first + 1, stop - 1
-    if stop - first < BLOCKS or _drifts(speeds[first:stop]):
-        return None
-    return first, stop
+    return None if stop - first < BLOCKS or _drifts(speeds[first:stop]) else (first, stop)
 
 
 def _drifts(speeds: Values) -> bool:
@@ -169,16 +152,13 @@ def _joined(velocity: Values, found: list[slice], wholes: list[slice], block: in
         both = slice(before.start, part.stop)
         is_near = part.start - before.stop < BLOCKS * block
         is_whole = any(whole.start <= both.start and both.stop <= whole.stop for whole in wholes)
-        if joined and is_near and is_whole and _is_steady(velocity, both):
+        speeds = _block_means(velocity, both, (both.stop - both.start) // BLOCKS)
+        is_one = float(np.ptp(speeds)) <= TOLERANCE * abs(float(speeds.mean())) and not _drifts(speeds)
+        if joined and is_near and is_whole and is_one:
             joined[-1] = both
         else:
             joined.append(part)
     return joined
-
-
-def _is_steady(velocity: Values, part: slice) -> bool:
-    speeds = _block_means(velocity, part, (part.stop - part.start) // BLOCKS)
-    return float(np.ptp(speeds)) <= TOLERANCE * abs(float(speeds.mean())) and not _drifts(speeds)
 
 
 def _stands_out(speed: float, others: Values) -> bool:
@@ -190,15 +170,6 @@ def _without(free: slice, taken: list[slice]) -> list[slice]:
     inside = [edge for part in taken if free.start <= part.start < free.stop for edge in (part.start, part.stop)]
     edges = [free.start, *inside, free.stop]
     return [slice(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True)]
-
-
-# ---- slope and friction
-
-
-APART = 0.1  # difference of the highest and lowest speed, at least, as a part of the highest
-ROUNDS = 3  # times that weights and line are computed in turn: the errors of the stretches depend on the slope
-UNLIKELY = 0.05  # probability of the scatter about the line below which it is more than the errors of the stretches
-DIRECTIONS = {"positive": 1.0, "negative": -1.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +214,8 @@ def fit_two_speeds(log: Log, effort: str = "") -> TwoSpeeds:
     velocity, speed_unit, step = find_velocity(log)
     drive = log.signals[role]
     parts = find_steady(log.t, velocity, step)
-    units = (log.units[role], unit_per_speed(log.units[role], speed_unit), speed_unit)
+    unit = log.units[role]
+    units = (unit, f"{unit}*s/{speed_unit.removesuffix('/s')}".removeprefix("*"), speed_unit)
     lines = {
         name: _fit_direction(name, (log.t, velocity, drive), [p for p in parts if velocity[p].mean() * sign > 0], units)
         for name, sign in DIRECTIONS.items()
@@ -279,11 +251,8 @@ def _fit_direction(
 
 
 def _weighted_line(measured: tuple[SteadyStretch, ...]) -> tuple[list[float], list[float], list[float], float]:
-    """Line through the means of the stretches, weighted by their length.
-
-    Slope and height at zero, their standard errors, degrees of freedom of each, scatter between the stretches. Weights
-    from the errors of the stretches would make the interval too short: each error is known with few degrees of freedom.
-    """
+    """Line through the means of stretches, weighted by length: slope and height at zero, errors, degrees, scatter."""
+    # Weights from the errors of the stretches, known with few degrees of freedom, would make the interval too short.
     v = np.array([stretch.speed for stretch in measured])
     f = np.array([stretch.effort for stretch in measured])
     columns = np.column_stack([v, np.ones(len(v))])
@@ -310,11 +279,8 @@ def _pull(columns: Values, size: Values) -> NDArray[np.float64]:
 
 
 def _scatter_between(columns: Values, effort: Values, pooled: Values, degrees: float) -> float:
-    """Standard deviation between stretches that brings the scatter about the line to what is expected.
-
-    Paule and Mandel, Journal of Research of the National Bureau of Standards 87 (1982) 377; 0 where the scatter is
-    likely without it.
-    """
+    """Standard deviation between stretches that explains their scatter about the line; 0 where none is needed."""
+    # Paule and Mandel, Journal of Research of the National Bureau of Standards 87 (1982) 377.
     free = len(effort) - 2
 
     def excess(between: float) -> float:

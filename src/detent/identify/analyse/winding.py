@@ -5,18 +5,14 @@ hardly changes in between, its samples obey exactly
 
     i[k+1] = a i[k] + g (u[k] - ke v[k] - u0),    a = exp(-R dt / L),    g = (1 - a) / R.
 
-No current is differentiated: this is the equation integrated over a sample. Noise of the measured current would make
-``a``, and with it L, too small; so the equation is solved with instruments. These are the columns with the current that
-the model itself makes of voltage and speed in place of the measured one, both behind the filter ``1 / (1 - a/z)``,
-found in turn with the constants: the simplified refined instrumental variable (P. C. Young, Recursive Estimation and
-Time-Series Analysis, 2nd ed. 2011, chapter 7), whose limit is the fit of the simulated current. Standard errors take
-the colour of the residual into account.
+Noise of the measured current would make ``a``, and with it L, too small; so the equation is solved with instruments:
+the columns with the current that the model itself makes of voltage and speed in place of the measured one, both behind
+the filter ``1 / (1 - a/z)``, found in turn with the constants (the simplified refined instrumental variable: P. C.
+Young, Recursive Estimation and Time-Series Analysis, 2nd ed. 2011, chapter 7). The torque constant comes from a torque
+or force where one is recorded, otherwise it equals the back-EMF constant, by conservation of energy.
 
-The torque constant comes from a torque or force where one is recorded, otherwise it equals the back-EMF constant, by
-conservation of energy.
-
-Assumptions: constant R, L and ke; the voltage is that at the winding (or its mean over a cycle of the modulator) and is
-not made from the noise of the measured current, as a very stiff current loop does; samples are even, within a tenth.
+Assumed: the voltage is that at the winding (or its mean over a cycle of the modulator) and is not made from the noise
+of the measured current, as a very stiff current loop does.
 """
 
 from dataclasses import dataclass, replace
@@ -63,10 +59,6 @@ class WindingFit:
     pole: tuple[float, float]  # interval of a
     residual: Values  # of the equation behind the filter
     made: list[Values]  # currents that the model makes, piece by piece
-
-    def correlation(self, one: int, other: int) -> float:
-        """Correlation of two constants, by their places."""
-        return float(self.covariance[one, other]) / (self.error(one) * self.error(other) or 1.0)
 
     def error(self, which: int) -> float:
         """Standard error of a constant."""
@@ -224,8 +216,14 @@ def fit_winding(log: Log) -> Winding:
     if found.reason or fit is None:
         return found
     found = _with_torque(log, pieces, fit, found)
-    earlier, later = (iterate(make_pieces(log, late), is_moving=is_moving) for late in (-1, 1))
-    return replace(found, notes=(*found.notes, *_delay_notes(fit, earlier, later)))
+    # Where the voltage acts at another time than it is recorded, another delay fits better.
+    others = {word: iterate(make_pieces(log, k), is_moving=is_moving) for word, k in (("earlier", -1), ("later", 1))}
+    shares = {word: float(one.residual.std()) / float(fit.residual.std()) for word, one in others.items() if one}
+    word = min(shares, key=shares.__getitem__, default="")
+    if not word or shares[word] >= CLEARLY_BETTER:
+        return found
+    note = f"a voltage that acts a sample {word} leaves {shares[word]:.0%} of the residual"
+    return replace(found, notes=(*found.notes, f"{note}; state by how much it is late"))
 
 
 def _refusal(log: Log) -> str:
@@ -256,11 +254,10 @@ def _told(pieces: list[Piece], fit: WindingFit | None, unit: str) -> Winding:
         return told
     if fit.is_vague(3):
         return replace(told, notes=(*told.notes, "the speed is too low to show a back-EMF; record higher speeds"))
-    ke = fit.estimate(3, "back_emf_constant", unit)
-    if ke.value < 0:
+    if fit.values[3] < 0:
         reason = "the back-EMF constant comes out negative: speed and voltage have opposite signs; turn one"
         return Winding(reason=reason)
-    return replace(told, back_emf_constant=ke)
+    return replace(told, back_emf_constant=fit.estimate(3, "back_emf_constant", unit))
 
 
 def _partner(pieces: list[Piece], found: WindingFit | None) -> str:
@@ -269,7 +266,11 @@ def _partner(pieces: list[Piece], found: WindingFit | None) -> str:
         is_possible = found.pole[0] < 1.0 and found.values[0] > 0 and found.values[3] > 0
         if is_possible and not found.is_vague(3):
             return ""
-        shares = {"resistance": abs(found.correlation(3, 0)), "offset": abs(found.correlation(3, 2))}
+        # Correlation of the back-EMF constant with each.
+        shares = {
+            name: abs(float(found.covariance[3, which])) / (found.error(3) * found.error(which) or 1.0)
+            for name, which in (("resistance", 0), ("offset", 2))
+        }
         name = max(shares, key=lambda key: shares[key])
         return name if shares[name] > TOGETHER else ""
     v, i = (np.concatenate(series) for series in ([p.smooth for p in pieces], [p.i[:-1] for p in pieces]))
@@ -313,14 +314,9 @@ def _still(pieces: list[Piece], found: WindingFit | None) -> Winding:
     elif found.pole[1] >= 1.0 or found.is_vague(1):
         notes.append("the inductance drowns in noise; record faster steps of the voltage")
         inductance = None
-    current = np.concatenate([piece.i for piece in pieces])
-    return Winding(
-        found.estimate(0, "resistance", "ohm"),
-        inductance,
-        offset=found.estimate(2, "voltage_offset", "V"),
-        relative_error=float(found.residual.std() / current.std()),
-        notes=tuple(notes),
-    )
+    error = float(found.residual.std() / np.concatenate([piece.i for piece in pieces]).std())
+    resistance, offset = found.estimate(0, "resistance", "ohm"), found.estimate(2, "voltage_offset", "V")
+    return Winding(resistance, inductance, offset=offset, relative_error=error, notes=tuple(notes))
 
 
 def _with_torque(log: Log, pieces: list[Piece], fit: WindingFit, found: Winding) -> Winding:
@@ -344,14 +340,3 @@ def _with_torque(log: Log, pieces: list[Piece], fit: WindingFit, found: Winding)
     method = "equal to the back-EMF constant, by conservation of energy"
     kt = replace(ke, name="torque_constant", unit=_TORQUE_UNITS[ke.unit], method=method)
     return replace(found, torque_constant=kt)
-
-
-def _delay_notes(fit: WindingFit, earlier: WindingFit | None, later: WindingFit | None) -> tuple[str, ...]:
-    """What to try where the voltage acts at another time than it is recorded."""
-    others = (("earlier", earlier), ("later", later))
-    shares = {word: float(other.residual.std()) / float(fit.residual.std()) for word, other in others if other}
-    word = min(shares, key=shares.__getitem__, default="")
-    if not word or shares[word] >= CLEARLY_BETTER:
-        return ()
-    note = f"a voltage that acts a sample {word} leaves {shares[word]:.0%} of the residual"
-    return (f"{note}; state by how much it is late",)

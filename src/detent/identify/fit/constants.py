@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import Estimate, estimate, significant
-from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Fit, Instruments
 from detent.logs.log import Values
 
@@ -73,10 +73,8 @@ class Constants:
         return tuple((self.names[i], self.names[j], float(c[i, j])) for i, j in pairs)
 
     def estimates(self, run: Run) -> tuple[Estimate, ...]:
-        """Each with its interval, in the units of a run.
-
-        Without a reference the delay is none of them: in a loop it hides in the answer of the effort to the noise.
-        """
+        """Each with its interval, in the units of a run."""
+        # Without a reference the delay is none of them: in a loop it hides in the answer of the effort to the noise.
         told = zip(self.names, self.values.tolist(), self.errors.tolist(), self.degrees.tolist(), strict=True)
         return tuple(
             estimate(name, value, run.unit(name), error, self.method, degrees)
@@ -88,8 +86,14 @@ class Constants:
 def constants_of(fit: Fit, rivals: Sequence[Fit] = ()) -> Constants:
     """Constants of a fitted model."""
     names, values, covariance, degrees = _sums_of(fit)
+    # What the rivals say otherwise; a constant that a rival does not have counts as its own value.
+    squares = np.zeros(len(values))
+    for rival in rivals:
+        theirs, found, *_ = _sums_of(rival)
+        known = dict(zip(theirs, found.tolist(), strict=True))
+        squares += np.array([(known.get(n, v) - v) ** 2 for n, v in zip(names, values.tolist(), strict=True)])
     if rivals:
-        covariance = covariance + np.diag(_spread(names, values, rivals))
+        covariance = covariance + np.diag(squares / len(rivals))
     return Constants(names, values, covariance, degrees, METHODS[fit.instruments], fit.instruments == "reference")
 
 
@@ -111,16 +115,6 @@ def _sums_of(fit: Fit) -> tuple[tuple[str, ...], Values, Values, Values]:
     # Two that cancel leave rounding, of either sign.
     values = [significant(v) if abs(v) > CANCELLED * p else 0.0 for v, p in zip(values, parts, strict=True)]
     return tuple(wanted), np.array(values), weights @ fit.covariance @ weights.T, degrees
-
-
-def _spread(names: Sequence[str], values: Values, rivals: Sequence[Fit]) -> Values:
-    """Mean square of what the rivals say otherwise; a constant that a rival does not have counts as its own value."""
-    squares = np.zeros(len(values))
-    for rival in rivals:
-        theirs, found, *_ = _sums_of(rival)
-        known = dict(zip(theirs, found.tolist(), strict=True))
-        squares += np.array([(known.get(n, v) - v) ** 2 for n, v in zip(names, values.tolist(), strict=True)])
-    return squares / len(rivals)
 
 
 def hanging_position(constants: Constants) -> float:

@@ -1,13 +1,11 @@
-"""The equation of motion of an axis over a run, window by window: one row per window, linear in the constants.
+"""A log made ready for a fit: what moved and what moved it, on an even grid, and its equation of motion by windows.
 
     F = M a + sum over the terms of the friction and the weight
 
 Each term is a constant times a function of velocity, its direction or the position. One number may bend the model, in
 which it is not linear: the Stribeck velocity, or the share ``l`` of the effort that a transmission loses, with which
-``F - l |F| sign(v)`` takes the place of F, so that all columns grow by ``1 / (1 - l sign(F v))``.
-
-A window is usable where it holds no sample that is missing, saturated, at standstill or turning round: there friction
-is whatever holds the axis, and no equation says how much.
+``F - l |F| sign(v)`` takes the place of F, so that all columns grow by ``1 / (1 - l sign(F v))``. A window holds no
+sample that is missing, saturated, at standstill or turning round: there friction is whatever holds the axis.
 
 No derivative of a measurement is taken. Both sides of ``F = M q'' + f(q')`` are multiplied with a window ``w`` and
 integrated; by parts, the derivatives pass from the measured position to the window, ``int w q'' = int w'' q``, where
@@ -22,17 +20,127 @@ Messenger, Bortz: Weak SINDy: Galerkin-based data-driven model selection. Multis
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.identify.fit.prepare import Run
-from detent.logs.log import Values
+from detent.errors import InputError
+from detent.logs.log import Kind, Log, Values
 
+GAP = 1.5  # time between two samples, in periods, from which on something is missing between them
+FEWEST = 20  # samples below which nothing is said about a log
+_MASS = {"N": "kg", "N*m": "kg*m^2"}
 Rows = NDArray[np.intp]  # numbers of samples
 _SHAPE = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
+FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
+NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
+HOPS = 2  # rows per half window
+LOSS = "loss"  # named in a model whose transmission loses a share of the effort; it bends the terms, without a column
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One run on an even grid."""
+
+    name: str  # name of the log
+    step: float  # time between two samples [s]
+    position: Values  # as measured [m], [rad] or [count]
+    effort: Values  # what drives the axis, from each sample to the next
+    usable: NDArray[np.bool_]  # samples that mean something
+    effort_name: str = "force"  # and effort_unit: what it is
+    effort_unit: str = "N"
+    position_unit: str = "m"
+    reference: Values | None = None  # position asked for
+    resolution: float = 0.0  # way of a count of the encoder; 0 where none shows
+    noise: float = 0.0  # standard deviation of the measured position, counts included
+
+    @property
+    def t(self) -> Values:
+        """Time from the first sample [s]."""
+        return np.asarray(np.arange(len(self.position)) * self.step, np.float64)
+
+    @property
+    def is_rotary(self) -> bool:
+        """True where the position is an angle."""
+        return self.position_unit == "rad"
+
+    def part(self, begin: int, end: int) -> "Run":
+        """Samples from `begin` to before `end`."""
+        cut, reference = slice(begin, end), None if self.reference is None else self.reference[begin:end]
+        position, effort, usable = self.position[cut], self.effort[cut], self.usable[cut]
+        return replace(self, position=position, effort=effort, usable=usable, reference=reference)
+
+    def unit(self, name: str) -> str:
+        """Unit of a constant by its name, such as ``viscous.positive``."""
+        effort, way = self.effort_unit or "1", self.position_unit
+        times = f"{effort}*" if effort != "1" else ""
+        units = {
+            "mass": _MASS.get(effort, f"{times}s^2/{way}"),
+            "viscous": f"{times}s/{way}",
+            "stribeck": f"{way}/s",
+            "delay": "s",
+            "spring": f"{effort}/{way}",
+            "loss": "1",
+            "hanging": "rad",
+        }
+        return units.get(name.partition(".")[0], effort)
+
+
+def make_run(log: Log, effort: str | None = None) -> Run:
+    """Put a log on an even grid and choose what drives its axis."""
+    name = log.effort(effort or "")
+    log.need("position")
+    if len(log.t) < FEWEST:
+        raise InputError.of_file(log.name, f"{len(log.t)} samples", f"{FEWEST} or more", "record a longer run")
+    step = log.period
+    samples = math.floor((log.t[-1] - log.t[0]) / step + 0.5) + 1
+    grid: Values = np.asarray(log.t[0] + np.arange(samples) * step, np.float64)
+    position = np.interp(grid, log.t, log.signals["position"])
+    reference = np.interp(grid, log.t, log.signals["reference"]) if "reference" in log.signals else None
+    values, resolution = log.signals[name], find_count(log.signals["position"])
+    # What drives stands from each of its samples to the next.
+    is_even = len(grid) == len(log.t) and float(np.abs(grid - log.t).max()) < 0.2 * step
+    places = np.clip(np.searchsorted(log.t, grid + 0.2 * step, side="right") - 1, 0, len(log.t) - 1)
+    held = (values if is_even else values[places]).astype(np.float64)
+    units, noise = (log.units[name] or "1", log.units["position"]), max(noise_of(position), 0.29 * resolution)
+    usable = _usable(log, grid, name)
+    return Run(log.name, step, position, held, usable, name, *units, reference, resolution, noise)
+
+
+def _usable(log: Log, grid: Values, effort: str) -> NDArray[np.bool_]:
+    """Grid samples that are not in gaps, filled in, stuck, saturated or without the drive."""
+    bad = log.mask(Kind.MISSING_VALUES, Kind.STUCK) | log.mask(Kind.SATURATED, signals={effort, "position"})
+    if effort in {"voltage", "command"} and "enabled" in log.signals:
+        # A winding that is switched off does not brake: another axis.
+        bad |= log.signals["enabled"] < 0.5
+    before = np.clip(np.searchsorted(log.t, grid, side="right") - 1, 0, len(log.t) - 1)
+    after = np.clip(before + 1, 0, len(log.t) - 1)
+    gap = log.t[after] - log.t[before] > GAP * log.period
+    return ~(bad[before] | (gap & (np.abs(grid - log.t[before]) > 0.2 * log.period)))
+
+
+def find_count(position: Values) -> float:
+    """Way of a count: the smallest step of a position whose steps are whole multiples of it; 0 where there is none."""
+    ways = np.abs(np.diff(position))
+    ways = ways[ways > 1e-12 * max(float(np.abs(position).max()), 1e-300)]
+    if len(ways) < 10:
+        return 0.0
+    count = float(np.quantile(ways, 0.01))
+    near = ways[ways < 1.5 * count]
+    count = float(np.median(near)) if len(near) else count
+    rest = np.abs(ways / count - np.round(ways / count))
+    return count if float(np.median(rest[ways < 20 * count])) < 0.05 else 0.0
+
+
+def noise_of(position: Values) -> float:
+    """Standard deviation of what is not smooth in a position: its third differences, 20 times their variance apart."""
+    third = np.diff(position, 3)
+    return float(np.sqrt(np.mean(third**2) / 20.0)) if len(third) else 0.0
+
+
+# ---- windows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,15 +201,10 @@ def make_kernel(half: int, step: float) -> Kernel:
     # Sums are no integrals: these make straight lines, parabolas and cubics come out exactly; of the third derivative a
     # straight line gives 0 and a cubic 6.
     t = np.asarray(np.arange(-half, half + 1) * step, np.float64)
+    second -= second.mean()
     third -= t * float(np.sum(third * t)) / float(np.sum(t * t))
-    return Kernel(
-        half,
-        step,
-        value,
-        first / float(np.sum(first * t)),
-        (second - second.mean()) * (2.0 / float(np.sum((second - second.mean()) * (t * t)))),
-        third * (6.0 / float(np.sum(third * t**3))),
-    )
+    second, third = second * (2.0 / float(np.sum(second * (t * t)))), third * (6.0 / float(np.sum(third * t**3)))
+    return Kernel(half, step, value, first / float(np.sum(first * t)), second, third)
 
 
 @cache
@@ -141,11 +244,6 @@ def _weighted(padded: Values, weights: Values, rows: Rows) -> Values:
 # ---- the equation of motion
 
 
-FINE, FINEST = 6e-3, 4  # half of the window that tells the direction [s], and its fewest samples
-NOISES = 5.0  # velocity that is told from standstill, in standard deviations of its noise
-HOPS = 2  # rows per half window
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """What a position says, window by window, each of shape (m,) unless said otherwise."""
@@ -172,18 +270,10 @@ def make_motion(position: Values, effort: Values, kernel: Kernel, rows: Rows) ->
     """Position, velocity and acceleration by a window."""
     quick = fine_kernel(kernel).velocities(position)
     still = 0.5 * (quick == 0.0)
-    return Motion(
-        kernel.mean(position, rows),
-        kernel.velocity(position, rows),
-        kernel.acceleration(position, rows),
-        kernel.mean((quick > 0.0) + still, rows),
-        kernel.mean((quick < 0.0) + still, rows),
-        quick,
-        position,
-        effort,
-        rows,
-        kernel,
-    )
+    right, left = (kernel.mean(way + still, rows) for way in (quick > 0.0, quick < 0.0))
+    place, acceleration = kernel.mean(position, rows), kernel.acceleration(position, rows)
+    velocity = kernel.velocity(position, rows)
+    return Motion(place, velocity, acceleration, right, left, quick, position, effort, rows, kernel)
 
 
 Term = Callable[[Motion, float], Values]
@@ -213,9 +303,6 @@ TERMS: Mapping[str, Term] = {
     "spring": lambda m, _: m.position,
 }
 """Every term of an equation of motion; `excess` is static less Coulomb friction."""
-
-
-LOSS = "loss"  # named in a model whose transmission loses a share of the effort; it bends the terms, without a column
 
 
 def is_bent(names: Sequence[str]) -> bool:

@@ -1,23 +1,17 @@
 """A constant with its limits, and standard errors of a regression whose residuals are coloured and of uneven size.
 
 The covariance of the constants needs the long-run variance of the scores, instrument times residual, row by row in
-their order of time. It is estimated by projecting the scores on the lowest cosines of the record (equal-weighted
-cosines): each projection is one independent look at the variance near frequency zero, so their mean has as many degrees
-of freedom as there are cosines, and Student's distribution with these gives intervals that hold in small samples, where
-those of a Newey-West sum are too short.
+time. Each projection of the scores on one of the lowest cosines of the record is an independent look at the variance
+near frequency zero; Student's distribution with as many degrees of freedom gives intervals that hold in small samples,
+where those of a Newey-West sum are too short (Lazarus, Lewis, Stock, Watson: HAR inference: recommendations for
+practice. Journal of Business and Economic Statistics 36 (2018); Mueller: HAC corrections for strongly autocorrelated
+time series. Same journal 32 (2014)). Where the instrument of a constant is large in few rows, as a jerk is, few
+residuals carry its error, and its degrees of freedom are fewer (Satterthwaite: An approximate distribution of estimates
+of variance components. Biometrics Bulletin 2 (1946)).
 
-A variance is known no better than by the residuals that count for it. Where the instrument of a constant is large in
-few rows, as a jerk is, few residuals carry its error, and the degrees of freedom of that constant are fewer.
-
-Lazarus, Lewis, Stock, Watson: HAR inference: recommendations for practice. Journal of Business and Economic Statistics
-36 (2018): number of cosines 0.41 n^(2/3), critical values of Student's distribution.
-Satterthwaite: An approximate distribution of estimates of variance components. Biometrics Bulletin 2 (1946).
-Stock, Watson: Introduction to Econometrics, section 15.4: weighted lags, 0.75 n^(1/3) of them.
-Mueller: HAC corrections for strongly autocorrelated time series. Same journal 32 (2014).
-
-All this takes whatever residual there is, but needs many rows; a fit to a dozen samples, or one in which a few rows
-hold most of what is known, leaves a residual that is too small. For these `known_noise_covariance` takes the noise of a
-longer series, made from white noise by an autoregressive filter (Yule and Walker), and the larger of both covariances.
+All this needs many rows; a fit to a dozen samples, or one in which a few rows hold most of what is known, leaves a
+residual that is too small. For these `known_noise_covariance` takes the noise of a longer series, made from white noise
+by an autoregressive filter (Yule and Walker), and the larger of both covariances.
 """
 
 from dataclasses import asdict, dataclass
@@ -33,6 +27,15 @@ LEVEL = 0.95  # share of intervals that hold the true value
 DIGITS = 9
 """Digits of a constant; what comes after them differs from processor to processor, and a simulation that sticks and
 slips would make more of it."""
+
+RANK = 1e-10
+"""Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding
+leaves of them decides nothing."""
+
+SHARE = 0.3  # cosines per independent residual, at most: beyond them the variance would be read where it has fallen
+ORDER = 4  # order of the autoregressive filter, at most
+ROWS_PER_ORDER = 20  # rows of the series for each order, at least
+FADED = 200  # rows before the first of a fit whose noise still acts on it, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,25 +113,8 @@ def quantile(degrees: float) -> float:
     return float(stats.norm.ppf(upper) if np.isinf(degrees) else stats.t.ppf(upper, max(degrees, 1.0)))
 
 
-# ---- errors with coloured residuals
-
-
-RANK = 1e-10
-"""Singular value, in parts of the largest, below which columns of unit length are one and the same: what rounding
-leaves of them decides nothing."""
-
-SHARE = 0.3  # cosines per independent residual, at most: beyond them the variance would be read where it has fallen
-ORDER = 4  # order of the autoregressive filter, at most
-ROWS_PER_ORDER = 20  # rows of the series for each order, at least
-FADED = 200  # rows before the first of a fit whose noise still acts on it, at most
-
-
 def independent_rows(residual: Values) -> float:
-    """How many independent residuals are worth as much as these, by the correlation of neighbours.
-
-    ``n (1 - r) / (1 + r)`` with the correlation `r` of neighbours within 0 and 0.99, corrected for its bias of
-    ``1 / n``.
-    """
+    """How many independent residuals are worth as much as these: ``n (1 - r) / (1 + r)`` with the correlation `r`."""
     n, r = len(residual), neighbour_correlation(residual)
     return n * (1.0 - r) / (1.0 + r)
 
@@ -188,12 +174,9 @@ def coloured_covariance(columns: Values, residual: Values, instruments: Values |
 
 
 def carried_degrees(columns: Values, residual: Values, instruments: Values, cosines: int) -> Values:
-    """Degrees of freedom behind the variance of each constant.
-
-    1 or more, and the cosines at most. A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum h^4``
-    degrees (Satterthwaite), times ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their squares are
-    correlated by its square.
-    """
+    """Degrees of freedom behind the variance of each constant, from 1 to the cosines."""
+    # A sum of squares ``h^2 e^2`` of normal residuals has ``(sum h^2)^2 / sum h^4`` (Satterthwaite), times
+    # ``(1 - r^2) / (1 + r^2)`` for a correlation `r` of neighbours, as their squares are correlated by its square.
     size, length = column_sizes(columns), column_sizes(instruments)
     tools = instruments / length
     weight = (tools @ np.asarray(np.linalg.pinv(tools.T @ (columns / size), rcond=RANK), np.float64).T) ** 2
@@ -210,10 +193,8 @@ def column_sizes(columns: Values) -> Values:
 
 
 def _lagged_variance(scores: Values, memory: float) -> Values:
-    """Long-run covariance by weighted lags, far enough for residuals of a memory of so many rows (Newey, West 1987).
-
-    It and the projections err independently; the larger of both does not leave an interval too short by chance.
-    """
+    """Long-run covariance by weighted lags, as far as residuals remember (Newey, West 1987; Stock, Watson, 15.4)."""
+    # It and the projections err independently; the larger of both does not leave an interval too short by chance.
     n = len(scores)
     lags = min(round(max(4.0, 0.75 * n ** (1.0 / 3.0), 3.0 * memory)), n - 1)
     total = scores.T @ scores

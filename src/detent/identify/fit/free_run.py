@@ -1,12 +1,10 @@
 """An axis with identified constants, simulated along a log: the test that no residual replaces.
 
-The axis gets the recorded effort and nothing else; its loops are open, so that every error of the constants adds up.
-From many moments of the log it starts where the log says the axis was, and runs for a horizon: a sample, a second, to
-the end. The same compiled blocks move it as in every other simulation.
+The axis gets the recorded effort and nothing else, so that every error of the constants adds up. From many moments of
+the log it starts where the log says the axis was, and runs for a horizon: a sample, a second, to the end.
 
-A log with a reference is followed under its own loops too (`simulate_closed_loop`). Loops hide errors of constants in
-the position, and show them in the effort; both are stated. The loops are those that `loop_fit` finds in the first part
-of the log; a log whose effort they do not explain is not simulated so.
+A log with a reference is followed under its own loops too (`simulate_closed_loop`), those that `loop_fit` finds in its
+first part. Loops hide errors of constants in the position, and show them in the effort; both are stated.
 """
 
 import math
@@ -17,10 +15,9 @@ import numpy as np
 
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants, hanging_position
-from detent.identify.fit.equations import fine_kernel, make_kernel
-from detent.identify.fit.estimate import rms
+from detent.identify.fit.equations import Run, fine_kernel, make_kernel
+from detent.identify.fit.estimate import rms, significant
 from detent.identify.fit.loop_fit import Loops, fit_loops
-from detent.identify.fit.prepare import Run
 from detent.kernel.loop import advance
 from detent.logs.log import Values
 from detent.methods.cascade import system as cascade
@@ -33,6 +30,7 @@ HORIZONS = (0.1, 0.5, 1.0, 2.0)  # lengths of simulated stretches [s]
 SUBSTEPS = 4  # ticks of the plant per sample of the log
 MOST_STARTS = 60  # stretches simulated per horizon at most, evenly spread over the log
 _LOOP_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position", "controller.law.command"]))
+_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position"]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class Plant:
 
     def __init__(self, constants: Constants, step: float) -> None:
         p = plant_registers(constants)
-        self.ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * step / cascade.MAX_RATE))
+        self.ticks = _ticks(p, step)
         cascade.fill_clocks(p, step / self.ticks, 1)
         self._params = p
         self._late = round(constants.value("delay") / step * self.ticks)
@@ -77,6 +75,11 @@ class Plant:
         return moved
 
 
+def _ticks(p: cascade.CascadeParams, step: float) -> int:
+    """Ticks of the plant per sample; the rate is rounded, as its last digits differ from processor to processor."""
+    return max(SUBSTEPS, math.ceil(significant(fastest_rate(p.plant.machine) * step / cascade.MAX_RATE)))
+
+
 def plant_registers(constants: Constants) -> cascade.CascadeParams:
     """Registers of a plant that is driven by the effort itself."""
     p = cascade.CascadeParams()
@@ -96,9 +99,6 @@ def plant_registers(constants: Constants) -> cascade.CascadeParams:
     for sensor in (p.controller.motor_sensor, p.controller.load_sensor):
         sensor.span, sensor.smoothing = 1, 1.0
     return p
-
-
-_PICKS = byte_places(choose_leaves(cascade.Cascade, ["plant.machine.motor.position"]))
 
 
 def start_velocities(run: Run) -> Values:
@@ -192,14 +192,10 @@ def simulate_closed_loop(constants: Constants, seen: Sequence[Run], unseen: Sequ
     effort = np.concatenate([u - run.effort for _, u, run in pairs])
     if not (np.isfinite(position).all() and np.isfinite(effort).all()):
         return None
-    return ClosedLoop(
-        rms=rms(position),
-        largest=float(np.abs(position).max()),
-        relative=_share(position, np.concatenate([run.position for *_, run in pairs])),
-        effort=_share(effort, np.concatenate([run.effort for *_, run in pairs])),
-        duration=sum(float(run.t[-1]) for *_, run in pairs),
-        loops=found[0],
-    )
+    relative = _share(position, np.concatenate([run.position for *_, run in pairs]))
+    share = _share(effort, np.concatenate([run.effort for *_, run in pairs]))
+    duration = sum(float(run.t[-1]) for *_, run in pairs)
+    return ClosedLoop(rms(position), float(np.abs(position).max()), relative, share, duration, found[0])
 
 
 def _share(error: Values, signal: Values) -> float:
@@ -218,7 +214,7 @@ def _params(constants: Constants, loops: Loops, run: Run) -> cascade.CascadePara
     p.plant.source.delay = min(max(round(constants.value("delay") / run.step), 0), MEMORY - 1)
     p.controller.motor_sensor.span = loops.span
     cascade.set_count(p, run.resolution, 0.0)
-    ticks = max(SUBSTEPS, math.ceil(fastest_rate(p.plant.machine) * run.step / cascade.MAX_RATE))
+    ticks = _ticks(p, run.step)
     cascade.fill_clocks(p, run.step / ticks, ticks)
     return p
 

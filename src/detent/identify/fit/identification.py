@@ -10,12 +10,11 @@ import numpy as np
 from detent.errors import InputError
 from detent.identify.fit import untold
 from detent.identify.fit.constants import Constants, constants_of
-from detent.identify.fit.equations import LOSS, make_kernel
+from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
 from detent.identify.fit.estimate import Estimate, quantile
 from detent.identify.fit.free_run import ClosedLoop, Horizon, simulate_closed_loop, simulate_horizons
-from detent.identify.fit.ladder import RUNGS, Climb, Rung, chosen_rung, climb, extended, fit_rung, is_at_bound
+from detent.identify.fit.ladder import AT_BOUND, RUNGS, Climb, Rung, bends_tried, chosen_rung, climb, extended, fit_rung
 from detent.identify.fit.output_error import STRETCH, fit_output_error
-from detent.identify.fit.prepare import Run, make_run
 from detent.identify.fit.regression import Fit, Instruments, Prepared, Residuals, prepare, residuals_of
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
 from detent.logs.log import Log
@@ -26,23 +25,18 @@ Verdict = Literal["trusted", "partly trusted", "refused"]
 
 WINDOW = 0.02  # half of the window to begin with [s]
 WIDEST = 0.12  # half of the widest window [s]
-
+# Share of the noise in the square of the acceleration, at most, by what instruments are made of.
 NOISE_SHARE: dict[Instruments, float] = {"reference": 0.1, "position": 0.01, "none": 0.002}
-"""Share of the noise in the square of the acceleration, at most, by what instruments are made of."""
-
+# Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken.
 LIKENESS: dict[Instruments, float] = {"reference": 0.6, "position": 0.95}
-"""Cosine between velocities, and between accelerations, of instruments and axis, from which on they are taken."""
-
 WIDEST_BEND = 0.5  # half of the interval of a Stribeck velocity or a loss over its value, at most
 HELD_OUT = 0.25  # last part of a log that the simulation is tested on
-
+TURN = 0.5  # range of an angle from which on a weight may show [rad]
 _WAYS: dict[Instruments, str] = {
     "reference": "references as instruments",
     "position": "wider windows as instruments: no reference that the axis follows closely",
     "none": "least squares: no reference that the axis follows closely, and motion too quick for wider windows",
 }
-
-TURN = 0.5  # range of an angle from which on a weight may show [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,14 +151,10 @@ def identify(
     if constants.value("mass") > 0.0:
         seen, horizons, closed = _test_simulation(runs, fit, chosen_rung(climbs), method, report)
     refusals += [*look_at_prediction(climbs, horizons, refusals)]
-    kernel = parts[0].motion.kernel
-    notes = (
-        f"effort: {runs[0].effort_name} [{runs[0].effort_unit}]",
-        f"windows of {2e3 * kernel.half * kernel.step:.3g} ms, {windows} of them",
-        _WAYS[parts[0].instruments],
-    )
-    told = constants.estimates(runs[0])
-    results = (constants, told, climbs, fit, horizons, tuple(refusals), seen, closed, notes)
+    kernel, told = parts[0].motion.kernel, f"{runs[0].effort_name} [{runs[0].effort_unit}]"
+    width = 2e3 * kernel.half * kernel.step
+    notes = (f"effort: {told}", f"windows of {width:.3g} ms, {windows} of them", _WAYS[parts[0].instruments])
+    results = (constants, constants.estimates(runs[0]), climbs, fit, horizons, tuple(refusals), seen, closed, notes)
     return Identification(tuple(logs), runs, *results)
 
 
@@ -183,15 +173,13 @@ def _check_alike(runs: Sequence[Run]) -> None:
 
 def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report) -> Constants:
     """Constants by simulation, from those of the regression on."""
-    longest = min(float(run.t[-1]) for run in runs)
-    return fit_output_error(runs, constants, min(STRETCH, longest / 4), partial(report, what))
+    duration = min(STRETCH, min(float(run.t[-1]) for run in runs) / 4)
+    return fit_output_error(runs, constants, duration, partial(report, what))
 
 
 def choose_windows(runs: Sequence[Run]) -> list[Prepared]:
-    """Windows with their instruments: the first of references, wider windows and none that is near the motion.
-
-    Instruments that say little of the motion leave a bias smaller than the scatter that they bring.
-    """
+    """Windows with their instruments: the first of references, wider windows and none that is near the motion."""
+    # Instruments that say little of the motion leave a bias smaller than the scatter that they bring.
     ways: list[Instruments] = ["reference"] if all(run.reference is not None for run in runs) else []
     for way in (*ways, "position"):
         parts = prepare_all(runs, way)
@@ -202,13 +190,12 @@ def choose_windows(runs: Sequence[Run]) -> list[Prepared]:
 
 def _follows(part: Prepared) -> bool:
     """True where velocity and acceleration of the instruments are those of the axis for the most part."""
-    if not len(part.motion.rows):
-        return False
     motion, ideal = part.motion, part.ideal
-    pairs = ((motion.velocity, ideal.velocity), (motion.acceleration, ideal.acceleration))
-    sizes = [float(np.linalg.norm(a) * np.linalg.norm(b)) for a, b in pairs]
-    cosines = [float(a @ b) / size if size > 0.0 else 0.0 for (a, b), size in zip(pairs, sizes, strict=True)]
-    return all(cosine > LIKENESS[part.instruments] for cosine in cosines)
+    for a, b in ((motion.velocity, ideal.velocity), (motion.acceleration, ideal.acceleration)):
+        size = float(np.linalg.norm(a) * np.linalg.norm(b))
+        if not (size > 0.0 and float(a @ b) / size > LIKENESS[part.instruments]):
+            return False
+    return True
 
 
 def prepare_all(runs: Sequence[Run], instruments: Instruments) -> list[Prepared]:
@@ -231,16 +218,13 @@ def _rungs_for(parts: Sequence[Prepared], runs: Sequence[Run]) -> tuple[Rung, ..
         return RUNGS
     plain = RUNGS[1]
     weights = [plain, *(extended(plain, terms) for terms in (("pendulum",), ("pendulum", "pendulum.across")))]
-    lifts = climb(parts, weights)
-    extra = chosen_rung(lifts).terms[len(plain.terms) :]
+    extra = chosen_rung(climb(parts, weights)).terms[len(plain.terms) :]
     if not extra:
         return RUNGS
     ladder = [extended(rung, extra) for rung in RUNGS]
     each = next(rung for rung in ladder if rung.name == "per direction")
-    lossy = Rung(
-        "loss", "friction of each direction, and a share of the force lost in the transmission", (*each.terms, LOSS)
-    )
-    return (*ladder, lossy)
+    text = "friction of each direction, and a share of the force lost in the transmission"
+    return (*ladder, Rung("loss", text, (*each.terms, LOSS)))
 
 
 def _fit_all(
@@ -258,15 +242,14 @@ def _fit_all(
 
 
 def _is_told(parts: Sequence[Prepared], fit: Fit) -> bool:
-    """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill.
-
-    A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
-    """
+    """True where the log tells the bend of a model, more than a bound of it, and that friction rises to standstill."""
+    # A model that predicts well with constants that nobody knows stays among the rivals: its spread widens the limits.
     reach = np.array([quantile(d) for d in fit.degrees.tolist()]) * np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    if is_at_bound(parts, fit) or not reach[-1] < WIDEST_BEND * fit.bend:
+    tried = bends_tried(parts, fit.model)
+    is_inside = (1.0 + AT_BOUND) * tried[0] < fit.bend < (1.0 - AT_BOUND) * tried[-1]
+    if not (is_inside and reach[-1] < WIDEST_BEND * fit.bend):
         return False
-    excess = [k for k, name in enumerate(fit.names) if name.startswith("excess")]
-    return all(fit.values[k] > reach[k] for k in excess)
+    return all(fit.values[k] > reach[k] for k, name in enumerate(fit.names) if name.startswith("excess"))
 
 
 def _is_rival(c: Climb, chosen: Climb) -> bool:

@@ -27,11 +27,11 @@ ALIKE = 1e-8  # gain, in parts of the mean square, up to which only rounding tel
 SLOWEST = 0.002  # least Stribeck velocity tried, in parts of the top speed
 FINER = 1.6  # ratio of neighbouring Stribeck velocities tried, at most
 AT_BOUND = 0.01  # a bend this near to the least or the largest tried, in parts of it, is a bound and no value
-
+# Shares lost in a transmission that are tried.
 LOSSES = np.array([0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
-"""Shares lost in a transmission that are tried."""
-
 ROUNDS, WIDER = 8, 1.3  # brackets of a Stribeck velocity or a loss looked at, and the ratio of their ends
+_EACH = ("coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,6 @@ class Rung:
         """True where a Stribeck velocity or a loss belongs to it."""
         return is_bent(self.terms)
 
-
-_EACH = ("coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative")
 
 RUNGS = (
     Rung("coulomb", "one Coulomb friction and a constant force", ("mass", "coulomb", "offset")),
@@ -81,31 +79,20 @@ def extended(rung: Rung, extra: Sequence[str]) -> Rung:
     return Rung(rung.name, rung.text, (*rung.terms, *extra))
 
 
-def stribeck_speeds(parts: Sequence[regression.Prepared]) -> Values:
-    """Stribeck velocities that the log could show, from the slow end of its motion to half its top speed."""
+def bends_tried(parts: Sequence[regression.Prepared], names: Sequence[str]) -> Values:
+    """Shares lost, or Stribeck velocities from the slow end of a log's motion to half its top speed."""
+    if LOSS in names:
+        return LOSSES
     speed = np.abs(np.concatenate([p.motion.velocity for p in parts]))
     top, low = float(np.quantile(speed, 0.98)), float(np.quantile(speed, 0.02))
     least, most = min(max(low, SLOWEST * top), 0.2 * top), 0.4 * top
     return np.geomspace(least, most, 1 + math.ceil(math.log(most / least) / math.log(FINER)))
 
 
-def bends_tried(parts: Sequence[regression.Prepared], names: Sequence[str]) -> Values:
-    """Stribeck velocities, or shares lost, among which the best is looked for."""
-    return LOSSES if LOSS in names else stribeck_speeds(parts)
-
-
-def is_at_bound(parts: Sequence[regression.Prepared], fit: regression.Fit) -> bool:
-    """True where the bend of a fit is the least or the largest that was tried: the log says no more than a bound."""
-    tried = bends_tried(parts, fit.model)
-    return not (1.0 + AT_BOUND) * tried[0] < fit.bend < (1.0 - AT_BOUND) * tried[-1]
-
-
 def best_bend(parts: Sequence[regression.Prepared], names: Sequence[str]) -> tuple[float, float]:
-    """Stribeck velocity, or share lost: what the instruments say, and that with the smallest residual, near it.
-
-    The smallest residual alone answers to the noise in the columns: intervals around it held the truth in 86 % of the
-    simulated logs with low-speed friction, those around what the instruments say in 93 to 96 %.
-    """
+    """Stribeck velocity, or share lost: what the instruments say, and that with the smallest residual, near it."""
+    # The latter alone answers to the noise in the columns: intervals around it held the truth in 86 % of the simulated
+    # logs with low-speed friction, those around what the instruments say in 93 to 96 %.
     tried = bends_tried(parts, names)
     plain = [name for name in terms_of(names) if not name.startswith("excess")]
     effort = regression.make_effort(parts, regression.fit_equations(parts, plain).value("delay"))
@@ -124,10 +111,8 @@ def best_bend(parts: Sequence[regression.Prepared], names: Sequence[str]) -> tup
 
 
 def _refined_bend(parts: Sequence[regression.Prepared], names: Sequence[str], start: float, tried: Values) -> float:
-    """The bend at which the instruments ask for no other; the start where there is none within the range tried.
-
-    What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
-    """
+    """The bend at which the instruments ask for no other; the start where there is none within the range tried."""
+    # What they ask for changes sign there: a bracket around it ends at one place, wherever it began.
 
     def asked(bend: float) -> float:
         """What the instruments want the bend changed by."""
@@ -177,20 +162,14 @@ def chosen_rung(climbs: Sequence[Climb]) -> Rung:
 
 
 def fit_rung(parts: Sequence[regression.Prepared], rung: Rung) -> regression.Fit:
-    """Fit the model of a rung, its Stribeck velocity or loss included.
-
-    Where two ways to that number differ by more than noise, the model is to blame; no residual shows it, so that the
-    difference counts as an error.
-    """
+    """Fit the model of a rung, its Stribeck velocity or loss included."""
+    # Where two ways to that number differ by more than noise, the model is to blame: their difference is an error.
     if not rung.is_bent:
         return regression.fit_equations(parts, rung.terms)
     bend, other = best_bend(parts, rung.terms)
     fit = regression.fit_equations(parts, rung.terms, bend)
     fit.covariance[-1, -1] += (bend - other) ** 2
     return fit
-
-
-Mask = NDArray[np.bool_]
 
 
 def hold_out(parts: Sequence[regression.Prepared]) -> Iterator[tuple[Mask, Mask]]:

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import rms, significant
-from detent.identify.fit.prepare import Run
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
@@ -53,9 +53,8 @@ def fit_loops(run: Run) -> Loops | None:
     """Find the loops that drove an axis; None without a reference, and where no such loops explain the effort."""
     if run.reference is None or len(run.position) < 10 * max(SPANS):
         return None
-    found = [loops for trial in _trials(run, run.reference) if (loops := trial.solve()) is not None]
-    best = min(found, key=lambda loops: loops.error, default=None)
-    return best if best is not None and best.error < WORST else None
+    found = [loops for trial in _trials(run, run.reference) if (loops := trial.solve()) and loops.error < WORST]
+    return min(found, key=lambda loops: loops.error, default=None)
 
 
 def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
@@ -97,10 +96,7 @@ class _Trial:
         return mixed
 
     def solve(self, feeds: tuple[int, ...] = (0, 1, 2)) -> Loops | None:
-        """The best gains; None where they are none of a loop that holds an axis.
-
-        A feed-forward that is slight, or against the motion, is left out.
-        """
+        """The best gains, without feed-forward that is slight or against the motion; None where they hold no axis."""
         effort, first = self.effort, self.loops
         cut = round(SEEN * len(effort))
         parts = np.ascontiguousarray(self.signals[:, [*range(2 * first), *(2 * first + f for f in feeds), -1]])

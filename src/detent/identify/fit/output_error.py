@@ -2,10 +2,9 @@
 
 The log is cut into stretches; each starts where the log says the axis was, and is simulated by the compiled blocks, so
 that standstill, breaking loose and every other corner of the friction count, which no regression sees. What a start is
-wrong by in position and velocity is fitted along with each stretch. The residuals of a stretch are as coloured as can
-be, but stretches are nearly independent: the covariance is that of their scores (K.-Y. Liang, S. L. Zeger,
-"Longitudinal data analysis using generalized linear models", Biometrika 73 (1986)), with Student's distribution of as
-many degrees as there are stretches beyond the constants.
+wrong by in position and velocity is fitted along with each stretch. Stretches are nearly independent: the covariance is
+that of their scores (K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika
+73 (1986)), with Student's distribution of as many degrees as there are stretches beyond the constants.
 
 Ljung: System Identification, 2nd ed. (1999), section 7.2 (output-error structure).
 Bock: Recent advances in parameter identification for ordinary differential equations (1983), multiple shooting.
@@ -21,8 +20,8 @@ import numpy as np
 from detent.errors import DetentError
 from detent.identify.fit import Report, untold
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import Run
 from detent.identify.fit.free_run import Plant, start_velocities
-from detent.identify.fit.prepare import Run
 from detent.logs.differences import scipy
 from detent.logs.log import Values
 
@@ -85,11 +84,9 @@ def fit_output_error(
 
 
 class _Search:
-    """Residuals and their minimum, with constants in parts of their scales.
+    """Residuals and their minimum, with constants in parts of their scales."""
 
-    In place of the Coulomb friction of both directions their mean and half their difference are searched: the mean is
-    friction and cannot be below 0, the difference is a constant force.
-    """
+    # Of both Coulomb frictions the mean is searched, which is not below 0, and half their difference, a constant force.
 
     def __init__(self, names: tuple[str, ...], start: Constants, stretches: Sequence[Stretch]) -> None:
         self.names, self._start, self._stretches = names, start, stretches
@@ -143,15 +140,7 @@ class _Search:
             columns = [(self.residual(at + NUDGE * unit) - middle) / NUDGE for unit in np.eye(len(at))]
             return np.column_stack(columns)
 
-        low, high = self._bounds()
-        start = np.clip(x, low + 1e-6, high - 1e-6)
-        accuracy = {"max_nfev": MOST_ROUNDS, "xtol": 1e-6, "ftol": 1e-8}
-        found = scipy("optimize").least_squares(self.residual, start, jac=jacobian, bounds=(low, high), **accuracy)
-        report(1.0)
-        return found
-
-    def _bounds(self) -> tuple[Values, Values]:
-        """Least and largest value of each searched constant, in parts of its scale."""
+        # Least and largest value of each searched constant, in parts of its scale.
         low, high = np.zeros(len(self._searched)), np.full(len(self._searched), np.inf)
         for k, name in enumerate(self._searched):
             if name in _FREE:
@@ -160,7 +149,11 @@ class _Search:
                 low[k] = SLOWEST * abs(self.begin[k])
             if name == "loss":
                 high[k] = MOST_LOST / self._scale[k]
-        return low, high
+        start = np.clip(x, low + 1e-6, high - 1e-6)
+        accuracy = {"max_nfev": MOST_ROUNDS, "xtol": 1e-6, "ftol": 1e-8}
+        found = scipy("optimize").least_squares(self.residual, start, jac=jacobian, bounds=(low, high), **accuracy)
+        report(1.0)
+        return found
 
     def constants_at(self, x: Values, jacobian: Values, residual: Values) -> Constants:
         """Constants with the covariance of the stretches' scores."""
@@ -194,8 +187,7 @@ def _searched_constants(names: Sequence[str]) -> tuple[tuple[str, ...], Values]:
 def _scales(names: Sequence[str], values: Values) -> Values:
     """Scale of each searched constant: its size, or a tenth of the largest of its unit where it is nearly nothing."""
     kinds = ["force" if (kind := name.partition(".")[0]) in _FORCES else kind for name in names]
-    sizes = {"force": 0.0, "viscous": 0.0}
-    for kind in sizes:
-        sizes[kind] = max((abs(v) for k, v in zip(kinds, values.tolist(), strict=True) if k == kind), default=0.0)
+    sizes = {kind: max((abs(v) for k, v in zip(kinds, values.tolist(), strict=True) if k == kind), default=0.0)
+             for kind in ("force", "viscous")}  # fmt: skip
     floors = [0.1 * sizes.get(kind, 0.1) for kind in kinds]
     return np.maximum(np.maximum(np.abs(values), floors), 1e-12)

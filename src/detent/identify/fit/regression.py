@@ -1,17 +1,14 @@
 """Constants of an equation of motion from runs, by least squares or by instruments, with limits for coloured residuals.
 
-The moment at which the effort acts is one of the constants: an effort that acts ``d`` later than it was recorded is
-``F(t - d) = F - d F'`` to first order, so that `d` is a constant of the column ``F'``; a few rounds find it exactly.
+An effort that acts ``d`` later than recorded is ``F(t - d) = F - d F'`` to first order, so that `d` is a constant of
+the column ``F'``; a few rounds find it exactly.
 
 Measured positions appear on the side of the columns, with their noise; and in a closed loop the effort answers to that
-noise. Least squares are then biased. The reference, where it was recorded, knows nothing of either: columns made of it
-are instruments, ``theta = (Z' X)^-1 Z' y``, and the bias is gone. Where there is none, columns of the measured position
-by wider windows take its place: of the white noise in the second derivative by narrow windows, those 2.5 times as wide
-hold 2.6 %.
-
-Soderstrom, Stoica: Instrumental variable methods for system identification (1983).
-Janot, Vandanjon, Gautier: A generic instrumental variable approach for industrial robot identification. IEEE Trans.
-Control Systems Technology 22 (2014).
+noise. Least squares are then biased. The reference, where it was recorded, knows nothing of either: with columns of it
+as instruments, ``theta = (Z' X)^-1 Z' y``, the bias is gone (Soderstrom, Stoica: Instrumental variable methods for
+system identification (1983); Janot, Vandanjon, Gautier: A generic instrumental variable approach for industrial robot
+identification. IEEE Trans. Control Systems Technology 22 (2014)). Where there is none, columns of the position by wider
+windows take its place: those 2.5 times as wide hold 2.6 % of the white noise in the second derivative.
 """
 
 from collections.abc import Sequence
@@ -21,8 +18,8 @@ from typing import Literal
 import numpy as np
 
 from detent.identify.fit import equations
+from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import RANK, carried_degrees, coloured_covariance, column_sizes, independent_rows, rms
-from detent.identify.fit.prepare import Run
 from detent.logs.log import Values
 
 Instruments = Literal["reference", "position", "none"]
@@ -158,17 +155,9 @@ def fit_equations(parts: Sequence[Prepared], names: Sequence[str], bend: float =
     covariance[unknown, unknown] = (UNKNOWN * float(np.abs(y).max())) ** 2
     singular = np.linalg.svd(columns / column_sizes(columns), compute_uv=False)
     bends = ("loss" if equations.LOSS in names else "stribeck",) if equations.is_bent(names) else ()
-    return Fit(
-        (*equations.terms_of(names), "delay", *bends),
-        np.concatenate([theta, [late], [bend] if bends else []]),
-        covariance,
-        carried_degrees(x, residual, z, cosines),
-        residual,
-        y,
-        tuple(names),
-        float(singular[0] / max(singular[-1], 1e-300)),
-        parts[0].instruments,
-    )
+    told, values = (*equations.terms_of(names), "delay", *bends), [*theta.tolist(), late, *([bend] if bends else [])]
+    degrees, condition = carried_degrees(x, residual, z, cosines), float(singular[0] / max(singular[-1], 1e-300))
+    return Fit(told, np.array(values), covariance, degrees, residual, y, tuple(names), condition, parts[0].instruments)
 
 
 def _with_delay(  # noqa: PLR0913 - all that a model consists of

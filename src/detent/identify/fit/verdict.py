@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import Estimate, rms
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import Climb
-from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import Prepared
 from detent.logs.log import Kind, Log, Severity, Values
 
@@ -29,6 +29,11 @@ WORST_SIMULATION = 0.7  # simulated error over that of going on with the velocit
 _WAYS = ("positive", "negative")
 _FRICTIONS = tuple(f"{kind}.{way}" for kind in ("coulomb", "viscous", "static") for way in _WAYS)
 FORCES = (*_FRICTIONS, "pendulum", "pendulum.across")
+_DIRT: dict[Kind, tuple[str, str]] = {
+    Kind.WRONG_SIGN: ("wrong sign", "turn the signal round in the mapping, as in force=-COLUMN"),
+    Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
+    Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +65,6 @@ class Refusal:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self)
-
-
-_DIRT: dict[Kind, tuple[str, str]] = {
-    Kind.WRONG_SIGN: ("wrong sign", "turn the signal round in the mapping, as in force=-COLUMN"),
-    Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
-    Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
-}
 
 
 def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:

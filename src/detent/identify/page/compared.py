@@ -11,11 +11,10 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.equations import HOPS
+from detent.identify.fit.equations import HOPS, Run
 from detent.identify.fit.estimate import quantile, rms
 from detent.identify.fit.free_run import HORIZONS, Horizon, Plant, free_run, start_velocities
 from detent.identify.fit.identification import HELD_OUT, Identification, prepare_all
-from detent.identify.fit.prepare import Run
 from detent.identify.page.words import SINCE, Ways, digits_for, effort_scale, label_of, long_bar, peak_of, scaled
 from detent.methods.cascade.units import percent
 from detent.page import chart
@@ -26,6 +25,8 @@ from detent.page.words import count, duration, number
 
 RESTART = 1.0  # time after which the simulation starts again from the recording [s]
 SPREAD = 0.5  # room about a measured position for a simulated one that runs away, over its range
+LAGS = 60  # lags of the autocorrelation, in rows of the regression
+DOTS = 1500  # windows drawn in the friction map
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,21 +70,15 @@ def _simulated(constants: Constants, run: Run, cut: int) -> HeldOut:
     return HeldOut(t, unseen.position[begin:], np.concatenate(pieces), free, samples * run.step)
 
 
-# ---- figures
-
-
 def simulated_figures(found: Identification, held: Sequence[HeldOut], shown: int) -> list[Figure]:
     """The simulation of one log over time, and how far that of all can be trusted."""
     ways = Ways(found.runs[0].position_unit)
     horizons = [_horizon_figure(found.horizons, ways)] if found.horizons else []
     if not held:
         return horizons
-    one = held[shown]
-    worst = (
-        f"Of {count(len(held), 'recording')} the one with the largest errors, {found.logs[shown].name}. "
-        if len(held) > 1
-        else ""
-    )
+    one, worst = held[shown], ""
+    if len(held) > 1:
+        worst = f"Of {count(len(held), 'recording')} the one with the largest errors, {found.logs[shown].name}. "
     caption = Markup(
         "{}A simulated axis with constants from the first three quarters of the recording, along its last quarter. It "
         "gets the recorded effort and nothing else; no controller holds it, so every error adds up. <b>Restarted every "
@@ -142,13 +137,6 @@ def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
     return Figure(title="How far it can be foretold", caption=caption, table=Table(heads=heads, rows=rows))
 
 
-# ---- the effort
-
-
-LAGS = 60  # lags of the autocorrelation, in rows of the regression
-DOTS = 1500  # windows drawn in the friction map
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
     """Rows of the regression of one log, in SI units, arrays of shape (m,)."""
@@ -174,18 +162,10 @@ def windows_of(found: Identification) -> tuple[Windows, ...]:
         motion, rows = prepared.motion, prepared.motion.rows
         part = slice(stop, stop := stop + len(rows))
         hop = max(motion.kernel.half // HOPS, 1)
-        made.append(
-            Windows(
-                t=rows * run.step,
-                effort=fit.effort[part],
-                fitted=fit.effort[part] - fit.residual[part],
-                residual=fit.residual[part],
-                velocity=motion.velocity,
-                place=(rows - (int(rows[0]) if len(rows) else 0)) // hop,
-                hop=hop * run.step,
-                width=(2 * motion.kernel.half + 1) * run.step,
-            )
-        )
+        effort, residual = fit.effort[part], fit.residual[part]
+        place, width = (rows - (int(rows[0]) if len(rows) else 0)) // hop, (2 * motion.kernel.half + 1) * run.step
+        series = (rows * run.step, effort, effort - residual, residual, motion.velocity, place)
+        made.append(Windows(*series, hop * run.step, width))
     return tuple(made)
 
 
@@ -204,9 +184,6 @@ def autocorrelation(windows: Sequence[Windows]) -> tuple[Numbers, Numbers]:
             pairs[lag] += known[lag:] @ known[: size - lag]
     means = np.divide(products, pairs, out=np.full(most + 1, np.nan), where=pairs > 0)
     return (means / means[0] if means[0] > 0 else np.zeros(most + 1)), pairs
-
-
-# ---- figures
 
 
 def effort_figures(found: Identification, windows: Sequence[Windows], shown: int) -> list[Figure]:
@@ -239,9 +216,8 @@ def effort_charts(windows: Windows, run: Run) -> list[chart.Chart]:
     series = [windows.effort, windows.fitted, windows.residual]
     # Rows that draw like all of them, with a gap in every curve before some rows: the chart's own thinning looks for
     # extremes, and would drop the gaps.
-    kept = np.unique(np.concatenate([gaps, *(chart.thin_indices(curve, chart.POINTS) for curve in series)])).astype(
-        np.intp
-    )
+    drawn = [chart.thin_indices(curve, chart.POINTS) for curve in series]
+    kept = np.unique(np.concatenate([gaps, *drawn])).astype(np.intp)
     holes = np.searchsorted(kept, gaps)
     t = np.insert(windows.t[kept], holes, 0.5 * (windows.t[gaps - 1] + windows.t[gaps]))
     effort, fitted, residual = (np.insert(curve[kept], holes, np.nan) for curve in series)
@@ -277,22 +253,15 @@ def memory_chart(windows: Sequence[Windows]) -> chart.Chart:
     lag = np.arange(len(correlation)) * one.hop * 1e3
     bound = 1.96 / math.sqrt(max(pairs[0], 1.0))
     panel = chart.Panel(
-        name="residual-memory",
-        label="correlation",
-        title="How much they resemble earlier ones",
-        height=260,
-        zero=True,
+        name="residual-memory", label="correlation", title="How much they resemble earlier ones", height=260, zero=True,
         span=(min(-0.4, float(np.nanmin(correlation)) - 0.05), 1.05),
         curves=[chart.Curve(label="with the residual so much earlier", colour="speed", y=correlation)],
         levels=[(bound, "95 % of white noise"), (-bound, "")],
-    )
+    )  # fmt: skip
     drawn = chart.line_chart(panel, lag, "earlier by [ms]")
     drawn["series"][0]["bars"] = 0
     overlap = {"spans": [[0.0, round(one.width * 1e3, 3)]], "colour": "brake", "label": "windows overlap"}
     return drawn | {"bands": [overlap]}
-
-
-# ---- friction over the speed, by the model and window by window
 
 
 def friction_figures(

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from detent.identify.fit.constants import Constants
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
+from detent.identify.fit.ladder import Climb
 from detent.identify.page import words
 from detent.methods.cascade.units import percent
 from detent.page.figure import Figure
@@ -92,9 +93,6 @@ def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> Markup:
     )  # fmt: skip
 
 
-# ---- which model
-
-
 def ladder_figures(found: Identification) -> list[Figure]:
     """Models from the simplest up, and which was chosen."""
     if not found.climbs:
@@ -104,8 +102,7 @@ def ladder_figures(found: Identification) -> list[Figure]:
     for climb in found.climbs:
         chosen = climb.rung is found.rung
         bar = words.long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
-        told = _step_text(climb.gain, possible=climb.possible, chosen=chosen)
-        rows.append([words.sentence(climb.rung.text), bar, told])
+        rows.append([words.sentence(climb.rung.text), bar, _step_text(climb, chosen=chosen)])
     caption = (
         "Each model is fitted to all of the recording but one stretch and foretells that one, stretch by stretch. A "
         "larger model is taken only if it foretells better; a better fit alone would not do."
@@ -114,19 +111,13 @@ def ladder_figures(found: Identification) -> list[Figure]:
     return [Figure(title="Models from the simplest up", caption=caption, table=Table(heads=heads, rows=rows))]
 
 
-def _step_text(gain: float, *, possible: bool, chosen: bool) -> str:
+def _step_text(climb: Climb, *, chosen: bool) -> str:
     if chosen:
         return Markup('<span style="color:var(--good)"><b>✔ chosen</b></span>')
-    if not possible:
+    if not climb.possible:
         return "its friction would fall towards standstill: not physical"
-    if math.isnan(gain):
-        return "the simplest"
-    if gain > 0.0:
-        return f"better than the one before by {number(gain, 2)} standard errors"
-    return "no better"
-
-
-# ---- what cannot be separated
+    better = f"better than the one before by {number(climb.gain, 2)} standard errors"
+    return "the simplest" if math.isnan(climb.gain) else better if climb.gain > 0.0 else "no better"
 
 
 def correlation_figures(constants: Constants | None, estimates: Sequence[Estimate]) -> list[Figure]:
@@ -153,11 +144,10 @@ def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
     if not pairs:
         return Markup("<p><b>None above {}: the recording tells all constants apart.</b></p>").format(ALIKE)
     pairs.sort(key=lambda pair: -abs(float(r[pair])))
-    ways = {True: "if one is too large, so is the other", False: "if one is too large, the other is too small"}
-    texts = [
-        f"{names[i]} and {names[j]} ({signed(float(r[i, j]))}): {ways[bool(r[i, j] > 0)]}"
-        for i, j in pairs[:MOST_PAIRS]
-    ]
+    texts: list[str] = []
+    for i, j in pairs[:MOST_PAIRS]:
+        other = "so is the other" if r[i, j] > 0 else "the other is too small"
+        texts.append(f"{names[i]} and {names[j]} ({signed(float(r[i, j]))}): if one is too large, {other}")
     if len(pairs) > MOST_PAIRS:
         texts.append(f"{further(len(pairs) - MOST_PAIRS, 'pair')} framed below.")
     items = Markup().join(Markup("<li>{}</li>").format(text) for text in texts)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from detent.identify.fit.equations import Run
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.identification import Identification, Verdict
-from detent.identify.fit.prepare import Run
 from detent.identify.page import words
 from detent.identify.page.compared import effort_figures, friction_figures, hold_out, simulated_figures, windows_of
 from detent.identify.page.constants import constant_figures, correlation_figures, ladder_figures
@@ -22,11 +22,15 @@ from detent.page.table import Table
 from detent.page.words import GAP, count, duration, further, number
 
 LOOKS: dict[Verdict, Level] = {"trusted": "good", "partly trusted": "warn", "refused": "bad"}
-
+# Constants in large type.
 ON_CARDS = {"mass", "coulomb.positive", "coulomb.negative", "viscous.positive", "viscous.negative"}
-"""Constants in large type."""
-
 MOST_NAMES = 12  # recordings that have a line of their own in the small print
+MOST_LOGS = 30  # recordings listed one by one
+MOST_FINDINGS = 60  # findings listed one by one
+MOST_BANDS = 200  # stretches marked in a chart; closer ones are drawn as one
+TALL = 12  # rows from which on a table scrolls inside
+Heads = list[tuple[str, bool]]  # of a table
+_COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "soft"}
 
 
 def identify_page(found: Identification) -> Page:
@@ -61,9 +65,6 @@ def identify_page(found: Identification) -> Page:
     )
 
 
-# ---- what came out, in one glance
-
-
 def _headline(found: Identification, title: str, ways: words.Ways) -> Headline:
     kicker = f"Constants of an axis, identified from {count(len(found.logs), 'recording')}"
     verdict = words.sentence(found.verdict)
@@ -75,11 +76,8 @@ def _lead(found: Identification, ways: words.Ways) -> str:
         general = [r for r in found.refusals if not r.constants]
         subjects = dict.fromkeys(r.subject for r in general or found.refusals)
         return f"No constant of this log can be trusted: {'; '.join(subjects)}. Below stands what to record instead."
-    good = count(len(found.trusted), "constant")
-    if found.verdict == "trusted":
-        first = f"All {good} can be trusted."
-    else:
-        first = f"{good} can be trusted; not {_listed(_missing(found))}."
+    good = f"{count(len(found.trusted), 'constant')} can be trusted"
+    first = f"All {good}." if found.verdict == "trusted" else f"{good}; not {_listed(_missing(found))}."
     if not (h := _telling(found.horizons)):
         return first
     return (
@@ -145,16 +143,6 @@ def _settings(found: Identification) -> dict[str, str]:
     return told
 
 
-# ---- what the recordings hold, what is wrong with them, what to record
-
-
-MOST_LOGS = 30  # recordings listed one by one
-MOST_FINDINGS = 60  # findings listed one by one
-MOST_BANDS = 200  # stretches marked in a chart; closer ones are drawn as one
-TALL = 12  # rows from which on a table scrolls inside
-_COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "soft"}
-
-
 def recording_figures(found: Identification, shown: int, *, simulated: bool) -> list[Figure]:
     """What one log holds over time, the faults of all, what was read from which column."""
     run, log = found.runs[shown], found.logs[shown]
@@ -168,9 +156,6 @@ def recording_figures(found: Identification, shown: int, *, simulated: bool) -> 
         *listed,
         _column_figure(log),
     ]
-
-
-# ---- over time
 
 
 def recorded_charts(run: Run) -> list[Chart]:
@@ -193,9 +178,6 @@ def recorded_charts(run: Run) -> list[Chart]:
     ])  # fmt: skip
 
 
-# ---- faults
-
-
 def _fault_figure(found: Identification) -> Figure:
     several = len(found.logs) > 1
     told = [(log, finding) for severity in _COLOURS for log in found.logs for finding in log.findings
@@ -211,19 +193,14 @@ def _fault_figure(found: Identification) -> Figure:
         done = "left as it is" if finding.action is Action.LEFT else finding.action.value
         where = f"{log.name}: {tell_rows(finding.rows)}" if several else tell_rows(finding.rows)
         rows.append([look, where, finding.signal or "all", what, done, finding.advice or "nothing"])
-    return Figure(
-        title="Faults",
-        caption="Rows are counted from 1 below the header of the file.",
-        table=Table(heads=heads, rows=rows, tall=len(rows) > TALL),
-        hint=_not_listed(len(told) - MOST_FINDINGS, "finding"),
-    )
+    caption = "Rows are counted from 1 below the header of the file."
+    return _listing("Faults", caption, heads, rows, (len(told), "finding"))
 
 
-def _not_listed(left: int, word: str) -> str:
-    return f"{further(left, word)} not listed." if left > 0 else ""
-
-
-# ---- recordings and columns
+def _listing(title: str, caption: str, heads: Heads, rows: list[list[str]], every: tuple[int, str]) -> Figure:
+    """A table that scrolls where it is long, and how many of all there are it does not list."""
+    hint = f"{further(every[0] - len(rows), every[1])} not listed." if every[0] > len(rows) else ""
+    return Figure(title=title, caption=caption, table=Table(heads=heads, rows=rows, tall=len(rows) > TALL), hint=hint)
 
 
 def _log_figure(logs: Sequence[Log], shown: int, *, simulated: bool) -> Figure:
@@ -233,12 +210,8 @@ def _log_figure(logs: Sequence[Log], shown: int, *, simulated: bool) -> Figure:
         for log in logs[:MOST_LOGS]
     ]
     worst = ", whose last quarter is simulated worst" if simulated else ""
-    return Figure(
-        title="Recordings",
-        caption=f"All are fitted together. Figures over time show {logs[shown].name}{worst}.",
-        table=Table(heads=heads, rows=rows, tall=len(rows) > TALL),
-        hint=_not_listed(len(logs) - MOST_LOGS, "recording"),
-    )
+    caption = f"All are fitted together. Figures over time show {logs[shown].name}{worst}."
+    return _listing("Recordings", caption, heads, rows, (len(logs), "recording"))
 
 
 def _column_figure(log: Log) -> Figure:
@@ -256,9 +229,6 @@ def _column_figure(log: Log) -> Figure:
         drawing=Markup("<ul>{}</ul>").format(guessed) if guessed else None,
         table=Table(heads=heads, rows=rows),
     )
-
-
-# ---- what to record
 
 
 def refused_figures(found: Identification) -> list[Figure]:

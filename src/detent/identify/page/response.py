@@ -43,32 +43,22 @@ def response_figures(found: Identification, shown: int) -> list[Figure]:
 
 
 def told_response(found: Identification, shown: int) -> FrequencyResponse | None:
-    """Response of a log, where it tells one: periods, or an open loop, and enough coherent lines.
-
-    Windows over a closed loop show the controller where noise drives the effort; so a log with a reference must have
-    periods.
-    """
+    """Response of a log, where it tells one: periods, or an open loop, and enough coherent lines."""
+    # Windows over a closed loop show the controller where noise drives the effort.
     run = found.runs[shown]
     try:
         response = response_of(found.logs[shown], run.effort_name)
     except DetentError:
         return None
-    is_open = response.resolution == 0.0 or run.reference is None
-    return response if is_open and _tells(response) else None
-
-
-def _tells(response: FrequencyResponse) -> bool:
-    """True for enough coherent lines whose neighbours agree.
-
-    Lines that are hardly excited beside strong ones hold what friction makes of these; it comes back in each period, so
-    that coherence does not show it.
-    """
     told = response.coherence >= COHERENT
     f, size = response.frequency[told], np.abs(response.response[told])
-    if len(f) < FEWEST_LINES or f[-1] < BROADEST * f[0]:
-        return False
+    is_open = response.resolution == 0.0 or run.reference is None
+    if not is_open or len(f) < FEWEST_LINES or f[-1] < BROADEST * f[0]:
+        return None
+    # Lines hardly excited beside strong ones hold what friction makes of these, which coherence does not show: there
+    # neighbours do not agree.
     apart = np.abs(np.diff(np.log(size * f**2)))
-    return bool(np.mean(apart < math.log(2.0)) > AGREEING)
+    return response if float(np.mean(apart < math.log(2.0))) > AGREEING else None
 
 
 def bode_charts(r: FrequencyResponse, constants: Constants | None) -> list[Chart]:

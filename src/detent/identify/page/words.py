@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from detent.identify.fit.estimate import Estimate
 from detent.methods.cascade.units import Scale, Units
-from detent.page.chart import POINTS, Curve
+from detent.page.chart import Curve
 from detent.page.parts import Numbers
 from detent.page.words import GAP, number
 
@@ -105,9 +106,7 @@ def relative_half(found: Estimate) -> float:
 
 def is_known(found: Estimate) -> bool:
     """False where the interval says nothing: a log without what this constant needs."""
-    if found.unit == "s":
-        return found.half < UNKNOWN_DELAY
-    return relative_half(found) < UNKNOWN
+    return found.half < UNKNOWN_DELAY if found.unit == "s" else relative_half(found) < UNKNOWN
 
 
 def long_bar(share: float, text: str, *, chosen: bool) -> Markup:
@@ -167,16 +166,7 @@ def peak_of(values: Numbers) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def scaled(  # noqa: PLR0913 - what a curve consists of
-    label: str,
-    colour: str,
-    values: Numbers,
-    scale: Scale,
-    *,
-    width: float | None = None,
-    dash: tuple[int, int] | None = None,
-    thin: int = POINTS,
-) -> Curve:
-    """A curve in its unit, with as many digits as it needs."""
+def scaled(label: str, colour: str, values: Numbers, scale: Scale, **look: Any) -> Curve:
+    """A curve in its unit, with as many digits as it needs, and with the look of a `Curve`."""
     y = values * scale.factor
-    return Curve(label=label, colour=colour, y=y, digits=digits_for(peak_of(y)), width=width, dash=dash, thin=thin)
+    return Curve(label=label, colour=colour, y=y, digits=digits_for(peak_of(y)), **look)

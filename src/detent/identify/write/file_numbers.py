@@ -1,4 +1,4 @@
-"""What identified constants are in an axis file: the numbers of its keys, each with its interval.
+"""What logs say in numbers of an axis file: identified constants, each with its interval, and the limits they show.
 
 An axis file knows forces, masses, and friction of two masses; a log knows what its effort did to all that moves. So
 the effort is converted to a force by what the file says of its drive, and what the file states beside a number, such as
@@ -6,25 +6,27 @@ the friction of the load, is taken off it.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from detent.axisfile.motion import unit_in
 from detent.errors import DetentError
 from detent.identify.fit.constants import hanging_position
+from detent.identify.fit.equations import Run, make_kernel
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
-from detent.identify.fit.prepare import Run
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, FrictionTable
 from detent.units import format_quantity
 
 NATIVE = {"linear": "N", "rotary": "N*m"}  # unit of an effort that an axis file has itself, by the motion of its axis
 MOST_LOSS = 0.95  # largest share of the effort that a file can say is lost
-
+# Unit of a constant in the file of a linear axis, by its kind; that of the others is N.
 LINEAR_UNITS = {"mass": "kg", "viscous": "N*s/m", "stribeck": "m/s", "delay": "s", "spring": "N/m", "loss": ""}
-"""Unit of a constant in the file of a linear axis, by its kind; that of the others is N."""
-
 _WAYS = ("positive", "negative")
+WINDOW = 0.02  # half of the window of velocities and accelerations [s]
+NEARLY_ALL = 0.999  # share of the samples whose speed and acceleration count: the rest may be noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +72,10 @@ def scale_of(spec: CascadeSpec, run: Run) -> Scale:
         )
     by_voltage = Scale(spec.effort_per_command, spec.back_emf_drag)
     scales = {NATIVE[motion]: Scale(), "1": by_voltage, "V": by_voltage}
-    if spec.drive.input == "voltage" and spec.motor is not None:
-        scales["V"] = Scale(spec.force_constant / spec.motor.resistance, spec.back_emf_drag)
     if spec.motor is not None:
-        scales |= {"A": Scale(spec.force_constant)}
+        scales["A"] = Scale(spec.force_constant)
+        if spec.drive.input == "voltage":
+            scales["V"] = Scale(spec.force_constant / spec.motor.resistance, spec.back_emf_drag)
         if motion == "linear":
             scales["N*m"] = Scale(1.0 / spec.radius)
     if run.effort_unit in scales:
@@ -163,8 +165,12 @@ class FileNumbers:
 
     def numbers(self) -> Iterator[Number]:
         """Every number, in the order of the file."""
+        run, base = self._found.runs[0], self._base
         if "delay" in self._known:
-            yield self._delay()
+            period = run.step if base is None else base.method.sample_period
+            samples = round(self._value("delay") / period) - (0 if base is None else base.encoder.delay)
+            within, text = float(min(max(samples, 0), MOST_SAMPLES)), f"samples of {format_quantity(period, 's')}; "
+            yield self._make("drive.delay", within, "", "delay", text)
         yield self._mass()
         if "pendulum" in self._known:
             weight = math.hypot(self._value("pendulum"), self._value("pendulum.across"))
@@ -193,13 +199,6 @@ class FileNumbers:
 
     def _make(self, key: str, value: float, linear: str, name: str, text: str = "") -> Number:
         return Number(key, value, self._unit(linear), f"{text}{self.interval(name)}", name in self._trusted)
-
-    def _delay(self) -> Number:
-        run, base, e = self._found.runs[0], self._base, self._known["delay"]
-        period = run.step if base is None else base.method.sample_period
-        samples = round(e.value / period) - (0 if base is None else base.encoder.delay)
-        note = f"samples of {format_quantity(period, 's')}; {self.interval('delay')}"
-        return Number("drive.delay", float(min(max(samples, 0), MOST_SAMPLES)), "", note, "delay" in self._trusted)
 
     def _mass(self) -> Number:
         base, total = self._base, self._value("mass")
@@ -274,3 +273,66 @@ class FileNumbers:
 def plain(name: str) -> str:
     """A name that any comment or text can hold."""
     return "".join(c if c.isprintable() else "?" for c in name)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Where an axis may go, or went, and how fast, in m or rad."""
+
+    lowest: float  # and highest: positions
+    highest: float
+    speed: float  # and acceleration: largest magnitudes [m/s, m/s^2]
+    acceleration: float  # [m/s, m/s^2]
+    start: float  # where it stands, in logs at the begin of the first
+    is_rotary: bool  # True for angles
+    # effort, period, resolution: of logs, the largest magnitude, the longest time between two samples [s], and the
+    # coarsest way of a count of the encoder, 0 where none shows
+    effort: float = 0.0
+    period: float = 0.0
+    resolution: float = 0.0
+
+    @property
+    def way(self) -> float:
+        """Distance between the extreme positions."""
+        return self.highest - self.lowest
+
+
+def see(runs: Sequence[Run]) -> Bounds:
+    """Extremes of runs."""
+    units = {run.position_unit for run in runs}
+    if len(units) > 1 or not units <= {"m", "rad"}:
+        came = " and ".join(sorted(units))
+        raise DetentError(
+            f"{runs[0].name}: came positions in {came}; allowed: m or rad, the same in all logs; state the unit of the "
+            "column, such as --column 'position=COLUMN [0.3125 um]' for counts"
+        )
+    # Largest speed and acceleration of each run, by a window that noise does not pass.
+    extremes: list[list[float]] = []
+    for run in runs:
+        half = min(max(5, round(WINDOW / run.step)), (len(run.position) - 1) // 2)
+        kernel, rows = make_kernel(half, run.step), np.arange(half, len(run.position) - half)
+        motion = kernel.velocity(run.position, rows), kernel.acceleration(run.position, rows)
+        extremes.append([float(np.quantile(np.abs(values), NEARLY_ALL)) for values in motion])
+    return Bounds(
+        lowest=min(float(run.position.min()) for run in runs),
+        highest=max(float(run.position.max()) for run in runs),
+        speed=max(speed for speed, _ in extremes),
+        acceleration=max(rise for _, rise in extremes),
+        effort=max(float(np.abs(run.effort).max()) for run in runs),
+        start=float(runs[0].position[0]),
+        period=max(run.step for run in runs),
+        resolution=max(run.resolution for run in runs),
+        is_rotary=runs[0].is_rotary,
+    )
+
+
+def outwards(value: float, *, up: bool, size: float) -> float:
+    """Round a value to two digits of a size, away from what it bounds.
+
+    >>> outwards(0.2034, up=True, size=0.4), outwards(-0.2034, up=False, size=0.4)
+    (0.21, -0.21)
+    """
+    if not size > 0.0:
+        return value
+    unit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    return float(f"{(math.ceil if up else math.floor)(value / unit) * unit:.12g}")

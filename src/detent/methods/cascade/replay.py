@@ -16,8 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from detent.errors import DetentError
+from detent.logs.headings import EFFORTS
 from detent.logs.log import Log
-from detent.logs.roles import EFFORTS
 from detent.methods.cascade.host import CascadeHost, Rows
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.cascade.system import set_off

@@ -41,9 +41,9 @@ def test_a_dead_time_comes_back(options):
     found = find_dead_time(*record(**options))
     delay = options.get("delay", 3)
     assert found.reason == ""
-    assert found.whole == delay
-    assert found.samples == pytest.approx(delay, abs=0.04)
-    assert found.fraction == pytest.approx(found.samples - delay)
+    assert found.to_dict()["whole"] == delay
+    assert found.to_dict()["samples"] == pytest.approx(delay, abs=0.04)
+    assert found.to_dict()["fraction"] == pytest.approx(found.to_dict()["samples"] - delay)
     assert abs(found.estimate.value - delay * T_SAMPLE) < 3 * found.estimate.error
     assert found.to_dict()["whole"] == delay
 
@@ -52,8 +52,8 @@ def test_a_fraction_of_a_sample():
     """Every fifth sample of a faster recording, taken between two efforts."""
     t, effort, position = record(delay=3, top=20.0)
     found = find_dead_time(t[::5], effort[::5], position[::5], hold=T_SAMPLE)
-    assert found.samples == pytest.approx(3 / 5, abs=0.05)
-    assert found.whole == 1
+    assert found.to_dict()["samples"] == pytest.approx(3 / 5, abs=0.05)
+    assert found.to_dict()["whole"] == 1
 
 
 def test_an_effort_that_was_measured_as_it_acts_is_not_held():

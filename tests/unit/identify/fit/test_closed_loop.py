@@ -5,8 +5,8 @@ import pytest
 from tests.trust.plants import make_axis, make_case
 
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import Run
 from detent.identify.fit.free_run import simulate_closed_loop
-from detent.identify.fit.prepare import Run
 
 pytestmark = pytest.mark.compiled
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from detent.identify.fit.constants import Constants, constants_of, hanging_position
-from detent.identify.fit.prepare import Run
+from detent.identify.fit.equations import Run
 from detent.identify.fit.regression import Fit
 
 RNG = np.random.default_rng(1)

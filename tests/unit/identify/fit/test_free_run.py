@@ -7,8 +7,8 @@ import pytest
 from tests.trust.plants import Axis, make_params, record
 
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import Run
 from detent.identify.fit.free_run import HORIZONS, Plant, free_run, simulate_horizons, start_velocities
-from detent.identify.fit.prepare import Run
 from detent.planning.profile import profile_of_recording
 
 pytestmark = pytest.mark.compiled

@@ -6,9 +6,9 @@ from tests.trust.plants import coloured
 
 from detent.errors import DetentError
 from detent.identify.fit.constants import Constants
+from detent.identify.fit.equations import Run
 from detent.identify.fit.free_run import Plant
 from detent.identify.fit.output_error import cut_stretches, fit_output_error
-from detent.identify.fit.prepare import Run
 
 pytestmark = pytest.mark.compiled
 

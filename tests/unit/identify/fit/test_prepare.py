@@ -5,9 +5,9 @@ import pytest
 from tests.identify_rig import make_log
 
 from detent.errors import InputError
-from detent.identify.fit.prepare import find_count, make_run, noise_of
+from detent.identify.fit.equations import find_count, make_run, noise_of
+from detent.logs.headings import EFFORTS
 from detent.logs.log import Action, Finding, Kind
-from detent.logs.roles import EFFORTS
 
 T = np.arange(1000) * 1e-3
 POSITION = 0.1 * np.sin(5 * T)

@@ -13,11 +13,11 @@ import pytest
 from tests.places import DATA
 
 from detent.identify.fit.constants import Constants, constants_of
+from detent.identify.fit.equations import Run, make_run
 from detent.identify.fit.free_run import Plant
 from detent.identify.fit.identification import Identification, choose_windows, identify
 from detent.identify.fit.ladder import RUNGS, extended
 from detent.identify.fit.output_error import cut_stretches, fit_output_error
-from detent.identify.fit.prepare import Run, make_run
 from detent.identify.fit.regression import fit_equations
 from detent.logs.read_log import read_log
 

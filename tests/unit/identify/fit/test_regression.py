@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from tests.identify_rig import TRUTH, Recorder
 
-from detent.identify.fit.equations import LOSS, make_kernel
+from detent.identify.fit.equations import LOSS, Run, make_kernel
 from detent.identify.fit.ladder import best_bend
-from detent.identify.fit.prepare import Run
 from detent.identify.fit.regression import WIDER, fit_equations, lag_of, make_columns, prepare, solve
 
 NAMES = tuple(TRUTH)

@@ -5,10 +5,9 @@ import pytest
 from tests.identify_rig import Recorder, make_log
 
 from detent.identify.fit.constants import Constants
-from detent.identify.fit.equations import make_kernel
+from detent.identify.fit.equations import make_kernel, make_run
 from detent.identify.fit.free_run import Horizon
 from detent.identify.fit.ladder import RUNGS, Climb
-from detent.identify.fit.prepare import make_run
 from detent.identify.fit.regression import prepare
 from detent.identify.fit.verdict import Refusal, look_at_constants, look_at_log, look_at_motion, look_at_prediction
 from detent.logs.log import Action, Finding, Kind, Severity

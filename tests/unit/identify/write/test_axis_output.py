@@ -14,9 +14,8 @@ from detent.errors import AxisError, DetentError, InputError
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.fit.loop_fit import fit_loops
 from detent.identify.fit.verdict import Refusal
-from detent.identify.write.axis_output import STEADY, axis_toml, cascade_spec, choose_gains
-from detent.identify.write.file_numbers import Scale, contrasts, scale_of, stated_constants
-from detent.identify.write.seen import Seen, outwards
+from detent.identify.write.file_numbers import Bounds, Scale, contrasts, outwards, scale_of, stated_constants
+from detent.identify.write.outputs import STEADY, axis_toml, cascade_spec, choose_gains
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
 
@@ -118,7 +117,7 @@ def test_without_loops_in_the_log_the_file_says_the_rule(folder: Path, found: Id
     [(1e-3, 2, 0.0, "dead time"), (1e-5, 0, 0.0, "fastest"), (1e-3, 0, 2e-3, "count")],
 )
 def test_gains_keep_to_dead_time_swing_and_counts(period: float, delay: int, count: float, bound: str) -> None:
-    seen = Seen(0.0, 1.0, 0.5, 5.0, 0.0, is_rotary=False, effort=20.0, period=period, resolution=count)
+    seen = Bounds(0.0, 1.0, 0.5, 5.0, 0.0, is_rotary=False, effort=20.0, period=period, resolution=count)
     gains = choose_gains(2.0, seen, delay)
     limits = {
         "dead time": 0.3 / gains.dead_time,

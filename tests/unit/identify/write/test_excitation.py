@@ -12,8 +12,7 @@ import detent
 from detent.errors import DetentError
 from detent.identify.fit.identification import Identification, identify
 from detent.identify.fit.verdict import Refusal
-from detent.identify.write.axis_output import cascade_spec
-from detent.identify.write.excitation import RAMPS, REVERSALS, SLOW, SPEEDS, excitation_job, missing_parts
+from detent.identify.write.outputs import RAMPS, REVERSALS, SLOW, SPEEDS, cascade_spec, excitation_job, missing_parts
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import MoveJob
