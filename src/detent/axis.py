@@ -1,6 +1,7 @@
 """The Python API: an axis, loaded from its file, and the runs it makes. The words are those of the command line."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -158,12 +159,10 @@ class Axis:
         fidelity = getattr(self.spec.axis, "fidelity", None)
         about |= {"fidelity": fidelity} if fidelity else {}
         recorder = Recorder(method.registers, names, every=every, period=method.tick)
-        if trace_file is None:
-            result = method.run(loaded, recorder=recorder, progress=progress)
-        else:
-            with TraceWriter(trace_file, recorder.trace(**about)) as writer:
+        with TraceWriter(trace_file, recorder.trace(**about)) if trace_file else nullcontext() as writer:
+            if writer is not None:
                 recorder.pass_on(writer.append, KEPT_ROWS)
-                result = method.run(loaded, recorder=recorder, progress=progress)
+            result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, recorder.trace(**about))
 
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from detent.errors import DetentError
+from detent.files.text import write_errors
 
 
 def discard_output() -> None:
@@ -70,11 +70,9 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
 @contextmanager
 def folder_for(option: str, folder: Path) -> Generator[None]:
     """Make a folder and let files be put into it; what keeps them out becomes an error that says what to do."""
-    try:
+    with write_errors(f"{option} {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
         yield
-    except OSError as error:
-        raise DetentError(f"{option} {folder}: cannot be written ({error.strerror}); choose another folder") from error
 
 
 @contextmanager

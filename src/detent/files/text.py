@@ -161,7 +161,7 @@ def check_target(path: str | Path, suffixes: Collection[str] = FIGURES, what: st
 
 
 @contextmanager
-def write_errors(path: Path) -> Generator[None]:
+def write_errors(path: Path | str) -> Generator[None]:
     """Turn the system's refusal to write into an error that says what to do."""
     try:
         yield
