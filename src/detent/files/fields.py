@@ -6,6 +6,7 @@ Everything else that knows about keys (validation, messages, the printed axis, t
 import operator
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
+from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Literal, Union, cast, get_args, get_origin
 
@@ -111,6 +112,7 @@ def named(doc: str, naming: Naming, **bounds: int) -> Any:
     return Field(description=doc, examples=[naming.example], json_schema_extra=extra, **constraints)
 
 
+@cache
 def is_named(field: FieldInfo) -> bool:
     """True for tables that the user names."""
     return get_origin(field.annotation) is dict
@@ -126,6 +128,7 @@ def file_key(name: str, field: FieldInfo) -> str:
     return field.alias or name
 
 
+@cache
 def keys_of(table: type[Table]) -> dict[str, FieldInfo]:
     """Declaration of each key of a table, as written in the file."""
     return {file_key(name, field): field for name, field in table.model_fields.items()}
@@ -137,6 +140,7 @@ def unit_of(field: FieldInfo) -> str:
     return units[0] if units else ""
 
 
+@cache
 def table_of(field: FieldInfo) -> type[Table] | None:
     """Model of the table below a field, of each table where they are named, or None for a value."""
     for candidate in (field.annotation, *get_args(field.annotation)):
