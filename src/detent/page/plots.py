@@ -106,7 +106,7 @@ def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
         yield figure
         # The same figure gives the same file: no date inside, and places free of the last bits, in which the solver of
         # the layout goes by where its variables lie in memory.
-        figure.draw_without_rendering()
+        figure.get_layout_engine().execute(figure)
         figure.set_layout_engine("none")
         for area in figure.axes:
             area.set_position(area.get_position().from_extents(area.get_position().extents.round(6)))

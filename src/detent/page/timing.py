@@ -99,7 +99,7 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
             else:
                 _draw_lozenges(area, row, _segments(row.signal, scale), scale)
         # Only once everything has its place is it known how much room a value has.
-        figure.draw_without_rendering()
+        figure.get_layout_engine().execute(figure)
         per_inch = scale.span / (area.get_position().width * WIDTH)
         for row in rows:
             if not row.signal.is_float and row.signal.bits > 1:

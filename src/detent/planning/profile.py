@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from detent.errors import DetentError
 
@@ -108,7 +107,7 @@ def profile_of_recording(
 
 def _spline(t: Numbers, values: Numbers, at: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Cubic spline through recorded values: itself and its first two derivatives, at other times."""
-    spline: Any = CubicSpline(t, values)  # scipy states no types
+    spline: Any = import_module("scipy.interpolate").CubicSpline(t, values)  # it states no types, and loads slowly
     value, first, second = (np.ascontiguousarray(spline(at, order), np.float64) for order in range(3))
     return value, first, second
 
