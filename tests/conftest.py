@@ -1,5 +1,6 @@
 """Settings that every test shares."""
 
+import gc
 import os
 
 # The matrices here are small: threads of the linear algebra only stand in one another's way. Read when numpy loads.
@@ -21,3 +22,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "detent")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files that take longest begin first: no process is left alone with one of them at the end."""
     items.sort(key=lambda item: item.get_closest_marker("early") is None)
+
+
+def pytest_collection_finish() -> None:
+    """What was imported and collected stays: looking through it for garbage, again and again, takes time only."""
+    gc.collect()
+    gc.freeze()

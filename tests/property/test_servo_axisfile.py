@@ -50,6 +50,7 @@ BUILD = {
 TEXT = {name: example_text(name) for name in BUILD}
 TEXT["stage"] += '[stepper.y.zone.edge]\nbegin = "-40 mm"\nend = "-38 mm"\nspeed = "5 mm/s"\n'
 TEXT["cascade"] += '[load_encoder]\nresolution = "1 um"\n'
+SOURCE = {name: parse_source("axis.toml", text) for name, text in TEXT.items()}
 METHOD = dict.fromkeys(BUILD, "stepper_envelope") | {name: name for name in BUILD if name in METHODS}
 METHOD["turntable"] = "cascade"
 ROTARY = {"turntable"}
@@ -133,10 +134,9 @@ def overrides_of(name):
     """Overrides of a few keys of a method's packaged example."""
     leaves = {dotted(named_path(name, path)): field for path, field in leaf_fields(model_of(name))}
     tried = [key for key in leaves if key not in HELD and not key.startswith(ASIDE) and not key.endswith("catalogue")]
+    drawn = {key: values_of(key, leaves[key]).map(f"{key}={{}}".format) for key in tried}
     some = st.lists(st.sampled_from(tried), min_size=0, max_size=6, unique=True)
-    return some.flatmap(
-        lambda keys: st.tuples(*(values_of(key, leaves[key]).map(f"{key}={{}}".format) for key in keys))
-    )
+    return some.flatmap(lambda keys: st.tuples(*(drawn[key] for key in keys)))
 
 
 def bursts():
@@ -167,7 +167,7 @@ def disturbances(name):
 
 
 def load(name, overrides):
-    return axis_of(parse_source("axis.toml", TEXT[name]), overrides)
+    return axis_of(SOURCE[name], overrides)
 
 
 def attempt(name, overrides):

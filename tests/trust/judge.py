@@ -113,7 +113,12 @@ def numbers_of(good: int, bad: int, first: int = 0) -> list[int]:
 
 
 def judge_all(numbers: Iterable[int], *, with_reference: bool = True, workers: int | None = None) -> list[Judged]:
-    """Judge cases in processes, one thread of linear algebra in each, as many as there are processors by default."""
+    """Judge cases in processes, one thread of linear algebra in each, as many as there are processors by default.
+
+    A single worker is this process itself.
+    """
+    if workers == 1:
+        return [judge_number(number, with_reference=with_reference) for number in numbers]
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
     # A process that starts anew reads these before it loads numpy.
     context = multiprocessing.get_context("spawn")

@@ -36,7 +36,8 @@ def asked_numbers():
 
 @pytest.fixture(scope="module")
 def reduced():
-    return figures_of(judge_all(numbers_of(40, 3 * len(BAD))))
+    # In this process, which has loaded all that the identification needs: its neighbour runs other tests meanwhile.
+    return figures_of(judge_all(numbers_of(40, 3 * len(BAD)), workers=1))
 
 
 def test_limits_hold_in_a_few_logs(reduced):

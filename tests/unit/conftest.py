@@ -1,5 +1,6 @@
 """The good axis file, and edits of it."""
 
+from functools import lru_cache
 from importlib.resources import files
 
 import pytest
@@ -20,8 +21,10 @@ def good_text():
 @pytest.fixture(scope="session")
 def load_text():
     """Load the text of an axis file as if it were axis.toml."""
+    # Thousands of tests change the same few texts by overrides: nobody writes to a source, so one parse serves them.
+    parsed = lru_cache(64)(lambda text: parse_source("axis.toml", text))
 
     def load(text, *overrides):
-        return axis_of(parse_source("axis.toml", text), overrides)
+        return axis_of(parsed(text), overrides)
 
     return load
