@@ -59,18 +59,18 @@ bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, millisec
 bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
 
-# Compiled code is invisible to coverage, so the steps run as plain Python here; what simulates minutes of an axis is
-# added with the steps compiled. Two processes at the same time, with about as much to do: the methods and the
-# properties; what is compiled, and all the rest.
-PLAIN    := -m "not long and not bench and not compiled" $(PYTEST_ARGS)
-COVER    := $(BIN)/python -m coverage run -m pytest
+# Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
+# long; then all run compiled, as in `make test`. Two processes at the same time, with about as much to do.
+STEPS    := $(addprefix tests/unit/,control drive kernel planning plant sensing) \
+            $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py plant.py system*.py))
+PLAIN    := -m "not long and not bench and not compiled"
+COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
 coverage: venv-test ## which lines and branches the unit and property tests reach
-	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.methods $(COVER) tests/unit/methods tests/property $(PLAIN) & methods=$$!; \
-	COVERAGE_FILE=.coverage.compiled $(COVER) tests/unit tests/property -m "compiled and not long" $(PYTEST_ARGS); \
-	compiled=$$?; NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.rest \
-		$(COVER) tests/unit --ignore=tests/unit/methods $(PLAIN); rest=$$?; \
-	wait $$methods && test $$compiled = 0 && test $$rest = 0
-	$(BIN)/python -m coverage combine .coverage.methods .coverage.compiled .coverage.rest
+	COVERAGE_FILE=.coverage.methods $(COVER) tests/unit/methods tests/property & methods=$$!; \
+	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) $(STEPS) $(PLAIN); steps=$$?; \
+	COVERAGE_FILE=.coverage.rest $(COVER) tests/unit --ignore=tests/unit/methods; rest=$$?; \
+	wait $$methods && test $$steps = 0 && test $$rest = 0
+	$(BIN)/python -m coverage combine .coverage.methods .coverage.steps .coverage.rest
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout

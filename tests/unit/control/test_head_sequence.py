@@ -141,6 +141,7 @@ def test_a_head_that_is_pushed_back_to_the_frame_ends_in_fault(s):
     assert rig.r.tick < rig.p.plant.push.end
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("s", [30, 60, 120])
 @pytest.mark.parametrize("force", [-25.0, 25.0])
 def test_a_short_push_is_no_fault_and_the_move_is_finished(s, force):
@@ -271,6 +272,7 @@ def test_an_obstacle_while_homing_ends_in_fault():
     assert (rig.head.state, rig.head.homed, rig.head.drive_cmd) == (FAULT, 0, 0)
 
 
+@pytest.mark.compiled
 def test_homing_never_exceeds_its_drive_limit():
     # The drive rises by a count per millisecond at a frame: with 100 ms to recognise it, it would go beyond the limit.
     rig = Rig(overrides=["homing.contact_timeout=100 ms"])

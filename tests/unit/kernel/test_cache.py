@@ -16,6 +16,8 @@ from detent.kernel import cache
 
 PACKAGE = Path(detent.__file__).parent
 
+pytestmark = pytest.mark.compiled
+
 
 class Copy:
     """A copy of the package with a compiled cache of its own; every `run` is a new process."""

@@ -73,6 +73,7 @@ def test_commands_of_the_host_end_in_none():
     assert rig.r.controller.law.command == 0.0
 
 
+@pytest.mark.compiled
 def test_behind_the_end_of_the_reference_the_axis_is_held_there():
     rig = Rig(make_params())
     move = plan_move(0.0, 0.01, MOVE, T)
@@ -99,6 +100,7 @@ def test_the_disturbing_force_acts_in_its_ticks():
     assert run["plant.machine.load.velocity"] == pytest.approx(-4.0 / MASS * ticks * TICK, rel=1e-12, abs=1e-18)
 
 
+@pytest.mark.compiled
 def test_the_gauge_reads_the_load():
     p = make_params()
     rig = Rig(p)
@@ -127,6 +129,7 @@ def test_the_velocity_loop_is_a_first_order_lag():
     assert run["plant.machine.load.velocity"] == pytest.approx(-0.2 * np.expm1(-run["t"] / tau), abs=0.2 * 3e-4)
 
 
+@pytest.mark.compiled
 def test_the_position_loop_follows_with_the_error_of_its_gain():
     p = make_params()
     rig = Rig(p)
