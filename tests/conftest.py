@@ -28,3 +28,4 @@ def pytest_collection_finish() -> None:
     """What was imported and collected stays: looking through it for garbage, again and again, takes time only."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000)

@@ -83,7 +83,7 @@ def test_other_commands_are_answered_at_rest_in_any_state(make):
     assert (rig.head.state, rig.head.maximum, rig.head.drive_cmd) == (state, 100, 0)
 
 
-@pytest.mark.parametrize("make", [powered, faulty])
+@pytest.mark.parametrize("make", [pytest.param(powered, marks=pytest.mark.compiled), faulty])
 def test_calculate_parameters_makes_the_axis_ready(make):
     rig = make()
     rig.send(0x01)

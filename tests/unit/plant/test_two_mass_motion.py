@@ -141,7 +141,7 @@ def test_the_load_sticks_while_the_motor_swings_on_the_coupling():
     assert r.load.position > 0.1
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [pytest.param(1, marks=pytest.mark.compiled), -1])
 def test_backlash_lets_the_motor_cross_the_gap_before_the_load_moves(sign):
     gap = 2e-4
     p = coupled(half_gap=gap / 2)
@@ -262,6 +262,7 @@ def test_the_order_is_four():
     assert orders == pytest.approx([4.0, 4.0, 4.0], abs=0.35)
 
 
+@pytest.mark.compiled
 def test_reversals_and_impacts_cost_no_more_than_their_order():
     """Break-away is asked at a tick's begin, a delay that costs order 2; so four times the ticks, 1/8 the error."""
     errors = []

@@ -116,6 +116,7 @@ def test_the_gauge_reads_the_load():
 # -- loops against closed forms ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 def test_the_velocity_loop_is_a_first_order_lag():
     """Position gain 0 and a fast sample: v = v_ref (1 - exp(-t K_v / m))."""
     p = make_params()
@@ -202,6 +203,7 @@ def test_the_integral_takes_the_error_of_the_weight_away():
     assert rig.r.controller.law.integral == pytest.approx(10.0, rel=1e-6)
 
 
+@pytest.mark.compiled
 def test_a_coarse_encoder_leaves_the_axis_within_a_count():
     p = make_params()
     set_count(p, 1e-5, 0.0)
