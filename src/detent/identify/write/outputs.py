@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from detent.axisfile.motion import unit_in
 from detent.errors import AxisError, DetentError, InputError
@@ -334,8 +335,8 @@ def _render(template: str, **values: Any) -> str:
     """Text of a file, by the template that looks like it."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    files = PackageLoader("detent.identify", "template")
-    templates = Environment(
-        loader=files, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined, keep_trailing_newline=True
-    )  # noqa: S701 - TOML, not HTML
+    templates = Environment(  # noqa: S701 - TOML, not HTML
+        loader=PackageLoader("detent.identify", "template"), undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )  # fmt: skip
     return templates.get_template(template).render(values)
