@@ -52,24 +52,31 @@ KINDS: dict[str, tuple[str, str]] = {
 }
 """Name and example of each unit a file may ask for, as they appear in messages."""
 
+DEGREE = Fraction("3.1415926535897932384626433832795028841971693993751") / 180  # [rad], with pint's digits of pi
 COMMON_UNITS: dict[str, dict[str, Fraction]] = {
-    "m": {"cm": Fraction(1, 100), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},
+    "m": {"cm": Fraction(1, 100), "mm": Fraction(1, 1000), "um": Fraction(1, 10**6), "in": Fraction(127, 5000)},
     "m/s": {"mm/s": Fraction(1, 1000), "in/s": Fraction(127, 5000)},
     "m/s^2": {"mm/s^2": Fraction(1, 1000)},
     "Hz": {"kHz": Fraction(1000), "MHz": Fraction(10**6)},
     "s": {"ms": Fraction(1, 1000), "us": Fraction(1, 10**6)},
     "kg": {"g": Fraction(1, 1000)},
-    "kg*m^2": {"g*cm^2": Fraction(1, 10**7)},
+    "kg*m^2": {"kg*cm^2": Fraction(1, 10**4), "g*m^2": Fraction(1, 1000), "g*cm^2": Fraction(1, 10**7)},
+    "N*s/m": {"kN*s/m": Fraction(1000)},
     "N/m": {"N/mm": Fraction(1000), "N/um": Fraction(10**6)},
     "N*m/A": {"mN*m/A": Fraction(1, 1000)},
-    "V/m": {"V/mm": Fraction(1000)},
+    "V": {"mV": Fraction(1, 1000)},
+    "V/m": {"V/mm": Fraction(1000), "kV/m": Fraction(1000)},
     "H": {"mH": Fraction(1, 1000), "uH": Fraction(1, 10**6)},
     "A": {"mA": Fraction(1, 1000)},
     "N*m": {"N*cm": Fraction(1, 100), "mN*m": Fraction(1, 1000)},
     "N*m*s/rad": {"mN*m*s/rad": Fraction(1, 1000)},
+    "rad": {"deg": DEGREE},
+    "rad/s": {"deg/s": DEGREE, "rpm": 6 * DEGREE},
+    "rad/s^2": {"deg/s^2": DEGREE},
+    "rad/s^3": {"deg/s^3": DEGREE},
 }
 """Factors met in nearly every file, by target unit, beside that unit itself: with these alone a file is read without
-waiting for pint's import (0.2 s). A test holds each of them to pint's."""
+waiting for pint's import and its table of units (0.4 s). A test holds each of them to pint's."""
 
 IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "deg/s^3"}  # as people read them
 
