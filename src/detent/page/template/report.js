@@ -243,7 +243,8 @@
   const optionsOf = (chart, holder) => ({
     width: holder.clientWidth, height: chart.height, padding: [10, 20, 0, 0],
     scales: {
-      x: { time: false, distr: distrOf(chart, "x") },
+      // A logarithmic axis reaches as far as its values, not to the next decade.
+      x: { time: false, distr: distrOf(chart, "x"), ...(distrOf(chart, "x") === 3 && { range: (_, low, high) => [low, high] }) },
       y: { distr: distrOf(chart, "y"), ...(chart.yRange && { range: () => chart.yRange }) },
     },
     axes: [axisOf(chart.foot === false ? null : chart.xLabel, 28, 60), chart.lanes ? laneAxisOf(chart) : valueAxisOf(chart)],
