@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from detent.control.endless_angle import TURN_COUNTER
-from detent.control.table_positioner import POWER_ON, SHORTEST, Positioner, PositionerParams, interrupt
+from detent.control.table_positioner import POWER_ON, SHORTEST, TURN_COUNTER, Positioner, PositionerParams, interrupt
 from detent.kernel.loop import advance
 from detent.methods.rotary_table.system import TICK, RotaryTable, RotaryTableParams, switch_on
 from detent.plant.rotary_motor import fill_motor

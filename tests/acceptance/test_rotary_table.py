@@ -22,16 +22,18 @@ from tests.rotary_table_rig import (
     speed_word,
 )
 
-from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.control.table_positioner import (
     AS_COMMANDED,
     ATOMIC,
     BY_ACTUAL,
+    FLAG,
     FLAG_FIRST,
     HOLD,
     JOG,
+    RAW,
     REMAINING_FIRST,
     SHORTEST,
+    TURN_COUNTER,
     begin_task,
     way_to,
 )

@@ -11,20 +11,26 @@ from tests.property.numbered_cases import asked_numbers, run_numbers
 from tests.property.table_cases import DELAY_TICKS, STROBE_TICKS, TableCase, run_table
 from tests.rotary_table_rig import COUNT, FINE, KP, ONE, RATIO, PositionerBench, Rig, T
 
-from detent.control.endless_angle import FLAG, RAW, EndlessAngle, EndlessAngleParams, extend, first_angle, read_angle
 from detent.control.table_positioner import (
     AS_COMMANDED,
+    FLAG,
     FLAG_FIRST,
     HOLD,
     NEGATIVE,
     POSITIVE,
+    RAW,
     REMAINING_FIRST,
     SHORTEST,
+    EndlessAngle,
+    EndlessAngleParams,
     Positioner,
     PositionerParams,
     begin_task,
     end_task,
+    extend,
+    first_angle,
     interrupt,
+    read_angle,
 )
 from detent.kernel.noise import NoiseSource, uniform
 from detent.kernel.step import step

@@ -1,4 +1,4 @@
-"""Positioner of a rotary table: the 2 ms interrupt and the 20 ms task (rotary-table specification 3, 4; A1, A3 to A6).
+"""Positioner of a rotary table: the 2 ms interrupt and the 20 ms task (rotary-table specification 3, 4; A1 to A6).
 
 During a jog the target is two periods ahead. When less than one period of the interpolated way remains, the task moves
 measurement and interpolated target back by one period together, so the servo never sees an end. Registers have their
@@ -7,20 +7,10 @@ names of the specification; the target is OAR, the interpolated one is ``C = OAR
 
 import math
 
-from detent.control.endless_angle import (
-    RAW,
-    TURN_COUNTER,
-    EndlessAngle,
-    EndlessAngleParams,
-    extend,
-    first_angle,
-    read_angle,
-    shift_back,
-    start_raw,
-)
 from detent.kernel.registers import Registers, block, f8, i1, i4, i8, i8_array, register, u1, u1_array
 from detent.kernel.step import step
 
+TURN_COUNTER, FLAG, RAW = 0, 1, 2  # forms of the extension of the angle
 # States of specification 4; JOG-RAW and JOG-EXT differ in FLG and n only.
 POWER_ON, HOLD, JOG, STOPPING, MOVE = 0, 1, 2, 3, 4
 BY_THEORETICAL, BY_ACTUAL = 0, 1  # remaining angle that the judge looks at
@@ -30,6 +20,29 @@ BUSY, NO_SUCH_POSITION, TOO_FAR = 1, 2, 3  # reasons for a refusal
 LONGEST_WAY = 1 << 31  # ways are shorter: IR has 32 bits before its point [count]
 SHORTEST, POSITIVE, NEGATIVE, AS_COMMANDED = 0, 1, 2, 3  # direction policies: ways to an angle
 POSITIONS = 128
+
+
+class EndlessAngleParams(Registers):
+    """Range of the detector and form of the extension beyond its one turn (3.2 to 3.5).
+
+    The present angle R is the detected one, D, with whole periods added: by a signed turn counter; by the flag of the
+    patent, which adds one period in the direction of the jog after any crossing; or, as a conventional unit, none.
+    """
+
+    period: i8 = register("range of the detected angle T", unit="count")
+    form: u1 = register("0 turn counter, 1 flag as in the patent, 2 raw: no extension", unit="code")
+
+
+class EndlessAngle(Registers):
+    """Detected and present angle."""
+
+    dar: i8 = register("DAR: detected angle D, 0..T-1", unit="count")
+    d_prev: i8 = register("D_prev: detected angle of the interrupt before", unit="count")
+    flg: u1 = register("FLG, 1: a boundary has been crossed in this manual feed")
+    turn: i8 = register("n: periods to add, signed", unit="count")
+    aar: i8 = register("AAR: present angle R, extended", unit="count")
+    position: i8 = register("position of record: all movement since power-on added to the first angle", unit="count")
+    crossings: i8 = register("boundaries crossed, either way", unit="count")
 
 
 class InterpolatorParams(Registers):
@@ -110,6 +123,57 @@ class Positioner(Registers):
     interrupts: i8 = register("interrupts so far", unit="count")
     passes: i8 = register("passes of the task so far", unit="count")
     rollovers: i8 = register("rollovers so far", unit="count")
+
+
+# -------------------------------------------------------------------------------- angle beyond a turn, A2: 200 to 212
+
+
+@step
+def first_angle(r: EndlessAngle, d: int) -> None:
+    """The first angle after power-on."""
+    r.dar = r.d_prev = r.aar = r.position = d
+    r.flg = 0
+    r.turn = 0
+
+
+@step
+def read_angle(p: EndlessAngleParams, r: EndlessAngle, d: int, manual: bool) -> None:
+    """Take over the detected angle: a change of more than half a period is a crossing. `manual`: FLG may be set."""
+    change = d - r.d_prev
+    wraps = 1 if 2 * change < -p.period else (-1 if 2 * change > p.period else 0)
+    r.dar = r.d_prev = d
+    r.position += change + wraps * p.period
+    if wraps != 0:
+        r.crossings += 1
+        r.turn += wraps
+        if manual:
+            r.flg = 1
+
+
+@step
+def extend(p: EndlessAngleParams, r: EndlessAngle, z: int) -> None:
+    """Present angle R; `z` is the direction of the jog."""
+    if p.form == TURN_COUNTER:
+        r.aar = r.dar + r.turn * p.period
+    elif p.form == FLAG and r.flg:
+        r.aar = r.dar + z * p.period
+    else:
+        r.aar = r.dar
+
+
+@step
+def start_raw(r: EndlessAngle) -> None:
+    """Initial set: nothing is added."""
+    r.flg = 0
+    r.turn = 0
+    r.aar = r.dar
+
+
+@step
+def shift_back(r: EndlessAngle, z: int) -> None:
+    """Step 118: one period less, against the direction of the jog."""
+    r.flg = 0
+    r.turn -= z
 
 
 # ------------------------------------------------------------------------------------------------- 2 ms interrupt

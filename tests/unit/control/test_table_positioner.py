@@ -4,11 +4,11 @@ import math
 import pytest
 from tests.rotary_table_rig import ONE, PositionerBench, T, speed_word
 
-from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.control.table_positioner import (
     AS_COMMANDED,
     BUSY,
     BY_ACTUAL,
+    FLAG,
     FLAG_FIRST,
     HOLD,
     JOG,
@@ -16,20 +16,30 @@ from detent.control.table_positioner import (
     NEGATIVE,
     NO_SUCH_POSITION,
     POSITIVE,
+    RAW,
     REMAINING_FIRST,
     SHORTEST,
     STOPPING,
     TOO_FAR,
+    TURN_COUNTER,
+    EndlessAngle,
+    EndlessAngleParams,
     Interpolator,
     InterpolatorParams,
     begin_task,
     braking_path,
     end_task,
+    extend,
+    first_angle,
     interpolate,
+    read_angle,
+    shift_back,
+    start_raw,
     way_to,
 )
 
 PLACE = 100_000
+PERIOD = 1000
 TURN = 3600
 
 
@@ -371,3 +381,64 @@ def test_every_way_but_as_commanded_ends_at_the_target():
                 assert (present + way - target) % TURN == 0
                 assert abs(way) <= (TURN // 2 if policy == SHORTEST else TURN)
                 assert policy == SHORTEST or abs(way) <= 2 or (way > 0) == (policy == POSITIVE)
+
+
+# -- the angle beyond a turn
+
+
+def angle_at(d: int) -> EndlessAngle:
+    r = EndlessAngle(turn=5, flg=1, position=77)
+    first_angle(r, d)
+    return r
+
+
+def test_the_first_angle_is_present_and_record():
+    r = angle_at(321)
+    assert (r.dar, r.d_prev, r.aar, r.position, r.flg, r.turn, r.crossings) == (321, 321, 321, 321, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "turn"),
+    [(990, 10, 1), (10, 990, -1), (0, 500, 0), (500, 0, 0), (0, 501, -1), (501, 0, 1), (999, 0, 1), (0, 999, -1)],
+)
+def test_a_change_of_more_than_half_a_period_is_a_crossing(before, now, turn):
+    r = angle_at(before)
+    read_angle(EndlessAngleParams(period=PERIOD), r, now, True)
+    assert (r.turn, r.crossings, r.flg) == (turn, abs(turn), abs(turn))
+    assert (r.dar, r.d_prev) == (now, now)
+    assert r.position == now + turn * PERIOD
+
+
+@pytest.mark.parametrize("manual", [True, False])
+def test_the_flag_is_set_in_manual_feed_only(manual):
+    r = angle_at(999)
+    read_angle(EndlessAngleParams(period=PERIOD), r, 1, manual)
+    assert (r.flg, r.turn) == (manual, 1)
+
+
+@pytest.mark.parametrize(
+    ("form", "turn", "flg", "z", "present"),
+    [
+        (TURN_COUNTER, 0, 1, 1, 10),
+        (TURN_COUNTER, -2, 0, 1, 10 - 2 * PERIOD),
+        (FLAG, 3, 0, -1, 10),
+        (FLAG, 0, 1, -1, 10 - PERIOD),
+        (FLAG, 0, 1, 1, 10 + PERIOD),
+        (RAW, 4, 1, 1, 10),
+    ],
+)
+def test_present_angle_of_each_form(form, turn, flg, z, present):
+    r = EndlessAngle(dar=10, turn=turn, flg=flg)
+    extend(EndlessAngleParams(period=PERIOD, form=form), r, z)
+    assert r.aar == present
+
+
+def test_start_and_shift():
+    r = EndlessAngle(dar=10, turn=2, flg=1, aar=2010)
+    shift_back(r, 1)
+    assert (r.flg, r.turn) == (0, 1)
+    shift_back(r, -1)
+    assert r.turn == 2
+    r.flg = 1
+    start_raw(r)
+    assert (r.flg, r.turn, r.aar) == (0, 0, 10)

@@ -4,7 +4,6 @@ import math
 
 from detent.axisfile.blocks import fill_guard, samples
 from detent.control import table_positioner as codes
-from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.kernel.turn_table import FRACTION, TURN
 from detent.methods.rotary_table.controller import TableControllerParams
 from detent.methods.rotary_table.schema import CoarseTable, FineTable, MechanicsTable, RotaryTableSpec
@@ -14,7 +13,7 @@ from detent.plant.rotary_motor import fill_motor
 from detent.sensing.resolver_counter import ResolverParams, fill_resolver
 
 GUARD_PERIOD = 20e-3  # time between two looks of the guard [s]; a strobe period where that is longer
-FORMS = {"turn counter": TURN_COUNTER, "flag": FLAG, "raw": RAW}
+FORMS = {"turn counter": codes.TURN_COUNTER, "flag": codes.FLAG, "raw": codes.RAW}
 JUDGES = {"theoretical": codes.BY_THEORETICAL, "actual": codes.BY_ACTUAL}
 UPDATES = {"atomic": codes.ATOMIC, "flag first": codes.FLAG_FIRST, "remaining first": codes.REMAINING_FIRST}
 DIRECTIONS = {

@@ -12,17 +12,19 @@ from typing import Any
 
 import pytest
 
-from detent.control.endless_angle import FLAG, RAW, TURN_COUNTER
 from detent.control.table_positioner import (
     AS_COMMANDED,
     ATOMIC,
     BY_ACTUAL,
+    FLAG,
     FLAG_FIRST,
     HOLD,
     NEGATIVE,
     POSITIVE,
+    RAW,
     REMAINING_FIRST,
     SHORTEST,
+    TURN_COUNTER,
 )
 from detent.methods.load import load_spec
 from detent.methods.reference import reference_rows
