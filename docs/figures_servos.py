@@ -67,8 +67,7 @@ def plus_pulse() -> None:
 def absolute_word() -> None:
     """Absolute word, and the error made of it, against the displacement from a positioning point."""
     from detent.methods.phase_servo.build import build_phase_servo
-    from detent.methods.phase_servo.controller import Converters, run_converters
-    from detent.sensing.phase_converters import absolute_error, reset_carrier
+    from detent.sensing.phase_converters import Converters, absolute_error, reset_carrier, run_converters
 
     spec = phase_axis().spec
     n, p = spec.detector.counts, build_phase_servo(spec)
@@ -146,7 +145,7 @@ def phase_move() -> None:
 
 def noise() -> None:
     """Spurious pulses: what `detent compare --figure` draws."""
-    from detent.methods.phase_servo.noise_comparison import compare_noise
+    from detent.methods.phase_servo.comparison import compare_noise
     from detent.page.draw import draw_figures
 
     draw_figures(compare_noise(phase_axis().spec).figures(), FOLDER / "noise.svg")
@@ -154,7 +153,7 @@ def noise() -> None:
 
 def hold() -> None:
     """Standing at the target: the other figure of `detent compare`."""
-    from detent.methods.phase_servo.hold_comparison import compare_hold
+    from detent.methods.phase_servo.comparison import compare_hold
     from detent.page.draw import draw_figures
 
     draw_figures(compare_hold(phase_axis().spec).figures(), FOLDER / "hold.svg")
@@ -338,7 +337,7 @@ def stability() -> None:
     spec = slide(*IDEAL).spec
     gains = np.geomspace(500, 60_000, 300)
     with picture("stability.svg", 1, 3.6) as (area,):
-        for (name, variant), colour in zip(feedback_variants(spec), (ORANGE, BLUE, PINK, GREEN), strict=True):
+        for (name, variant), colour in zip(feedback_variants(spec).items(), (ORANGE, BLUE, PINK, GREEN), strict=True):
             loop = model_of(variant)
             radius = [replace(loop, gain=float(gain)).spectral_radius() for gain in gains]
             # Per 5 ms, so that windows of different length can be compared.
@@ -384,8 +383,7 @@ def feedback_table() -> None:
     import generate
 
     _, heads, rows = feedback().table
-    short = {"speed feedback": "", "std of speed word": "std of y", "stop overshoot": "overshoot"}
-    text = generate.table(tuple(short.get(head, head) for head in heads), [tuple(row) for row in rows])
+    text = generate.table(("", *heads[1:]), [tuple(row) for row in rows])
     (FOLDER / "feedback.md").write_text(text, encoding="utf-8")
 
 

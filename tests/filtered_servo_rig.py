@@ -9,8 +9,8 @@ import numpy as np
 
 from detent.control.pulse_generator import PER_PULSE
 from detent.kernel.loop import advance
-from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.controller import acknowledge, go_to
+from detent.methods.filtered_servo.build import build_filtered_servo
+from detent.methods.filtered_servo.controller import go_to
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams, switch_on
 from detent.methods.load import load_spec
@@ -80,7 +80,7 @@ class Rig:
         self.p: FilteredServoParams = build_filtered_servo(spec)
         self.r = FilteredServo()
         self.c, self.lines, self.plant = self.r.controller, self.r.lines, self.r.plant
-        switch_on(self.p, self.r, START, sample_microseconds(spec), spec.encoder.seed)
+        switch_on(self.p, self.r, START, round(spec.method.sample_period * 1e6), spec.encoder.seed)
         self.run_ticks(1)
 
     @property
@@ -98,7 +98,7 @@ class Rig:
 
     def acknowledge(self) -> None:
         """The host has looked."""
-        acknowledge(self.c)
+        self.c.event = 0
 
     def run_ticks(self, ticks: int) -> None:
         """Let ticks pass, whatever the axis says."""

@@ -12,19 +12,20 @@ from detent.kernel.loop import advance
 from detent.kernel.turn_table import TURN
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.controller import (
-    ConverterParams,
-    Converters,
-    command,
-    convert,
-    run_converters,
-    take_ready,
-)
+from detent.methods.phase_servo.controller import command, take_ready
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready, switch_on
 from detent.sensing.gauge import set_gauge
 from detent.sensing.interference import plan_next
-from detent.sensing.phase_converters import AbsoluteConverter, count_carrier, reset_carrier
+from detent.sensing.phase_converters import (
+    AbsoluteConverter,
+    ConverterParams,
+    Converters,
+    convert,
+    count_carrier,
+    reset_carrier,
+    run_converters,
+)
 from detent.sensing.phase_detector import Detector, DetectorParams, compare
 
 EXAMPLE = Path(str(files("detent") / "examples" / "phase_servo.toml"))

@@ -26,7 +26,7 @@ from detent.analysis.transfer_function import ServoTransfer
 from detent.control.clocks import SampleClock, count_clock
 from detent.control.deviation_counter import RUN, Deviation, count_deviation
 from detent.control.pulse_generator import FULL, PER_PULSE, PulseGenerator, clock_generator
-from detent.methods.filtered_servo.controller import CLOCKS, set_period
+from detent.methods.filtered_servo.controller import CLOCKS
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
 from detent.sensing.counted_speed import (
@@ -437,7 +437,7 @@ def test_19_one_strobe_drives_the_counter_and_the_filter():
                 ],
             )
         )
-        set_period(rig.c, demanded)
+        rig.c.clock.demanded = demanded
         periods.append(demanded)
     rows.append(rig.record(0.05, list(rows[0])[:-1]))
     run = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}

@@ -18,8 +18,7 @@ from tests.c_struct import c_struct
 from tests.phase_servo_rig import make_spec
 
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.controller import ConverterParams, Converters, run_converters
-from detent.sensing.phase_converters import reset_carrier
+from detent.sensing.phase_converters import ConverterParams, Converters, reset_carrier, run_converters
 
 C_BAR = 2.0
 """The composed steps may take this much longer than C."""

@@ -12,13 +12,13 @@ from detent.drive.split_bridge import SplitBridge, drive_two, sense_current
 from detent.kernel.compiled import copy_back, local_copy
 from detent.kernel.loop import advance
 from detent.kernel.step import step
-from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
+from detent.methods.filtered_servo.build import build_filtered_servo
 from detent.methods.filtered_servo.controller import RUN, go_to
 from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 from detent.methods.load import load_spec
-from detent.methods.phase_servo.controller import run_converters
 from detent.plant.drive_train import move_averaged
 from detent.sensing.gauge import read_gauge
+from detent.sensing.phase_converters import run_converters
 from detent.sensing.phase_detector import compare
 
 PHASE_BAR = 4.0
@@ -61,7 +61,9 @@ class Slide:
     def __init__(self, rate, *overrides):
         spec = load_spec(SLIDE, overrides)
         self.p, self.r = build_filtered_servo(spec), FilteredServo()
-        switch_on(self.p, self.r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
+        switch_on(
+            self.p, self.r, spec.mechanics.start_position, round(spec.method.sample_period * 1e6), spec.encoder.seed
+        )
         self.advance(1)
         go_to(self.r.controller, 1_000_000, rate * PER_PULSE)
         self.advance(round(0.5 / TICK))

@@ -6,9 +6,9 @@ from functools import cache
 
 import pytest
 from tests.docs.pages import ROOT, inline_code_of, page_name
+from tests.reference import reference_rows
 
 from detent.kernel.registers import Registers
-from detent.methods.reference import reference_rows
 from detent.methods.registry import METHODS
 
 PAGES = [

@@ -1,16 +1,15 @@
 """Everything a person can look up is documented: registers, keys, options, status bits, motors, the Python API."""
 
-import importlib.util
 import inspect
 import re
 
 import pytest
 from tests.docs.pages import ROOT
+from tests.reference import GENERATE, reference_rows
 
 import detent
 from detent.control import head_computer
 from detent.errors import SB1_TEXT
-from detent.methods.reference import reference_rows
 from detent.methods.registry import METHODS
 from detent.record.trace import Trace
 
@@ -38,14 +37,6 @@ DOCUMENTED = {
 }
 
 
-def generator():
-    spec = importlib.util.spec_from_file_location("docs_generate", ROOT / "docs" / "generate.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-GENERATE = generator()
 OPTIONS = [(name, option) for name, command in GENERATE.commands().items() for option in command.params]
 
 

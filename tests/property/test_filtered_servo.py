@@ -10,7 +10,7 @@ from tests.difference import values_of
 from tests.filtered_servo_rig import PLANT_B, START, Rig, plant_a
 
 from detent.control.deviation_counter import FAULT, RUN, Deviation, count_deviation
-from detent.methods.filtered_servo.controller import CLOCKS, set_period
+from detent.methods.filtered_servo.controller import CLOCKS
 from detent.sensing.counted_speed import (
     FIXED,
     FLOAT,
@@ -123,7 +123,7 @@ def play(rig, script):
         elif what == "goal":
             rig.c.generator.goal = rig.c.generator.command + value
         elif what == "period":
-            set_period(rig.c, value)
+            rig.c.clock.demanded = value
         columns.append(rig.record(ticks * 1e-5, RECORDED))
     run = {name: np.concatenate([column[name] for column in columns]) for name in RECORDED}
     # After a fault nothing is promised but that the drive is off.

@@ -7,8 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from detent.errors import InputError
-from detent.methods.moves.job import text_job
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import load_moves, text_job
 
 UNITS = {
     "target": {"m": Fraction(1), "mm": Fraction(1, 1000), "in": Fraction(127, 5000)},

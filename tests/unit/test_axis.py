@@ -11,7 +11,7 @@ import pytest
 import detent
 from detent import axis as axis_module
 from detent.errors import DetentError, InputError
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import load_moves
 from detent.methods.print_head.page import print_page
 from detent.methods.print_head.print_job import load_job
 from detent.methods.print_head.run import SIGNALS

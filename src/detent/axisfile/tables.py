@@ -4,6 +4,7 @@ import math
 from typing import Annotated, Any, Literal, Self
 
 from annotated_types import Ge, Le
+from pydantic import Field
 
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
@@ -186,6 +187,13 @@ class PushTable(Table, frozen=True):
     force: Force = required("force on the carriage, + to the right", '"3 N"', ge=-1e5, le=1e5)
     at: Time = required("start of the push, in simulated time", '"2 s"', ge=0.0, le=1e5)
     duration: Time = required("length of the push", '"60 ms"', gt=0.0, le=1e5)
+
+
+class DisturbanceTable(Table, frozen=True):
+    """What the axis does not know of."""
+
+    push: PushTable | None = None
+    lines: InterferenceTable = Field(default_factory=InterferenceTable)
 
 
 class ProtectionTable(Table, frozen=True):

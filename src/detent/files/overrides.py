@@ -40,9 +40,9 @@ def _example_override(tables: dict[str, Any], known: Iterable[tuple[Path, FieldI
     quantities = [(path, field) for path, field in known if unit_of(field) and not is_list(field)]
     supply = [path for path, _ in quantities if path[-2:] == ("drive", "supply")]
     if supply:
-        return f"{dotted(next(_filled(tables, supply[0])))}=34 V"
+        return f"{dotted(next(filled(tables, supply[0])))}=34 V"
     path, field = next((path, field) for path, field in quantities if field.is_required())
-    return f"{dotted(next(_filled(tables, path)))}={example_of(field).strip(chr(34))}"
+    return f"{dotted(next(filled(tables, path)))}={example_of(field).strip(chr(34))}"
 
 
 def _keys_near(tables: dict[str, Any], known: Iterable[Path], path: Path) -> list[str]:
@@ -50,19 +50,19 @@ def _keys_near(tables: dict[str, Any], known: Iterable[Path], path: Path) -> lis
     near: list[str] = []
     for pattern in known:
         own = named_as(pattern, path)
-        keys = [*_filled(tables, pattern), *([] if any(isinstance(part, AnyName) for part in own) else [own])]
+        keys = [*filled(tables, pattern), *([] if any(isinstance(part, AnyName) for part in own) else [own])]
         near += [dotted(key) for key in keys]
     return near
 
 
-def _filled(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:
+def filled(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:
     """A path of the schema with each name that the file uses; the placeholder stays where it uses none."""
     if not pattern:
         yield done
         return
     first = pattern[0]
     for name in (tables or [first]) if isinstance(first, AnyName) else [first]:
-        yield from _filled(as_table(tables.get(name)), pattern[1:], (*done, name))
+        yield from filled(as_table(tables.get(name)), pattern[1:], (*done, name))
 
 
 def _override_value(field: FieldInfo, text: str) -> object:

@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
 from detent.errors import FileProblem, InputError
-from detent.files.fields import AnyName, Table, example_of, held_leaves, is_named, leaf_fields, table_of, unit_of
+from detent.files.fields import Table, example_of, held_leaves, is_named, leaf_fields, table_of, unit_of
 from detent.files.findings import Contradiction
 from detent.files.locate import Path
-from detent.files.overrides import apply_overrides, as_table, put_value
+from detent.files.overrides import apply_overrides, as_table, filled, put_value
 from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path
 from detent.files.read import told_errors
 from detent.files.source import Source, read_source
@@ -83,7 +83,8 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
     """Method the file names, for its motion; without a name the likeliest, so that the rest is checked too."""
     name, stated = _stated(source, overrides, METHOD_KEY)
     if not isinstance(name, str):
-        likeliest = copy.copy(max(METHODS.usable(), key=lambda method: _known_keys(source, method)))
+        known = {method: dict(leaf_fields(method.spec)) for method in METHODS.usable()}
+        likeliest = copy.copy(max(known, key=lambda method: sum(path in known[method] for path in source.places)))
         likeliest.rules = ()  # what does not go together depends on the method, which is only guessed
         return likeliest
     if name in METHODS:
@@ -96,12 +97,6 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
     # Nothing else can be said: another method would have other keys.
     problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
-
-
-def _known_keys(source: Source, method: Method[Any]) -> int:
-    """How many keys of a file the method knows."""
-    known = {path for path, _ in leaf_fields(method.spec)}
-    return sum(path in known for path in source.places)
 
 
 def _stated(source: Source, overrides: Sequence[str], path: Path) -> tuple[object, bool]:
@@ -123,18 +118,8 @@ def _apply_catalogue(layers: _Layers, reporter: Reporter, method: Method[Any]) -
     known = [path for path, _ in leaf_fields(method.spec)]
     pattern = next(path for path in known if path[-2:] == ("motor", "catalogue"))
     keys = {path[-1] for path in known if path[:-1] == pattern[:-1]}
-    for path in list(_paths_like(layers.tables, pattern)):
+    for path in list(filled(layers.tables, pattern)):
         _apply_motor(layers, reporter, method.catalogue, path, keys)
-
-
-def _paths_like(tables: dict[str, Any], pattern: Path, done: Path = ()) -> Iterator[Path]:
-    """Paths of the file that a path of the schema stands for, with a value."""
-    first, *rest = pattern
-    for key in tables if isinstance(first, AnyName) else [first] if first in tables else []:
-        if not rest:
-            yield (*done, key)
-        else:
-            yield from _paths_like(as_table(tables[key]), tuple(rest), (*done, key))
 
 
 def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: set[str]) -> None:
@@ -187,18 +172,15 @@ def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_w
 
 def _tell(
     found: list[dict[str, Any]], layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool
-) -> list[FileProblem]:
+) -> Iterator[FileProblem]:
     """Problems of one validation, without those that only follow from others."""
-    problems: list[FileProblem] = []
     told = told_errors(found, reporter, method.spec, is_whole=is_whole, doubtful=layers.doubtful)
     for path, problem, error in told:
         if error["type"] == "quantity":
-            other = _other_motion(method, path, error["input"])
-            problems.append(replace(problem, remedy=problem.remedy + other))
+            yield replace(problem, remedy=problem.remedy + _other_motion(method, path, error["input"]))
         else:
             # The model knows the one method it was made for; a file may name any.
-            problems.append(replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem)
-    return problems
+            yield replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem
 
 
 def _other_motion(method: Method[Any], path: Path, value: object) -> str:
@@ -214,24 +196,19 @@ def _other_motion(method: Method[Any], path: Path, value: object) -> str:
     return f', or set axis.motion = "{"linear" if turns else "rotary"}"'
 
 
-def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> list[FileProblem]:
+def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> Iterator[FileProblem]:
     """Problems between keys that are each right for themselves."""
-    problems: list[FileProblem] = []
     for contradiction in found:
         paths = contradiction.paths
         # One path is the other, or lies inside it.
         if any(path[: len(other)] == other[: len(path)] for path in paths for other in layers.doubtful):
             continue
         # What the user changed last is to blame first.
-        stated = [path for path in paths if path in layers.overrides] or [
-            path for path in paths if reporter.is_stated(path)
-        ]
+        stated = [path for path in paths if path in layers.overrides] or list(filter(reporter.is_stated, paths))
         blamed = stated[0] if stated else paths[0]
         came = reporter.came(blamed) if stated else "the default"
-        problems.append(
-            reporter.problem(blamed, came, _allowed_at(blamed, contradiction, reporter), contradiction.remedy)
-        )
-    return problems
+        allowed = _allowed_at(blamed, contradiction, reporter)
+        yield reporter.problem(blamed, came, allowed, contradiction.remedy)
 
 
 def _allowed_at(blamed: Path, contradiction: Contradiction, reporter: Reporter) -> str:
@@ -249,7 +226,7 @@ def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Ta
     for entry in found:
         path = key_path(entry["loc"])
         if entry["type"] == "extra_forbidden" or not field_at(model, path).is_required():
-            _drop(patched, path)
+            _around(patched, path).pop(path[-1], None)
         elif is_named(field_at(model, path)):
             put_value(patched, path, {example_of(field_at(model, path)): {}})
         elif table_of(field_at(model, path)) is not None:
@@ -259,18 +236,16 @@ def _patched(tables: dict[str, Any], found: list[dict[str, Any]], model: type[Ta
     return patched
 
 
-def _drop(tables: dict[str, Any], path: Path) -> None:
-    """Remove a key from nested tables."""
+def _around(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The nested table that a key is in; an empty one where there is none."""
     for key in path[:-1]:
-        tables = tables[key]
-    tables.pop(path[-1], None)
+        tables = as_table(tables.get(key))
+    return tables
 
 
 def _value_at(tables: dict[str, Any], path: Path) -> object:
     """Value of a key in nested tables; None where there is none."""
-    for key in path[:-1]:
-        tables = as_table(tables.get(key))
-    return tables.get(path[-1])
+    return _around(tables, path).get(path[-1])
 
 
 def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, str], dict[str, str]]:

@@ -102,61 +102,39 @@ class Method(Protocol[SpecT]):
     stands there loads when it is first needed.
     """
 
-    name: ClassVar[str]
-    """What ``axis.method`` says."""
-    title: ClassVar[str]
-    """A few words for people."""
-    jobs: ClassVar[str]
-    """What it takes as a job, for help texts."""
-    pace: ClassVar[str]
-    """Its base tick and how many lie between two rows of a trace, for help texts."""
-    spec: type[SpecT]
-    """Model of the whole file."""
+    name: ClassVar[str]  # what ``axis.method`` says
+    title: ClassVar[str]  # a few words for people
+    jobs: ClassVar[str]  # what it takes as a job, for help texts
+    pace: ClassVar[str]  # its base tick and how many lie between two rows of a trace, for help texts
+    spec: type[SpecT]  # model of the whole file
     rotary: type[SpecT] | None = None
     """The model where ``axis.motion = "rotary"``; None where the method has no such key."""
-    catalogue: Catalogue | None = None
-    """Motors that ``motor.catalogue`` may name."""
+    catalogue: Catalogue | None = None  # motors that ``motor.catalogue`` may name
 
-    fills: ClassVar[str] = ""
-    """Place of what gives a specification the defaults that depend on another table."""
-    refuses: ClassVar[str] = ""
-    """Place of the `rules`: what must hold between keys."""
-    derives: ClassVar[str] = ""
-    """Place of the derived figures of a specification."""
-    warns: ClassVar[str] = ""
-    """Place of the cautions: what looks wrong with an axis that can be built."""
+    fills: ClassVar[str] = ""  # place of what gives a specification the defaults that depend on another table
+    refuses: ClassVar[str] = ""  # place of the `rules`: what must hold between keys
+    derives: ClassVar[str] = ""  # place of the derived figures of a specification
+    warns: ClassVar[str] = ""  # place of the cautions: what looks wrong with an axis that can be built
 
-    state: ClassVar[str]
-    """Place of the class of the axis's state, or of a part of which it has several."""
-    params: ClassVar[str]
-    """The same of what does not change while it runs."""
-    clock: ClassVar[str] = "system:TICK"
-    """Place of its base tick [s]."""
-    every: ClassVar[int] = 1
-    """Ticks between two rows of a trace unless told otherwise."""
-    seed: ClassVar[str] = ""
-    """Key of the file that its noise starts from."""
+    state: ClassVar[str]  # place of the class of the axis's state, or of a part of which it has several
+    params: ClassVar[str]  # the same of what does not change while it runs
+    clock: ClassVar[str] = "system:TICK"  # place of its base tick [s]
+    every: ClassVar[int] = 1  # ticks between two rows of a trace unless told otherwise
+    seed: ClassVar[str] = ""  # key of the file that its noise starts from
     signals: ClassVar[str | tuple[str, ...]] = ()
     """Registers that a run records unless told otherwise, or the place of their names."""
-    timing: ClassVar[tuple[str, ...]] = ()
-    """The same for a timing diagram."""
-    takes: ClassVar[str]
-    """Place of the class of its jobs."""
-    reads: ClassVar[str]
-    """Place of what reads a job file."""
-    runs: ClassVar[str]
-    """Place of what makes a job: ``run(spec, job, recorder=, progress=)``."""
+    timing: ClassVar[tuple[str, ...]] = ()  # the same for a timing diagram
+    takes: ClassVar[str]  # place of the class of its jobs
+    reads: ClassVar[str]  # place of what reads a job file
+    runs: ClassVar[str]  # place of what makes a job: ``run(spec, job, recorder=, progress=)``
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
-    sums_up: ClassVar[str]
-    """Place of what gives the first figures of a run: ``rows(spec, result)``."""
-    reports: ClassVar[str]
-    """Place of the report of a run: ``page(spec, result, trace, comparisons, settings)``."""
+    sums_up: ClassVar[str]  # place of what gives the first figures of a run: ``rows(spec, result)``
+    reports: ClassVar[str]  # place of the report of a run: ``page(spec, result, trace, comparisons, settings)``
     says: ClassVar[tuple[str, str]] = ("{job}: every move arrived on {axis}.", "Not done: {failure}")
     """Whether the job was done, in a sentence: when it was, and when it was not."""
-    reports_comparisons: bool = True
-    """Whether the report of a run shows the comparisons unless told otherwise."""
+    reports_comparisons: bool = True  # whether the report of a run shows the comparisons unless told otherwise
 
     def brought(self, place: str) -> Any:
         """What stands at a place; it loads only here."""

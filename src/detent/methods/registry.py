@@ -1,6 +1,7 @@
 """The control methods that are installed: each is the entry point of its name in the group ``detent.methods``."""
 
-from collections.abc import Iterator, MutableMapping
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -10,23 +11,20 @@ from detent.methods.method import Method
 GROUP = "detent.methods"
 
 
-class Methods(MutableMapping[str, Method[Any]]):
+class Methods(Mapping[str, Method[Any]]):
     """Methods by name; each loads when it is first asked for."""
 
-    def __init__(self) -> None:
-        self._known: dict[str, EntryPoint | Method[Any]] | None = None
-        self.refused: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
 
-    def _all(self) -> dict[str, EntryPoint | Method[Any]]:
-        if self._known is None:
-            self._known = {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name)}
-        return self._known
+    @cached_property
+    def known(self) -> dict[str, EntryPoint | Method[Any]]:
+        """The entry points, and in their place the methods that have been loaded."""
+        return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
 
     def __getitem__(self, name: str) -> Method[Any]:
-        known = self._all()
-        found = known[name]
+        found = self.known[name]
         if isinstance(found, EntryPoint):
-            found = known[name] = _loaded(found)
+            found = self.known[name] = _loaded(found)
         return found
 
     def usable(self) -> list[Method[Any]]:
@@ -40,17 +38,11 @@ class Methods(MutableMapping[str, Method[Any]]):
                 self.refused += (str(error),)
         return found
 
-    def __setitem__(self, name: str, method: Method[Any]) -> None:
-        self._all()[name] = method
-
-    def __delitem__(self, name: str) -> None:
-        del self._all()[name]
-
     def __iter__(self) -> Iterator[str]:
-        return iter(self._all())
+        return iter(self.known)
 
     def __len__(self) -> int:
-        return len(self._all())
+        return len(self.known)
 
 
 def _loaded(entry: EntryPoint) -> Method[Any]:

@@ -94,23 +94,12 @@ def plan_next(p: InterferenceParams, r: Interference, tick: int) -> None:
 
 
 @step
-def take_away(r: Interference) -> bool:
-    """True when the pulse that has just come is lost on the line."""
-    if r.remove == 0:
-        return False
-    r.remove -= 1
-    r.removed += 1
-    return True
-
-
-@step
-def lose(r: Interference) -> bool:
-    """True when the sample that is due is lost."""
-    if r.lose_sample == 0:
-        return False
-    r.lose_sample -= 1
-    r.lost += 1
-    return True
+def count_losses(r: Interference, pulses: int, samples: int) -> None:
+    """The lines have lost so many pulses and samples, of those that were to be lost."""
+    r.remove -= pulses
+    r.removed += pulses
+    r.lose_sample -= samples
+    r.lost += samples
 
 
 def start_interference(p: InterferenceParams, r: Interference, seed: int) -> None:

@@ -8,7 +8,8 @@ less per cycle; each such correction is a pulse, a step. Order inside a referenc
 first clock, `emit_pulse` while the second is active, `shift_samples` at its trailing edge.
 """
 
-from detent.kernel.registers import Registers, i8, register, u1, u2
+from detent.kernel.compiled import copy_back, local_copy
+from detent.kernel.registers import Registers, block, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 
 
@@ -143,3 +144,48 @@ def count_absolute(p: AbsoluteParams, r: AbsoluteConverter, ps: int) -> None:
 def absolute_error(p: AbsoluteParams, r: AbsoluteConverter) -> int:
     """Error word e in steps, target - actual: half the word from its middle; its lowest bit is 0 at 50 % duty."""
     return (r.word >> 1) - ((p.mask + 1) >> 2)
+
+
+# ---- all three
+
+
+class ConverterParams(Registers):
+    """Everything that the clocked logic between comparator and pulses reads."""
+
+    carrier: CarrierParams = block("carrier generator")
+    tracking: TrackingParams = block("tracking converter")
+    absolute: AbsoluteParams = block("absolute converter")
+
+
+class Converters(Registers):
+    """The logic that runs in every tick: carrier, tracking and absolute converter."""
+
+    carrier: Carrier = block("carrier generator")
+    tracking: TrackingConverter = block("tracking converter")
+    absolute: AbsoluteConverter = block("absolute converter")
+
+
+@hot_step
+def convert(p: ConverterParams, r: Converters, ps: int) -> None:
+    """Both converters for one tick; the carrier has counted, and `ps` is the comparator's answer to it."""
+    count_reference(p.tracking, r.tracking)
+    count_absolute(p.absolute, r.absolute, ps)
+    emit_pulse(p.tracking, r.tracking)
+    shift_samples(p.tracking, r.tracking, ps)
+
+
+@step
+def run_converters(p: ConverterParams, r: Converters, start: int, rate: int, periods: int) -> int:
+    """Converters alone, the phase of the secondary at `start` and growing by `rate` per period [2^-32 turn]."""
+    local = local_copy(r)
+    net = 0
+    phase = start
+    shift = 29 - p.carrier.shift  # 32 - log2 N
+    for _ in range(periods):
+        count_carrier(p.carrier, local.carrier)
+        ps = (phase + (local.carrier.count << shift)) >> 31 & 1
+        convert(p, local, ps)
+        net += local.tracking.plus - local.tracking.minus
+        phase += rate
+    copy_back(r, local)
+    return net

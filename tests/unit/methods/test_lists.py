@@ -41,7 +41,7 @@ def faulty(monkeypatch):
         title = "faulty: fails when told"
         spec = FaultSpec
 
-    monkeypatch.setitem(METHODS, "faulty", Faulty())
+    monkeypatch.setitem(METHODS.known, "faulty", Faulty())
 
 
 def field(key):

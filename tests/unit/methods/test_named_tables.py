@@ -5,6 +5,7 @@ from typing import Annotated
 import pytest
 from annotated_types import Ge, Le
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.axisfile.catalogue import STEPPER_MOTORS
 from detent.axisfile.tables import AxisSpec, AxisTable
@@ -33,7 +34,6 @@ from detent.files.problems import bad_names, default_text, field_at, format_valu
 from detent.files.quantities import Frequency, Inertia, Length, Torque
 from detent.methods.check import check_spec
 from detent.methods.method import Method
-from detent.methods.reference import reference_rows
 from detent.methods.registry import METHODS
 
 NAME = Naming("NAME", "[a-z][a-z0-9_-]{0,9}", "up to 10 small letters, digits and signs, a letter first", "north")
@@ -89,7 +89,7 @@ def yard(monkeypatch):
         rules = (stops_inside,)
         catalogue = STEPPER_MOTORS
 
-    monkeypatch.setitem(METHODS, "yard", Yard())
+    monkeypatch.setitem(METHODS.known, "yard", Yard())
 
 
 MOTOR = "Trinamic QSH2818-32-07-006"

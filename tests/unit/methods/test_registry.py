@@ -9,6 +9,7 @@ from typing import Literal
 
 import pytest
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.errors import DetentError, InputError
@@ -19,7 +20,6 @@ from detent.files.quantities import Length
 from detent.kernel.registers import Registers
 from detent.methods.check import check_spec
 from detent.methods.method import Method
-from detent.methods.reference import reference_rows
 from detent.methods.registry import METHODS
 
 
@@ -75,7 +75,7 @@ SLED_TEXT = 'travel = "2 m"\n[axis]\nname = "hill"\nmethod = "sled"\n'
 
 @pytest.fixture(autouse=True)
 def sled(monkeypatch):
-    monkeypatch.setitem(METHODS, "sled", Sled())
+    monkeypatch.setitem(METHODS.known, "sled", Sled())
 
 
 def problem_of(load_text, key, text, *overrides):
@@ -157,7 +157,7 @@ def test_the_registry_loads_no_compiled_blocks():
 
 @pytest.fixture
 def lost(monkeypatch):
-    monkeypatch.setitem(METHODS, "lost", EntryPoint("lost", "nowhere.to_be_found:Lost", "detent.methods"))
+    monkeypatch.setitem(METHODS.known, "lost", EntryPoint("lost", "nowhere.to_be_found:Lost", "detent.methods"))
 
 
 @pytest.mark.usefixtures("lost")

@@ -16,12 +16,11 @@ from detent.sensing.interference import (
     REMOVE,
     Interference,
     InterferenceParams,
+    count_losses,
     interfere,
-    lose,
     plan_next,
     start_interference,
     strike,
-    take_away,
 )
 
 SEED = 5
@@ -115,16 +114,11 @@ def test_the_list_may_be_full():
     assert r.next_tick == NEVER
 
 
-def test_as_many_pulses_are_taken_away_as_came_removals():
-    r = Interference(remove=2)
-    assert [bool(take_away(r)) for _ in range(4)] == [True, True, False, False]
-    assert (r.remove, r.removed) == (0, 2)
-
-
-def test_as_many_samples_are_lost_as_were_to_be():
-    r = Interference(lose_sample=2)
-    assert [bool(lose(r)) for _ in range(4)] == [True, True, False, False]
-    assert (r.lose_sample, r.lost) == (0, 2)
+def test_what_the_lines_have_lost_is_counted_and_need_not_be_lost_again():
+    r = Interference(remove=2, lose_sample=3)
+    count_losses(r, 1, 0)
+    count_losses(r, 1, 2)
+    assert (r.remove, r.removed, r.lose_sample, r.lost) == (0, 2, 1, 2)
 
 
 @pytest.mark.parametrize("k", range(RATES))

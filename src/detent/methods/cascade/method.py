@@ -35,7 +35,7 @@ class CascadeMethod(Method[CascadeSpec]):
         "plant.machine.motor.position", "plant.machine.motor.sense", "plant.machine.load.position",
         "plant.machine.side",
     )  # fmt: skip
-    takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.move_file:load_moves"
+    takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"

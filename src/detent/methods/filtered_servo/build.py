@@ -6,7 +6,7 @@ from detent.axisfile.blocks import fill_guard, fill_interference, fill_push, fil
 from detent.control.pulse_generator import PER_PULSE
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServoParams
-from detent.sensing.counted_speed import FIXED, FLOAT, NONE, SpeedFilterParams
+from detent.sensing.counted_speed import FIXED, FLOAT, NONE
 
 GUARD_PERIOD = 1e-3  # time between two looks of the guard [s]
 
@@ -24,7 +24,9 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     c.deviation.word_limit = spec.word_limit
     c.deviation.whole_words = drive.whole_words
     c.speed.half = 1 << (method.counter_bits - 1)
-    _fill_filter(c.filter, spec)
+    c.filter.kind = {"none": NONE, "float": FLOAT, "fixed": FIXED}[method.filter]
+    c.filter.scale, c.filter.coefficient = method.scale, method.coefficient
+    c.filter.shift, c.filter.fraction_bits = round(-math.log2(method.coefficient)), method.fraction_bits
     m.amplifier.voltage_drive = drive.amplifier == "voltage"
     m.amplifier.per_count = drive.supply / full if m.amplifier.voltage_drive else drive.current_per_count
     m.amplifier.carrier_ticks = round(1 / (drive.pwm_frequency * TICK))
@@ -40,16 +42,3 @@ def build_filtered_servo(spec: FilteredServoSpec) -> FilteredServoParams:
     c.window = method.in_position
     c.window_ticks = round(method.in_position_time / TICK)
     return p
-
-
-def sample_microseconds(spec: FilteredServoSpec) -> int:
-    """Period of the sample clock in clocks of the decoder."""
-    return round(spec.method.sample_period * 1e6)
-
-
-def _fill_filter(f: SpeedFilterParams, spec: FilteredServoSpec) -> None:
-    method = spec.method
-    f.kind = {"none": NONE, "float": FLOAT, "fixed": FIXED}[method.filter]
-    f.scale, f.coefficient = method.scale, method.coefficient
-    f.shift = round(-math.log2(method.coefficient))
-    f.fraction_bits = method.fraction_bits

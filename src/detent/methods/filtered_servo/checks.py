@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies
-from detent.methods.filtered_servo.derive import FilteredFigures
+from detent.methods.filtered_servo.derive import FilteredFigures, damping_of
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.units import format_quantity as text
 
@@ -53,17 +53,12 @@ def _arithmetic(spec: FilteredServoSpec) -> Iterator[Contradiction]:
     if method.filter != "fixed":
         return
     if method.coefficient != power:
-        yield wrong(
-            "method.coefficient method.filter",
-            "a power of two from 2^-12 to 1 where the filter is fixed-point: it shifts (3.4)",
-            remedy.exactly("method.coefficient", power),
-        )
+        allowed = "a power of two from 2^-12 to 1 where the filter is fixed-point: it shifts (3.4)"
+        yield wrong("method.coefficient method.filter", allowed, remedy.exactly("method.coefficient", power))
     if largest << method.fraction_bits > WIDEST_WORD:
-        yield wrong(
-            "method.fraction_bits method.scale method.counter_bits",
-            f"few enough for scale x count, up to {largest}, in an accumulator of 32 bits",
-            remedy.most("method.fraction_bits", (WIDEST_WORD // largest).bit_length() - 1),
-        )
+        keys = "method.fraction_bits method.scale method.counter_bits"
+        allowed = f"few enough for scale x count, up to {largest}, in an accumulator of 32 bits"
+        yield wrong(keys, allowed, remedy.most("method.fraction_bits", (WIDEST_WORD // largest).bit_length() - 1))
 
 
 def _clocks(spec: FilteredServoSpec) -> Iterator[Contradiction]:
@@ -90,11 +85,9 @@ def _counters(spec: FilteredServoSpec) -> Iterator[Contradiction]:
             remedy.most("limits.speed", most * spec.pulse / method.sample_period * (1 - BARELY)),
         )
     if speed > fastest:
-        yield wrong(
-            "limits.speed encoder.cycles_per_revolution mechanics.travel_per_revolution",
-            f"up to {text(fastest, 'm/s')}: the edges keep below half the decoder's clock of 1 MHz (3.1)",
-            remedy.most("limits.speed", fastest),
-        )
+        keys = "limits.speed encoder.cycles_per_revolution mechanics.travel_per_revolution"
+        allowed = f"up to {text(fastest, 'm/s')}: the edges keep below half the decoder's clock of 1 MHz (3.1)"
+        yield wrong(keys, allowed, remedy.most("limits.speed", fastest))
     error, range_ = spec.following_error(speed), (1 << (method.position_bits - 1)) - 1
     if error > range_:
         yield wrong(
@@ -121,11 +114,9 @@ def _command(spec: FilteredServoSpec) -> Iterator[Contradiction]:
             remedy.least("method.command_acceleration", least * spec.pulse),
         )
     if spec.drive.whole_words and spec.limits.effort < spec.force_per_count:
-        yield wrong(
-            "limits.effort drive.whole_words drive.current_per_count drive.supply",
-            f"at least one count of the drive word, {text(spec.force_per_count, 'N')}, where it is whole",
-            remedy.least("limits.effort", spec.force_per_count),
-        )
+        keys = "limits.effort drive.whole_words drive.current_per_count drive.supply"
+        allowed = f"at least one count of the drive word, {text(spec.force_per_count, 'N')}, where it is whole"
+        yield wrong(keys, allowed, remedy.least("limits.effort", spec.force_per_count))
     yield from common.end_of_move(remedy, method.timeout, method.in_position_time, TICK)
     yield from common.inside_travel({"mechanics.start_position": spec.mechanics.start_position}, spec.limits.travel)
 
@@ -157,11 +148,9 @@ def _machine(spec: FilteredServoSpec) -> Iterator[Contradiction]:
             common.Plant(resistance, motor.inductance, coupling, spec.mass), friction, FASTEST
         )
     elif rate + coupling / resistance > FASTEST:
-        yield wrong(
-            "motor.resistance mechanics.moving_mass mechanics.friction.right.viscous",
-            f"such that speed decays in {text(1 / FASTEST, 's')} or more",
-            "check the units of motor, screw and mass",
-        )
+        keys = "motor.resistance mechanics.moving_mass mechanics.friction.right.viscous"
+        allowed = f"such that speed decays in {text(1 / FASTEST, 's')} or more"
+        yield wrong(keys, allowed, "check the units of motor, screw and mass")
     yield from common.static_friction(common.sides(friction))
     yield from common.burst(spec.disturbance.lines.burst, TICK)
 
@@ -176,13 +165,14 @@ RULES = (_arithmetic, _clocks, _counters, _command, _gain, _machine)
 def find_cautions(spec: FilteredServoSpec) -> Iterator[Caution]:
     """Look a filtered-servo axis over."""
     machine = FilteredFigures(spec)
-    for look in (_loop, _resolution, _ramp, _drive, _acceleration, _rest, _amplifier):
+    for look in (_loop, _resolution, _ramp, _drive, _acceleration, _amplifier):
         yield from look(machine)
 
 
 def _loop(m: FilteredFigures) -> Iterator[Caution]:
     """The loop settles, and a stop does not ring."""
-    margin, product = m.gain_margin, m.coefficient * m.spec.method.scale / m.spec.method.position_gain
+    margin, damping = m.gain_margin, damping_of(m.loop)
+    product = m.coefficient * m.spec.method.scale / m.spec.method.position_gain
     drive = "drive.supply" if m.spec.drive.amplifier == "voltage" else "drive.current_per_count"
     if margin < LEAST_GAIN_MARGIN:
         yield Caution(
@@ -195,10 +185,10 @@ def _loop(m: FilteredFigures) -> Iterator[Caution]:
             f"lower {drive}, shorten method.sample_period, or raise mechanics.moving_mass",
         )
     lagging = m.coefficient < 1 and product < 4
-    if margin >= 1 and m.damping < LEAST_DAMPING:
+    if margin >= 1 and damping < LEAST_DAMPING:
         yield Caution(
             "damping of the loop",
-            f"{m.damping:.3g}" + (f", with A B / K1 = {product:.3g}" if lagging else ""),
+            f"{damping:.3g}" + (f", with A B / K1 = {product:.3g}" if lagging else ""),
             f"at least {LEAST_DAMPING:g}" + (", A B / K1 at least 4" if lagging else ""),
             "the filter lags as long as the loop itself, and a stop rings (trap 1)"
             if lagging
@@ -213,29 +203,19 @@ def _resolution(m: FilteredFigures) -> Iterator[Caution]:
     jump, lost = m.coefficient * method.scale, 1 / method.coefficient - 1
     if counted < WELL_COUNTED:
         micros = math.ceil(WELL_COUNTED / m.rate * 1e6 * (1 - BARELY))
-        yield Caution(
-            "count at limits.speed",
-            f"{counted:.3g} pulses in a sample",
-            f"at least {WELL_COUNTED}",
-            f"a count is uncertain by one, {100 / counted:.3g} % of the largest speed",
-            remedy.exactly("method.sample_period", micros * 1e-6, "use a finer encoder"),
-        )
+        value = f"{counted:.3g} pulses in a sample"
+        consequence = f"a count is uncertain by one, {100 / counted:.3g} % of the largest speed"
+        advice = remedy.exactly("method.sample_period", micros * 1e-6, "use a finer encoder")
+        yield Caution("count at limits.speed", value, f"at least {WELL_COUNTED}", consequence, advice)
     if jump > LARGEST_JUMP:
-        yield Caution(
-            "jump of the drive word for one pulse",
-            f"{jump:.4g} counts, A x B",
-            f"up to {LARGEST_JUMP:g} counts",
-            "the uncertainty of a count makes the force lumpy",
-            remedy.most("method.scale", LARGEST_JUMP / m.coefficient),
-        )
+        allowed, consequence = f"up to {LARGEST_JUMP:g} counts", "the uncertainty of a count makes the force lumpy"
+        advice = remedy.most("method.scale", LARGEST_JUMP / m.coefficient)
+        yield Caution("jump of the drive word for one pulse", f"{jump:.4g} counts, A x B", allowed, consequence, advice)
     if method.filter == "fixed" and lost > SMALL_ERROR * 2**method.fraction_bits:
-        yield Caution(
-            "fixed-point filter",
-            f"sticks up to {lost / 2**method.fraction_bits:.3g} pulses below its input",
-            f"up to {SMALL_ERROR:g} pulses",
-            "the speed word is wrong in one direction, and with it the following error",
-            remedy.least("method.fraction_bits", math.log2(lost / SMALL_ERROR), "raise method.coefficient"),
-        )
+        value = f"sticks up to {lost / 2**method.fraction_bits:.3g} pulses below its input"
+        consequence = "the speed word is wrong in one direction, and with it the following error"
+        advice = remedy.least("method.fraction_bits", math.log2(lost / SMALL_ERROR), "raise method.coefficient")
+        yield Caution("fixed-point filter", value, f"up to {SMALL_ERROR:g} pulses", consequence, advice)
 
 
 def _ramp(m: FilteredFigures) -> Iterator[Caution]:
@@ -243,32 +223,23 @@ def _ramp(m: FilteredFigures) -> Iterator[Caution]:
     spec, method = m.spec, m.spec.method
     least, most = RATE_UNIT / TICK * spec.pulse, (1 << (method.position_bits - 1)) - 1
     if 0 < method.command_acceleration < FINE_RAMP * least * (1 - BARELY):
-        yield Caution(
-            "method.command_acceleration",
-            f"{method.command_acceleration / least:.3g} millionths of a pulse per second in each tick",
-            f"at least {FINE_RAMP} of them",
-            "they are rounded down, and the command speeds up more slowly than stated",
-            remedy.least("method.command_acceleration", FINE_RAMP * least),
-        )
+        value = f"{method.command_acceleration / least:.3g} millionths of a pulse per second in each tick"
+        consequence = "they are rounded down, and the command speeds up more slowly than stated"
+        advice = remedy.least("method.command_acceleration", FINE_RAMP * least)
+        yield Caution("method.command_acceleration", value, f"at least {FINE_RAMP} of them", consequence, advice)
     if method.command_acceleration == 0 or m.gain_margin < 1:
         return
     if m.largest_count > spec.most_counted >= spec.counted(spec.limits.speed):
-        yield Caution(
-            "count on reaching limits.speed",
-            f"{m.largest_count} pulses in a sample",
-            f"up to {spec.most_counted}",
-            "the slide overshoots its speed, and a speed counter about to wrap is a fault",
-            remedy.least("method.counter_bits", (m.largest_count + 1).bit_length() + 1, "lower limits.speed"),
-        )
+        value = f"{m.largest_count} pulses in a sample"
+        consequence = "the slide overshoots its speed, and a speed counter about to wrap is a fault"
+        advice = remedy.least("method.counter_bits", (m.largest_count + 1).bit_length() + 1, "lower limits.speed")
+        yield Caution("count on reaching limits.speed", value, f"up to {spec.most_counted}", consequence, advice)
     if m.largest_error > most:
         bits = math.ceil(m.largest_error).bit_length() + 1
-        yield Caution(
-            "following error on reaching limits.speed",
-            f"{m.largest_error:.4g} pulses",
-            f"up to {most}, the range of the position counter",
-            "the following error leaves its range, which is a fault",
-            remedy.least("method.position_bits", bits, "lower method.command_acceleration"),
-        )
+        value, allowed = f"{m.largest_error:.4g} pulses", f"up to {most}, the range of the position counter"
+        consequence = "the following error leaves its range, which is a fault"
+        advice = remedy.least("method.position_bits", bits, "lower method.command_acceleration")
+        yield Caution("following error on reaching limits.speed", value, allowed, consequence, advice)
 
 
 def _drive(m: FilteredFigures) -> Iterator[Caution]:
@@ -277,13 +248,9 @@ def _drive(m: FilteredFigures) -> Iterator[Caution]:
     full = ((1 << (spec.drive.word_bits - 1)) - 1) * spec.force_per_count
     yield from common.idle_effort(remedy, spec.limits.effort, full, "N", "a full drive word gives")
     if m.static >= force:
-        yield Caution(
-            "static friction",
-            text(m.static, "N"),
-            f"below the largest force, {text(force, 'N')}",
-            "the slide never breaks loose",
-            "raise limits.effort or the drive, or lower mechanics.friction",
-        )
+        allowed = f"below the largest force, {text(force, 'N')}"
+        advice = "raise limits.effort or the drive, or lower mechanics.friction"
+        yield Caution("static friction", text(m.static, "N"), allowed, "the slide never breaks loose", advice)
     elif top < spec.limits.speed:
         yield Caution(
             "drive at limits.speed",
@@ -295,30 +262,21 @@ def _drive(m: FilteredFigures) -> Iterator[Caution]:
 
 
 def _acceleration(m: FilteredFigures) -> Iterator[Caution]:
-    """At limits.speed there is force left for the command's acceleration."""
+    """At limits.speed there is force left to accelerate, and friction does not hold the slide outside its window."""
     spec = m.spec
     left = (spec.word_limit - spec.holding_word(spec.limits.speed)) * spec.force_per_count / spec.mass
     if spec.method.command_acceleration > left > 0:
-        yield Caution(
-            "force for method.command_acceleration",
-            text(spec.method.command_acceleration, "m/s^2"),
-            f"up to {text(left, 'm/s^2')}, what the drive gives at limits.speed",
-            "the drive is clipped and the following error grows while the command speeds up",
-            remedy.most("method.command_acceleration", left),
-        )
-
-
-def _rest(m: FilteredFigures) -> Iterator[Caution]:
-    """Friction does not hold the slide outside its window."""
+        value = text(spec.method.command_acceleration, "m/s^2")
+        allowed = f"up to {text(left, 'm/s^2')}, what the drive gives at limits.speed"
+        consequence = "the drive is clipped and the following error grows while the command speeds up"
+        advice = remedy.most("method.command_acceleration", left)
+        yield Caution("force for method.command_acceleration", value, allowed, consequence, advice)
     error, window = m.resting_error, m.spec.method.in_position
     if error > window:
-        yield Caution(
-            "following error that friction holds",
-            f"up to {error} pulses",
-            f"up to method.in_position, {window}",
-            "the slide rests off its place, and moves end by method.timeout",
-            remedy.least("method.in_position", error, "raise method.position_gain or the drive"),
-        )
+        allowed = f"up to method.in_position, {window}"
+        consequence = "the slide rests off its place, and moves end by method.timeout"
+        advice = remedy.least("method.in_position", error, "raise method.position_gain or the drive")
+        yield Caution("following error that friction holds", f"up to {error} pulses", allowed, consequence, advice)
 
 
 def _amplifier(m: FilteredFigures) -> Iterator[Caution]:
@@ -330,21 +288,15 @@ def _amplifier(m: FilteredFigures) -> Iterator[Caution]:
         per_count = drive.supply / (1 << (drive.word_bits - 1)) / resistance
     if 10 / drive.pwm_frequency > window * (1 + BARELY):
         ticks = max(1, math.floor(window / 10 / TICK * (1 + BARELY)))
-        yield Caution(
-            "PWM period",
-            text(1 / drive.pwm_frequency, "s"),
-            f"up to a tenth of the sample period, {text(window / 10, 's')}",
-            "the drive word waits for the PWM, a delay that the figures of the loop leave out",
-            remedy.exactly("drive.pwm_frequency", 1e5 / ticks),
-        )
+        value = text(1 / drive.pwm_frequency, "s")
+        allowed = f"up to a tenth of the sample period, {text(window / 10, 's')}"
+        consequence = "the drive word waits for the PWM, a delay that the figures of the loop leave out"
+        yield Caution("PWM period", value, allowed, consequence, remedy.exactly("drive.pwm_frequency", 1e5 / ticks))
     if drive.amplifier == "voltage" and lag > window / 5:
-        yield Caution(
-            "electrical time constant",
-            text(lag, "s"),
-            f"up to a fifth of the sample period, {text(window / 5, 's')}",
-            "the current lags behind the drive word, which the figures of the loop leave out",
-            remedy.most("motor.inductance", resistance * window / 5),
-        )
+        allowed = f"up to a fifth of the sample period, {text(window / 5, 's')}"
+        consequence = "the current lags behind the drive word, which the figures of the loop leave out"
+        advice = remedy.most("motor.inductance", resistance * window / 5)
+        yield Caution("electrical time constant", text(lag, "s"), allowed, consequence, advice)
     most = spec.motor.max_current
     lower = remedy.most("limits.effort", (most or 0.0) / per_count * spec.force_per_count, "choose a larger motor")
     yield from common.overheating("current of the largest drive word", spec.word_limit * per_count, most, lower)

@@ -6,30 +6,28 @@ stop.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from detent.analysis.arguments import check_constants
-from detent.control.deviation_counter import FAULT
+from detent.axisfile.tables import DisturbanceTable
 from detent.control.pulse_generator import PER_PULSE
-from detent.methods.filtered_servo.controller import acknowledge, go_to
+from detent.methods.filtered_servo.controller import go_to
 from detent.methods.filtered_servo.derive import FilteredFigures
-from detent.methods.filtered_servo.host import filtered_servo_machine
-from detent.methods.filtered_servo.schema import DisturbanceTable, FilteredServoSpec
-from detent.methods.filtered_servo.system import TICK, FilteredServo, FilteredServoParams
+from detent.methods.filtered_servo.host import FilteredHost
+from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.filtered_servo.system import TICK, FilteredServo
+from detent.methods.method import untold
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, number
-from detent.record.machine import Machine, Progress
+from detent.record.machine import Progress
 from detent.record.recorder import Recorder
-from detent.record.trace import Trace
-from detent.units import format_quantity
 
 RATE = 1037.0  # rate of the specification [pulses/s]: not a whole number of pulses in a window of 5 ms
 
@@ -73,15 +71,6 @@ class FeedbackCase:
     error: Numbers  #: E [count]; shape (n,)
     speed_word: Numbers  #: y [count]; shape (n,)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
-        names = (
-            "name", "sample_period", "scale", "coefficient", "kv", "std_speed", "std_error", "force_ripple",
-            "stop_overshoot", "stable", "gain_limit", "gain_margin",
-        )  # fmt: skip
-        found = {name: _finite(getattr(self, name)) for name in names}
-        return found | {"error_range": [_finite(value) for value in self.error_range]}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FeedbackComparison:
@@ -95,66 +84,42 @@ class FeedbackComparison:
     @property
     def table(self) -> TextTable:
         """What every case costs and brings."""
-        heads = (
-            "speed feedback", "window", "B", "A", "KV", "std of speed word", "std of E", "force ripple",
-            "stop overshoot", "gain margin",
-        )  # fmt: skip
-        return TextTable(f"At {self.rate:g} pulses/s", heads, [_text_row(case) for case in self.cases])
+        rows = [[cell.text if isinstance(cell, Cell) else cell for cell in _row(case)] for case in self.cases]
+        return TextTable(f"At {self.rate:g} pulses/s", [head for head, _ in HEADS], rows)
 
     def figures(self) -> tuple[Figure, ...]:
         """Words at constant speed, and all cases as a table."""
-        heads = [("", False), ("TS [ms]", True), ("B", True), ("A", True), ("KV [1/s]", True),
-                 ("speed word, std [pulse]", True), ("drive word, std [count]", True),
-                 ("drive word, from \u2026 to", True), ("force ripple, std [N]", True),
-                 ("overshoot at stop [pulse]", True), ("gain margin", True)]  # fmt: skip
+        words = "Drive at constant speed, with and without the filter"
         caption = (
             "The ways to quieten a counted speed, all on this axis. A longer window delays and may not be stable; a "
             "smaller multiplier takes the damping. KV is speed over following error; the last column says by how much "
             f"the loop's gain (here {count(round(self.gain))}{GAP}1/s²) could grow before it oscillates, after the "
             "exact sampled model."
         )
-        table = Table(heads=heads, rows=[_page_row(case) for case in self.cases])
+        table = Table(heads=HEADS, rows=[_row(case) for case in self.cases])
         return (
-            Figure(
-                title="Drive at constant speed, with and without the filter",
-                caption=_quieter(self),
-                charts=_word_charts(self),
-            ),
+            Figure(title=words, caption=_quieter(self), charts=_word_charts(self)),
             Figure(title="The filter and its alternatives", caption=caption, table=table),
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for ``--json``: everything but the curves; null for what is not a finite number."""
-        found = {name: _finite(getattr(self, name)) for name in ("rate", "gain", "tau_m")}
-        return found | {"cases": [case.to_dict() for case in self.cases]}
+        """Plain data for ``--json``: everything but the curves."""
+        cases = [{k: v for k, v in asdict(case).items() if not isinstance(v, np.ndarray)} for case in self.cases]
+        return {"rate": self.rate, "gain": self.gain, "tau_m": self.tau_m, "cases": cases}
 
 
-def _finite(value: Any) -> Any:
-    """JSON has no words for infinity and NaN."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+HEADS = (("speed feedback", False), ("TS [ms]", True), ("B", True), ("A", True), ("KV [1/s]", True),
+         ("speed word, std [pulse]", True), ("drive word, std [count]", True), ("drive word, from \u2026 to", True),
+         ("force ripple, std [N]", True), ("overshoot at stop [pulse]", True), ("gain margin", True))  # fmt: skip
+"""Columns of the table, and whether they hold numbers."""
 
 
-def _text_row(case: FeedbackCase) -> tuple[str, ...]:
-    return (
-        case.name,
-        format_quantity(case.sample_period, "s"),
-        str(case.scale),
-        "none" if case.coefficient == 1 else f"{case.coefficient:g}",
-        f"{case.kv:.0f}/s",
-        f"{case.std_speed:.3g}",
-        f"{case.std_error:.3g}",
-        format_quantity(case.force_ripple, "N", 3),
-        "does not settle" if not case.stable else f"{case.stop_overshoot:.0f} pulses",
-        f"{case.gain_margin:.2f}",
-    )
-
-
-def _page_row(case: FeedbackCase) -> list[str | Cell]:
+def _row(case: FeedbackCase) -> list[str | Cell]:
     low, high = case.error_range
     margin = f"× {number(case.gain_margin)}" if math.isfinite(case.gain_margin) else "any"
     rest = math.isnan(case.stop_overshoot)
     return [
-        Cell(text=Markup("<b>{}</b>").format(case.name), nowrap=True),
+        Cell(text=case.name, nowrap=True),
         number(case.sample_period * 1e3),
         number(case.scale),
         "\u2013" if case.coefficient == 1 else number(case.coefficient),
@@ -200,23 +165,20 @@ def _word_charts(found: FeedbackComparison) -> list[Chart]:
     ])  # fmt: skip
 
 
-def compare_feedback(
-    spec: FilteredServoSpec, *, rate: float = RATE, progress: Progress | None = None
-) -> FeedbackComparison:
+def compare_feedback(spec: FilteredServoSpec, *, rate: float = RATE, progress: Progress = untold) -> FeedbackComparison:
     """Drive the axis at constant rate and stop it, with each way of feeding the counted speed back."""
     check_constants("compare_feedback: ", rate=rate)
     rate = min(rate, spec.limits.speed / spec.pulse)
-    variants = list(feedback_variants(spec))
+    variants = feedback_variants(spec)
     stretch = min(max(1.0, spec.method.scale * spec.method.sample_period / WINDOW), LONGEST)
     cases: list[FeedbackCase] = []
-    for name, variant in variants:
-        if progress is not None:
-            progress(len(cases) / len(variants), name)
+    for name, variant in variants.items():
+        progress(len(cases) / len(variants), name)
         cases.append(_measure(name, variant, rate, stretch))
     return FeedbackComparison(cases=tuple(cases), rate=rate, gain=spec.gain, tau_m=FilteredFigures(spec).tau_m)
 
 
-def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredServoSpec]]:
+def feedback_variants(spec: FilteredServoSpec) -> dict[str, FilteredServoSpec]:
     """The same axis with each of the four kinds of speed feedback."""
     method = spec.method
     window = method.scale * method.sample_period
@@ -226,41 +188,31 @@ def feedback_variants(spec: FilteredServoSpec) -> Iterator[tuple[str, FilteredSe
         "long window": {"filter": "none", "scale": 1, "sample_period": window, "counter_bits": WIDE_COUNTER},
         "small multiplier": {"filter": "none", "scale": 1},
     }
-    for name, change in changes.items():
-        yield name, spec.changed(method=change)
+    return {name: spec.changed(method=change) for name, change in changes.items()}
 
 
 def _measure(name: str, spec: FilteredServoSpec, rate: float, stretch: float) -> FeedbackCase:
     """One case: figures of a run at constant rate, of a stop, and of the model."""
     seconds = STEADY_TIME * stretch
     signals = ("controller.deviation.error", "controller.filter.output", "plant.train.current")
-    bench = _Bench(spec, rate, seconds, signals, max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS)))
-    done, trace = bench.run(seconds), bench.trace()
+    host, recorder = _driven(spec, rate, seconds, signals, max(1, math.ceil(seconds / 2 / TICK / MOST_ROWS)))
+    host.machine.close()
+    trace = recorder.trace()
     # The second half; no rows if the axis fails.
-    late = (trace.time >= seconds / 2) & done
+    late = (trace.time >= seconds / 2) & (not host.failure)
     t, (error, speed, current) = trace.time[late], (trace[name][late] for name in signals)
     overshoot = _stop(spec, rate, stretch)
     model = FilteredFigures(spec).loop
     limit = model.stability_limit()
     shown = t >= seconds - SHOWN * WINDOW * stretch
     return FeedbackCase(
-        name=name,
-        sample_period=spec.method.sample_period,
-        scale=spec.method.scale,
-        coefficient=model.coefficient,
-        kv=model.velocity_error_constant,
-        std_speed=_std(speed),
-        std_error=_std(error),
+        name=name, sample_period=spec.method.sample_period, scale=spec.method.scale, coefficient=model.coefficient,
+        kv=model.velocity_error_constant, std_speed=_std(speed), std_error=_std(error),
         force_ripple=_std(current * (spec.motor.torque_constant / spec.mechanics.radius)),
         error_range=(float(error.min()), float(error.max())) if len(error) else (math.nan, math.nan),
-        stop_overshoot=overshoot,
-        stable=len(t) > 0 and not math.isnan(overshoot),
-        gain_limit=limit,
-        gain_margin=limit / spec.gain,
-        t=t[shown],
-        error=error[shown],
-        speed_word=speed[shown],
-    )
+        stop_overshoot=overshoot, stable=len(t) > 0 and not math.isnan(overshoot),
+        gain_limit=limit, gain_margin=limit / spec.gain, t=t[shown], error=error[shown], speed_word=speed[shown],
+    )  # fmt: skip
 
 
 def _std(values: Numbers) -> float:
@@ -268,50 +220,37 @@ def _std(values: Numbers) -> float:
     return float(np.std(values)) if len(values) else math.nan
 
 
-class _Bench:
-    """An axis after reset, with way enough, commanded to a rate without end; signals are recorded every n-th tick."""
-
-    def __init__(
-        self, spec: FilteredServoSpec, rate: float, seconds: float, signals: Sequence[str], every: int
-    ) -> None:
-        half = math.ceil(2 * rate * seconds) + 100_000  # pulses to either side, more than an unstable axis swings
-        stated = spec.method.command_acceleration
-        acceleration = max(stated, rate * spec.pulse / RAMP) if stated > 0 else 0.0  # 0 jumps to the rate
-        roomy = spec.changed(
-            limits={"travel": 2 * half * spec.pulse},
-            mechanics={"start_position": half * spec.pulse},
-            method={"command_acceleration": acceleration},
-            disturbance=DisturbanceTable(),
-        )
-        self.recorder = Recorder(FilteredServo, signals, every=every, period=TICK)
-        self.machine: Machine[FilteredServoParams, FilteredServo] = filtered_servo_machine(roomy, self.recorder)
-        self.controller = self.machine.state.controller
-        self.machine.pass_ticks(1)  # leaves the reset
-        go_to(self.controller, ENDLESS, round(rate * PER_PULSE))
-
-    def run(self, seconds: float) -> bool:
-        """Let time pass, up to a fault; False when there was one."""
-        left = round(seconds / TICK)
-        while left > 0 and self.controller.deviation.state != FAULT:
-            left -= self.machine.pass_ticks(left)
-            acknowledge(self.controller)
-        return self.controller.deviation.state != FAULT
-
-    def trace(self) -> Trace:
-        """What was recorded."""
-        self.machine.close()
-        return self.recorder.trace()
+def _driven(
+    spec: FilteredServoSpec, rate: float, seconds: float, signals: Sequence[str], every: int
+) -> tuple[FilteredHost, Recorder]:
+    """An axis with way enough after some time at a rate without end, and the recorder of every n-th tick."""
+    half = math.ceil(2 * rate * seconds) + 100_000  # pulses to either side, more than an unstable axis swings
+    stated = spec.method.command_acceleration
+    acceleration = max(stated, rate * spec.pulse / RAMP) if stated > 0 else 0.0  # 0 jumps to the rate
+    roomy = spec.changed(
+        limits={"travel": 2 * half * spec.pulse},
+        mechanics={"start_position": half * spec.pulse},
+        method={"command_acceleration": acceleration},
+        disturbance=DisturbanceTable(),
+    )
+    recorder = Recorder(FilteredServo, signals, every=every, period=TICK)
+    host = FilteredHost(roomy, recorder)
+    host.start()
+    go_to(host.controller, ENDLESS, round(rate * PER_PULSE))
+    host.stands(seconds)
+    return host, recorder
 
 
 def _stop(spec: FilteredServoSpec, rate: float, stretch: float) -> float:
     """Overshoot after a stop from constant rate [count]; NaN for an axis that does not settle."""
     deviation, moment = "controller.deviation.deviation", STOP_AFTER * stretch
-    bench = _Bench(spec, rate, moment, (deviation,), max(1, math.ceil(stretch)))
-    bench.run(moment)
-    generator = bench.controller.generator
-    go_to(bench.controller, generator.command, generator.rate)  # the command stops where it is
-    settled, trace = bench.run(STOP_TIME * stretch), bench.trace()
+    host, recorder = _driven(spec, rate, moment, (deviation,), max(1, math.ceil(stretch)))
+    generator = host.controller.generator
+    go_to(host.controller, generator.command, generator.rate)  # the command stops where it is
+    host.stands(STOP_TIME * stretch)
+    host.machine.close()
+    trace = recorder.trace()
     after = trace[deviation][trace.time > moment]
-    if not settled or np.ptp(after[-len(after) // 4 :]) > SETTLED:
+    if host.failure or np.ptp(after[-len(after) // 4 :]) > SETTLED:
         return math.nan
     return float(max(0, -int(after.min())))

@@ -16,7 +16,7 @@ from detent.control.deviation_counter import (
     drive_word,
     watch_ranges,
 )
-from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
+from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
 from detent.control.pulse_generator import (
     PulseGenerator,
     PulseGeneratorParams,
@@ -115,27 +115,9 @@ def go_to(c: FilteredController, goal: int, rate: int) -> None:
 
 
 @step
-def arrive_within(c: FilteredController, ticks: int) -> None:
-    """The axis must be in position within so many ticks; 0 lifts it."""
-    await_arrival(c.guard, ticks)
-
-
-@step
-def set_period(c: FilteredController, sample_us: int) -> None:
-    """Sample period of the next window."""
-    c.clock.demanded = sample_us
-
-
-@step
 def reset(c: FilteredController) -> None:
     """Leave a fault."""
     c.deviation.reset = c.busy = 1
-    c.event = 0
-
-
-@step
-def acknowledge(c: FilteredController) -> None:
-    """The host has looked."""
     c.event = 0
 
 
@@ -358,10 +340,3 @@ def control_clock(p: FilteredControllerParams, c: FilteredController, lines: Fil
         if c.deviation.reset:
             leave_reset(c)
     one_clock(p, c, lines, k)
-
-
-@step
-def end_clocks(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
-    """What follows from ten clocks."""
-    conclude(p, c, lines)
-    end_tick(p, c, lines)

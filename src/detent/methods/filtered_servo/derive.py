@@ -34,6 +34,8 @@ class FilteredFigures:
         self.static = max(friction.right.static, friction.left.static)
         self.coulomb = max(friction.right.coulomb, friction.left.coulomb)
         self.rate = spec.limits.speed / spec.pulse
+        # Pulses of following error that friction holds at rest.
+        self.resting_error = math.floor(self.static / spec.force_per_count / spec.method.position_gain)
         self._loop_constants: dict[str, float] = {
             "gain": spec.gain,
             "sample_period": spec.method.sample_period,
@@ -62,11 +64,6 @@ class FilteredFigures:
         return self.loop.stability_limit() / self.spec.gain
 
     @cached_property
-    def damping(self) -> float:
-        """Damping ratio of the least damped mode that swings; 1 where none does, below 0 where one grows."""
-        return damping_of(self.loop)
-
-    @cached_property
     def ramp(self) -> "Response":
         """Answer of the loop, its drive unlimited, to the command's ramp up to limits.speed."""
         window, acceleration = self.spec.method.sample_period, self.spec.method.command_acceleration / self.spec.pulse
@@ -88,11 +85,6 @@ class FilteredFigures:
         return float(self.ramp.following_error.max()) + friction
 
     @property
-    def resting_error(self) -> int:
-        """Pulses of following error that friction holds at rest."""
-        return math.floor(self.static / self.spec.force_per_count / self.spec.method.position_gain)
-
-    @property
     def top_speed(self) -> float:
         """Speed that the largest drive word holds [m/s]; infinite where nothing slows the motor down."""
         holding = self.spec.holding_word
@@ -111,23 +103,18 @@ def damping_of(loop: "SampledLoop") -> float:
 
 def derive(spec: FilteredServoSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = FilteredFigures(spec)
-    return (*_scales(machine), *_drive(machine), *_speed(machine), *_filter(machine), *_loop(machine))
+    m = FilteredFigures(spec)
+    return (*_drive(m), *_feedback(m), *_loop(m))
 
 
-def _scales(machine: FilteredFigures) -> Iterator[Derived]:
-    """What a pulse is, and how many there are."""
-    spec = machine.spec
+def _drive(m: FilteredFigures) -> Iterator[Derived]:
+    """What a pulse is, and how many there are; forces, and the constants of the plant."""
+    spec = m.spec
     yield quantity_figure("pulse", spec.pulse, "m", "travel per revolution / (4 cycles per revolution)")
-    yield Derived("pulse rate at limits.speed", machine.rate, "1/s", f"{machine.rate:.5g} pulses/s", "speed / pulse")
+    yield Derived("pulse rate at limits.speed", m.rate, "1/s", f"{m.rate:.5g} pulses/s", "speed / pulse")
     counted = spec.counted(spec.limits.speed)
     text = f"{counted} of {spec.most_counted} pulses in a sample"
     yield Derived("count at limits.speed", counted, "count", text, "pulse rate x TS, rounded up")
-
-
-def _drive(machine: FilteredFigures) -> Iterator[Derived]:
-    """Forces, and the constants of the plant."""
-    spec = machine.spec
     yield quantity_figure("moving mass", spec.mass, "kg", "slide + (rotor + screw) / r^2")
     word = "supply / 2^(bits - 1) / R" if spec.drive.amplifier == "voltage" else "current per count"
     yield quantity_figure("force of one count", spec.force_per_count, "N", f"{word} x Kt / r")
@@ -136,32 +123,27 @@ def _drive(machine: FilteredFigures) -> Iterator[Derived]:
     yield Derived("largest force", force, "N", text, "full drive word, at most limits.effort")
     text = f"{spec.gain:.4g} pulses/s^2 per count"
     yield Derived("gain K", spec.gain, "1/s^2", text, "force of one count / m / pulse")
-    if math.isfinite(machine.tau_m):
-        yield quantity_figure("mechanical time constant", machine.tau_m, "s", "1 / (Kt Ke / (R J) + viscous / m)")
-    error = machine.resting_error
+    if math.isfinite(m.tau_m):
+        yield quantity_figure("mechanical time constant", m.tau_m, "s", "1 / (Kt Ke / (R J) + viscous / m)")
+    error = m.resting_error
     formula = "static / (force of one count x K1), rounded down"
     yield Derived("error at rest", error, "count", f"|P| up to {error}", formula)
 
 
-def _speed(machine: FilteredFigures) -> Iterator[Derived]:
-    """The constants of 3.6: how the following error goes with speed."""
-    spec, method = machine.spec, machine.spec.method
-    yield quantity_figure("K2", machine.transfer.speed_gain, "s", "B x TS")
-    constant = machine.transfer.velocity_error_constant
+def _feedback(m: FilteredFigures) -> Iterator[Derived]:
+    """The constants of 3.6: how the following error goes with speed; the filter alone (3.4)."""
+    from detent.analysis.first_order_filter import cutoff_hz, equivalent_time_constant, noise_gain
+
+    spec, method, coefficient, window = m.spec, m.spec.method, m.coefficient, m.spec.method.sample_period
+    yield quantity_figure("K2", m.transfer.speed_gain, "s", "B x TS")
+    constant = m.transfer.velocity_error_constant
     yield Derived("velocity-error constant KV", constant, "1/s", f"{constant:.4g} 1/s", "K1 / (B x TS)")
     error = spec.following_error(spec.limits.speed)
     most = (1 << (method.position_bits - 1)) - 1
     text = f"{error:.4g} of {most} pulses ({format_quantity(error * spec.pulse, 'm')})"
     formula = "(speed word B x TS x rate + word that holds the speed) / K1"
     yield Derived("following error at limits.speed", error, "count", text, formula)
-
-
-def _filter(machine: FilteredFigures) -> Iterator[Derived]:
-    """The filter alone (3.4)."""
-    from detent.analysis.first_order_filter import cutoff_hz, equivalent_time_constant, noise_gain
-
-    coefficient, window = machine.coefficient, machine.spec.method.sample_period
-    jump = coefficient * machine.spec.method.scale
+    jump = coefficient * method.scale
     formula = "A x B: a count is uncertain by one"
     yield Derived("jump of the drive word for one pulse", jump, "count", f"{jump:.4g} x one count", formula)
     if coefficient == 1.0:
@@ -176,20 +158,21 @@ def _filter(machine: FilteredFigures) -> Iterator[Derived]:
     yield Derived("noise gain of the filter", gain, "", f"{gain:.3g}", "sqrt(A / (2 - A))")
 
 
-def _loop(machine: FilteredFigures) -> Iterator[Derived]:
+def _loop(m: FilteredFigures) -> Iterator[Derived]:
     """How the loop settles (3.6, 3.7)."""
-    spec, transfer = machine.spec, machine.transfer
+    spec, transfer = m.spec, m.transfer
     stiffness = spec.gain * spec.method.sample_period**2
     yield Derived(
         "K TS^2", stiffness, "", f"{stiffness:.4g}", "twice the pulses that a count of drive moves in a sample"
     )
-    margin, limit = machine.gain_margin, machine.loop.stability_limit()
+    margin, limit = m.gain_margin, m.loop.stability_limit()
     if math.isfinite(limit):
         text = f"K = {limit:.5g} 1/s^2, {margin:.3g} x the gain"
         yield Derived("stability limit", limit, "1/s^2", text, "lowest K with a spectral radius of 1 (3.7)")
-    radius = machine.loop.spectral_radius()
+    radius = m.loop.spectral_radius()
     yield Derived("spectral radius", radius, "", f"{radius:.4f}", "largest mode from sample to sample (3.7)")
-    yield Derived("damping of the loop", machine.damping, "", f"{machine.damping:.3g}", "least damped mode that swings")
+    damping = damping_of(m.loop)
+    yield Derived("damping of the loop", damping, "", f"{damping:.3g}", "least damped mode that swings")
     ratio = transfer.filter_ratio
     yield Derived("Tf / (K2 / K1)", ratio, "", f"{ratio:.3g}", "K1 / (A B); far below 1 for a first-order loop (3.6)")
     ratio = transfer.inertia_ratio

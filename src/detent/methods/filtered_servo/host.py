@@ -2,37 +2,32 @@
 
 from detent.axisfile.blocks import describe_fault
 from detent.control.deviation_counter import FAULT, GUARDED
+from detent.control.guard import await_arrival
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT
-from detent.methods.filtered_servo import system as filtered_servo
-from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.controller import acknowledge, arrive_within, go_to, set_period
+from detent.methods.filtered_servo.build import build_filtered_servo
+from detent.methods.filtered_servo.controller import go_to
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.moves.host import Destination, Host, Wrong
+from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks, switch_on
+from detent.methods.moves.run import Destination, Host, Wrong
 from detent.record.machine import AnyRecorder, Machine
 from detent.units import format_quantity
-
-
-def filtered_servo_machine(
-    spec: FilteredServoSpec, recorder: AnyRecorder | None = None
-) -> Machine[filtered_servo.FilteredServoParams, filtered_servo.FilteredServo]:
-    """Filtered servo at power-on."""
-    p, r = build_filtered_servo(spec), filtered_servo.FilteredServo()
-    filtered_servo.switch_on(p, r, spec.mechanics.start_position, sample_microseconds(spec), spec.encoder.seed)
-    return Machine(p, r, filtered_servo.TICK, recorder, by_clocks=filtered_servo.advance_by_clocks)
 
 
 class FilteredHost(Host):
     """Host of a filtered servo: command pulses, in position, fault."""
 
     def __init__(self, spec: FilteredServoSpec, recorder: AnyRecorder | None = None) -> None:
-        machine, within = filtered_servo_machine(spec, recorder), (spec.method.in_position + 1) * spec.pulse
-        super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=spec.mechanics.start_position)
+        p, r, home = build_filtered_servo(spec), FilteredServo(), spec.mechanics.start_position
+        switch_on(p, r, home, round(spec.method.sample_period * 1e6), spec.encoder.seed)
+        machine = Machine(p, r, TICK, recorder, by_clocks=advance_by_clocks)
+        within = (spec.method.in_position + 1) * spec.pulse
+        super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=home)
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""
         move = to.move
-        set_period(self.controller, round((move.sample_period or self.spec.method.sample_period) * 1e6))
+        self.controller.clock.demanded = round((move.sample_period or self.spec.method.sample_period) * 1e6)
         go_to(self.controller, to.counts, round((move.speed or self.spec.limits.speed) / self.spec.pulse * PER_PULSE))
 
     def time_limit(self, to: Destination) -> float:
@@ -43,13 +38,11 @@ class FilteredHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until in position; False on a fault, or when it is not within `seconds`."""
-        ticks = max(1, round(seconds / self.machine.tick))
-        arrive_within(self.controller, ticks)
-        self.machine.pass_ticks(ticks)
-        arrived = bool(self.controller.event) and not self.controller.guard.code and not self.failure
-        arrive_within(self.controller, 0)
-        acknowledge(self.controller)
-        return arrived
+        guard = self.controller.guard
+        await_arrival(guard, max(1, round(seconds / self.machine.tick)))
+        arrived = super().wait(seconds)
+        await_arrival(guard, 0)
+        return arrived and not guard.code and not self.failure
 
     def problems(self, to: Destination, asked: float) -> Wrong:
         """Speed and sample period of a move against the limits of the counters."""
@@ -82,4 +75,4 @@ class FilteredHost(Host):
         left = round(dwell / self.machine.tick)
         while left > 0:
             left -= self.machine.pass_ticks(left)
-            acknowledge(self.controller)
+            self.controller.event = 0

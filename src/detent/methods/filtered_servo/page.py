@@ -37,10 +37,7 @@ class FilteredView(MoveView):
         """Speed with the commanded one, the speed words, following error, drive word."""
         rows = shown.rows
         commanded = command_speed(rows.t, rows[COMMAND], rows[WINDOW] * 1e-6) * self.spec.pulse
-        speeds = [
-            true_speed(shown),
-            Curve(label="commanded", colour="left", dash=(6, 4), y=commanded * MM, thin=0),
-        ]
+        speeds = [true_speed(shown), Curve(label="commanded", colour="left", dash=(6, 4), y=commanded * MM, thin=0)]
         counted = rows[COUNTED] * self.spec.method.scale
         words = [
             Curve(label="counted × B", colour="muted", step=True, y=counted, digits=1),

@@ -8,7 +8,7 @@ from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.plant.push import Push, push_force
 from detent.sensing.encoder import Encoder, EncoderParams, pass_left, pass_right
 from detent.sensing.gauge import Gauge, read_gauge
-from detent.sensing.interference import Interference, InterferenceParams, interfere
+from detent.sensing.interference import Interference, InterferenceParams, count_losses, interfere
 
 
 class AmplifierParams(Registers):
@@ -118,21 +118,13 @@ def actuate(p: AmplifierParams, r: Amplifier, lines: FilteredLines) -> None:
         r.word = lines.word
 
 
-@step
-def count_losses(r: Interference, lines: FilteredLines) -> None:
-    """Pulses swallowed and strobes lost in this tick."""
-    r.remove -= lines.swallowed - r.removed
-    r.removed = lines.swallowed
-    r.lose_sample -= lines.missed - r.lost
-    r.lost = lines.missed
-
-
 @hot_step
 def move(p: FilteredPlantParams, plant: FilteredPlant, train: DriveTrain, tick: int, lines: FilteredLines) -> None:
     """The plant moves through the tick; without drive it coasts, whatever the amplifier."""
     actuate(p.amplifier, plant.amplifier, lines)
-    if unlikely(plant.interference.remove + plant.interference.lose_sample > 0):
-        count_losses(plant.interference, lines)
+    n = plant.interference
+    if unlikely(n.remove + n.lose_sample > 0):
+        count_losses(n, lines.swallowed - n.removed, lines.missed - n.lost)
     train.force = push_force(p.push, tick)
     output = plant.amplifier.word * p.amplifier.per_count
     if p.amplifier.voltage_drive and lines.run:

@@ -11,11 +11,10 @@ from pydantic import Field
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
+    DisturbanceTable,
     EncoderTable,
-    InterferenceTable,
     MotionProtectionTable,
     MotorTable,
-    PushTable,
     ScrewTable,
     breaking_effort,
 )
@@ -114,13 +113,6 @@ class MethodTable(Table, frozen=True):
     timeout: Time = optional(
         "time from the end of the command until a move that is not in position has failed", 2.0, gt=0.0, le=1000.0
     )
-
-
-class DisturbanceTable(Table, frozen=True):
-    """What the axis does not know of."""
-
-    push: PushTable | None = None
-    lines: InterferenceTable = Field(default_factory=InterferenceTable)
 
 
 class FilteredServoSpec(AxisSpec, frozen=True):

@@ -18,9 +18,10 @@ from detent.methods.filtered_servo.controller import (
     FilteredController,
     FilteredControllerParams,
     FilteredLines,
+    conclude,
     control,
     control_clock,
-    end_clocks,
+    end_tick,
     power_on,
 )
 from detent.methods.filtered_servo.plant import FilteredPlant, FilteredPlantParams, hold_levels, move, sense
@@ -73,7 +74,8 @@ def advance_by_clocks(p: FilteredServoParams, r: FilteredServo, most: int, trace
         for k in range(CLOCKS):
             control_clock(p.controller, r.controller, r.lines, k)
             write_row(r, r.tick * CLOCKS + k, trace, picks, 1)
-        end_clocks(p.controller, r.controller, r.lines)
+        conclude(p.controller, r.controller, r.lines)
+        end_tick(p.controller, r.controller, r.lines)
         move(p.plant, r.plant, train, r.tick, r.lines)
         r.tick += 1
         n += 1

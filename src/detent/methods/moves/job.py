@@ -1,23 +1,27 @@
-"""Jobs of servo axes: lists of moves, and plain text as the moves of the carriage that prints it.
+"""Jobs of servo axes: lists of moves (CSV, TOML), and plain text as the moves of the carriage that prints it.
 
 A servo axis knows no lines and no hammer: it goes to a place, says that it is ready and stands there for a while. A
-move is that and nothing else. Files of moves are read in `move_file`; here everything is in SI units.
+move is that and nothing else.
 """
 
 from __future__ import annotations
 
 import unicodedata
-from dataclasses import dataclass, field, replace
-from pathlib import PurePath
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
 
 from detent.errors import MOST_PROBLEMS, FileProblem, InputError
 from detent.files.fields import Table, optional, rows
-from detent.files.quantities import Length, Time, Velocity
-from detent.files.read import Row, check_values
+from detent.files.quantities import Angle, AngularVelocity, Length, Time, Velocity
+from detent.files.read import Row, check_values, read_tables
+from detent.files.read_csv import CsvRows
+from detent.files.source import parse_source
+from detent.files.text import decode_utf8, read_data
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from os import PathLike
 
     from _typeshed import DataclassInstance
 
@@ -32,6 +36,8 @@ TAB_WIDTH = 8  # characters between the tab stops of plain text
 # A form feed brings another sheet under the hammer: to the carriage that is the beginning of a line, like the others.
 _LINE_BEGINS = {"\n", "\r", "\f"}
 _WHAT_TEXT_HOLDS = "printable characters, spaces, tabs, line ends and form feeds"
+_ACCENTS = {"Mn", "Me"}  # categories of characters that are struck together with the one before
+_WHAT_A_JOB_IS = "a list of moves (.csv or .toml) or a text (.txt)"
 
 
 class MoveRow(Row, frozen=True):
@@ -44,6 +50,14 @@ class MoveRow(Row, frozen=True):
     repeat: int = optional("how often it is done in succession", 1, ge=1, le=MOST_MOVES)
     speed: Velocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
     sample_period: Time | None = optional("of the servo in this move", None, derived="the axis's own", gt=0)
+
+
+class RotaryMoveRow(MoveRow, frozen=True):
+    """The same of an axis that turns."""
+
+    target: Angle | None = optional("where to", None)
+    by: Angle | None = optional("how far from where the move before went to", None)
+    speed: AngularVelocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
 
 
 class MoveFile(Table, Generic[AnyRow], frozen=True):
@@ -122,9 +136,8 @@ def expand_moves(
 
 def too_many_moves(file: str, came: str) -> InputError:
     """Refuse a job for its length."""
-    return InputError.of_file(
-        file, came, f"up to {MOST_MOVES} moves", "lower the repeats, or divide the job among several files"
-    )
+    remedy = "lower the repeats, or divide the job among several files"
+    return InputError.of_file(file, came, f"up to {MOST_MOVES} moves", remedy)
 
 
 def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, hammer_time: float = 0.0) -> MoveJob:
@@ -139,71 +152,97 @@ def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, ha
     >>> [(move.label, move.target, move.row) for move in job.moves]
     [('a', 0.0, 1), ('b', 0.00254, 1), ('c', 0.00762, 1), ('d', 0.0, 2)]
     """
-    carriage = _Carriage(name)
-    for char in text.rstrip("\x1a").replace("\r\n", "\n"):
-        carriage.read(char)
-        if len(carriage.problems) >= MOST_PROBLEMS:
-            break
-        if len(carriage.struck) > MOST_MOVES:
-            raise too_many_moves(name, f"more than {MOST_MOVES} characters to print")
-    if carriage.problems:
-        raise InputError(carriage.problems)
-    if not carriage.struck:
-        raise InputError.of_file(
-            name,
-            "a text that prints nothing" if text else "an empty file",
-            "a text with at least one character to print",
-            "put some text into it, or name another file",
-        )
+    struck = _struck(text, name)
+    if not struck:
+        came = "a text that prints nothing" if text else "an empty file"
+        allowed, remedy = "a text with at least one character to print", "put some text into it, or name another file"
+        raise InputError.of_file(name, came, allowed, remedy)
     moves = (
         Move(number, row, target=left_margin + column * pitch, dwell=hammer_time, label=label)
-        for number, (row, column, label) in enumerate(carriage.struck, start=1)
+        for number, (row, column, label) in enumerate(struck, start=1)
     )
     return MoveJob(PurePath(name).name, "text", tuple(moves))
 
 
-@dataclass(slots=True)
-class _Carriage:
-    """Reads text character by character and notes what is struck where."""
-
-    file: str
-    row: int = 1
-    place: int = 0  # characters of this line read so far, as an editor counts them
-    column: int = 0  # where the carriage stands
-    may_take_accent: bool = False  # the character before was a letter
-    struck: list[tuple[int, int, str]] = field(default_factory=list[tuple[int, int, str]])
-    problems: list[FileProblem] = field(default_factory=list[FileProblem])
-
-    def read(self, char: str) -> None:
-        """Take the next character."""
-        self.place += 1
+def _struck(text: str, file: str) -> list[tuple[int, int, str]]:
+    """Line, column and character of everything that a text prints."""
+    struck: list[tuple[int, int, str]] = []
+    problems: list[FileProblem] = []
+    row, place, column = 1, 0, 0  # the place is counted as an editor does
+    letter = False  # the character before may take an accent
+    for char in text.rstrip("\x1a").replace("\r\n", "\n"):
+        place += 1
         category = unicodedata.category(char)
-        if category in {"Mn", "Me"} and self.may_take_accent:
-            row, column, letter = self.struck[-1]
-            self.struck[-1] = (row, column, letter + char)
-            return
-        self.may_take_accent = False
-        if char in _LINE_BEGINS:
-            self.column = 0
-            if char != "\f":
-                self.row += 1
-                self.place = 0
+        accent, letter = letter and category in _ACCENTS, False
+        if accent:
+            struck[-1] = (*struck[-1][:2], struck[-1][2] + char)
+            letter = True
+        elif char in _LINE_BEGINS:
+            column = 0
+            row, place = (row, place) if char == "\f" else (row + 1, 0)
         elif char == "\t":
-            self.column = (self.column // TAB_WIDTH + 1) * TAB_WIDTH
+            column = (column // TAB_WIDTH + 1) * TAB_WIDTH
         elif category == "Zs":
-            self.column += 1
-        elif char.isprintable() and category not in {"Mn", "Me"}:
-            self.struck.append((self.row, self.column, char))
-            self.column += 1
-            self.may_take_accent = True
-        else:
-            self._refuse(char)
+            column += 1
+        elif char.isprintable() and category not in _ACCENTS:
+            struck.append((row, column, char))
+            column, letter = column + 1, True
+            if len(struck) > MOST_MOVES:
+                raise too_many_moves(file, f"more than {MOST_MOVES} characters to print")
+        elif len(problems) < MOST_PROBLEMS:
+            code = f"0x{ord(char):02X}" if ord(char) < 0x100 else f"U+{ord(char):04X}"
+            came = f"the character {code}, which prints nothing alone"
+            remedy = "remove it; save a document of a word processor as plain text first"
+            problems.append(FileProblem(file, row, place, "", came, _WHAT_TEXT_HOLDS, remedy))
+    if problems:
+        raise InputError(problems)
+    return struck
 
-    def _refuse(self, char: str) -> None:
-        code = f"0x{ord(char):02X}" if ord(char) < 0x100 else f"U+{ord(char):04X}"
-        remedy = "remove it; save a document of a word processor as plain text first"
-        came = f"the character {code}, which prints nothing alone"
-        self.problems.append(FileProblem(self.file, self.row, self.place, "", came, _WHAT_TEXT_HOLDS, remedy))
+
+def load_moves(
+    path: str | PathLike[str],
+    *,
+    pitch: float | None = None,
+    left_margin: float = 0.0,
+    hammer_time: float = 0.0,
+    rotary: bool = False,
+) -> MoveJob:
+    """Read the job of a servo axis: a list of moves, or a text of characters `pitch` [m] apart; the ending says which.
+
+    Whether the axis can do it is not checked here; of an axis that turns, places and ways are angles [rad]. What is
+    wrong with the file is told all at once, with line and column, as an `InputError`.
+    """
+    file = Path(path)
+    data = read_data(file, (".csv", ".toml", ".txt"), _WHAT_A_JOB_IS)
+    if file.suffix.lower() != ".txt":
+        return _parse_moves(file, decode_utf8(file, data), RotaryMoveRow if rotary else MoveRow)
+    if pitch is None:
+        remedy = "name a list of moves; a text is for an axis that has a character pitch"
+        came, allowed = "a text; this axis prints no text", "a list of moves (.csv or .toml)"
+        raise InputError.of_file(str(file), came, allowed, remedy)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text_job(text, name=str(file), pitch=pitch, left_margin=left_margin, hammer_time=hammer_time)
+
+
+def _parse_moves(file: Path, text: str, model: type[MoveRow]) -> MoveJob:
+    """Moves of a text, in the format that the file's name says."""
+    repeat = 1
+    if file.suffix.lower() == ".csv":
+        made = CsvRows(str(file), text, model).read(_make_move, MOST_MOVES)
+    else:
+        source = parse_source(str(file), text)
+        found = read_tables(source, MoveFile[model])
+        repeat = found.repeat
+        made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
+    return MoveJob(file.name, "moves", expand_moves(str(file), made, repeat))
+
+
+def _make_move(line: int, row: MoveRow) -> tuple[Move, int]:
+    """The move of a row, and how often it is done."""
+    return Move(1, line, **row.model_dump(exclude={"repeat"})), row.repeat
 
 
 def one_move(name: str, by: float, dwell: float) -> MoveJob:

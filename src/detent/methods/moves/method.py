@@ -7,7 +7,6 @@ from detent.methods.method import Method, Shown
 from detent.methods.moves.job import MoveJob, one_move
 
 if TYPE_CHECKING:
-    from detent.methods.moves.host import Host
     from detent.methods.moves.page import MoveView
     from detent.methods.moves.run import MoveRun
     from detent.page.frame import Page
@@ -20,15 +19,9 @@ class MoveMethod(Method[SpecT], Protocol[SpecT]):
     """A control method that makes lists of moves."""
 
     jobs = "a list of moves (.csv, .toml)"
-    takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.move_file:load_moves"
-    commands: ClassVar[str]
-    """Place of the host, made of a specification and a recorder."""
-    shows: ClassVar[str]
-    """Place of the view of a run, made of a specification."""
-
-    def host(self, spec: SpecT, recorder: "AnyRecorder | None" = None) -> "Host":
-        """The simulated axis at power-on, and what commands it."""
-        return self.brought(self.commands)(spec, recorder)
+    takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
+    commands: ClassVar[str]  # place of the host, made of a specification and a recorder
+    shows: ClassVar[str]  # place of the view of a run, made of a specification
 
     def view(self, spec: SpecT) -> "MoveView":
         """What the method shows of itself on the page of a run."""
@@ -44,7 +37,7 @@ class MoveMethod(Method[SpecT], Protocol[SpecT]):
         """Make the moves, from power-on."""
         from detent.methods.moves.run import run_moves
 
-        return run_moves(self.host(spec, recorder), job, progress=progress)
+        return run_moves(self.brought(self.commands)(spec, recorder), job, progress=progress)
 
     def summary(self, spec: SpecT, result: Any) -> list[tuple[str, str]]:
         """Moves, times, worst errors."""

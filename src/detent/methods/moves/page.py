@@ -69,18 +69,11 @@ class ShownMove:
 class MoveView:
     """What a method shows of itself on the page of a list of moves. What it leaves out has the default here."""
 
-    signals: ClassVar[Sequence[str]] = ()
-    """Signals that a move is drawn from beside position, velocity and target."""
-    captions: ClassVar[tuple[str, str]] = ("", "")
-    """What to look for in the whole move, and in the words at its end."""
+    signals: ClassVar[Sequence[str]] = ()  # signals that a move is drawn from beside position, velocity and target
+    captions: ClassVar[tuple[str, str]] = ("", "")  # what to look for in the whole move, and in the words at its end
 
     def __init__(self, spec: Any) -> None:
         self.spec = spec
-
-    @property
-    def name(self) -> str:
-        """Name of the axis."""
-        return self.spec.axis.name
 
     @property
     def unit(self) -> CountUnit:
@@ -129,7 +122,7 @@ def moves_page(
     text = view.text_figure(run) if run.job.kind == "text" and run.moves else None
     result = [text, _job_figure(figures, trace), _rest_figure(view, figures)]
     return Page(
-        title=page_title(view.name, run),
+        title=page_title(view.spec.axis.name, run),
         headline=_headline(view, figures),
         cards=_cards(view, figures),
         notes=_notes(figures),
@@ -149,26 +142,23 @@ def moves_page(
 def _headline(view: MoveView, figures: MoveFigures) -> Headline:
     run, asked = figures.run, count(figures.asked, figures.word)
     if not run.done:
-        return run_headline(view.name, run, stopped_after(len(figures.there), asked, figures.seconds))
+        return run_headline(view.spec.axis.name, run, stopped_after(len(figures.there), asked, figures.seconds))
     lead = f"{asked} in {duration(figures.seconds)}."
     if error := figures.error:
         counts = f"{number(error.value / view.unit.size, 2)} {view.unit.words}"
         lead += f" At the end of every dwell the axis stood within {length(error.value)} ({counts}) of its target."
     if not figures.early:
-        return run_headline(view.name, run, lead)
+        return run_headline(view.spec.axis.name, run, lead)
     moves = count(len(figures.early), "move")
     lead += f" But in {moves} it said that it had arrived before it was there for good."
-    return run_headline(view.name, run, lead, doubt="Done, but ready too early")
+    return run_headline(view.spec.axis.name, run, lead, doubt="Done, but ready too early")
 
 
 def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
     run, words = figures.run, figures.word + "s"
-    shown = [
-        made_card(words.capitalize(), len(figures.there), figures.asked, "arrived and stayed"),
-        time_card(
-            figures.seconds, f"{number(run.moves_per_second)} {words} per second" if run.done else "until it stopped"
-        ),
-    ]
+    pace = f"{number(run.moves_per_second)} {words} per second" if run.done else "until it stopped"
+    made = made_card(words.capitalize(), len(figures.there), figures.asked, "arrived and stayed")
+    shown = [made, time_card(figures.seconds, pace)]
     if longest := figures.longest:
         below = f"median; worst {milliseconds(longest.value)}, {whose(longest.of)}"
         median = median_of(figures.went, lambda move: move.move_time)
@@ -230,17 +220,14 @@ def _rest_figure(view: MoveView, figures: MoveFigures) -> Figure | None:
         "that stand apart mean that it matters from which side the axis comes. "
         f"Allowed: ±{length(run.tolerance)}{outside}; a {view.unit.word} is {length(view.unit.size)}."
     )
-    return Figure(title="Error at rest", caption=caption, charts=[_rest_chart(run)])
-
-
-def _rest_chart(run: MoveRun) -> Chart:
-    """Moves over the place where they ended: right of the target is where the error is negative."""
+    # Right of the target is where the error is negative.
     heaps: list[Heap] = []
     for name, right in (("right", True), ("left", False)):
         errors = np.array([move.error for move in run.moves if (move.target > move.start) == right], dtype=float)
         heaps.append(Heap(label=f"moved to the {name}", colour=name, at=-errors * UM, counts=np.ones(len(errors))))
     labels = ("← left of the target   [µm]   right of it →", "moves")
-    return histogram_chart("rest", heaps, labels, finest=FINEST_BAR, limit=run.tolerance * UM)
+    chart = histogram_chart("rest", heaps, labels, finest=FINEST_BAR, limit=run.tolerance * UM)
+    return Figure(title="Error at rest", caption=caption, charts=[chart])
 
 
 # ---- one move
@@ -329,34 +316,23 @@ def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
     begin = shown.rows.first(np.abs(shown.to_go) <= max(CLOSE * shown.run.tolerance, 1.5 * abs(float(shown.to_go[-1]))))
     last = events[-1].t
     rows = shown.rows.between(begin, min(last + 0.15 * (last - begin), float(t[-1])))
-    limit = shown.run.tolerance / view.unit.size
-    place = (rows[POSITION] - shown.move.target) / view.unit.size
+    unit, limit = view.unit, shown.run.tolerance / view.unit.size
+    place = (rows[POSITION] - shown.move.target) / unit.size
+    # The whole curve, and both limits with their names; more above, where the numbers of the events stand.
+    low, high = min(float(place.min()), -limit), max(float(place.max()), limit)
+    span = (round(low - 0.1 * (high - low), 3), round(high + 0.25 * (high - low), 3))
     within = [(shown.settled, float(t[-1]))] if shown.settled < t[-1] else []
-    timeline = Timeline(
-        name="approach",
-        t=rows.t,
-        label="time since the command",
-        bands=[Band(label="within the tolerance", colour="good", spans=within)],
-        events=events,  # all of them: those in sight have the numbers of the figure above
-    )
+    bands = [Band(label="within the tolerance", colour="good", spans=within)]
+    # All events: those in sight have the numbers of the figure above.
+    timeline = Timeline(name="approach", t=rows.t, label="time since the command", bands=bands, events=events)
     return time_charts(timeline, [
         Panel(
-            name="approach-place", label=f"right of the target [{view.unit.word}]", height=260, zero=True,
-            span=_span_around(place, limit),
-            levels=[(limit, f"+{view.unit.counts(shown.run.tolerance)}"),
-                    (-limit, f"−{view.unit.counts(shown.run.tolerance)}")],
+            name="approach-place", label=f"right of the target [{unit.word}]", height=260, zero=True, span=span,
+            levels=[(limit, f"+{unit.counts(shown.run.tolerance)}"), (-limit, f"−{unit.counts(shown.run.tolerance)}")],
             curves=[Curve(label="true position", colour="speed", width=2, y=place)],
         ),
         Panel(name="approach-words", label="words [count]", height=180, zero=True, curves=view.words(rows)),
     ])  # fmt: skip
-
-
-def _span_around(place: Numbers, limit: float) -> tuple[float, float]:
-    """Ends of an axis that shows the whole curve, and both limits with their names."""
-    low, high = min(float(place.min()), -limit), max(float(place.max()), limit)
-    room = high - low
-    # More above: the numbers of the events stand there.
-    return round(low - 0.1 * room, 3), round(high + 0.25 * room, 3)
 
 
 # ---- table

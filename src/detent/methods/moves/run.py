@@ -1,16 +1,117 @@
-"""A list of moves on a simulated servo axis, from power-on: what an observer beside the carriage sees."""
+"""A list of moves on a simulated servo axis, from power-on: its host, and what an observer beside the carriage sees.
+
+The host does what a controller above the axis does to make one move; it sees what the lines show, no more. The place
+the axis stands at after power-on is known to it (a home sensor tells it in a machine).
+"""
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
-from detent.errors import AxisError
-from detent.methods.moves.host import Destination, Host, check_job, line_faults
-from detent.methods.moves.job import MoveJob
-from detent.record.machine import Progress
+from detent.errors import MOST_PROBLEMS, AxisError, FileProblem, InputError
+from detent.methods.moves.job import Move, MoveJob
+from detent.record.machine import Machine, Progress
 from detent.record.run import RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
+
+FAULTS = {"inserted": "inserted", "removed": "removed", "lost samples": "lost", "corrupted": "corrupted"}
+"""What interference does to the pulse lines, and the register that counts it."""
+
+Wrong = Iterator[tuple[str, str, str, str]]  # problems of a move: key, what came, what is allowed and what to do
+
+
+@dataclass(frozen=True, slots=True)
+class Destination:
+    """A move as the host commands it."""
+
+    move: Move
+    position: float  # where the axis shall stand [m], on its grid
+    counts: int  # the same in counts of the axis from where it stood at power-on
+
+
+class Host(ABC):
+    """What each servo brings; the frame makes the moves of a job with it. What it leaves out has the default here."""
+
+    own_pace: ClassVar[str] = "this axis has one of its own"  # why a move can bring neither speed nor sample period
+
+    def __init__(self, spec: Any, machine: Machine[Any, Any], *, grid: float, tolerance: float, home: float) -> None:
+        self.spec, self.machine, self.controller = spec, machine, machine.state.controller
+        self.grid = grid  # distance of two places at which it can stand [m]
+        self.tolerance = tolerance  # error that counts as arrived [m]
+        self.home = home  # where it stands at power-on [m]
+
+    def start(self) -> None:
+        """Wait until the axis takes commands."""
+        self.machine.pass_ticks(1)
+
+    def place(self, move: Move, position: float) -> Destination:
+        """Where a move to `position` [m] ends."""
+        counts = round((position - self.home) / self.grid)
+        return Destination(move, self.home + counts * self.grid, counts)
+
+    def problems(self, to: Destination, asked: float) -> Wrong:
+        """What this axis cannot do of a move to `asked` [m], beside leaving its travel: here a speed or a period."""
+        del asked
+        for word, value in (("speed", to.move.speed), ("sample_period", to.move.sample_period)):
+            if value is not None:
+                yield word, str(value), f"no {word}: {self.own_pace}", "leave it out, or change the axis file"
+
+    @abstractmethod
+    def command(self, to: Destination) -> None:
+        """Begin the move."""
+
+    @abstractmethod
+    def time_limit(self, to: Destination) -> float:
+        """Time after which a move that has not arrived has failed [s]."""
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until it has arrived, which is the event of its controller; False when it has not within `seconds`."""
+        self.machine.pass_time(seconds)
+        arrived, self.controller.event = bool(self.controller.event), 0
+        return arrived
+
+    def stands(self, dwell: float) -> None:
+        """Let the axis stand [s]."""
+        self.machine.pass_time(dwell)
+
+    def in_counts(self, error: float) -> str:
+        """An error [m] in the unit of the axis."""
+        return f"{abs(error) / self.grid:.1f} pulses"
+
+    @property
+    def failure(self) -> str:
+        """Why the axis has given up; empty while it has not."""
+        return ""
+
+    @property
+    def switched(self) -> float:
+        """When position mode was entered [s]; NaN for an axis of one mode."""
+        return math.nan
+
+
+def check_job(host: Host, job: MoveJob) -> list[Destination]:
+    """Destinations of a whole job, before anything moves."""
+    problems: list[FileProblem] = []
+    found: list[Destination] = []
+    position, travel = host.home, host.spec.limits.travel
+    allowed = f"a position from 0 to limits.travel, {format_quantity(travel, 'm', 5)}"
+    for move in job.moves:
+        position = position + move.by if move.by is not None else float(move.target or 0.0)
+        to = host.place(move, position)
+        wrong = list(host.problems(to, position))
+        if not 0.0 <= position <= travel:
+            came = format_quantity(position, "m", 6)
+            wrong.insert(0, (move.place_key, came, allowed, "keep the move between the two ends"))
+        told = (FileProblem(job.name, move.row, 1 if move.row else 0, *what) for what in wrong)
+        problems += [problem for problem in told if len(problems) < MOST_PROBLEMS]
+        position = to.position
+        found.append(to)
+    if problems:
+        raise InputError(problems)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +195,12 @@ def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> 
         result.failure = str(error)
     finally:
         host.machine.close()
-    _finish(host, result)
+    plant = host.machine.state.plant
+    result.time_end = host.machine.time
+    result.peak_current, result.energy = float(plant.train.peak_current), float(plant.train.energy)
+    if lines := getattr(plant, "interference", None):
+        result.faults = {name: getattr(lines, register) for name, register in FAULTS.items()}
+    result.done = not result.failure and len(result.moves) == len(result.job.moves)
     return result
 
 
@@ -109,22 +215,11 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
     if arrived and to.move.dwell > 0:
         host.stands(to.move.dwell)
     error = to.position - float(plant.train.position)
-    result.moves.append(
-        MoveRecord(
-            number=to.move.number,
-            label=to.move.label,
-            begin=begin,
-            start=start,
-            target=to.position,
-            switched=host.switched,
-            ready=ready,
-            settled=plant.gauge.outside * host.machine.tick,
-            end=host.machine.time,
-            overshoot=max(float(plant.gauge.beyond), 0.0),
-            error=error,
-            peak_speed=float(plant.gauge.peak_speed),
-        )
-    )
+    result.moves.append(MoveRecord(
+        number=to.move.number, label=to.move.label, begin=begin, start=start, target=to.position,
+        switched=host.switched, ready=ready, settled=plant.gauge.outside * host.machine.tick, end=host.machine.time,
+        overshoot=max(float(plant.gauge.beyond), 0.0), error=error, peak_speed=float(plant.gauge.peak_speed),
+    ))  # fmt: skip
     return _verdict(host, to, error, arrived=arrived)
 
 
@@ -149,12 +244,3 @@ def _away(host: Host, error: float) -> str:
     counts, more = host.in_counts(error).partition(",")[::2]
     side = "short of it to the left" if error > 0 else "to the right of it"
     return f"{format_quantity(abs(error), 'm')} ({counts}) {side}{',' + more if more else ''}"
-
-
-def _finish(host: Host, result: MoveRun) -> None:
-    """Totals."""
-    plant = host.machine.state.plant
-    result.time_end = host.machine.time
-    result.peak_current, result.energy = float(plant.train.peak_current), float(plant.train.energy)
-    result.faults = line_faults(plant.interference) if hasattr(plant, "interference") else {}
-    result.done = not result.failure and len(result.moves) == len(result.job.moves)

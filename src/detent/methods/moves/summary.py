@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 
 from detent.methods.moves.run import MoveRecord, MoveRun
-from detent.page.run_page import Worst, median_of, worst
+from detent.page.run_page import median_of, worst
 from detent.page.words import GAP, CountUnit, count, duration, length, milliseconds, number
 
 SOONEST = 1e-6  # an axis that says so by less than this before it is within the tolerance says so in time [s]
@@ -16,8 +16,6 @@ FAULT_WORDS = {
     "corrupted": ("sensor sample corrupted", "sensor samples corrupted"),
 }
 """What interference did, as `MoveRun.faults` names it, in words for one and for several."""
-
-WorstMove = Worst[MoveRecord] | None
 
 
 def arrived(run: MoveRun, move: MoveRecord) -> bool:
@@ -58,34 +56,26 @@ class MoveFigures:
 def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
     """Name and text of each figure of a run of moves; what a run did not come to is left out."""
     figures = MoveFigures(run)
-    words = figures.word + "s"
+    words, within = figures.word + "s", f"until within {length(run.tolerance)} for good"
     rows = [(words, f"{count(len(figures.there))} of {count(figures.asked)}")]
     if run.moves:
         rate = f", {number(run.moves_per_second)} {words} per second" if run.done else ""
-        rows += [
-            ("time", duration(figures.seconds) + rate),
-            *_settling(figures),
-            *_worst(figures.overshoot, "overshoot", unit),
-            *_worst(figures.error, "error at rest", unit),
-        ]
+        rows.append(("time", duration(figures.seconds) + rate))
+    switched = [move for move in figures.went if not math.isnan(move.switched)]
+    rows += _times(figures.went, lambda move: move.move_time, "settling", f"from the command {within}")
+    rows += _times(switched, approach, "final approach", f"from the mode switch {within}")
+    for name, found in (("overshoot", figures.overshoot), ("error at rest", figures.error)):
+        if found:
+            rows.append((name, f"worst {length(found.value)}, {unit.counts(found.value)} ({whose(found.of)})"))
     if early := figures.earliest:
         moves = count(len(figures.early), "move")
         rows.append(("ready too early", f"{moves}, by up to {milliseconds(early.value)} ({whose(early.of)})"))
     if fastest := figures.peak_speed:
         rows.append(("peak speed", f"{number(fastest.value * 1e3)} mm/s ({whose(fastest.of)})"))
     rows.append(("motor", f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J"))
-    noise = interference_text(run)
-    rows += [("interference", noise)] if noise else []
+    if noise := interference_text(run):
+        rows.append(("interference", noise))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
-
-
-def _settling(figures: MoveFigures) -> list[tuple[str, str]]:
-    within = f"until within {length(figures.run.tolerance)} for good"
-    switched = [move for move in figures.went if not math.isnan(move.switched)]
-    return [
-        *_times(figures.went, lambda move: move.move_time, "settling", f"from the command {within}"),
-        *_times(switched, approach, "final approach", f"from the mode switch {within}"),
-    ]
 
 
 def _times(moves: list[MoveRecord], time: Callable[[MoveRecord], float], name: str, span: str) -> list[tuple[str, str]]:
@@ -94,10 +84,6 @@ def _times(moves: list[MoveRecord], time: Callable[[MoveRecord], float], name: s
         return []
     text = f"median {milliseconds(median_of(moves, time))}, worst {milliseconds(longest.value)} ({whose(longest.of)})"
     return [(name, f"{text}, {span}")]
-
-
-def _worst(found: WorstMove, name: str, unit: CountUnit) -> list[tuple[str, str]]:
-    return [(name, f"worst {length(found.value)}, {unit.counts(found.value)} ({whose(found.of)})")] if found else []
 
 
 def whose(move: MoveRecord) -> str:

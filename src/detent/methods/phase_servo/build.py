@@ -6,7 +6,6 @@ from detent.axisfile.blocks import fill_drive_train, fill_guard, fill_interferen
 from detent.control.phase_law import LawParams
 from detent.control.phase_sequencer import NEVER, TABLE, SequencerParams
 from detent.kernel.turn_table import TURN
-from detent.methods.phase_servo.controller import ConverterParams
 from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServoParams
 from detent.sensing.phase_detector import DetectorParams, fill_errors
@@ -21,7 +20,10 @@ def build_phase_servo(spec: PhaseServoSpec) -> PhaseServoParams:
     c, plant = p.controller, p.plant
     c.clocks.integrate_mask = (1 << spec.clock.integrate_tap) - 1
     c.clocks.sample_mask = (1 << spec.clock.sample_tap) - 1
-    _fill_converters(c.converters, spec)
+    k, bits = c.converters, spec.detector.counts.bit_length() - 1
+    k.carrier.mask = k.tracking.mask = k.absolute.mask = spec.detector.counts - 1
+    k.tracking.top = k.absolute.top = bits - 1
+    k.carrier.shift, k.tracking.leave_antiphase = bits - 3, spec.method.leave_antiphase
     _fill_sequencer(c.sequencer, spec)
     _fill_law(c.law, spec)
     c.speed.half = 1 << (spec.method.speed_bits - 1)
@@ -50,14 +52,6 @@ def velocity_table(spec: PhaseServoSpec) -> list[int]:
     while not table or (table[-1] < spec.peak_count and len(table) < TABLE):
         table.append(spec.table_velocity(len(table)))
     return table
-
-
-def _fill_converters(c: ConverterParams, spec: PhaseServoSpec) -> None:
-    bits = spec.detector.counts.bit_length() - 1
-    c.carrier.mask = c.tracking.mask = c.absolute.mask = spec.detector.counts - 1
-    c.tracking.top = c.absolute.top = bits - 1
-    c.carrier.shift = bits - 3
-    c.tracking.leave_antiphase = spec.method.leave_antiphase
 
 
 def _fill_detector(d: DetectorParams, spec: PhaseServoSpec) -> None:

@@ -44,11 +44,9 @@ def _tracker(spec: PhaseServoSpec) -> Iterator[Contradiction]:
         allowed = "a power of two: the counters of carrier, tracker and absolute word run over on their own (2)"
         yield wrong("detector.counts", allowed, remedy.exactly("detector.counts", 1 << round(math.log2(n))))
     if spec.limits.speed >= fastest:
-        yield wrong(
-            "limits.speed clock.oscillator detector.counts detector.pitches_per_revolution",
-            f"below {text(fastest, 'm/s')}: the tracker follows one step in N + 1 = {n + 1} clocks (3.4)",
-            remedy.most("limits.speed", fastest * (1 - BARELY)),
-        )
+        keys = "limits.speed clock.oscillator detector.counts detector.pitches_per_revolution"
+        allowed = f"below {text(fastest, 'm/s')}: the tracker follows one step in N + 1 = {n + 1} clocks (3.4)"
+        yield wrong(keys, allowed, remedy.most("limits.speed", fastest * (1 - BARELY)))
     if lag >= n:
         allowed = f"below detector.counts, {n}; left out it is N/4 - 1 = {n // 4 - 1}"
         yield wrong("detector.lag_counts detector.counts", allowed, remedy.most("detector.lag_counts", n - 1))
@@ -58,11 +56,8 @@ def _speed_counted(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     """The speed word holds the peak of the velocity table, and the table has one."""
     one, most, bits = spec.step / spec.sample_period, (1 << (spec.method.speed_bits - 1)) - 1, spec.method.speed_bits
     if spec.peak_count < 1:
-        yield wrong(
-            "limits.speed clock.sample_tap",
-            f"at least one pulse per speed sample, {text(one, 'm/s')}: the table would hold only zeros",
-            remedy.least("limits.speed", one, "use a finer detector"),
-        )
+        allowed = f"at least one pulse per speed sample, {text(one, 'm/s')}: the table would hold only zeros"
+        yield wrong("limits.speed clock.sample_tap", allowed, remedy.least("limits.speed", one, "use a finer detector"))
     if spec.peak_count > most:
         yield wrong(
             "method.speed_bits limits.speed clock.sample_tap",
@@ -132,15 +127,12 @@ def _words(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     for key, ((k1, k2, k3), setpoint, integral) in sums.items():
         inner = k1 * setpoint + integral + (k2 << (method.speed_bits - 1))
         if k3 * inner > WIDEST_SUM:
-            yield wrong(
-                f"{key} method.speed_bits limits.speed",
-                f"such that the largest sum of the arithmetic unit, here {k3 * inner:.3g}, fits 32 bits",
-                put(key, [k1, k2, WIDEST_SUM // inner]),
-            )
+            allowed = f"such that the largest sum of the arithmetic unit, here {k3 * inner:.3g}, fits 32 bits"
+            yield wrong(f"{key} method.speed_bits limits.speed", allowed, put(key, [k1, k2, WIDEST_SUM // inner]))
 
 
 def _table(spec: PhaseServoSpec) -> Iterator[Contradiction]:
-    """The velocity table reaches its peak within its entries, and does not stop before the threshold."""
+    """The velocity table reaches its peak, and does not stop before the threshold; ready comes before stop."""
     top, last, first, key = spec.peak_count, TABLE_ENTRIES - 1, spec.method.threshold + 1, "method.table_acceleration"
     reached = spec.table_velocity(last)
     # The entry of a distance of n steps is floor(sqrt(2 a n / step) Tv + 1/2).
@@ -159,10 +151,6 @@ def _table(spec: PhaseServoSpec) -> Iterator[Contradiction]:
             f"reaches method.threshold, {first - 1}",
             remedy.least(key, 0.25 * one / first, "raise clock.sample_tap"),
         )
-
-
-def _one_shots(spec: PhaseServoSpec) -> Iterator[Contradiction]:
-    """Ready comes before stop."""
     method = spec.method
     if not method.stop_always_off and method.stop_time < method.ready_time + spec.tick:
         allowed = f"longer than method.ready_time, {text(method.ready_time, 's')}: ready comes first (4)"
@@ -206,7 +194,7 @@ def _machine(spec: PhaseServoSpec) -> Iterator[Contradiction]:
 
 
 # Contradictions are told in this order.
-RULES = (_tracker, _speed_counted, _approach, _way, _words, _table, _one_shots, _edges, _machine)
+RULES = (_tracker, _speed_counted, _approach, _way, _words, _table, _edges, _machine)
 
 
 # ---- cautions
@@ -215,7 +203,7 @@ RULES = (_tracker, _speed_counted, _approach, _way, _words, _table, _one_shots, 
 def find_cautions(spec: PhaseServoSpec) -> Iterator[Caution]:
     """Look a phase-servo axis over."""
     machine = PhaseFigures(spec)
-    for look in (_current, _force, _end_of_move, _speed, _settling, _integral, _detector, _burst):
+    for look in (_current, _force, _speed, _settling, _integral, _detector, _burst):
         yield from look(machine)
 
 
@@ -223,21 +211,15 @@ def _current(m: PhaseFigures) -> Iterator[Caution]:
     """PWM, comparator and supply keep the current near its limit."""
     ratio, step, limit, stall = m.pwm_hz / m.corner_hz, m.current_per_tick, m.spec.limits.effort, m.stall_current
     if ratio <= PWM_RATIO:
-        yield Caution(
-            "PWM frequency",
-            f"{text(m.pwm_hz, 'Hz')}, {ratio:.3g} x the electrical corner",
-            f"above {PWM_RATIO} x",
-            "the current ripples with the PWM and the motor runs hot",
-            remedy.least("motor.inductance", PWM_RATIO * m.resistance / (2 * math.pi * m.pwm_hz) * (1 + BARELY)),
-        )
+        value = f"{text(m.pwm_hz, 'Hz')}, {ratio:.3g} x the electrical corner"
+        consequence = "the current ripples with the PWM and the motor runs hot"
+        advice = remedy.least("motor.inductance", PWM_RATIO * m.resistance / (2 * math.pi * m.pwm_hz) * (1 + BARELY))
+        yield Caution("PWM frequency", value, f"above {PWM_RATIO} x", consequence, advice)
     if step > CURRENT_STEP * limit:
-        yield Caution(
-            "current within a tick",
-            text(step, "A"),
-            f"up to {100 * CURRENT_STEP:g} % of limits.effort, {text(CURRENT_STEP * limit, 'A')}",
-            "the current passes its limit by that much before the comparator is asked again",
-            "raise clock.oscillator, or choose a motor of more inductance",
-        )
+        allowed = f"up to {100 * CURRENT_STEP:g} % of limits.effort, {text(CURRENT_STEP * limit, 'A')}"
+        consequence = "the current passes its limit by that much before the comparator is asked again"
+        advice = "raise clock.oscillator, or choose a motor of more inductance"
+        yield Caution("current within a tick", text(step, "A"), allowed, consequence, advice)
     if stall < limit:
         yield Caution(
             "stall current",
@@ -252,22 +234,14 @@ def _current(m: PhaseFigures) -> Iterator[Caution]:
 
 
 def _force(m: PhaseFigures) -> Iterator[Caution]:
-    """The force follows the velocity table."""
-    asked, available = m.spec.method.table_acceleration, m.acceleration
+    """The force follows the velocity table; in position mode the carriage can stop, and stands when it says so."""
+    asked, available, ready = m.spec.method.table_acceleration, m.acceleration, m.spec.method.ready_time
     if asked >= available:
         gentler = remedy.most("method.table_acceleration", available * (1 - BARELY), "raise limits.effort")
-        yield Caution(
-            "force at the current limit",
-            f"{text(m.force_limit, 'N')}, for {max(0.0, available):.3g} m/s^2 against friction",
-            f"above a m + friction, {text(asked * m.mass + m.coulomb, 'N')}",
-            "the carriage cannot follow the velocity table and runs past its target",
-            gentler,
-        )
-
-
-def _end_of_move(m: PhaseFigures) -> Iterator[Caution]:
-    """From the change of mode the carriage can stop, and stands when it says that it is ready."""
-    ready, available = m.spec.method.ready_time, m.acceleration
+        value = f"{text(m.force_limit, 'N')}, for {max(0.0, available):.3g} m/s^2 against friction"
+        allowed = f"above a m + friction, {text(asked * m.mass + m.coulomb, 'N')}"
+        consequence = "the carriage cannot follow the velocity table and runs past its target"
+        yield Caution("force at the current limit", value, allowed, consequence, gentler)
     if m.switch_deceleration >= available > 0:
         yield Caution(
             "deceleration from the change of mode",
@@ -278,13 +252,9 @@ def _end_of_move(m: PhaseFigures) -> Iterator[Caution]:
             "raise method.threshold, or lower method.table_acceleration",
         )
     if ready < m.switch_time:
-        yield Caution(
-            "method.ready_time",
-            text(ready, "s"),
-            f"at least the time of an even stop from the change of mode, {text(m.switch_time, 's')}",
-            "the axis says that it is ready before it stands",
-            remedy.least("method.ready_time", m.switch_time),
-        )
+        value, advice = text(ready, "s"), remedy.least("method.ready_time", m.switch_time)
+        allowed = f"at least the time of an even stop from the change of mode, {text(m.switch_time, 's')}"
+        yield Caution("method.ready_time", value, allowed, "the axis says that it is ready before it stands", advice)
 
 
 def _speed(m: PhaseFigures) -> Iterator[Caution]:
@@ -292,37 +262,21 @@ def _speed(m: PhaseFigures) -> Iterator[Caution]:
     spec, top, most = m.spec, m.top_speed, (1 << (m.spec.method.speed_bits - 1)) - 1
     reached = spec.peak_count + OVERSHOOT
     if top < m.peak_speed:
-        yield Caution(
-            "supply",
-            f"enough for {text(max(0.0, top), 'm/s')}",
-            f"enough for the peak of the velocity table, {text(m.peak_speed, 'm/s')}",
-            "back-EMF and friction leave no voltage for more: the carriage never gets to the table's speed",
-            remedy.most("limits.speed", top, "raise drive.supply") if top > 0 else "raise drive.supply",
-        )
+        allowed = f"enough for the peak of the velocity table, {text(m.peak_speed, 'm/s')}"
+        consequence = "back-EMF and friction leave no voltage for more: the carriage never gets to the table's speed"
+        advice = remedy.most("limits.speed", top, "raise drive.supply") if top > 0 else "raise drive.supply"
+        yield Caution("supply", f"enough for {text(max(0.0, top), 'm/s')}", allowed, consequence, advice)
+    lost, over = "pulses are lost and the move ends early or late", "the speed word runs over and drives the wrong way"
     for name, largest, consequence, other in (
-        (
-            "slew limit of the tracker",
-            m.slew_backward / m.speed_per_count,
-            "pulses are lost and the move ends early or late",
-            "raise clock.oscillator",
-        ),
-        (
-            "range of the speed word",
-            most,
-            "the speed word runs over and drives the wrong way",
-            "raise method.speed_bits",
-        ),
+        ("slew limit of the tracker", m.slew_backward / m.speed_per_count, lost, "raise clock.oscillator"),
+        ("range of the speed word", most, over, "raise method.speed_bits"),
     ):
         if reached > largest:
             slower = math.floor(largest) - OVERSHOOT + 1
             fitting = slower * m.speed_per_count * (1 - BARELY)
-            yield Caution(
-                f"speed above the table, {name}",
-                f"up to {spec.peak_count} + {OVERSHOOT} counts per sample",
-                f"up to {largest:.4g} counts",
-                consequence,
-                remedy.most("limits.speed", fitting, other) if slower >= 2 else other,
-            )
+            value = f"up to {spec.peak_count} + {OVERSHOOT} counts per sample"
+            advice = remedy.most("limits.speed", fitting, other) if slower >= 2 else other
+            yield Caution(f"speed above the table, {name}", value, f"up to {largest:.4g} counts", consequence, advice)
 
 
 def _settling(m: PhaseFigures) -> Iterator[Caution]:
@@ -330,21 +284,15 @@ def _settling(m: PhaseFigures) -> Iterator[Caution]:
     k1, k2, k3 = m.spec.method.position_gains
     rest = m.breakaway_counts / (k1 * k3)
     if m.gain_margin < LEAST_GAIN_MARGIN:
-        yield Caution(
-            "gain margin of the position loop",
-            f"{m.gain_margin:.3g}",
-            f"at least {LEAST_GAIN_MARGIN:g}",
-            "the carriage oscillates about its target, or barely comes to rest",
-            "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)",
-        )
+        value, consequence = f"{m.gain_margin:.3g}", "the carriage oscillates about its target, or barely comes to rest"
+        advice = "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)"
+        yield Caution("gain margin of the position loop", value, f"at least {LEAST_GAIN_MARGIN:g}", consequence, advice)
     if rest > 2:
-        yield Caution(
-            "drive that breaks the carriage loose",
-            f"{m.breakaway_counts:.3g} counts, {rest:.3g} steps of error",
-            f"up to 2 steps, {2 * k1 * k3} counts",
-            "friction holds the carriage off its target until the integral moves it",
-            put("method.position_gains", [math.ceil(m.breakaway_counts / (2 * k3)), k2, k3]),
-        )
+        value = f"{m.breakaway_counts:.3g} counts, {rest:.3g} steps of error"
+        allowed = f"up to 2 steps, {2 * k1 * k3} counts"
+        consequence = "friction holds the carriage off its target until the integral moves it"
+        advice = put("method.position_gains", [math.ceil(m.breakaway_counts / (2 * k3)), k2, k3])
+        yield Caution("drive that breaks the carriage loose", value, allowed, consequence, advice)
 
 
 def _integral(m: PhaseFigures) -> Iterator[Caution]:
@@ -354,29 +302,19 @@ def _integral(m: PhaseFigures) -> Iterator[Caution]:
         return
     if m.integral_rate > INTEGRAL_PACE:
         tap = clock.integrate_tap + math.ceil(math.log2(m.integral_rate / INTEGRAL_PACE))
-        yield Caution(
-            "pace of the integral",
-            f"{m.integral_rate:.3g} steps within 1 rad of the position loop",
-            f"up to {INTEGRAL_PACE:g}",
-            "under load the integral hunts for ever",
-            remedy.least("clock.integrate_tap", tap, "raise KP1 of method.position_gains"),
-        )
+        value, allowed = f"{m.integral_rate:.3g} steps within 1 rad of the position loop", f"up to {INTEGRAL_PACE:g}"
+        advice = remedy.least("clock.integrate_tap", tap, "raise KP1 of method.position_gains")
+        yield Caution("pace of the integral", value, allowed, "under load the integral hunts for ever", advice)
     if method.dead_band == 0:
-        yield Caution(
-            "method.dead_band",
-            "0 with the integrator in use",
-            "at least 1 step",
-            "the integral never rests: the carriage hunts across the boundary",
-            put("method.dead_band", 1),
-        )
+        value = "0 with the integrator in use"
+        consequence = "the integral never rests: the carriage hunts across the boundary"
+        yield Caution("method.dead_band", value, "at least 1 step", consequence, put("method.dead_band", 1))
     if method.integral_limit * k3 < m.breakaway_counts:
-        yield Caution(
-            "method.integral_limit",
-            f"{method.integral_limit}, worth {method.integral_limit * k3} counts of drive",
-            f"enough to break the carriage loose, {m.breakaway_counts:.3g} counts",
-            "the integral cannot bring a carriage that friction holds to its target",
-            remedy.least("method.integral_limit", m.breakaway_counts / k3, "lower friction"),
-        )
+        value = f"{method.integral_limit}, worth {method.integral_limit * k3} counts of drive"
+        allowed = f"enough to break the carriage loose, {m.breakaway_counts:.3g} counts"
+        consequence = "the integral cannot bring a carriage that friction holds to its target"
+        advice = remedy.least("method.integral_limit", m.breakaway_counts / k3, "lower friction")
+        yield Caution("method.integral_limit", value, allowed, consequence, advice)
 
 
 def _detector(m: PhaseFigures) -> Iterator[Caution]:
@@ -422,10 +360,7 @@ def _burst(m: PhaseFigures) -> Iterator[Caution]:
         )
     rate = lines.inserted + lines.removed
     if rate * longest > max(1, expected):
-        yield Caution(
-            "pulses of disturbance.lines",
-            f"{rate * longest:.3g} in the longest move, {text(longest, 's')}",
-            expectation,
-            "the protection is not said to stand so many: a long move may end in another pitch",
-            f"lower disturbance.lines.inserted and removed to {at_most(max(1, expected) / longest, 'Hz')} together",
-        )
+        value = f"{rate * longest:.3g} in the longest move, {text(longest, 's')}"
+        consequence = "the protection is not said to stand so many: a long move may end in another pitch"
+        advice = f"lower disturbance.lines.inserted and removed to {at_most(max(1, expected) / longest, 'Hz')} together"
+        yield Caution("pulses of disturbance.lines", value, expectation, consequence, advice)

@@ -16,7 +16,7 @@ from detent.control.clocks import (
     reference_period,
     sample_strobe,
 )
-from detent.control.guard import Guard, GuardParams, await_arrival, enable_guard, is_overdue, watch
+from detent.control.guard import Guard, GuardParams, enable_guard, is_overdue, watch
 from detent.control.phase_law import Law, LawParams, drive_word, integrate
 from detent.control.phase_sequencer import (
     ACQUIRE,
@@ -33,42 +33,19 @@ from detent.control.phase_sequencer import (
     setpoint,
     take_command,
 )
-from detent.kernel.compiled import copy_back, local_copy, unlikely
+from detent.kernel.compiled import unlikely
 from detent.kernel.loop import controls
 from detent.kernel.registers import CONTROLLER, PLANT, Registers, block, i1, i4, i8, register, u1, u2
 from detent.kernel.step import hot_step, step
 from detent.sensing.counted_speed import PulseCounter, PulseCounterParams, add_pulses, close_window
 from detent.sensing.phase_converters import (
-    AbsoluteConverter,
-    AbsoluteParams,
-    Carrier,
-    CarrierParams,
-    TrackingConverter,
-    TrackingParams,
+    ConverterParams,
+    Converters,
     absolute_error,
-    count_absolute,
+    convert,
     count_carrier,
-    count_reference,
-    emit_pulse,
     reset_carrier,
-    shift_samples,
 )
-
-
-class ConverterParams(Registers):
-    """Everything that the clocked logic between comparator and pulses reads."""
-
-    carrier: CarrierParams = block("carrier generator")
-    tracking: TrackingParams = block("tracking converter")
-    absolute: AbsoluteParams = block("absolute converter")
-
-
-class Converters(Registers):
-    """The logic that runs in every tick: carrier, tracking and absolute converter."""
-
-    carrier: Carrier = block("carrier generator")
-    tracking: TrackingConverter = block("tracking converter")
-    absolute: AbsoluteConverter = block("absolute converter")
 
 
 class PhaseControllerParams(Registers):
@@ -114,15 +91,6 @@ class PhaseLines(Registers):
     )
     request: i1 = register("request of the PWM in its second: 1 plus, -1 minus, 0 neither", by=CONTROLLER)
     enable: u1 = register("1 once the bridge may drive", by=CONTROLLER)
-
-
-@hot_step
-def convert(p: ConverterParams, r: Converters, ps: int) -> None:
-    """Both converters for one tick; the carrier has counted, and `ps` is the comparator's answer to it."""
-    count_reference(p.tracking, r.tracking)
-    count_absolute(p.absolute, r.absolute, ps)
-    emit_pulse(p.tracking, r.tracking)
-    shift_samples(p.tracking, r.tracking, ps)
 
 
 @step
@@ -244,12 +212,6 @@ def command(c: PhaseController, distance: int, backward: int) -> None:
 
 
 @step
-def arrive_within(c: PhaseController, windows: int) -> None:
-    """Ready must rise within so many windows of the speed detector; 0 lifts it."""
-    await_arrival(c.guard, windows)
-
-
-@step
 def acquire(c: PhaseController) -> None:
     """Leave a fault: once the tracker is silent the bridge drives again."""
     c.sequencer.state, c.sequencer.last_pulse = ACQUIRE, reference_period(c.clocks)
@@ -271,20 +233,3 @@ def power_on(c: PhaseController) -> None:
     c.sequencer.mode = POSITION_MODE
     c.sequencer.direction = 1
     c.wake = NEVER
-
-
-@step
-def run_converters(p: ConverterParams, r: Converters, start: int, rate: int, periods: int) -> int:
-    """Converters alone, the phase of the secondary at `start` and growing by `rate` per period [2^-32 turn]."""
-    local = local_copy(r)
-    net = 0
-    phase = start
-    shift = 29 - p.carrier.shift  # 32 - log2 N
-    for _ in range(periods):
-        count_carrier(p.carrier, local.carrier)
-        ps = (phase + (local.carrier.count << shift)) >> 31 & 1
-        convert(p, local, ps)
-        net += local.tracking.plus - local.tracking.minus
-        phase += rate
-    copy_back(r, local)
-    return net

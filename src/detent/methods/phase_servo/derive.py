@@ -77,11 +77,6 @@ class PhaseFigures:
         # Steps by which a running integral moves the carriage within 1 rad of the position loop.
         self.integral_rate = spec.clock.oscillator / 2**spec.clock.integrate_tap / k1 / self.position_loop
 
-    @property
-    def peak_distance(self) -> int:
-        """Smallest distance at which the table is at its peak [steps]."""
-        return bisect_left(range(TABLE_ENTRIES - 1), self.spec.peak_count, key=self.spec.table_velocity)
-
     @cached_property
     def gain_margin(self) -> float:
         """By how much the gain may grow until position mode no longer settles, the winding's lag neglected."""
@@ -111,8 +106,8 @@ def weakest_output(spec: PhaseServoSpec) -> float:
 
 def derive(spec: PhaseServoSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = PhaseFigures(spec)
-    return (*_scales(machine), *_tracker(machine), *_table(machine), *_motor(machine), *_loops(machine))
+    m = PhaseFigures(spec)
+    return (*_logic(m), *_motion(m), *_loops(m))
 
 
 def _speed(name: str, value: float, formula: str, step: float) -> Derived:
@@ -120,9 +115,9 @@ def _speed(name: str, value: float, formula: str, step: float) -> Derived:
     return Derived(name, value, "m/s", text, formula)
 
 
-def _scales(machine: PhaseFigures) -> Iterator[Derived]:
-    """Lengths, clocks, and what one count of each word is."""
-    spec = machine.spec
+def _logic(m: PhaseFigures) -> Iterator[Derived]:
+    """Lengths, clocks, what one count of each word is; how fast the carriage may be, and how far it may go."""
+    spec = m.spec
     yield quantity_figure("pitch", spec.pitch, "m", "pulley circumference / pitches per revolution")
     yield quantity_figure("step", spec.step, "m", "pitch / N")
     yield quantity_figure("reference clock", 1 / spec.tick, "Hz", "oscillator / 2, the base tick")
@@ -130,20 +125,15 @@ def _scales(machine: PhaseFigures) -> Iterator[Derived]:
     yield quantity_figure("speed sample period", spec.sample_period, "s", f"2^{spec.clock.sample_tap} / oscillator")
     period = 2**spec.clock.integrate_tap / spec.clock.oscillator
     yield quantity_figure("integration period", period, "s", f"2^{spec.clock.integrate_tap} / oscillator")
-    yield quantity_figure("one count of the drive word", machine.volts_per_count, "V", "2 ES / 2^M")
+    yield quantity_figure("one count of the drive word", m.volts_per_count, "V", "2 ES / 2^M")
     k3 = spec.method.position_gains[2]
-    yield quantity_figure("one unit of the integral", k3 * machine.volts_per_count, "V", "KP3 counts of the drive word")
-    yield _speed("one count of the speed word", machine.speed_per_count, "step / Tv", spec.step)
-
-
-def _tracker(machine: PhaseFigures) -> Iterator[Derived]:
-    """How fast the carriage may be, and how far it may go."""
-    spec = machine.spec
-    yield _speed("slew limit, right", machine.slew_forward, "f / (N - 1) steps/s", spec.step)
-    yield _speed("slew limit, left", machine.slew_backward, "f / (N + 1) steps/s", spec.step)
-    share = machine.peak_speed / machine.slew_backward
+    yield quantity_figure("one unit of the integral", k3 * m.volts_per_count, "V", "KP3 counts of the drive word")
+    yield _speed("one count of the speed word", m.speed_per_count, "step / Tv", spec.step)
+    yield _speed("slew limit, right", m.slew_forward, "f / (N - 1) steps/s", spec.step)
+    yield _speed("slew limit, left", m.slew_backward, "f / (N + 1) steps/s", spec.step)
+    share = m.peak_speed / m.slew_backward
     formula = f"{spec.peak_count} counts x step / Tv, {100 * share:.3g} % of the slew limit"
-    yield _speed("peak speed", machine.peak_speed, formula, spec.step)
+    yield _speed("peak speed", m.peak_speed, formula, spec.step)
     bits = spec.peak_count.bit_length() + 1
     yield Derived("speed word", bits, "bit", f"{bits} of {spec.method.speed_bits} bits", "peak and sign")
     steps = spec.limits.travel / spec.step
@@ -153,53 +143,44 @@ def _tracker(machine: PhaseFigures) -> Iterator[Derived]:
     yield Derived("spurious pulses it stands", spare, "count", f"up to {spare} in a move", "below N/2 - threshold")
 
 
-def _table(machine: PhaseFigures) -> Iterator[Derived]:
-    """The velocity table and what happens at its end."""
-    spec = machine.spec
-    distance = machine.peak_distance
+def _motion(m: PhaseFigures) -> Iterator[Derived]:
+    """The velocity table and what happens at its end; forces, voltages, and how fast things happen."""
+    spec = m.spec
+    distance = bisect_left(range(TABLE_ENTRIES - 1), spec.peak_count, key=spec.table_velocity)
     formula = f"floor(sqrt(2 a n step) / step x Tv + 1/2), n up to {TABLE_ENTRIES - 1}"
     text = f"{spec.peak_count} counts from {distance} steps on"
     yield Derived("peak of the velocity table", distance, "step", text, formula)
     formula = "entry above the threshold + 1/2 count"
-    yield _speed("speed at the change of mode", machine.switch_speed, formula, spec.step)
-    way = format_quantity(machine.switch_distance, "m")
+    yield _speed("speed at the change of mode", m.switch_speed, formula, spec.step)
+    way = format_quantity(m.switch_distance, "m")
     yield quantity_figure(
-        "deceleration from there", machine.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
+        "deceleration from there", m.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
     )
-    yield quantity_figure("time from there", machine.switch_time, "s", f"2 x {way} / v, braking evenly")
-
-
-def _motor(machine: PhaseFigures) -> Iterator[Derived]:
-    """Forces, voltages, and how fast things happen."""
-    supply, resistance = machine.spec.drive.supply, machine.resistance
-    yield quantity_figure("moving mass", machine.mass, "kg", "carriage + (rotor + pulley) / r^2")
-    yield quantity_figure("force at the current limit", machine.force_limit, "N", "limits.effort x k")
-    yield quantity_figure("acceleration against friction", machine.acceleration, "m/s^2", "(force - coulomb) / m")
-    yield quantity_figure("stall current", machine.stall_current, "A", "supply / R")
-    emf = machine.volts_per_speed * machine.peak_speed
+    yield quantity_figure("time from there", m.switch_time, "s", f"2 x {way} / v, braking evenly")
+    supply, resistance = spec.drive.supply, m.resistance
+    yield quantity_figure("moving mass", m.mass, "kg", "carriage + (rotor + pulley) / r^2")
+    yield quantity_figure("force at the current limit", m.force_limit, "N", "limits.effort x k")
+    yield quantity_figure("acceleration against friction", m.acceleration, "m/s^2", "(force - coulomb) / m")
+    yield quantity_figure("stall current", m.stall_current, "A", "supply / R")
+    emf = m.volts_per_speed * m.peak_speed
     yield quantity_figure("back-EMF at peak speed", emf, "V", f"Ke / r x peak speed, of {format_quantity(supply, 'V')}")
-    constant = machine.spec.motor.inductance / resistance
+    constant = spec.motor.inductance / resistance
     yield quantity_figure("electrical time constant", constant, "s", "L / R")
-    ratio = machine.pwm_hz / machine.corner_hz
-    text = f"{format_quantity(machine.pwm_hz, 'Hz')} ({ratio:.3g} x the electrical corner)"
-    formula = f"oscillator / 2^M, corner R / (2 pi L) = {format_quantity(machine.corner_hz, 'Hz')}"
-    yield Derived("PWM frequency", machine.pwm_hz, "Hz", text, formula)
+    ratio = m.pwm_hz / m.corner_hz
+    text = f"{format_quantity(m.pwm_hz, 'Hz')} ({ratio:.3g} x the electrical corner)"
+    formula = f"oscillator / 2^M, corner R / (2 pi L) = {format_quantity(m.corner_hz, 'Hz')}"
+    yield Derived("PWM frequency", m.pwm_hz, "Hz", text, formula)
 
 
-def _loops(machine: PhaseFigures) -> Iterator[Derived]:
+def _loops(m: PhaseFigures) -> Iterator[Derived]:
     """Bandwidths and what friction is worth."""
-    text = "{:.4g} rad/s"
-    value = machine.velocity_loop
-    formula = "KS2 KS3 x (count of the drive word) k / (R m) / (count of the speed word)"
-    yield Derived("velocity loop", value, "rad/s", text.format(value), formula)
-    value = machine.position_loop
-    formula = "sqrt(KP1 KP3 x (count of the drive word) k / (R m) / step)"
-    yield Derived("position loop", value, "rad/s", text.format(value), formula)
-    value = machine.damping
+    for name, value, formula in (
+        ("velocity loop", m.velocity_loop, "KS2 KS3 x (count of the drive word) k / (R m) / (count of the speed word)"),
+        ("position loop", m.position_loop, "sqrt(KP1 KP3 x (count of the drive word) k / (R m) / step)"),
+    ):
+        yield Derived(name, value, "rad/s", f"{value:.4g} rad/s", formula)
     formula = "(KP2 KP3 velocity feedback + back-EMF) / (2 x position loop), without delays"
-    yield Derived("damping of the position loop", value, "", f"{value:.3g}", formula)
-    yield count_figure(
-        "drive that breaks loose", machine.breakaway_counts, "static x R / k / (count of the drive word)"
-    )
-    k1, _, k3 = machine.spec.method.position_gains
+    yield Derived("damping of the position loop", m.damping, "", f"{m.damping:.3g}", formula)
+    yield count_figure("drive that breaks loose", m.breakaway_counts, "static x R / k / (count of the drive word)")
+    k1, _, k3 = m.spec.method.position_gains
     yield count_figure("drive of one step", k1 * k3, "KP1 x KP3")

@@ -3,15 +3,16 @@
 import math
 
 from detent.axisfile.blocks import describe_fault
-from detent.control.guard import NO_ARRIVAL
+from detent.axisfile.tables import DisturbanceTable
+from detent.control.guard import NO_ARRIVAL, await_arrival
 from detent.control.phase_sequencer import POSITION_MODE
 from detent.errors import AxisError
-from detent.methods.moves.host import Destination, Host, Wrong, refused_words
 from detent.methods.moves.job import Move
-from detent.methods.phase_servo import system as phase_servo
+from detent.methods.moves.run import Destination, Host, Wrong
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.controller import arrive_within, command, take_ready
-from detent.methods.phase_servo.schema import DisturbanceTable, PhaseServoSpec
+from detent.methods.phase_servo.controller import command, take_ready
+from detent.methods.phase_servo.schema import PhaseServoSpec
+from detent.methods.phase_servo.system import PhaseServo, be_ready, switch_on
 from detent.record.machine import AnyRecorder, Machine
 from detent.record.recorder import Recorder
 from detent.units import format_quantity
@@ -28,21 +29,15 @@ LOOK = 1e-3  # how often it looks whether position mode has been entered [s]
 UNDISTURBED = DisturbanceTable()
 
 
-def phase_servo_machine(
-    spec: PhaseServoSpec, recorder: AnyRecorder | None = None
-) -> Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo]:
-    """Phase servo at power-on."""
-    p, r = build_phase_servo(spec), phase_servo.PhaseServo()
-    phase_servo.switch_on(p, r, spec.mechanics.start_position, spec.detector.seed)
-    return Machine(p, r, spec.tick, recorder)
-
-
 class PhaseHost(Host):
     """Host of a phase servo: set strobe with direction and distance, ready, stop."""
 
+    own_pace = "this axis takes its speed from the velocity table"
+
     def __init__(self, spec: PhaseServoSpec, recorder: AnyRecorder | None = None) -> None:
-        home = round(spec.mechanics.start_position / spec.pitch) * spec.pitch
-        machine = phase_servo_machine(spec, recorder)
+        p, r, start = build_phase_servo(spec), PhaseServo(), spec.mechanics.start_position
+        switch_on(p, r, start, spec.detector.seed)
+        machine, home = Machine(p, r, spec.tick, recorder), round(start / spec.pitch) * spec.pitch
         super().__init__(spec, machine, grid=spec.pitch, tolerance=2 * spec.step, home=home)
         self._counts = 0
 
@@ -74,11 +69,12 @@ class PhaseHost(Host):
 
     def wait(self, seconds: float) -> bool:
         """Wait until ready; False when it is not within `seconds`."""
-        windows = math.ceil(seconds / self.spec.sample_period)
-        arrive_within(self.controller, windows)
-        self.machine.pass_time((windows + 1) * self.spec.sample_period)
+        guard, period = self.controller.guard, self.spec.sample_period
+        windows = math.ceil(seconds / period)
+        await_arrival(guard, windows)
+        self.machine.pass_time((windows + 1) * period)
         ready = bool(take_ready(self.controller))
-        arrive_within(self.controller, 0)
+        await_arrival(guard, 0)
         return ready
 
     def problems(self, to: Destination, asked: float) -> Wrong:
@@ -88,16 +84,15 @@ class PhaseHost(Host):
             near = f"{format_quantity(low, 'm', 7)} or {format_quantity(low + self.grid, 'm', 7)}"
             grid = f"a multiple of the detector's pitch, {format_quantity(self.grid, 'm', 6)}"
             yield to.move.place_key, format_quantity(asked, "m", 7), grid, f"move to a positioning point: {near}"
-        yield from refused_words(to.move, "this axis takes its speed from the velocity table")
+        yield from super().problems(to, asked)
 
     @property
     def failure(self) -> str:
         """Why the bridge is off; empty while it drives."""
         if self.controller.guard.code in {0, NO_ARRIVAL}:
             return ""
-        return describe_fault(
-            self.controller.guard, self.spec.protection, format_quantity(self.spec.limits.speed, "m/s")
-        )
+        speed = format_quantity(self.spec.limits.speed, "m/s")
+        return describe_fault(self.controller.guard, self.spec.protection, speed)
 
     def in_counts(self, error: float) -> str:
         """How far off that is, in steps, and whether it is on another positioning point."""
@@ -134,10 +129,8 @@ class PhaseBench:
             disturbance=disturbance,
         )
         self.pitches, self.target = pitches, (begin + pitches) * spec.pitch
-        self.machine: Machine[phase_servo.PhaseServoParams, phase_servo.PhaseServo] = phase_servo_machine(
-            self.spec, recorder
-        )
-        phase_servo.be_ready(self.machine.params, self.machine.state)
+        self.machine = PhaseHost(self.spec, recorder).machine
+        be_ready(self.machine.params, self.machine.state)
 
     @property
     def displacement(self) -> float:

@@ -8,7 +8,7 @@ from detent.methods.phase_servo.controller import PhaseLines
 from detent.plant.drive_train import DriveTrain, DriveTrainParams, move_averaged
 from detent.plant.push import Push, push_force
 from detent.sensing.gauge import Gauge, read_gauge
-from detent.sensing.interference import Interference, InterferenceParams, interfere, lose, take_away
+from detent.sensing.interference import Interference, InterferenceParams, count_losses, interfere
 from detent.sensing.phase_detector import Detector, DetectorParams, compare
 
 
@@ -44,15 +44,6 @@ def disturb(p: PhasePlantParams, plant: PhasePlant, lines: PhaseLines, tick: int
     lines.mask = n.lose_sample > 0
 
 
-@step
-def count_losses(n: Interference, lines: PhaseLines) -> None:
-    """What the lines have lost in this tick, noise need not take any more."""
-    if lines.swallowed:
-        take_away(n)
-    if lines.missed:
-        lose(n)
-
-
 @hot_step
 def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, tick: int) -> None:
     """What the electronics see in this tick; the comparator answers to the carrier's next count, that of this CK1."""
@@ -65,7 +56,7 @@ def sense(p: PhasePlantParams, plant: PhasePlant, x: float, lines: PhaseLines, t
 def move(p: PhasePlantParams, plant: PhasePlant, train: DriveTrain, lines: PhaseLines, tick: int) -> None:
     """The machine moves through the tick."""
     if unlikely(lines.swallowed + lines.missed > 0):
-        count_losses(plant.interference, lines)
+        count_losses(plant.interference, lines.swallowed, lines.missed)
     sense_current(p.bridge, plant.bridge, train.current)
     first, second = (lines.first_request, lines.request) if lines.enable else (0, 0)
     drive_two(p.bridge, plant.bridge, first, second)

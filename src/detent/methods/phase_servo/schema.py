@@ -4,7 +4,7 @@ Sections in brackets are those of the phase-servo specification; a step is a pit
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le
 from pydantic import Field
@@ -12,11 +12,10 @@ from pydantic import Field
 from detent.axisfile.tables import (
     AxisSpec,
     AxisTable,
+    DisturbanceTable,
     FrictionTables,
-    InterferenceTable,
     MotorTable,
     ProtectionTable,
-    PushTable,
     breaking_effort,
 )
 from detent.files.fields import Table, optional, required
@@ -39,6 +38,14 @@ from detent.files.quantities import (
 TABLE_ENTRIES = 4096  # entries of the velocity table at most (`control.phase_sequencer`)
 
 Gain = Annotated[int, Ge(1), Le(1000)]
+SPEED, POSITION = ([1, 1, 16], [1, 1, 8]), ([4, 16, 1], [3, 6, 1])
+"""Gains of each mode by default, and with the literal order of clocks."""
+
+
+def _gains(doc: str, gains: tuple[list[int], list[int]]) -> Any:
+    """Declare the three gains of a mode."""
+    derived, allowed = "{}, with the literal order {}".format(*gains), "three whole numbers from 1 to 1000"
+    return optional(doc, [], derived=derived, allowed=allowed, min_length=3, max_length=3)
 
 
 class PhaseServoAxisTable(AxisTable, frozen=True):
@@ -94,11 +101,7 @@ class DetectorTable(Table, frozen=True):
     gain_error: Percentage = optional("amplitude of the first winding over the second", 0.0, ge=-0.5, le=0.5)
     # The bounds are 30 deg, which reads back a rounding error above math.radians(30).
     quadrature_error: Angle = optional(
-        "by how much the windings miss 90 deg",
-        0.0,
-        allowed="an angle from -30 deg to 30 deg",
-        ge=-0.5236,
-        le=0.5236,
+        "by how much the windings miss 90 deg", 0.0, allowed="an angle from -30 deg to 30 deg", ge=-0.5236, le=0.5236
     )
     amplitude: Percentage = optional(
         "amplitude of the secondary over its nominal: a weaker one lets offset and noise displace the edges farther",
@@ -140,21 +143,9 @@ class MethodTable(Table, frozen=True):
         "pulses that noise may add or remove in one move, for the protection rule", 20, ge=0, le=1000
     )
     table_acceleration: Acceleration = optional("deceleration the velocity table is made for", 10.0, gt=0.0, le=1e4)
-    speed_gains: list[Gain] = optional(
-        "KS1, KS2, KS3: gains of setpoint, speed word and sum in speed mode (3.9)",
-        [],
-        derived="[1, 1, 16], with the literal order [1, 1, 8]",
-        allowed="three whole numbers from 1 to 1000",
-        min_length=3,
-        max_length=3,
-    )
-    position_gains: list[Gain] = optional(
-        "KP1, KP2, KP3: gains of error, speed word and sum in position mode (3.9)",
-        [],
-        derived="[4, 16, 1], with the literal order [3, 6, 1]",
-        allowed="three whole numbers from 1 to 1000",
-        min_length=3,
-        max_length=3,
+    speed_gains: list[Gain] = _gains("KS1, KS2, KS3: gains of setpoint, speed word and sum in speed mode (3.9)", SPEED)
+    position_gains: list[Gain] = _gains(
+        "KP1, KP2, KP3: gains of error, speed word and sum in position mode (3.9)", POSITION
     )
     speed_bits: int = optional("width of the speed counter", 8, ge=4, le=16)
     corrector: bool = optional("no zero while settling, dead band at stop (3.8)", default=True)
@@ -184,13 +175,6 @@ class PrintTable(Table, frozen=True):
         le=10.0,
     )
     hammer_time: Time = optional("time the carriage stands for a character after ready", 8e-3, ge=0.0, le=1.0)
-
-
-class DisturbanceTable(Table, frozen=True):
-    """What the axis does not know of."""
-
-    push: PushTable | None = None
-    lines: InterferenceTable = Field(default_factory=InterferenceTable)
 
 
 class PhaseServoSpec(AxisSpec, frozen=True):
@@ -256,10 +240,7 @@ def fill_derived(spec: PhaseServoSpec) -> PhaseServoSpec:
         mechanics={"start_position": 0.1 * travel},
         detector={"lag_counts": spec.detector.counts // 4 - 1},
         clock={"integrate_tap": 12 if literal else 13, "sample_tap": 13 if literal else 12},
-        method={
-            "speed_gains": [1, 1, 8] if literal else [1, 1, 16],
-            "position_gains": [3, 6, 1] if literal else [4, 16, 1],
-        },
+        method={"speed_gains": SPEED[literal], "position_gains": POSITION[literal]},
         protection={"stuck_effort": breaking_effort(static, stall)},
         printing={"left_margin": min(INCH, travel / 2), "character_pitch": character},
     )

@@ -1,10 +1,9 @@
 """The axis at power-on, what commands it, and what it shows of a move."""
 
 from detent.axisfile.blocks import fill_slide
-from detent.methods.moves.host import Host
 from detent.methods.moves.job import one_move
 from detent.methods.moves.page import MoveView
-from detent.methods.moves.run import run_moves
+from detent.methods.moves.run import Host, run_moves
 from detent.page.chart import Curve, Panel
 from detent.page.frame import TableComparison
 from detent.page.table import TextTable

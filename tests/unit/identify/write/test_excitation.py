@@ -15,8 +15,7 @@ from detent.identify.fit.verdict import Refusal
 from detent.identify.write.outputs import RAMPS, REVERSALS, SLOW, SPEEDS, cascade_spec, excitation_job, missing_parts
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.moves.job import MoveJob
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import MoveJob, load_moves
 
 pytestmark = pytest.mark.compiled
 

@@ -11,6 +11,7 @@ import pytest
 from tests.bad_files import example_text
 from tests.cascade_rig import Rig
 from tests.difference import diff
+from tests.reference import reference_rows
 
 from detent.files.source import parse_source
 from detent.methods.cascade.build import (
@@ -24,7 +25,6 @@ from detent.methods.cascade.checks import find_cautions
 from detent.methods.cascade.derive import derive
 from detent.methods.cascade.system import MAX_RATE
 from detent.methods.load import axis_of
-from detent.methods.reference import reference_rows
 from detent.planning.profile import MotionLimits, plan_move
 from detent.plant.linear_two_mass import fastest_rate
 

@@ -15,8 +15,7 @@ from detent.methods.cascade.run import (
     run_cascade_moves,
 )
 from detent.methods.load import load_spec
-from detent.methods.moves.job import Move, MoveJob
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import Move, MoveJob, load_moves
 from detent.record.recorder import Recorder, choose_leaves
 
 pytestmark = pytest.mark.compiled

@@ -9,14 +9,14 @@ from functools import cache
 
 import pytest
 from tests.filtered_servo_rig import EXAMPLE
+from tests.reference import reference_rows
 
 from detent.axisfile.tables import MotionProtectionTable
 from detent.control.pulse_generator import PER_PULSE
-from detent.methods.filtered_servo.build import build_filtered_servo, sample_microseconds
-from detent.methods.filtered_servo.controller import acknowledge, go_to
-from detent.methods.filtered_servo.host import filtered_servo_machine
+from detent.methods.filtered_servo.build import build_filtered_servo
+from detent.methods.filtered_servo.controller import go_to
+from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.load import load_spec
-from detent.methods.reference import reference_rows
 from detent.sensing.counted_speed import FIXED, FLOAT, NONE
 
 pytestmark = pytest.mark.compiled
@@ -106,13 +106,13 @@ def test_each_key_of_the_schema_is_tried() -> None:
 def registers_after(overrides: tuple[str, ...]) -> tuple[bytes, ...]:
     """Registers every 5 ms while the axis of `overrides` goes 20 mm to the right, and back."""
     spec = load_spec(EXAMPLE, overrides)
-    machine = filtered_servo_machine(spec)
+    machine = FilteredHost(spec).machine
     machine.pass_ticks(10)
     r, states, moves = machine.state, [], [4000, 0]
     r.controller.event = 1
     while machine.time < 1.2:
         if r.controller.event:
-            acknowledge(r.controller)
+            r.controller.event = 0
             if moves:
                 go_to(r.controller, moves.pop(0), round(spec.limits.speed / spec.pulse * PER_PULSE))
         machine.pass_time(5e-3)
@@ -135,7 +135,7 @@ def test_the_machine_does_not_know(text: str) -> None:
 def test_the_parameters_of_the_default_axis() -> None:
     spec = load_spec(EXAMPLE)
     p = build_filtered_servo(spec)
-    assert sample_microseconds(spec) == 5000
+    assert round(spec.method.sample_period * 1e6) == 5000
     assert (
         p.controller.deviation.gain,
         p.controller.deviation.range,

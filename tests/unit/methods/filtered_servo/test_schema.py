@@ -5,11 +5,11 @@ import math
 import pytest
 from tests.bad_files import check_bad_file, edit, params
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.files.fields import Table, leaf_fields
 from detent.files.problems import dotted
 from detent.methods.filtered_servo.schema import FilteredServoSpec
-from detent.methods.reference import reference_rows
 
 ROWS = {row.key: row for row in reference_rows("filtered_servo")}
 PERIOD = 'sample_period = "5 ms"'

@@ -6,7 +6,7 @@ from tests.filtered_servo_rig import NO_TRACE, PLANT_B, PULSE, START, Rig, plant
 
 from detent.control.deviation_counter import DEVIATION_RANGE, FAULT, RESET, RUN, SPEED_RANGE
 from detent.kernel.loop import advance
-from detent.methods.filtered_servo.controller import CLOCKS, acknowledge, reset, set_period
+from detent.methods.filtered_servo.controller import CLOCKS, reset
 from detent.methods.filtered_servo.system import TICK, FilteredServo, switch_on
 
 RAMP = "method.command_acceleration=1 m/s^2"
@@ -174,7 +174,7 @@ def test_the_axis_says_so_when_it_has_been_in_position_for_its_time():
     assert r.tick - 1 - run["tick"][run["controller.away"] == 1][-1] == rig.p.controller.window_ticks == 2000
     assert r.controller.settling == 0
     assert advance(rig.p, r, 100, *NO_TRACE) == 0, "the loop waits for its host"
-    acknowledge(r.controller)
+    r.controller.event = 0
     rig.run_ticks(10)
     assert advance(rig.p, r, 50_000, *NO_TRACE) == 50_000, "it says so once"
 
@@ -211,14 +211,14 @@ def test_what_counts_as_in_position_is_the_window_and_the_end_of_the_command(win
 def overrun(rig):
     """A command that no slide can follow."""
     rig.go(10**6, rate=200_000)
-    acknowledge(rig.c)
+    rig.c.event = 0
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
 def spin(rig):
     """A slide that moves more pulses in a sample than the counter holds, though nobody asks it to."""
     rig.plant.train.velocity = 40_000 * PULSE
-    acknowledge(rig.c)
+    rig.c.event = 0
     return advance(rig.p, rig.r, 10**5, *NO_TRACE)
 
 
@@ -236,7 +236,7 @@ def test_a_fault_drives_to_zero_current_and_says_why(make, cause, plant):
     )
     assert (r.lines.word, r.plant.amplifier.word, r.plant.train.current) == (0.0, 0.0, 0.0)
     velocity = r.plant.train.velocity
-    acknowledge(r.controller)
+    r.controller.event = 0
     run = rig.record(0.01, ["lines.word", "plant.amplifier.word", "plant.train.current", "plant.train.velocity"])
     assert not run["lines.word"].any()
     assert not run["plant.amplifier.word"].any()
@@ -249,7 +249,7 @@ def test_a_fault_drives_to_zero_current_and_says_why(make, cause, plant):
 def test_a_fault_is_told_once():
     rig = Rig()
     overrun(rig)
-    acknowledge(rig.c)
+    rig.c.event = 0
     assert advance(rig.p, rig.r, 1000, *NO_TRACE) == 1000
     assert (rig.c.event, rig.c.deviation.state) == (0, FAULT)
 
@@ -325,7 +325,7 @@ def test_a_retune_takes_effect_at_the_next_window():
     rig.command_rate(1000)
     rig.run(1.0)
     rig.run_ticks(-rig.r.tick % 500 + 123)
-    set_period(rig.c, 2500)
+    rig.c.clock.demanded = 2500
     level = rig.c.filter.output
     run = rig.record(
         0.0333,

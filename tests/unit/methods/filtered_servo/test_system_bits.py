@@ -13,7 +13,7 @@ from tests.filtered_servo_rig import PLANT_B, PULSE, Rig, plant_a
 from tests.places import ROOT
 
 from detent.control.deviation_counter import FAULT
-from detent.methods.filtered_servo.controller import CLOCKS, go_to, reset, set_period
+from detent.methods.filtered_servo.controller import CLOCKS, go_to, reset
 from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks
 
 RAMP = "method.command_acceleration=1 m/s^2"
@@ -29,10 +29,10 @@ def scenario(*, noise):
     g = rig.c.generator
     actions = [
         (400, lambda: rig.go(300, rate=9000)),
-        (900, lambda: set_period(rig.c, 2770)),
+        (900, lambda: setattr(rig.c.clock, "demanded", 2770)),
         (700, lambda: go_to(rig.c, g.command - 40, g.rate)),
         (300, lambda: rig.go(-500, rate=1037)),
-        (1200, lambda: set_period(rig.c, 5000)),
+        (1200, lambda: setattr(rig.c.clock, "demanded", 5000)),
     ]
     return rig, actions
 
@@ -176,7 +176,7 @@ def run_hash(servo: str) -> str:
     digest = hashlib.sha256(rig.p.snapshot())
     rig.go(400, rate=12_000)
     for demanded in (5000, 1330, 7000):
-        set_period(rig.c, demanded)
+        rig.c.clock.demanded = demanded
         rig.run_ticks(2500)
         digest.update(rig.r.snapshot())
     assert rig.c.deviation.position > 100

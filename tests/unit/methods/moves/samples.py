@@ -1,6 +1,7 @@
 """Made-up runs of moves, a method that shows little of itself, and a trace: small enough to know every number."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class View:
     """A method with one word, which speaks when it is asked to."""
 
     plant = ""
-    name = "wire & pulley"
+    spec = SimpleNamespace(axis=SimpleNamespace(name="wire & pulley"))
     unit = CountUnit(STEP, "step")
     max_speed = 0.35
     signals = ("word",)

@@ -10,8 +10,7 @@ from detent.methods.filtered_servo import method as filtered_method
 from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
-from detent.methods.moves.job import Move, MoveJob, text_job
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import Move, MoveJob, load_moves, text_job
 from detent.methods.moves.run import run_moves
 from detent.methods.phase_servo import method as phase_method
 from detent.methods.phase_servo.host import PhaseHost

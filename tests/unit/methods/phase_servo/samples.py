@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from detent.methods.phase_servo.hold_comparison import HoldCase, HoldComparison
-from detent.methods.phase_servo.noise_comparison import NoiseComparison
+from detent.methods.phase_servo.comparison import HoldCase, HoldComparison, NoiseComparison
 
 STEP = 10e-6
 """A step of the made-up servo [m]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests.phase_servo_rig import EXAMPLE
+from tests.reference import reference_rows
 
 from detent.axisfile.tables import ProtectionTable
 from detent.control.phase_sequencer import NEVER
@@ -17,8 +18,7 @@ from detent.errors import InputError
 from detent.kernel.turn_table import TURN
 from detent.methods.load import load_spec
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.host import phase_servo_machine
-from detent.methods.reference import reference_rows
+from detent.methods.phase_servo.host import PhaseHost
 
 pytestmark = pytest.mark.compiled
 
@@ -117,7 +117,7 @@ def test_each_key_of_the_schema_is_tried() -> None:
 def registers_after(overrides: tuple[str, ...]) -> tuple[bytes, ...]:
     """Registers each millisecond while the axis of `overrides` acquires, goes a pitch to the right, and back."""
     spec = load_spec(EXAMPLE, overrides)
-    machine = phase_servo_machine(spec)
+    machine = PhaseHost(spec).machine
     s, states, moves = machine.state.controller.sequencer, [], [0, 1]
     while machine.time < 0.07:
         machine.pass_time(1e-3)

@@ -90,9 +90,9 @@ def test_every_figure_has_a_text_and_a_formula(figures):
     ],
 )
 def test_the_peak_of_the_table_is_where_the_table_says(load_text, good_text, overrides):
-    spec = load_text(good_text, *overrides).spec
+    axis = load_text(good_text, *overrides)
+    spec, distance = axis.spec, derived(axis)["peak of the velocity table"].value
     table = velocity_table(spec)
-    distance = PhaseFigures(spec).peak_distance
     assert table[distance] == spec.peak_count > table[distance - 1]
     assert table == [spec.table_velocity(n) for n in range(len(table))]
 

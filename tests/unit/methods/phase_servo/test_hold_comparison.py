@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from tests.phase_servo_rig import make_spec
 
-from detent.methods.phase_servo.hold_comparison import compare_hold, push_force
+from detent.methods.phase_servo.comparison import compare_hold, push_force
 
 pytestmark = pytest.mark.compiled
 

@@ -6,8 +6,8 @@ import pytest
 from tests.phase_servo_rig import make_spec
 
 from detent.errors import DetentError
-from detent.methods.phase_servo import noise_comparison
-from detent.methods.phase_servo.noise_comparison import compare_noise, pulse_counts, rest_point
+from detent.methods.phase_servo import comparison
+from detent.methods.phase_servo.comparison import compare_noise, pulse_counts, rest_point
 
 pytestmark = pytest.mark.compiled
 
@@ -60,7 +60,7 @@ def test_plain_data_for_json():
 
 
 def test_progress_rises_and_says_what_is_being_done(monkeypatch):
-    monkeypatch.setattr(noise_comparison, "rest_point", lambda *_: 0.0)
+    monkeypatch.setattr(comparison, "rest_point", lambda *_: 0.0)
     told = []
     compare_noise(make_spec(), progress=lambda share, text: told.append((share, text)))
     shares = [share for share, _ in told]
@@ -96,9 +96,9 @@ def test_a_threshold_of_its_own_has_a_margin_of_its_own():
 
 def test_in_a_short_move_the_pulses_come_on_the_way_too():
     spec = make_spec()
-    begin = noise_comparison._first_pulse(spec, 1)
+    begin = comparison._first_pulse(spec, 1)
     assert begin == pytest.approx(0.25e-3 + (6.7e-3 - 0.25e-3) / 4, rel=0.05)
-    assert noise_comparison._first_pulse(spec, 6) == 5e-3
+    assert comparison._first_pulse(spec, 6) == 5e-3
     assert rest_point(spec, 1, 30, "+", begin) == pytest.approx(-64, abs=1)
     assert abs(rest_point(spec, 1, 30, "+", 20e-3)) < 1  # after the move they do nothing
 

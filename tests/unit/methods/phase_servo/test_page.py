@@ -7,8 +7,7 @@ from tests.unit.methods.moves.samples import record, run_of
 
 import detent
 from detent.methods.load import load_spec
-from detent.methods.moves.job import MoveJob, text_job
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import MoveJob, load_moves, text_job
 from detent.methods.moves.page import POSITION, TARGET, VELOCITY, moves_page
 from detent.methods.moves.run import MoveRun, run_moves
 from detent.methods.moves.summary import move_summary

@@ -5,12 +5,12 @@ import math
 import pytest
 from tests.bad_files import added, check_bad_file, edit, params
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.files.fields import Table, leaf_fields
 from detent.files.problems import dotted
 from detent.kernel.registers import Registers
 from detent.methods.phase_servo.schema import PhaseServoSpec
-from detent.methods.reference import reference_rows
 
 ROWS = {row.key: row for row in reference_rows("phase_servo")}
 

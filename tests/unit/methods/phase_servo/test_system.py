@@ -16,7 +16,7 @@ from detent.control.phase_sequencer import ACQUIRE, HOLD, POSITION_MODE, SETTLE_
 from detent.kernel.loop import advance
 from detent.kernel.step import step
 from detent.methods.phase_servo.build import build_phase_servo
-from detent.methods.phase_servo.host import phase_servo_machine
+from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.phase_servo.system import PhaseServo, PhaseServoParams, be_ready, switch_on, tick
 
 N = 64
@@ -297,7 +297,7 @@ def test_without_the_integrator_it_stays_at_zero():
 
 def test_the_machine_switches_on_as_its_file_says():
     spec = make_spec()
-    machine = phase_servo_machine(spec)
+    machine = PhaseHost(spec).machine
     assert machine.state.plant.train.position == spec.mechanics.start_position
     machine.pass_ticks(10)
     assert machine.time == pytest.approx(2.5e-6)

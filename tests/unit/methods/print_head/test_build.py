@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from tests.print_head_rig import EXAMPLE, TICK
+from tests.reference import reference_rows
 
 from detent.files.fields import leaf_fields, options_of
 from detent.files.problems import dotted
@@ -20,7 +21,6 @@ from detent.methods.print_head.print_job import parse_text
 from detent.methods.print_head.run import print_job
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec
 from detent.methods.print_head.system import PrintHead
-from detent.methods.reference import reference_rows
 from detent.record.recorder import Recorder
 
 pytestmark = pytest.mark.compiled

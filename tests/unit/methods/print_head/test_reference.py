@@ -1,8 +1,7 @@
 """Rows of the reference of the print-head axis."""
 
 import pytest
-
-from detent.methods.reference import reference_rows
+from tests.reference import reference_rows
 
 ROWS = {row.key: row for row in reference_rows("print_head")}
 

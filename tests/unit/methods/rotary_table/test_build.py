@@ -11,6 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 import pytest
+from tests.reference import reference_rows
 
 from detent.control.table_positioner import (
     AS_COMMANDED,
@@ -27,7 +28,6 @@ from detent.control.table_positioner import (
     TURN_COUNTER,
 )
 from detent.methods.load import load_spec
-from detent.methods.reference import reference_rows
 from detent.methods.rotary_table.build import build_rotary_table, start_turns
 from detent.methods.rotary_table.schema import TableProtectionTable
 

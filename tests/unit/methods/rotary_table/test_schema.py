@@ -5,10 +5,10 @@ import math
 import pytest
 from tests.bad_files import added, check_bad_file, edit, params
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.files.fields import Table, held_leaves, leaf_fields
 from detent.files.problems import dotted
-from detent.methods.reference import reference_rows
 from detent.methods.rotary_table.schema import RotaryTableSpec
 
 ROWS = {row.key: row for row in reference_rows("rotary_table")}

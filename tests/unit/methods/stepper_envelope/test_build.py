@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from tests.bad_files import example_text
+from tests.reference import reference_rows
 from tests.stepper_rig import COARSE_FINE, FINE_HZ, LOAD, MAX_HZ, MOTOR, RAMP, rotor_params
 
 from detent.control.step_rule import start_move
 from detent.files.source import parse_source
 from detent.kernel.loop import advance
 from detent.methods.load import axis_of
-from detent.methods.reference import reference_rows
 from detent.methods.stepper_envelope.build import (
     build_stepper,
     instant,

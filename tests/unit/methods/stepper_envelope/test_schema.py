@@ -5,10 +5,10 @@ import math
 import pytest
 from tests.bad_files import check_bad_file, edit, given, params
 from tests.dump import dump_spec
+from tests.reference import reference_rows
 
 from detent.files.fields import held_leaves, leaf_fields
 from detent.files.problems import dotted
-from detent.methods.reference import reference_rows
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 
 ROWS = {row.key: row for row in reference_rows("stepper_envelope")}

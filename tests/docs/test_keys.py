@@ -1,8 +1,8 @@
 """The reference is generated from the declarations, so every key of every method must be declared in full."""
 
 import pytest
+from tests.reference import reference_rows
 
-from detent.methods.reference import reference_rows
 from detent.methods.registry import METHODS
 
 ROWS = [pytest.param(row, id=f"{name}: {row.key}") for name in METHODS for row in reference_rows(name)]

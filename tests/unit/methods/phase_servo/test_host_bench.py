@@ -3,10 +3,9 @@ import math
 import pytest
 from tests.phase_servo_rig import make_spec
 
-from detent.axisfile.tables import BurstTable, InterferenceTable
+from detent.axisfile.tables import BurstTable, DisturbanceTable, InterferenceTable
 from detent.control.phase_sequencer import HOLD, POSITION_MODE
 from detent.methods.phase_servo.host import START, PhaseBench
-from detent.methods.phase_servo.schema import DisturbanceTable
 from detent.methods.phase_servo.system import PhaseServo
 from detent.record.recorder import Recorder
 

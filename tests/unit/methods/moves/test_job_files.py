@@ -6,8 +6,7 @@ import pytest
 
 from detent.errors import MOST_PROBLEMS, InputError
 from detent.files.text import MAX_BYTES
-from detent.methods.moves.job import MOST_MOVES
-from detent.methods.moves.move_file import load_moves
+from detent.methods.moves.job import MOST_MOVES, load_moves
 
 EXAMPLES = files("detent") / "examples"
 INCH = 0.0254
