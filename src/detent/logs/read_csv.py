@@ -98,8 +98,9 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         fitting = _sort_out(table, layout, block, first)
         found: list[NDArray[np.generic]] = []
         wrong: dict[int, str] = {}  # of each row that holds no number where it should, the first such cell
+        across = list(zip(*(block[row] for row in fitting), strict=True)) or [()] * len(layout.names)
         for index in columns:
-            column = [block[row][index] for row in fitting]
+            column = across[index]
             dated = index in layout.moment_columns
             values, bad = read_moments(column) if dated else read_column(column, layout.decimal)
             found.append(values)
@@ -204,7 +205,7 @@ def split_lines(lines: Iterable[str], separator: str) -> Iterator[list[str]]:
         yield from (line.split() for line in lines)
     else:
         reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
-        yield from ([cell.strip() for cell in cells] for cells in reader)
+        yield from (list(map(str.strip, cells)) for cells in reader)
 
 
 def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) -> CsvLayout:

@@ -91,8 +91,8 @@ def _rotated_rows(clock: Values, column: Values, step: float, *, is_partial: boo
         if is_partial:  # where the clock runs in most rows, it is known how evenly
             away = np.abs(own[own_runs] - usual)
             own_runs &= np.abs(own - usual) <= max(_ROUNDING * usual, 3 * float(np.percentile(away, 75)))
-    better = fill_holes(runs, _HOLE)
-    for begin, end in runs_of(better).tolist():
+    stretches = runs_of(fill_holes(runs, _HOLE))
+    for begin, end in stretches[stretches[:, 1] - stretches[:, 0] >= SHORTEST].tolist():
         first, last = _edges(_missed(theirs[begin:end], step), _missed(own[begin:end], step))
         first, last = begin + first, begin + last
         steps = own[first:last]
