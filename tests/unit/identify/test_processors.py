@@ -50,15 +50,7 @@ print(json.dumps([bits, [printed(words) for words in commands]]))
 """
 """Prints what commands print, and bits of a solution that tell one kernel from another."""
 
-DOCUMENTED = [
-    "--set",
-    "mechanics.load_mass=40 kg",
-    "--set",
-    "encoder.resolution=20 nm",
-    "--no-compare",
-    "--trace",
-    "csv",
-]
+DOCUMENTED = ["--set", "mechanics.load_mass=40 kg", "--set", "encoder.resolution=20 nm", "--no-compare"]
 """How docs/how-to/identify-an-axis.md records its axis."""
 
 SERVO = [
@@ -127,7 +119,7 @@ def documented(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def of_the_page(log: str) -> list[str]:
-    return ["identify", f"{log}/trace.csv", "--column", "voltage=controller.law.command", "--axis", "axes/cascade.toml"]
+    return ["identify", f"{log}/trace.h5", "--column", "voltage=controller.law.command", "--axis", "axes/cascade.toml"]
 
 
 def test_the_log_of_the_page_and_recordings(documented: Path) -> None:

@@ -139,4 +139,5 @@ def test_an_angle_is_that_of_the_library_within_its_last_digits(y, x):
     true = math.atan2(y, x) if y else (0.0 if x >= 0.0 else math.pi)
     # Squares of shorter vectors are no longer normal numbers.
     if math.hypot(x, y) > 1e-150 or not y:
-        assert abs(angle_of(y, x) - true) <= 8 * math.ulp(true)
+        # Below the smallest normal number a halving loses digits, which the doubling after it does not bring back.
+        assert abs(angle_of(y, x) - true) <= max(8 * math.ulp(true), 16 * math.ulp(0.0))
