@@ -86,7 +86,7 @@ def test_letter_warm(benchmark, tmp_path):
 def test_letter_cold(benchmark, tmp_path):
     cache = tmp_path / "cache"
     done = benchmark.pedantic(run, args=(LETTER, tmp_path / "out"), kwargs={"cache": cache}, rounds=1)
-    assert list(cache.rglob("*.nbi")), "the run has compiled nothing: it was not cold"
+    assert list(cache.rglob("*.code")), "the run has compiled nothing: it was not cold"
     if not benchmark.disabled:
         assert done.seconds <= COLD_BAR
 

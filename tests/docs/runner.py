@@ -66,7 +66,7 @@ def words_of(text: str) -> list[str] | None:
     return shlex.split(joined)
 
 
-FIRST_RUN = "First run with this version: compiling the axis"
+FIRST_RUN = "First run: compiling the axis"
 
 
 def matches(shown: str, came: str) -> bool:

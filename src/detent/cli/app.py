@@ -9,8 +9,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from detent import __version__
-from detent.cli.terminal import discard_output
+from detent.cli.terminal import discard_output, say_compiling
 from detent.errors import DetentError
+from detent.kernel.cache import AT_FIRST_COMPILING
 
 DONE, NOT_DONE = 0, 1
 LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
@@ -94,6 +95,7 @@ def main() -> NoReturn:
         # A file name may hold bytes, and a letter signs, that the terminal's encoding does not know.
         with suppress(AttributeError):
             cast("Any", stream).reconfigure(errors="backslashreplace")
+    AT_FIRST_COMPILING[:] = [say_compiling]
     app()
     raise SystemExit(DONE)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from detent.cli.app import File, Json, Set, app, option
-from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say, say_if_cold
+from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say
 from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")  # of the files with the tables of a motor
@@ -51,7 +51,6 @@ def compare(
 
     check_target(figure, (".html", *FIGURES))
     axis = load(file, overrides or [])
-    say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "running the axis in several ways")
         found = axis.compare(progress)

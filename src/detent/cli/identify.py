@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from detent.cli.app import LOGS, NOT_DONE, Columns, Json, Mapping, app, option
-from detent.cli.terminal import print_json, print_table, progress_bar, say, say_if_cold
+from detent.cli.terminal import print_json, print_table, progress_bar, say
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
@@ -61,7 +61,6 @@ def identify(
     # Options that read the logs in the same way once more.
     options = ["--map", str(mapping)] if mapping is not None else []
     options += [part for column in columns or [] for part in ("--column", column)]
-    say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         done = identify_axis(
             logs, mapping=mapping, columns=columns or [], effort=effort, method=chosen, axis=axis, progress=progress,
@@ -260,7 +259,6 @@ def analyse(
 
     names = list(dict.fromkeys(what or ANALYSES))
     check_names(names)
-    say_if_cold()
     found: list[Analysis] = []
     with progress_bar(quiet=as_json) as progress:
         read = read_log(log, mapping, columns or [])

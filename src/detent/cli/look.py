@@ -10,7 +10,7 @@ import typer
 
 from detent import examples
 from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option
-from detent.cli.terminal import folder_for, print_json, progress_bar, say_if_cold, split_names
+from detent.cli.terminal import folder_for, print_json, progress_bar, split_names
 from detent.errors import DetentError
 
 TIMING = "Registers in place of the usual ones, comma-separated."
@@ -41,7 +41,6 @@ def timing(
     names = split_names(signals) or list(axis.simulated.timing)
     axis.check_signals(names)
     loaded = axis.load_job(job) if job is not None else None
-    say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         found = axis.timing(begin, length, job=loaded, signals=names, progress=progress)
         progress(1.0, "drawing")

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
-from detent.cli.terminal import folder_for, print_json, progress_bar, say, say_if_cold, split_names
+from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
 from detent.errors import DetentError
 
 TRACE_KINDS = ("h5", "csv", "parquet")
@@ -56,7 +56,6 @@ def run(
     with folder_for("--output", folder):
         for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
             (folder / name).unlink(missing_ok=True)
-    say_if_cold()
     with progress_bar(quiet=as_json) as progress:
         store = folder / "trace.h5" if kinds else None
         done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)

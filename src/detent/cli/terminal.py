@@ -90,18 +90,10 @@ def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
         yield lambda share, text: bar.update(task, completed=share, description=text)
 
 
-def say_if_cold() -> None:
-    """Say why the first run takes longer."""
-    from detent.kernel.cache import compiled_folder, is_warm
-
-    if is_warm():
-        return
-    later = "later runs start at once"
-    try:
-        compiled_folder()
-    except OSError as error:
-        later = f"it cannot be kept ({error.filename}: {error.strerror}); set DETENT_CACHE_DIR to a folder of yours"
-    sys.stderr.write(f"First run with this version: compiling the axis, up to 15 s; {later}.\n")
+def say_compiling(why_unkept: str) -> None:
+    """Say why the first run of an axis takes longer."""
+    later = f"it cannot be kept ({why_unkept})" if why_unkept else "later runs start at once"
+    sys.stderr.write(f"First run: compiling the axis, up to 15 s; {later}.\n")
     sys.stderr.flush()
 
 

@@ -3,6 +3,9 @@
 Numba stamps a cached function with the contents of its own file only, so an edit of a callee in another file would be
 served stale. Here the folder itself is named by a hash over every source that a step can be made of and over the
 versions that shape the machine code: any such edit means another folder, and nothing in it can be stale.
+
+What is kept runs as code. So the folder must be the user's alone, and each file carries a checksum over its name and
+its contents: one that is damaged is dropped, and compiled anew. Where nothing can be kept, that costs time only.
 """
 
 import hashlib
@@ -10,6 +13,8 @@ import os
 import re
 import shutil
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +23,8 @@ STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "err
 DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # a method's part of a step
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made
+_REMEDY = "set DETENT_CACHE_DIR to a folder of yours"
+AT_FIRST_COMPILING: list[Callable[[str], object]] = []  # called, once, by `tell_compiling`
 
 
 def user_cache_root() -> Path:
@@ -55,22 +62,65 @@ def step_sources() -> frozenset[Path]:
 
 
 @cache
-def compiled_folder() -> Path:
-    """Folder of this package's compiled steps; made, and old ones of other sources removed, at the first call."""
-    root = user_cache_root() / "compiled"
-    folder = root / source_hash()
-    folder.mkdir(parents=True, exist_ok=True)
-    os.utime(folder)
-    _forget_old(root, keep=folder)
-    return folder
-
-
-def is_warm() -> bool:
-    """True when a process with the same sources has compiled before."""
+def compiled_folder() -> tuple[Path | None, str]:
+    """Folder of this package's compiled steps, made at the first call; None where there is none, and why."""
+    folder = user_cache_root() / "compiled" / source_hash()
     try:
-        return any(compiled_folder().glob("*.nbi"))
-    except OSError:  # no folder can be made: nothing is ever kept
-        return False
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for one in (folder.parents[1], folder.parents[0], folder):
+            if reason := _open_to_others(one):
+                return None, f"{one} {reason}; {_REMEDY}"
+    except OSError as error:
+        return None, f"{error.filename}: {error.strerror}; {_REMEDY}"
+    with suppress(OSError):  # one that can only be read is as good
+        os.utime(folder)
+        _forget_old(folder.parent, keep=folder)
+    return folder, ""
+
+
+def _open_to_others(folder: Path) -> str:
+    """Who beside the user may put code into a folder; empty where nobody may."""
+    if sys.platform == "win32":  # a folder of the user's profile is theirs
+        return ""
+    status = folder.stat()
+    if status.st_uid != os.geteuid():
+        return "belongs to another user"
+    return "can be written by other users" if status.st_mode & 0o022 else ""
+
+
+def read_kept(file: Path) -> bytes | None:
+    """What `keep` wrote; None where nothing was kept. A file that holds anything else is removed."""
+    try:
+        whole = file.read_bytes()
+    except OSError:
+        return None
+    mark, data = whole[: hashlib.sha256().digest_size], whole[hashlib.sha256().digest_size :]
+    if mark == _checksum(file, data):
+        return data
+    with suppress(OSError):
+        file.unlink()
+    return None
+
+
+def keep(file: Path, data: bytes) -> None:
+    """Write what the next process may take over; a disk that is full costs its time, no more."""
+    part = file.with_name(f"{file.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(_checksum(file, data) + data)
+        part.replace(file)
+    except OSError:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _checksum(file: Path, data: bytes) -> bytes:
+    return hashlib.sha256(file.name.encode() + b"\0" + data).digest()
+
+
+def tell_compiling(why_unkept: str) -> None:
+    """Tell whoever asked, once, that a step is compiled, and why that cannot be kept."""
+    while AT_FIRST_COMPILING:
+        AT_FIRST_COMPILING.pop()(why_unkept)
 
 
 def _forget_old(root: Path, keep: Path) -> None:

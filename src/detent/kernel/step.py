@@ -5,92 +5,64 @@ same functions run as plain Python on the same memory and give the same bits.
 """
 
 import hashlib
+import pickle
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba as untyped_numba
 from numba.core import config as untyped_config
+from numba.core import serialize as untyped_serialize
 from numba.core import types as untyped_types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult as UntypedCompileResult
 
 import detent.kernel.compiled  # noqa: F401  # pyright: ignore[reportUnusedImport] - registers numba's types
-from detent.kernel.cache import compiled_folder, source_hash, step_sources
+from detent.kernel.cache import compiled_folder, keep, read_kept, step_sources, tell_compiling
 
 numba: Any = untyped_numba  # its annotations leave out an option that we use
 types: Any = untyped_types
 config: Any = untyped_config  # numba sets its attributes at run time
+CompileResult: Any = UntypedCompileResult
+serialize: Any = untyped_serialize
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class _PackageLocator(UserProvidedCacheLocator):
-    """Puts a function's machine code into the folder of the package's source hash."""
+class _Kept(NullCache):
+    """Keeps what is compiled of a step for registers of the package, a file for each set of types and each processor.
 
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        self._py_file = py_file
-        self._lineno: int = py_func.__code__.co_firstlineno
-        self._cache_path = str(compiled_folder())
-
-    def get_source_stamp(self) -> bytes:
-        """The hash that also names the folder: an index that was moved here from elsewhere does not count."""
-        return source_hash().encode()
-
-    def get_disambiguator(self) -> str:
-        """The module, so that equal names in two modules do not meet."""
-        return Path(self._py_file).parent.name
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> "_PackageLocator | None":
-        """None where the user's cache folder cannot be written."""
-        try:
-            found = cls(py_func, py_file)
-            found.ensure_cache_path()
-        except OSError:
-            return None
-        return found
-
-
-class _PackageCacheImpl(CompileResultCacheImpl):
-    _locator_classes = [_PackageLocator]  # noqa: RUF012 - numba's own attribute
-
-
-class _PackageCache(FunctionCache):
-    """Keeps what is compiled for registers of the package.
-
-    An index names the types of all it holds: reading it imports them, and fails where one cannot be imported. So each
-    set of registers has an index of its own, and `advance` of one method imports no other method; machine code for the
-    registers of somebody's own script stays with the process that made it.
+    Machine code for the registers of somebody's own script stays with the process that made it: the hash that names
+    the folder does not cover them.
     """
 
-    _impl_class = _PackageCacheImpl
-    _impl: Any  # numba states no types
-    _cache_path: Any
-    _cache_file: Any
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._name = f"{function.__module__.removeprefix('detent.')}.{function.__qualname__}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for these types; None if nothing was, or if it is not kept."""
-        kept: Any = super()
-        return kept.load_overload(sig, target_context) if self._choose_index(sig) else None
+        target_context.refresh()  # as numba's own cache does: it may not be ready yet
+        file, why = self._file(sig, target_context.codegen())
+        kept = read_kept(file) if file else None
+        if kept is None:
+            tell_compiling(why)
+            return None
+        return CompileResult._rebuild(target_context, *pickle.loads(kept))  # noqa: SLF001, S301 - as numba does; ours
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, sig: Any, cres: Any) -> None:
         """Keep what was compiled for these types."""
-        kept: Any = super()
-        if self._choose_index(sig):
-            kept.save_overload(sig, data)
+        file, _ = self._file(sig, cres.codegen)
+        if file and not cres.library.has_dynamic_globals:  # an address in it means nothing in another process
+            keep(file, serialize.dumps(cres._reduce()))  # noqa: SLF001 - as numba's own cache does
 
-    def _choose_index(self, signature: Any) -> bool:
-        """Turn to the index of the registers among the types of a call; False where not all are the package's."""
+    def _file(self, signature: Any, codegen: Any) -> tuple[Path | None, str]:
+        """Where code for these types and this processor is kept; None where it is not, and why."""
         kinds = getattr(signature, "args", signature)
-        files = [kind.registers for kind in kinds if hasattr(kind, "registers")]
-        if not all(one.__module__.startswith("detent.") for one in files):
-            return False
-        names = " ".join(f"{one.__module__}.{one.__qualname__}" for one in files)
-        mark = hashlib.sha256(names.encode()).hexdigest()[:8]
-        base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(self._cache_path, f"{base}-{mark}", stamp)
-        return True
+        if not all(kind.registers.__module__.startswith("detent.") for kind in kinds if hasattr(kind, "registers")):
+            return None, "registers of another package"
+        folder, why = compiled_folder()
+        told = " ".join([*map(str, kinds), *map(str, codegen.magic_tuple())])
+        return folder and folder / f"{self._name}-{hashlib.sha256(told.encode()).hexdigest()[:16]}.code", why
 
 
 def step(function: F) -> F:
@@ -115,8 +87,7 @@ def _compiled(function: F, *, forceinline: bool) -> F:
         return cast("F", made)
     _compile_once(made)
     if Path(function.__code__.co_filename).resolve() in step_sources():
-        with suppress(RuntimeError):  # numba finds no locator where the cache cannot be written: each process compiles
-            made._cache = _PackageCache(function)  # noqa: SLF001 - numba offers no public way to choose the folder
+        made._cache = _Kept(function)  # noqa: SLF001 - numba offers no public way to choose a cache
     return cast("F", made)
 
 

@@ -53,7 +53,7 @@ class Copy:
     @property
     def compiled(self) -> list[str]:
         """Names of the machine code files in every folder."""
-        return sorted(str(f.relative_to(self.cache)) for f in self.cache.rglob("*.nbc"))
+        return sorted(str(f.relative_to(self.cache)) for f in self.cache.rglob("*.code"))
 
     @property
     def folders(self) -> list[Path]:
@@ -206,6 +206,80 @@ def test_a_cache_folder_that_cannot_be_made_does_not_stop_the_program(package, t
     blocked = tmp_path / "a file"
     blocked.write_text("in the way")
     assert package.run(SHORT_PROGRAM, DETENT_CACHE_DIR=str(blocked / "cache")) == "False"
+
+
+def test_damaged_code_is_dropped_and_compiled_anew(package):
+    """An empty file ended in "Aborted.", a flipped byte of machine code in a wrong trace."""
+    first = package.run(SHORT_PROGRAM)
+    files = [package.cache / name for name in package.compiled]
+    assert len(files) > 1
+    for k, file in enumerate(files):
+        whole = bytearray(file.read_bytes())
+        whole[len(whole) * 2 // 3] ^= 1 << k % 8
+        file.write_bytes((bytes(whole), b"", bytes(whole[:-1]), b"\0" * len(whole))[k % 4])
+        assert cache.read_kept(file) is None
+    assert package.run(SHORT_PROGRAM) == first
+    assert [package.cache / name for name in package.compiled] == files
+    assert None not in [cache.read_kept(file) for file in files]
+
+
+def test_no_flipped_bit_gets_through(tmp_path):
+    file = tmp_path / "step-1.code"
+    cache.keep(file, b"machine code")
+    whole = file.read_bytes()
+    assert cache.read_kept(file) == b"machine code"
+    for bit in range(8 * len(whole)):
+        flipped = bytearray(whole)
+        flipped[bit // 8] ^= 1 << bit % 8
+        file.write_bytes(flipped)
+        assert cache.read_kept(file) is None
+        assert not file.exists()
+
+
+def test_code_of_another_step_is_not_taken(tmp_path):
+    cache.keep(tmp_path / "one.code", b"machine code")
+    (tmp_path / "one.code").rename(tmp_path / "other.code")
+    assert cache.read_kept(tmp_path / "other.code") is None
+
+
+def test_a_folder_in_the_place_of_a_file_is_left_alone(tmp_path):
+    (tmp_path / "one.code").mkdir()
+    cache.keep(tmp_path / "one.code", b"machine code")
+    assert cache.read_kept(tmp_path / "one.code") is None
+    assert [file.name for file in tmp_path.iterdir()] == ["one.code"]
+
+
+def test_a_full_disk_costs_time_only(package):
+    program = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + textwrap.dedent(SHORT_PROGRAM)
+    assert package.run(program) == "False"
+    assert [file for file in package.cache.rglob("*") if file.is_file()] == []
+
+
+def test_a_folder_that_others_may_write_is_not_used(package):
+    assert package.run(SHORT_PROGRAM) == "False"
+    kept = package.compiled
+    why = "from detent.kernel.cache import compiled_folder; print(compiled_folder())"
+    for folder in (package.cache, package.cache / "compiled", *package.folders):
+        folder.chmod(0o775)
+        told = f"(None, '{folder} can be written by other users; set DETENT_CACHE_DIR to a folder of yours')"
+        assert package.run(why) == told
+        folder.chmod(0o700)
+    assert kept
+    assert package.compiled == kept
+
+
+def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
+    assert cache._open_to_others(tmp_path) == ""
+    monkeypatch.setattr(cache.os, "geteuid", lambda: tmp_path.stat().st_uid + 1)
+    assert cache._open_to_others(tmp_path) == "belongs to another user"
+
+
+def test_compiling_is_told_once(monkeypatch):
+    told = []
+    monkeypatch.setattr(cache, "AT_FIRST_COMPILING", [told.append])
+    cache.tell_compiling("a reason")
+    cache.tell_compiling("a reason")
+    assert told == ["a reason"]
 
 
 def test_sources_of_the_hash_are_the_rooms_a_step_can_be_made_of():

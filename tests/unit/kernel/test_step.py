@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from numba.core.registry import cpu_target
 
 import detent.kernel.step as step_module
 from detent.control.feed_forward import steady_drive
@@ -74,7 +75,7 @@ print(rows[1, 0])
 
 @compiled_only
 def test_registers_of_a_script_stay_out_of_the_cache(tmp_path):
-    """An index that named a class of a script could be read by no process that cannot import it: commands crashed."""
+    """Code that names a class of a script can be read by no process that cannot import it: commands crashed."""
     (tmp_path / "own_axis.py").write_text(SCRIPT, encoding="utf-8")
     package = Path(step_module.__file__).parents[2]
     environment = os.environ | {
@@ -85,23 +86,24 @@ def test_registers_of_a_script_stay_out_of_the_cache(tmp_path):
         [sys.executable, "-c", "import own_axis"], env=environment, capture_output=True, text=True, check=False
     )
     assert run.stdout == "7\n", run.stderr
-    assert not any(b"own_axis" in index.read_bytes() for index in (tmp_path / "cache").rglob("*.nbi"))
+    assert not any(b"own_axis" in kept.read_bytes() for kept in (tmp_path / "cache").rglob("*.code"))
 
 
 @compiled_only
 @compiled_only
 def test_registers_of_the_package_are_kept():
-    kinds, cache = (numba.typeof(TwoMass()), numba.int64), steady_drive._cache
-    assert cache._choose_index(kinds)
-    assert not cache._choose_index((numba.typeof(Ratio()),))
+    kinds, codegen = (numba.typeof(TwoMass()), numba.int64), cpu_target.target_context.codegen()
+    file, why = steady_drive._cache._file(kinds, codegen)
+    assert (file is not None, why) == (True, "")
+    assert steady_drive._cache._file((numba.typeof(Ratio()),), codegen) == (None, "registers of another package")
     # What numba hands over may be a signature with its return type.
-    assert cache._choose_index(numba.none(*kinds))
+    assert steady_drive._cache._file(numba.none(*kinds), codegen) == (file, "")
 
 
 @compiled_only
 def test_only_steps_of_the_package_are_cached():
-    assert isinstance(steady_drive._cache, step_module._PackageCache)
-    assert not isinstance(divide._cache, step_module._PackageCache)
+    assert isinstance(steady_drive._cache, step_module._Kept)
+    assert not isinstance(divide._cache, step_module._Kept)
 
 
 def test_the_name_and_the_documentation_stay():
