@@ -6,7 +6,6 @@ that ``"3 in"`` and ``"76.2 mm"`` are the same number. Pint is imported at the f
 """
 
 import math
-import pickle
 import re
 from fractions import Fraction
 from functools import cache
@@ -83,7 +82,11 @@ IN_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s^2": "deg/s^2", "rad/s^3": "
 _NUMBER_THEN_UNIT = re.compile(
     r"\s*([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)\s*(\S.*)?", re.DOTALL
 )
-_UNIT_TEXT = re.compile(r"(?:[A-Za-zµμΩ]|[*/() ]|\^-?[0-9](?![0-9]))+")
+# Products of units and of their powers by one digit; brackets hold such a product, and have no power themselves. Pint
+# would work powers of powers out, which takes 40 characters to last for ever.
+_FACTOR = r"[A-Za-zµμΩ]+(?:\^-?[0-9])?"
+_PRODUCT = rf"{_FACTOR}(?: *[*/ ] *{_FACTOR})*"
+_UNIT_TEXT = re.compile(rf"(?:{_FACTOR}|\( *{_PRODUCT} *\))(?: *[*/ ] *(?:{_FACTOR}|\( *{_PRODUCT} *\)))*")
 _OUNCE_OR_POUND = re.compile(r"\b(oz|lb)\b")
 
 
@@ -173,17 +176,11 @@ def _prefixed(size: float, unit: str) -> tuple[float, str]:
 
 @cache
 def _registry() -> Any:
-    """Load pint's units once, with factors as exact fractions; parsed definitions are kept in the user's cache."""
+    """Load pint's units once, with factors as exact fractions, and nothing kept in files that others may damage."""
     import pint
 
-    # Pint's annotations do not know registries of exact fractions.
-    make_registry: Any = pint.UnitRegistry
-    try:
-        return make_registry(cache_folder=":auto:", non_int_type=Fraction)
-    except (OSError, EOFError, pickle.UnpicklingError):
-        # A read-only home, or a cache that another process has just begun to write, or was killed writing: slower by a
-        # few tenths of a second, otherwise the same.
-        return make_registry(non_int_type=Fraction)
+    make_registry: Any = pint.UnitRegistry  # its annotations do not know registries of exact fractions
+    return make_registry(non_int_type=Fraction)
 
 
 @cache
@@ -206,14 +203,15 @@ def _conversion_factor(unit_text: str, unit: str) -> Fraction:
 
 def _pint_factor(unit_text: str, unit: str) -> Fraction:
     """Ask pint for the factor; every way it can fail becomes a `QuantityError`."""
+    example = describe_kind(unit)[1]
+    unknown = QuantityError(f'the unknown unit "{unit_text}"', unit, f'use a unit as in "{example}"')
+    spelled = re.sub(r"[·.]", "*", unit_text).replace("**", "^").replace("²", "^2")
+    if not _UNIT_TEXT.fullmatch(spelled):
+        raise unknown
     import pint
 
-    example = describe_kind(unit)[1]
     registry = _registry()
-    spelled = re.sub(r"[·.]", "*", unit_text).replace("**", "^").replace("²", "^2")
     try:
-        if not _UNIT_TEXT.fullmatch(spelled):
-            raise ValueError(unit_text)  # noqa: TRY301 - joins the failures of pint below
         factor = registry.Quantity(Fraction(1), registry.parse_units(spelled)).to(unit).magnitude
     except pint.DimensionalityError:
         remedy = f'use a unit of the same dimension as in "{example}"'
@@ -222,5 +220,5 @@ def _pint_factor(unit_text: str, unit: str) -> Fraction:
         raise QuantityError(f'the unit "{unit_text}", which measures something else', unit, remedy) from None
     except Exception as error:
         # Pint reports a malformed unit by half a dozen kinds of exception; to the user all mean the same.
-        raise QuantityError(f'the unknown unit "{unit_text}"', unit, f'use a unit as in "{example}"') from error
+        raise unknown from error
     return Fraction(factor)
