@@ -26,7 +26,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 # The commands share one environment: under `make -j` two of them must not install into it at once.
 .NOTPARALLEL:
-.PHONY: help demo test test-long bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
+.PHONY: help demo test test-wide test-long bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1#/' | awk -F'#' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -50,6 +50,9 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 test: venv-test ## the tests, without those that take long
 	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark $(PYTEST_ARGS)
 
+test-wide: venv-test ## thousands of numbered cases, dozens of logs, other processors' kernels
+	$(PYTEST) -m wide -n auto -p no:benchmark $(PYTEST_ARGS)
+
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)
 
@@ -63,7 +66,7 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 # long; then all run compiled, as in `make test`. Two processes at the same time, with about as much to do.
 STEPS    := $(addprefix tests/unit/,control drive kernel planning plant sensing) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py plant.py system*.py))
-PLAIN    := -m "not long and not bench and not compiled"
+PLAIN    := -m "not long and not wide and not bench and not compiled"
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
 coverage: venv-test ## which lines and branches the unit and property tests reach
 	COVERAGE_FILE=.coverage.methods $(COVER) tests/unit/methods tests/property & methods=$$!; \

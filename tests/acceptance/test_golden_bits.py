@@ -225,6 +225,7 @@ def test_every_register_has_its_golden_bits(golden):
     assert all_bits(whole=True) == golden
 
 
+@pytest.mark.wide
 @pytest.mark.compiled
 @pytest.mark.skipif(platform.machine() not in {"x86_64", "AMD64"}, reason="the names are those of x86 kernels")
 def test_no_kernel_and_no_width_changes_a_bit(golden):

@@ -360,6 +360,7 @@ def test_from_any_state_no_tick_exceeds_the_limits(velocity, oar, irr, word, sta
 # ------------------------------------------------------------------------------------------------------ numbered cases
 
 
+@pytest.mark.wide
 @pytest.mark.compiled
 def test_two_thousand_numbered_tables():
     met = run_numbers(run_table, range(2000))

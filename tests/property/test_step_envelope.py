@@ -178,6 +178,7 @@ def test_the_default_motor_lies_inside_the_margin_and_not_far_inside():
     assert not is_inside_margin(replace(MOTOR, pull_out=FirstOrderPullOut(0.045, 800.0)), RAMP)
 
 
+@pytest.mark.wide
 @pytest.mark.compiled
 def test_two_thousand_numbered_steppers():
     met = run_numbers(run_case, range(2000))

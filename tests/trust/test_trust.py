@@ -40,6 +40,7 @@ def reduced():
     return figures_of(judge_all(numbers_of(40, 3 * len(BAD)), workers=1))
 
 
+@pytest.mark.wide
 def test_limits_hold_in_a_few_logs(reduced):
     """At 0.95, 35 intervals leave chance 29 to 35 hits: so few logs find gross errors only."""
     for c in reduced.coverage:
@@ -51,20 +52,24 @@ def test_limits_hold_in_a_few_logs(reduced):
     assert hits < trusted  # intervals that always hold the truth are too wide
 
 
+@pytest.mark.wide
 def test_bad_logs_are_refused_in_a_few_logs(reduced):
     assert {j.bad for j in reduced.bad} == set(BAD)
     assert len(reduced.accepted_bad) <= binom.ppf(1 - DOUBT, len(reduced.bad), MOST_ACCEPTED), reduced.accepted_bad
 
 
+@pytest.mark.wide
 def test_good_logs_are_accepted_in_a_few_logs(reduced):
     assert len(reduced.refused_good) <= binom.ppf(1 - DOUBT, len(reduced.good), MOST_REFUSED), reduced.refused_good
 
 
+@pytest.mark.wide
 def test_intervals_are_narrow_enough_to_be_of_use(reduced):
     for c in reduced.coverage:
         assert c.width < {"mass": 0.02, "delay": 2.0}.get(c.name, 0.06), c
 
 
+@pytest.mark.wide
 def test_the_page_holds_all_figures(reduced):
     text = page(reduced, reduced, 0)
     assert text.count(coverage_table(reduced)) == 2

@@ -122,6 +122,7 @@ def of_the_page(log: str) -> list[str]:
     return ["identify", f"{log}/trace.h5", "--column", "voltage=controller.law.command", "--axis", "axes/cascade.toml"]
 
 
+@pytest.mark.wide
 def test_the_log_of_the_page_and_recordings(documented: Path) -> None:
     """Of the page's log six constants were trusted by some kernels and nine by others, three of them wrong.
 
