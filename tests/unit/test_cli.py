@@ -618,3 +618,15 @@ def test_text_is_written_where_the_terminal_cannot_show_it(tmp_path: Path) -> No
     assert answer.status == 0
     assert "um" in answer.out or "\\xb5m" in answer.out
     assert io.StringIO(answer.out).readline() == "Printed letter.txt on print head.\n"
+
+
+@pytest.mark.parametrize("example", [e.name for e in detent.examples() if "[axis]" in e.read_text(errors="ignore")])
+def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
+    """What a name, a file's name or --set held reached the terminal raw."""
+    axis = tmp_path / "axis\x1b[2J.toml"
+    shutil.copy(detent.example(example), axis)
+    told = {"axis.name=a\x1b[2J\u202eb": "a\\x1b[2J\\u202eb", "a\x9bb=1": "a\\x9bb"}
+    for override, text in told.items():
+        answer = call("check", axis, "--set", override)
+        assert text in answer.out + answer.err
+        assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", answer.out + answer.err)

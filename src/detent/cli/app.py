@@ -11,6 +11,7 @@ from typer.core import TyperCommand, TyperGroup
 from detent import __version__
 from detent.cli.terminal import discard_output, say_compiling
 from detent.errors import DetentError
+from detent.files.text import shown
 from detent.kernel.cache import AT_FIRST_COMPILING
 
 DONE, NOT_DONE = 0, 1
@@ -26,7 +27,7 @@ class Commands(TyperGroup):
         try:
             super().invoke(ctx)
         except DetentError as error:
-            sys.stderr.write(f"{error}\n")
+            sys.stderr.write(f"{shown(str(error))}\n")
             status = error.exit_status
         except typer.Exit as left:
             status = left.exit_code

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from detent.cli.app import File, Json, Set, app, option
-from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say
+from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say, tell
 from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")  # of the files with the tables of a motor
@@ -69,7 +69,7 @@ def compare(
     for one in found:
         print_table(*one.table, right=True)
     for path in files:
-        print(f"{'page' if path.suffix.lower() == '.html' else 'figure'}: {path}")
+        tell(f"{'page' if path.suffix.lower() == '.html' else 'figure'}: {path}")
 
 
 @app.command()
@@ -107,4 +107,4 @@ def envelope(
     ]
     print_table(axis.name, ("motor", "travel", "ramp", "run-up", "memory"), rows)
     for path in (path for paths in written.values() for path in paths):
-        print(f"{'figure' if path.suffix == '.png' else path.suffix[1:]:<6} {path}")
+        tell(f"{'figure' if path.suffix == '.png' else path.suffix[1:]:<6} {path}")

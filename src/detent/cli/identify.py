@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from detent.cli.app import LOGS, NOT_DONE, Columns, Json, Mapping, app, option
-from detent.cli.terminal import print_json, print_table, progress_bar, say
+from detent.cli.terminal import print_json, print_table, progress_bar, say, tell
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _print(done: "Identified", outside: list[str]) -> None:
     _print_refusals(done)
     for text in outside:
         say(f"  not as the axis file: {text}", "yellow")
-    print()
+    tell()
     _print_logs(found)
     if found.estimates:
         _print_constants(done)
@@ -180,7 +180,7 @@ def _print_logs(found: Any) -> None:
         say(f"{len(found.logs) - MOST_LINES} more logs; --json shows them all")
     if found.notes:
         say(f"  {'; '.join(found.notes)}", "dim")
-    print()
+    tell()
 
 
 def _print_constants(done: "Identified") -> None:
@@ -285,6 +285,6 @@ def _print_answers(found: "list[Analysis]", findings: list[str]) -> None:
             say(f"  {note}", "dim")
         if one.reason:
             say(f"  not trusted: {one.reason}", "bold yellow")
-        print()
+        tell()
     for one in (one for one in found if not one.estimates):
         say(f"{one.name}: no answer: {one.reason}")

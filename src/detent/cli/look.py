@@ -10,7 +10,7 @@ import typer
 
 from detent import examples
 from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option
-from detent.cli.terminal import folder_for, print_json, progress_bar, split_names
+from detent.cli.terminal import folder_for, print_json, progress_bar, split_names, tell
 from detent.errors import DetentError
 
 TIMING = "Registers in place of the usual ones, comma-separated."
@@ -51,7 +51,7 @@ def timing(
         print_json({"signals": [s.name for s in found.waveforms.signals], "files": [str(path) for path in files]})
         return
     for path in files:
-        print(f"{'figure' if path == figure else 'VCD'}: {path}")
+        tell(f"{'figure' if path == figure else 'VCD'}: {path}")
 
 
 def _time(option: str, text: str) -> float:
@@ -85,7 +85,7 @@ def plot(
             print_json(rows)
             return
         for row in rows:
-            print(f"{row['name']:<28} {row['unit']:<10} {row['doc']}".rstrip())
+            tell(f"{row['name']:<28} {row['unit']:<10} {row['doc']}".rstrip())
         return
     from detent.page.plots import plot_signals
 
@@ -94,7 +94,7 @@ def plot(
     if as_json:
         print_json({"files": [str(output)]})
     else:
-        print(f"figure: {output}")
+        tell(f"figure: {output}")
 
 
 @app.command("examples")
@@ -116,18 +116,20 @@ def examples_command(
         print_json([{"name": path.name, "path": str(path), "about": _about(path)} for path in found])
         return
     for path in found:
-        print(f"{path.name:<20} {_about(path)}")
+        tell(f"{path.name:<20} {_about(path)}")
     if copy is None:
-        print("\nCopy them with: detent examples --copy FOLDER")
+        tell("\nCopy them with: detent examples --copy FOLDER")
     else:
         axis, job = (shlex.quote(str(copy / name)) for name in ("print_head.toml", "letter.txt"))
-        print(f"\nCopied to {copy}. Try: detent run {axis} --job {job}")
+        tell(f"\nCopied to {copy}. Try: detent run {axis} --job {job}")
 
 
 def _about(path: Path) -> str:
     """First comment line of an axis file or a list of moves; what kind of job the others are."""
+    from detent.files.text import lines_of
+
     if path.suffix in {".toml", ".csv"}:
-        return path.read_text(encoding="utf-8").splitlines()[0].lstrip("# ")
+        return lines_of(path.read_text(encoding="utf-8"))[0].lstrip("# ")
     return "print job, Diablo 630 stream" if path.suffix == ".prn" else "print job, plain text"
 
 
@@ -148,7 +150,7 @@ def registers_command(
         return
     for row in rows:
         writer = f" (written by the {row['by']})" if row["by"] else ""
-        print(f"{row['name']:<36} {row['width']:<3} {row['unit']:<14} {row['doc']}{writer}")
+        tell(f"{row['name']:<36} {row['width']:<3} {row['unit']:<14} {row['doc']}{writer}")
 
 
 def _registers_of(method: str) -> Any:

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from detent.files.text import write_errors
+from detent.files.text import shown, write_errors
 
 
 def discard_output() -> None:
@@ -32,6 +32,11 @@ def _finite(data: Any) -> Any:
     return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
+def tell(line: str = "") -> None:
+    """A line of text, with nothing in it that steers the terminal."""
+    print(shown(line))
+
+
 def make_console(*, stderr: bool = False) -> Any:
     """A terminal that takes every text as it is, and a pipe that closes early as no error."""
     from rich.console import Console
@@ -49,7 +54,7 @@ def make_console(*, stderr: bool = False) -> Any:
 
 def say(text: str, style: str | None = None) -> None:
     """A line of any length, taken as it is."""
-    make_console().print(text, style=style, soft_wrap=True)
+    make_console().print(shown(text), style=style, soft_wrap=True)
 
 
 def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]], *, right: bool = False) -> None:
@@ -57,11 +62,11 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left", box=None, pad_edge=False)
+    table = Table(title=Text(shown(title)), title_justify="left", box=None, pad_edge=False)
     for number, head in enumerate(heads):
-        table.add_column(Text(head), overflow="fold", justify="right" if right and number else "left")
+        table.add_column(Text(shown(head)), overflow="fold", justify="right" if right and number else "left")
     for row in rows:
-        table.add_row(*(Text(str(cell)) for cell in row))
+        table.add_row(*(Text(shown(str(cell))) for cell in row))
     console = make_console()
     console.print(table)
     console.print()
@@ -87,7 +92,7 @@ def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=1.0)
-        yield lambda share, text: bar.update(task, completed=share, description=text)
+        yield lambda share, text: bar.update(task, completed=share, description=shown(text))
 
 
 def say_compiling(why_unkept: str) -> None:

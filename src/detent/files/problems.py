@@ -27,7 +27,7 @@ from detent.files.fields import (
     unit_of,
 )
 from detent.files.locate import Index, Path, Place, find_place
-from detent.files.text import MAX_SHOWN, nearest
+from detent.files.text import MAX_SHOWN, lines_of, nearest
 from detent.units import format_quantity
 
 MAX_ELEMENTS = 3  # wrong numbers of a list shown in a message
@@ -248,7 +248,7 @@ def dotted(path: Sequence[str]) -> str:
 
 def _shortened(text: str) -> str:
     """First line of a text, and no more of it than a message has room for."""
-    first, *more = text.splitlines() or [""]
+    first, *more = lines_of(text) or [""]
     return f"{first[:MAX_SHOWN]}..." if more or len(first) > MAX_SHOWN else first
 
 

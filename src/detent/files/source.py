@@ -10,7 +10,7 @@ from typing import Any
 
 from detent.errors import FileProblem, InputError
 from detent.files.locate import Index, Place, locate_keys
-from detent.files.text import decode_utf8, read_head
+from detent.files.text import decode_utf8, lines_of, read_head
 
 MAX_BYTES = 1_000_000  # largest axis file read; a real one has a few thousand bytes
 MAX_SYNTAX_PROBLEMS = 20  # syntax errors reported at most: a file of another kind would have one in each line
@@ -49,7 +49,7 @@ def read_source(path: Path | str) -> Source:
 def parse_source(file: str, text: str) -> Source:
     """Parse the text of an axis file; each line with a syntax error is reported and left out."""
     problems: list[FileProblem] = []
-    lines = text.splitlines()
+    lines = lines_of(text)
     trustworthy = True
     while len(problems) < MAX_SYNTAX_PROBLEMS:
         try:

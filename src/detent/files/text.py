@@ -2,6 +2,7 @@
 
 import gzip
 import os
+import re
 import zlib
 from collections.abc import Collection, Generator, Iterable
 from contextlib import contextmanager, suppress
@@ -20,6 +21,28 @@ FIGURES = (".png", ".svg", ".pdf")  # endings of pictures
 PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
 _CHECK_JOB = "check the name after --job"
 _CHECK_LOG = "check the name of the recording"
+
+
+# Of a terminal or a browser: control codes beside tab and line feed, and marks that turn the order of reading.
+_STEERING = re.compile("[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def shown(text: str) -> str:
+    r"""Text as it may be shown: what would steer the terminal or turn the order of reading is told by its escape.
+
+    >>> shown("a\x1b[2J\u202eb")
+    'a\\x1b[2J\\u202eb'
+    """
+    return _STEERING.sub(lambda code: code[0].encode("unicode_escape").decode(), text)
+
+
+def lines_of(text: str) -> list[str]:
+    r"""Lines of a text, which end in LF or CR LF, in TOML and in logs; other signs that end one for Python do not.
+
+    >>> lines_of("a\u2028b\r\nc\n")
+    ['a\u2028b', 'c']
+    """
+    return [line.removesuffix("\r") for line in text.removesuffix("\n").split("\n")] if text else []
 
 
 def short(text: str) -> str:

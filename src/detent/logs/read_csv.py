@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
-from detent.files.text import read_bytes, short
+from detent.files.text import lines_of, read_bytes, short
 from detent.logs.headings import is_unit, split_heading
 from detent.logs.log import tell_count
 from detent.logs.mapping import SEPARATORS, FileOptions
@@ -55,7 +55,8 @@ class CsvLayout:
 def read_csv(path: Path, options: FileOptions) -> RawTable:
     """Read a text table; rows that do not fit the header or their columns of numbers are put aside as broken."""
     table = RawTable(str(path))
-    lines = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table).splitlines()
+    text = decode(path, read_bytes(path, MAX_BYTES, ALLOWED), table)
+    lines = lines_of(text if "\n" in text else text.replace("\r", "\n"))  # old programs end a line in CR alone
     try:
         layout = guess_layout(table, lines, options)
         numbers = [index for index in range(layout.first, len(lines)) if is_telling(lines[index])]

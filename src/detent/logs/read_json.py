@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import FileProblem, InputError
-from detent.files.text import decode_utf8, kind_of, read_bytes, short
+from detent.files.text import decode_utf8, kind_of, lines_of, read_bytes, short
 from detent.logs.headings import split_heading
 from detent.logs.mapping import FileOptions
 from detent.logs.raw_table import BrokenRow, Item, RawTable, check_size, flatten, no_table, table_of, tell
@@ -38,7 +38,7 @@ def read_json(path: Path, options: FileOptions) -> RawTable:
         if error.msg == "Extra data" and error.lineno > 1:
             return _read_lines(file, text)  # one record per line, under another name
         remedy = f"correct the line ({error.msg[:1].lower()}{error.msg[1:]}), or record again"
-        came = short(text.splitlines()[error.lineno - 1].strip()) or "the end of the file"
+        came = short(lines_of(text)[error.lineno - 1].strip()) or "the end of the file"
         problem = FileProblem(file, error.lineno, error.colno, "", came, ALLOWED, remedy)
         raise InputError([problem]) from None
     except (RecursionError, ValueError) as error:
@@ -85,7 +85,7 @@ def _array(value: Any) -> Any:
 def _read_lines(file: str, text: str) -> RawTable:
     """Read one record per line; a line that is none becomes a broken row."""
     records: list[Any] = []
-    for line in text.splitlines():
+    for line in lines_of(text):
         if line.strip():
             try:
                 records.append(json.loads(line))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from detent.files.text import check_target
+from detent.files.text import check_target, lines_of
 from detent.page.chart import Chart
 from detent.page.figure import Figure
 from detent.page.plots import ABOVE, Axes, new_figure
@@ -76,7 +76,7 @@ def _draw_table(table: Table, canvas: Any, at: Any) -> None:
     rows = [[cell for cell, _ in table.cells(row)] for row in table.rows]
     texts = [["\n".join(textwrap.wrap(plain(cell.text), 30)) for cell in row] for row in rows]
     heads = ["\n".join(textwrap.wrap(plain(title), 12)) for title, _ in table.heads]
-    lengths = [max(len(line) for text in column for line in (text.splitlines() or [""])) + 2
+    lengths = [max(len(line) for text in column for line in (lines_of(text) or [""])) + 2
                for column in zip(heads, *texts, strict=True)]  # fmt: skip
     widths = [length / sum(lengths) for length in lengths]
     drawn = area.table(texts, colLabels=heads, colWidths=widths, loc="upper center")

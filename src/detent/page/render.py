@@ -8,13 +8,13 @@ import json
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from detent import __version__
-from detent.files.text import write_text
+from detent.files.text import shown, write_text
 from detent.page.figure import about
 from detent.page.frame import Page
 from detent.page.words import further
@@ -33,7 +33,7 @@ def write_page(path: str | Path, page: Page) -> None:
 def render_page(page: Page) -> str:
     """A whole HTML document."""
     order = list(LEVELS)
-    return _template().render(
+    made = _template().render(
         page=page,
         notes=sorted(page.notes, key=lambda note: order.index(note.level)),
         charts=[{key: value for key, value in chart.items() if key not in FOR_THE_PAGE} for chart in page.charts],
@@ -45,6 +45,7 @@ def render_page(page: Page) -> str:
         about=about,
         further=further,
     )
+    return shown(made)
 
 
 @cache
@@ -66,6 +67,17 @@ def _asset(name: str) -> Markup:
 
 def _embedded(name: str, payload: dict[str, Any]) -> Markup:
     """JSON in a script element that it cannot end, whatever it says."""
-    text = json.dumps(payload, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(_shown(payload), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     safe = text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
     return Markup(f'<script type="application/json" id="{name}">{safe}</script>')  # noqa: S704 - escaped above
+
+
+def _shown(data: Any) -> Any:
+    """The same data, its texts as they may be shown."""
+    if isinstance(data, str):
+        return shown(data)
+    if isinstance(data, dict):
+        return {key: _shown(value) for key, value in cast("dict[str, Any]", data).items()}
+    if isinstance(data, list | tuple) and not (data and isinstance(data[0], int | float)):  # not what a curve holds
+        return [_shown(one) for one in cast("list[Any]", data)]
+    return cast("Any", data)

@@ -70,3 +70,17 @@ def test_a_good_file_has_no_problems(good_text):
     assert source.problems == ()
     assert source.is_whole
     assert source.is_readable
+
+
+@pytest.mark.parametrize("end", ["\u2028", "\u2029", "\x85"])
+def test_what_ends_a_line_for_python_alone_stays_in_its_comment(end):
+    """A sign of Unicode that ends a line turned the rest of a comment into live keys."""
+    source = parse_source("axis.toml", f'[axis]  # a note{end}name = "live"\r\nmethod = "cascade"\n')
+    assert source.tables == {"axis": {"method": "cascade"}}
+    assert source.places["axis", "method"].line == 2
+
+
+def test_a_carriage_return_alone_ends_no_line():
+    source = parse_source("axis.toml", "[axis]  # a note\rname = 'live'\n")
+    assert source.tables == {}
+    assert [problem.line for problem in source.problems] == [1]

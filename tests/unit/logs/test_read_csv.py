@@ -256,3 +256,17 @@ def test_pieces_of_columns():
     assert wrong == {0}
     moments, wrong = read_moments(["2024-12-02 03:04:05", "now"])
     assert (np.isnat(moments).tolist(), wrong) == ([False, True], {1})
+
+
+@pytest.mark.parametrize("sign", ["\u2028", "\x85", "\x1c", "\v"])
+def test_a_row_ends_where_its_line_ends(write, sign):
+    table = read_csv(write(f"t [s],note,x [mm]\n0,one{sign}more,1\n1,two,2\n2,three,3\n"), FileOptions())
+    assert columns(table) == {"t [s]": [0, 1, 2], "x [mm]": [1, 2, 3]}
+    assert table.broken == []
+
+
+def test_lines_of_old_programs_end_in_a_carriage_return_alone(write):
+    assert columns(read_csv(write("t [s],x [mm]\r0,1\r1,2\r2,3\r"), FileOptions())) == {
+        "t [s]": [0, 1, 2],
+        "x [mm]": [1, 2, 3],
+    }

@@ -56,7 +56,7 @@ def test_every_chart_has_its_place_and_says_what_it_shows() -> None:
 def test_the_page_carries_the_charts_whatever_they_say() -> None:
     chart = plain_chart("a") | {"xLabel": "t </script> \u2028 [s]"}
     html = render_page(of(Figure(title="a", charts=[chart | {"about": "a"}])))
-    assert charts_of(html) == [chart]
+    assert charts_of(html) == [chart | {"xLabel": "t </script> \\u2028 [s]"}]
     assert Reader(html).open == []
     assert "\u2028" not in html
 
@@ -114,3 +114,13 @@ def test_a_page_replaces_the_one_before_and_leaves_nothing_beside_it(tmp_path: P
 def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
     with pytest.raises(DetentError, match=r"nowhere.*cannot be written \(No such file or directory\)"):
         write_page(tmp_path / "nowhere" / "a.html", page())
+
+
+def test_nothing_on_a_page_steers_who_reads_it() -> None:
+    """Escape, codes above 127 and marks that turn the order of reading came through raw from names in files."""
+    name = "a\x1b[2J\x9b\u202eb"
+    chart = plain_chart("a") | {"about": name}
+    html = render_page(replace(of(Figure(title=name, charts=[chart])), title=name))
+    assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", html)
+    assert "a\\x1b[2J\\x9b\\u202eb" in html
+    charts_of(html)
