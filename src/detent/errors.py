@@ -81,6 +81,12 @@ class InputError(DetentError):
         return type(self), (self.problems,)
 
 
+class DiskError(DetentError):
+    """A disk did not take what was to be written: it is full, or read-only, or it fails."""
+
+    exit_status = 1
+
+
 class AxisError(DetentError):
     """The axis did not do what it was asked: it stalled, met an obstruction, or could not be identified."""
 

@@ -630,3 +630,68 @@ def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
         answer = call("check", axis, "--set", override)
         assert text in answer.out + answer.err
         assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", answer.out + answer.err)
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", AXIS, "--job", LETTER, "--output", "out"),
+        ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out"),
+        ("plot", "out/trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png"),
+        ("compare", AXIS, "--figure", "out/comparison.html"),
+    ],
+)
+def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
+    words: tuple[str, ...], tmp_path: Path, trace: Path
+) -> None:
+    """HDF5 that cannot write crashed the process at its end, and the earlier report was gone."""
+    (tmp_path / "out").mkdir()
+    for name in ("report.html", "comparison.html", "timing.vcd", "plot.png"):
+        (tmp_path / "out" / name).write_text("earlier")
+    shutil.copy(trace, tmp_path / "out" / "trace.h5")
+    before = files_in(tmp_path)
+    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000)); "
+    program = f"{limit}from detent.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(detent.__file__).parents[1])},
+    )  # fmt: skip
+    told = [line for line in done.stderr.splitlines() if not line.startswith("First run")]
+    assert (done.returncode, len(told)) == (1, 1), done.stderr
+    assert "cannot be written (File too large); choose another place or make room" in told[0]
+    assert files_in(tmp_path) == before
+
+
+def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace: Path) -> None:
+    import h5py
+
+    broken = shutil.copy(trace, tmp_path / "broken.h5")
+    with h5py.File(broken, "r+") as file:
+        file.attrs["complete"] = 0
+    draw = ("plot", broken, "--signals", "plant.train.velocity", "-o", tmp_path / "plot.png")
+    study = ("analyse", broken, "--column", "position=plant.train.position")
+    for words, asked in ((draw, ("--incomplete",)), (study, ("--column", "incomplete=yes"))):
+        refused = call(*words)
+        assert refused.status == 2
+        assert "a trace of a run that broke off" in refused.err
+        assert asked[-1] in refused.err
+        assert "broke off" not in call(*words, *asked).err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize("words", [("registers",), ("check", AXIS, "--json")])
+def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...]) -> None:
+    source = {"PYTHONPATH": str(Path(detent.__file__).parents[1])}
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "detent", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            env={**os.environ, **source},
+        )  # fmt: skip
+    told = "standard output: cannot be written (No space left on device); choose another place or make room\n"
+    assert done.stderr == told
+    assert done.returncode == 1

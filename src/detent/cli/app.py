@@ -25,18 +25,21 @@ class Commands(TyperGroup):
         """Run the verb."""
         status = DONE
         try:
-            super().invoke(ctx)
-        except DetentError as error:
-            sys.stderr.write(f"{shown(str(error))}\n")
-            status = error.exit_status
-        except typer.Exit as left:
-            status = left.exit_code
-        except BrokenPipeError:
-            discard_output()
-        try:
+            try:
+                super().invoke(ctx)
+            except DetentError as error:
+                sys.stderr.write(f"{shown(str(error))}\n")
+                status = error.exit_status
+            except typer.Exit as left:
+                status = left.exit_code
             sys.stdout.flush()
         except BrokenPipeError:
             discard_output()
+        except OSError as error:
+            discard_output()
+            place = error.filename or "standard output"
+            sys.stderr.write(f"{place}: cannot be written ({error.strerror}); choose another place or make room\n")
+            status = NOT_DONE
         raise typer.Exit(status)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click hands it over

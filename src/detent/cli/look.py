@@ -11,7 +11,7 @@ import typer
 from detent import examples
 from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option
 from detent.cli.terminal import folder_for, print_json, progress_bar, split_names, tell
-from detent.errors import DetentError
+from detent.errors import DetentError, InputError
 
 TIMING = "Registers in place of the usual ones, comma-separated."
 SIGNALS = "Registers, comma-separated; patterns such as 'head.*' too."
@@ -72,12 +72,16 @@ def plot(
     start: Annotated[float | None, option("--from", "SECONDS", "First moment.")] = None,
     stop: Annotated[float | None, option("--to", "SECONDS", "Last moment.")] = None,
     *,
+    incomplete: Annotated[bool, option("--incomplete", "", "Take a trace of a run that broke off.")] = False,
     as_json: Json = False,
 ) -> None:
     """Draw any recorded registers against time; without --signals, list them."""
     from detent.record.trace_files import load_trace
 
     loaded = load_trace(trace)
+    if not loaded.attributes.get("complete", 1) and not incomplete:
+        came, allowed = "a trace of a run that broke off", "a trace of a run that came to its end"
+        raise InputError.of_file(str(trace), came, allowed, "record again, or draw it as it is with --incomplete")
     names = split_names(signals)
     if not names:
         rows = [{"name": n, "unit": loaded.units.get(n, ""), "doc": loaded.docs.get(n, "")} for n in loaded.signals]

@@ -2,7 +2,10 @@
 
 import shlex
 import sys
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -52,18 +55,16 @@ def run(
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
     wanted = [*axis.simulated.signals, *split_names(signals)]
     axis.check_signals(wanted)
-    # Without the files of an earlier run: a report must not stand beside another run's trace.
-    with folder_for("--output", folder):
-        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
-            (folder / name).unlink(missing_ok=True)
-    with progress_bar(quiet=as_json) as progress:
-        store = folder / "trace.h5" if kinds else None
+    with _beside(folder) as made, progress_bar(quiet=as_json) as progress:
+        store = made / "trace.h5" if kinds else None
         done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
         if comparison and replay is None and axis.method.reports_comparisons:
             done.comparisons = axis.compare(progress)
         progress(1.0, "writing the report")
-        written = [done.report(folder / "report.html"), *_convert_trace(folder, kinds)]
+        done.report(made / "report.html")
+        _convert_trace(made, kinds)
+    written = [folder / name for name in ("report.html", *(f"trace.{kind}" for kind in kinds))]
     if as_json:
         print_json(done.to_dict() | {"files": [str(path) for path in written]})
     else:
@@ -99,7 +100,22 @@ def _trace_kinds(formats: str) -> list[str]:
     return list(dict.fromkeys(kinds))
 
 
-def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
+@contextmanager
+def _beside(folder: Path) -> Generator[Path]:
+    """A place to write to, until all is whole: only then the files of an earlier run give way, all of them.
+
+    A report must not stand beside another run's trace.
+    """
+    with folder_for("--output", folder), TemporaryDirectory(prefix=".run-", dir=folder) as made:
+        yield Path(made)
+        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
+            if (Path(made) / name).exists():
+                (Path(made) / name).replace(folder / name)
+            else:
+                (folder / name).unlink(missing_ok=True)
+
+
+def _convert_trace(folder: Path, kinds: list[str]) -> None:
     """The HDF5 trace is there; make the others from it and drop it if it was not asked for."""
     from detent.record.trace_files import convert_trace
 
@@ -109,7 +125,6 @@ def _convert_trace(folder: Path, kinds: list[str]) -> list[Path]:
             convert_trace(store, folder / f"trace.{kind}")
     if kinds and "h5" not in kinds:
         store.unlink()
-    return [folder / f"trace.{kind}" for kind in kinds]
 
 
 def _print_run(done: Any, written: list[Path]) -> None:

@@ -1,5 +1,6 @@
 """Files read as far as their kind allows, written whole or not at all, or refused with the reason; short texts."""
 
+import errno
 import gzip
 import os
 import re
@@ -9,7 +10,7 @@ from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from pathlib import Path
 
-from detent.errors import DetentError, FileProblem, InputError
+from detent.errors import DetentError, DiskError, FileProblem, InputError
 
 MAX_SHOWN = 60  # characters of a value shown in a message
 
@@ -17,6 +18,8 @@ MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
 """Largest job read, by the ending of its name: room for the most moves that a job can have. TOML is parsed more slowly
 than it is written by hand; a list so long comes from a program, which can write CSV."""
 
+# What is wrong with a place, where nothing is wrong with the disk.
+_NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL}
 FIGURES = (".png", ".svg", ".pdf")  # endings of pictures
 PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
 _CHECK_JOB = "check the name after --job"
@@ -189,8 +192,8 @@ def write_errors(path: Path | str) -> Generator[None]:
     try:
         yield
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise DetentError(f"{path}: cannot be written ({reason}); choose another place or make room") from error
+        reason, kind = error.strerror or str(error), DetentError if error.errno in _NO_PLACE else DiskError
+        raise kind(f"{path}: cannot be written ({reason}); choose another place or make room") from error
 
 
 @contextmanager

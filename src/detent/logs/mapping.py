@@ -58,6 +58,14 @@ def _word_of(words: dict[str, str], value: object) -> str:
     raise _refused("write one of these words in quotes")
 
 
+def _yes(value: object) -> bool:
+    if value in (True, "yes", "true"):
+        return True
+    if value in (False, "no", "false"):
+        return False
+    raise _refused("write incomplete = true")
+
+
 def _read_column(value: object) -> str:
     if isinstance(value, str) or (type(value) is int and 0 < value < 10**6):
         return str(value)
@@ -100,6 +108,9 @@ class FileOptions(Table, frozen=True):
     header: int | None = optional("line of the header, 0 for none", None, ge=0, lt=10**6)
     table: str = optional("group, structure or list of a file that holds several", "")
     period: Time | None = optional("time between two rows of a file without a column for the time", None, gt=0)
+    incomplete: Annotated[bool, PlainValidator(_yes)] = optional(
+        "a trace of a run that broke off is taken as far as it goes", default=False, allowed="true or yes, false or no"
+    )
 
 
 class Choice(Table, frozen=True):

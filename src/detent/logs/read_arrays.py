@@ -21,6 +21,7 @@ ALLOWED_MAT = "a MATLAB file with vectors of equal length"
 ALLOWED_NPZ = "an NPZ or NPY file with vectors of equal length"
 ALLOWED_HDF5 = "an HDF5 file with vectors of equal length"
 ALLOWED_PARQUET = "a Parquet file with columns of numbers"
+BROKEN_OFF = ("a trace of a run that broke off", "a trace of a run that came to its end")
 _DEEPEST = 4
 _DEEPEST_GROUP = 6
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")
@@ -142,7 +143,12 @@ def read_hdf5(path: Path, options: FileOptions) -> raw_table.RawTable:
 
     check_file(path, MAX_COLUMNAR, ALLOWED_HDF5)
     with raw_table.whole(path, "HDF5", ALLOWED_HDF5), h5py.File(path, "r") as file:
+        told: Any = file.attrs
+        whole = bool(told.get("complete", 1)) or not str(told.get("format", "")).startswith("detent trace")
+        if not whole and not options.incomplete:
+            raise InputError.of_file(str(path), *BROKEN_OFF, "record again, or state incomplete=yes with its columns")
         items, notes = _read_file(str(path), file, options.table.strip("/"))
+        notes += [] if whole else ["the run broke off: the trace is taken as far as it goes"]
     table = raw_table.table_of(str(path), items, ALLOWED_HDF5)
     table.notes += notes
     return table

@@ -9,7 +9,9 @@
 
 import csv
 import importlib
+import io
 import json
+import os
 import re
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -36,6 +38,75 @@ _HEADER = re.compile(r"(?P<name>.*?)(?: \[(?P<unit>[^\[\]]*)\])?")
 # ---- the store
 
 
+class _Disk(io.RawIOBase):
+    """A file that takes every write: what the disk refuses stays in memory, and its error is raised by `check`.
+
+    HDF5 cannot leave a file that it cannot write: the process crashed at its end.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("w+b", buffering=0)
+        self._at = self._end = 0
+        self._refused: OSError | None = None
+        self._kept: list[tuple[int, bytes]] = []  # where each refused piece belongs
+
+    def write(self, data: Any) -> int:
+        """Take all of it, whatever the disk says."""
+        piece, done = bytes(data), 0
+        try:
+            while done < len(piece) and self._refused is None:
+                self._file.seek(self._at + done)
+                done += self._file.write(piece[done:])
+        except OSError as error:
+            self._refused = error
+        if done < len(piece):
+            self._kept.append((self._at, piece))
+        self._at += len(piece)
+        self._end = max(self._end, self._at)
+        return len(piece)
+
+    def readinto(self, buffer: Any) -> int:
+        """Read what was written, to the disk or not."""
+        found = bytearray(len(buffer))
+        self._file.seek(self._at)
+        self._file.readinto(memoryview(found))
+        for begin, piece in self._kept:
+            first, last = max(begin, self._at), min(begin + len(piece), self._at + len(found))
+            if first < last:
+                found[first - self._at : last - self._at] = piece[first - begin : last - begin]
+        buffer[:] = found
+        self._at += len(found)
+        return len(found)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place."""
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._end}[whence]
+        return self._at
+
+    def tell(self) -> int:
+        """The place."""
+        return self._at
+
+    def truncate(self, size: int | None = None) -> int:
+        """End the file here or there."""
+        self._end = self._at if size is None else size
+        try:
+            self._file.truncate(self._end)
+        except OSError as error:
+            self._refused = self._refused or error
+        return self._end
+
+    def check(self) -> None:
+        """Raise what the disk said."""
+        if self._refused:
+            raise self._refused
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._file.close()
+        super().close()
+
+
 class TraceWriter:
     """Write a trace to HDF5 piece by piece, in constant memory, for runs of any length.
 
@@ -59,7 +130,8 @@ class TraceWriter:
         # A copy of a trace that broke off stays one that broke off.
         self._whole = bool(head.attributes.get("complete", 1))
         with ExitStack() as stack:
-            self._file: Any = _h5py().File(stack.enter_context(writing(self.path)), "w")
+            self._disk = _Disk(stack.enter_context(writing(self.path)))
+            self._file: Any = _h5py().File(self._disk, "w")
             self._sets = self._write_head(head)
             self._naming = stack.pop_all()
 
@@ -102,6 +174,7 @@ class TraceWriter:
             for name, values in columns.items():
                 self._sets[name].resize((end,))
                 self._sets[name][self.rows : end] = values
+            self._disk.check()
         self.rows, self._last_time = end, time[-1]
 
     def close(self, *, complete: bool = True) -> None:
@@ -112,6 +185,8 @@ class TraceWriter:
             file, self._file = self._file, None
             file.attrs["complete"] = int(complete and self._whole)
             file.close()
+            self._disk.close()
+            self._disk.check()
 
     def __enter__(self) -> Self:
         return self

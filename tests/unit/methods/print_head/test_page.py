@@ -17,6 +17,7 @@ from tests.print_head_rig import EXAMPLE, TICK
 
 import detent
 from detent.files.quantities import INCH
+from detent.files.text import shown
 from detent.methods.load import load_spec
 from detent.methods.print_head.detail import SIGNALS
 from detent.methods.print_head.diablo630 import parse_diablo
@@ -482,7 +483,7 @@ def test_what_the_job_says_cannot_break_the_page(letter: Played) -> None:
     paper = paper_of(html)
     assert paper
     printed = "".join(line["text"] for line in paper["pages"][0]["lines"])
-    assert sorted(printed) == sorted(evil)
+    assert sorted(printed) == sorted(shown(evil))
     read = Reader(html)
     assert read.open == []
     assert "<b>$data</b>" in read.text
