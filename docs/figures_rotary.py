@@ -170,10 +170,10 @@ def travelled(place: float, speed: float, judge: str, sign: int = 1, turns: floa
 
 def threshold(speed: float, judge: str) -> float:
     """Distance beyond the boundary up to which a start fails [deg]; by AR, before it."""
-    from detent.methods.rotary_table.derive import Machine
+    from detent.methods.rotary_table.derive import TableFigures
 
     side, turns = (1, 1.4) if judge == "theoretical" else (-1, 2.4)
-    low, high = 0.0, 1.1 * float(np.degrees(Machine(table().spec).following_error(np.radians(speed)))) + 0.05
+    low, high = 0.0, 1.1 * float(np.degrees(TableFigures(table().spec).following_error(np.radians(speed)))) + 0.05
     for _ in range(7):
         middle = 0.5 * (low + high)
         missed = abs(travelled(side * middle, speed, judge, turns=turns) - 360 * turns) > 100
@@ -183,7 +183,7 @@ def threshold(speed: float, judge: str) -> float:
 
 def start_angles() -> None:
     """Where the literal form throws the table back, over time and over speed and start angle."""
-    from detent.methods.rotary_table.derive import Machine
+    from detent.methods.rotary_table.derive import TableFigures
 
     with picture("start-angles.svg", 1, 4.2, columns=2, share_x=False) as (ways, places):
         for place, colour in ((3.0, BLUE), (1.5, PINK), (0.5, ORANGE)):
@@ -200,7 +200,7 @@ def start_angles() -> None:
         ways.legend(**LEGEND, ncols=3, title="start angle", alignment="left")
         ways.margins(x=0)
         speeds = np.arange(10, 61, 2.0)
-        machine = Machine(table().spec)
+        machine = TableFigures(table().spec)
         lag = np.array([np.degrees(machine.following_error(np.radians(speed))) for speed in speeds])
         late = speeds * machine.spec.method.task_period
         for judge, colour, marker, text in (

@@ -300,7 +300,7 @@ def test_check_as_json_has_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     ).items()
     assert set(data["derived"][0]) == {"name", "value", "unit", "text", "formula"}
     assert [set(warning) for warning in data["warnings"]] == [{"name", "value", "limit", "consequence", "remedy"}]
-    monkeypatch.setattr("detent.methods.print_head.derive.Machine.current", lambda _machine, _counts: float("inf"))
+    monkeypatch.setattr("detent.methods.print_head.derive.HeadFigures.current", lambda _machine, _counts: float("inf"))
     assert None in [row["value"] for row in call("check", AXIS, "--json").data["derived"]]  # not Infinity
 
 

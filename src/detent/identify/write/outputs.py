@@ -56,13 +56,7 @@ def axis_toml(found: Identification, base: str | None = None, file: str = "axis 
 
 def cascade_spec(text: str, file: str) -> CascadeSpec:
     """Read the text of an axis file of the cascade method."""
-    spec = axis_of(parse_source(file, text)).spec
-    if not isinstance(spec, CascadeSpec):
-        raise DetentError(
-            f"{file}: came an axis of the method {spec.axis.method}; allowed: cascade, whose constants are those of an "
-            "identification; name an axis file of it, or leave it out"
-        )
-    return spec
+    return CascadeSpec.of(axis_of(parse_source(file, text)).spec, file)
 
 
 @dataclass(frozen=True, slots=True)

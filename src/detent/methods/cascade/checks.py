@@ -10,7 +10,7 @@ from detent.axisfile import common_checks as common
 from detent.axisfile.motion import rotary_model
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, Remedies, at_most, put
-from detent.methods.cascade.derive import Machine, dead_time
+from detent.methods.cascade.derive import CascadeFigures, dead_time
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable
 from detent.units import format_quantity as text
 
@@ -215,12 +215,12 @@ RULES = (_motor, _masses, _gains, _encoders, _places, _rate, _drive, _supervisio
 
 def find_cautions(spec: CascadeSpec) -> Iterator[Caution]:
     """Look a cascade axis over."""
-    machine = Machine(spec)
+    machine = CascadeFigures(spec)
     for look in (_loops, _bandwidth, _position, _force, _current, _following):
         yield from look(machine)
 
 
-def _loops(m: Machine) -> Iterator[Caution]:
+def _loops(m: CascadeFigures) -> Iterator[Caution]:
     """The loops settle, and do not ring."""
     loop, margin = m.loop, m.loop.gain_margin
     if margin < LEAST_GAIN_MARGIN:
@@ -244,7 +244,7 @@ def _loops(m: Machine) -> Iterator[Caution]:
             yield Caution(f"phase margin of the {name}", value, limit, "it rings after every change", remedy)
 
 
-def _lowered(m: Machine, share: float) -> str:
+def _lowered(m: CascadeFigures, share: float) -> str:
     """Remedy: the gain of the whole loop lowered to a share of what it is."""
     method, unit = m.spec.method, m.spec.unit
     if method.structure == "pid":
@@ -255,7 +255,7 @@ def _lowered(m: Machine, share: float) -> str:
     return f"{gain} and method.velocity_integral = {at_most(share * method.velocity_integral, unit('V/m'))}"
 
 
-def _bandwidth(m: Machine) -> Iterator[Caution]:
+def _bandwidth(m: CascadeFigures) -> Iterator[Caution]:
     """Each loop keeps below what it acts on."""
     loop, method = m.loop, m.spec.method
     inner, outer = loop.velocity_loop.crossover, loop.position_loop.crossover
@@ -272,7 +272,7 @@ def _bandwidth(m: Machine) -> Iterator[Caution]:
         yield Caution("bandwidth of the velocity loop", text(inner, "Hz"), limit, consequence, remedy)
 
 
-def _position(m: Machine) -> Iterator[Caution]:
+def _position(m: CascadeFigures) -> Iterator[Caution]:
     """Position is measured where and as finely as it is held, and a count of velocity does not shake the drive."""
     spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
     count = spec.encoder_of("position").resolution
@@ -296,7 +296,7 @@ def _position(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _force(m: Machine) -> Iterator[Caution]:
+def _force(m: CascadeFigures) -> Iterator[Caution]:
     """The drive has the force that the limits ask for."""
     spec, speed, acceleration, unit = m.spec, m.speed, m.spec.limits.acceleration, m.spec.unit("N")
     loose, strongest = m.breaking(), m.available(0.0)
@@ -318,7 +318,7 @@ def _force(m: Machine) -> Iterator[Caution]:
         yield Caution("force of an acceleration", text(needed, unit), limit, consequence, remedy)
 
 
-def _current(m: Machine) -> Iterator[Caution]:
+def _current(m: CascadeFigures) -> Iterator[Caution]:
     """The limits act before the drive's own, and the motor stands the current."""
     spec, motor, unit = m.spec, m.spec.motor, m.spec.unit("N")
     has_limit = spec.drive.max_current is not None and spec.drive.input != "force"
@@ -332,7 +332,7 @@ def _current(m: Machine) -> Iterator[Caution]:
         yield from common.overheating("current at limits.speed", held, motor.max_current, stronger)
 
 
-def _following(m: Machine) -> Iterator[Caution]:
+def _following(m: CascadeFigures) -> Iterator[Caution]:
     """At limits.speed the axis keeps within the limits of its loops, and at rest friction does not hold it outside."""
     method, unit, speed = m.spec.method, m.spec.unit("m"), m.spec.unit("m/s")
     error, demand, remedy = m.following_error, m.velocity_demand, remedy_of(m.spec)

@@ -24,7 +24,7 @@ def dead_time(spec: CascadeSpec) -> float:
     return samples * spec.method.sample_period + table.velocity_filter
 
 
-class Machine:
+class CascadeFigures:
     """The machine behind a specification, with the model of its loops."""
 
     def __init__(self, spec: CascadeSpec) -> None:
@@ -126,12 +126,12 @@ class Machine:
 
 def derive(spec: CascadeSpec) -> Iterator[Derived]:
     """All derived figures, in the order they are read."""
-    machine = Machine(spec)
+    machine = CascadeFigures(spec)
     for group in (_masses, _swings, _clocks, _drive, _loops, _errors):
         yield from group(machine)
 
 
-def _masses(m: Machine) -> Iterator[Derived]:
+def _masses(m: CascadeFigures) -> Iterator[Derived]:
     """What moves."""
     name = "moment of inertia" if m.spec.axis.motion == "rotary" else "mass"
     rotor = "" if m.spec.motor is None else " + rotor / (travel per radian)^2"
@@ -140,7 +140,7 @@ def _masses(m: Machine) -> Iterator[Derived]:
         yield m.figure(f"{name} on the motor's side m1", m.spec.motor_mass, "kg", f"motor_mass{rotor}")
 
 
-def _swings(m: Machine) -> Iterator[Derived]:
+def _swings(m: CascadeFigures) -> Iterator[Derived]:
     """Both masses on their coupling."""
     spec, coupling = m.spec, m.spec.mechanics.coupling
     if coupling is None:
@@ -154,7 +154,7 @@ def _swings(m: Machine) -> Iterator[Derived]:
     yield Derived("damping of the resonance", damping, "", f"{damping:.3g}", formula)
 
 
-def _clocks(m: Machine) -> Iterator[Derived]:
+def _clocks(m: CascadeFigures) -> Iterator[Derived]:
     """Sampling and dead time."""
     formula = "T (1/2 + drive.delay + encoder's delay + velocity_span / 2) + velocity_filter"
     yield m.figure("dead time of the velocity loop", dead_time(m.spec), "s", formula)
@@ -162,7 +162,7 @@ def _clocks(m: Machine) -> Iterator[Derived]:
         yield m.figure("velocity of one count", m.counted_velocity, "m/s", "resolution / (velocity_span x T)")
 
 
-def _drive(m: Machine) -> Iterator[Derived]:
+def _drive(m: CascadeFigures) -> Iterator[Derived]:
     """What the drive can do, and what the limits need of it."""
     spec, speed, acceleration = m.spec, m.speed, m.spec.limits.acceleration
     if spec.motor is not None:
@@ -186,7 +186,7 @@ def _drive(m: Machine) -> Iterator[Derived]:
     yield m.figure("way of an acceleration", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk aside")
 
 
-def _loops(m: Machine) -> Iterator[Derived]:
+def _loops(m: CascadeFigures) -> Iterator[Derived]:
     """Bandwidths and margins of the exact linear model."""
     for name, margin in (("velocity loop", m.loop.velocity_loop), ("position loop", m.loop.position_loop)):
         if margin.crossover > 0:
@@ -198,7 +198,7 @@ def _loops(m: Machine) -> Iterator[Derived]:
     yield Derived("gain margin", m.loop.gain_margin, "", f"{m.loop.gain_margin:.3g}", formula)
 
 
-def _errors(m: Machine) -> Iterator[Derived]:
+def _errors(m: CascadeFigures) -> Iterator[Derived]:
     """How the axis follows and how it rests."""
     formula = "((1 - share) v + command left by feed-forward / Kv, unless there is an integral) / Kp"
     if m.spec.method.structure == "pid":

@@ -19,6 +19,7 @@ from detent.axisfile.tables import (
     breaking_effort,
     usual_stiction,
 )
+from detent.errors import DetentError
 from detent.files.fields import Table, optional, required
 from detent.files.quantities import (
     Acceleration,
@@ -333,6 +334,16 @@ class CascadeSpec(AxisSpec, frozen=True):
         if self.drive.input == "force":
             return min(limit, self.limits.effort / self.effort_per_command)
         return min(limit, self.max_current / self.drive.current_per_volt) if self.drive.input == "current" else limit
+
+    @classmethod
+    def of(cls, spec: AxisSpec, file: str) -> "CascadeSpec":
+        """The specification of an axis of this method; that of another is refused."""
+        if isinstance(spec, cls):
+            return spec
+        raise DetentError(
+            f"{file}: came an axis of the method {spec.axis.method}; allowed: cascade, whose constants are those of an "
+            "identification; name an axis file of it, or leave it out"
+        )
 
     def encoder_of(self, loop: Literal["position", "velocity"]) -> EncoderTable:
         """Encoder that a loop uses."""

@@ -6,7 +6,7 @@ from typing import TypeVar
 from detent.axisfile.blocks import fill_drive_train, fill_encoder
 from detent.files.fields import Table
 from detent.methods.print_head.controller import PERIOD_US
-from detent.methods.print_head.derive import Machine
+from detent.methods.print_head.derive import HeadFigures
 from detent.methods.print_head.plant import AVERAGED, SWITCH_LEVEL
 from detent.methods.print_head.schema import COLUMN, EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.methods.print_head.system import PrintHeadParams
@@ -47,7 +47,7 @@ def build_print_head(spec: PrintHeadSpec) -> PrintHeadParams:
 
 def _fill_drive_train(t: DriveTrainParams, spec: PrintHeadSpec) -> None:
     mechanics, friction = spec.mechanics, spec.mechanics.friction
-    machine, drift = Machine(spec), 1 + spec.disturbance.motor_constant
+    machine, drift = HeadFigures(spec), 1 + spec.disturbance.motor_constant
     # The drift is that of the drive Vf = F R / k: with a drifted motor constant the force drifts by both.
     kinds = ("coulomb", "static", "viscous")
     right = _times(friction.right, kinds, 1 + spec.disturbance.friction_right, drift)

@@ -10,7 +10,7 @@ from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import Remedies
 from detent.files.quantities import INCH
-from detent.methods.print_head.derive import DIRECTIONS, Machine
+from detent.methods.print_head.derive import DIRECTIONS, HeadFigures
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.units import format_quantity as text
 
@@ -119,7 +119,7 @@ def _homing(spec: PrintHeadSpec) -> Iterator[Contradiction]:
 
 def _simulated(spec: PrintHeadSpec) -> Iterator[Contradiction]:
     """Motor and friction can be simulated, with their drifts."""
-    m, drifts = Machine(spec), spec.disturbance
+    m, drifts = HeadFigures(spec), spec.disturbance
     drift = (1 + drifts.motor_constant) * (1 + max(drifts.friction_right, drifts.friction_left))
     coupling = m.force_per_ampere * m.volts_per_speed / m.mass
     plant = common.Plant(m.resistance, spec.motor.inductance, coupling, m.mass / max(1.0, drift))
@@ -137,12 +137,12 @@ RULES: tuple[Rule, ...] = (_machine, _inside_limits, _identified, _homing, _simu
 
 def find_cautions(spec: PrintHeadSpec) -> Iterator[Caution]:
     """Look a print-head axis over."""
-    machine = Machine(spec)
+    machine = HeadFigures(spec)
     for look in (_headroom, _identification, _calibration, _ramp, _breaking_loose, _motor):
         yield from look(machine)
 
 
-def _headroom(m: Machine) -> Iterator[Caution]:
+def _headroom(m: HeadFigures) -> Iterator[Caution]:
     """The drive has counts left to accelerate with at the top speed."""
     ir_counts = m.spec.method.ir_counts
     for direction in DIRECTIONS:
@@ -158,7 +158,7 @@ def _headroom(m: Machine) -> Iterator[Caution]:
             )
 
 
-def _identification(m: Machine) -> Iterator[Caution]:
+def _identification(m: HeadFigures) -> Iterator[Caution]:
     """The axis computer takes the true constants for plausible."""
     method = m.spec.method
     for name, values, low, high, unit in (
@@ -176,7 +176,7 @@ def _identification(m: Machine) -> Iterator[Caution]:
                 )
 
 
-def _calibration(m: Machine) -> Iterator[Caution]:
+def _calibration(m: HeadFigures) -> Iterator[Caution]:
     """Both calibration passes can be made, and told apart."""
     method, top = m.spec.method, m.top_speed
     drives = {speed: (method.default_slope * speed >> 8) + method.default_friction_counts for speed in (top, 60)}
@@ -208,7 +208,7 @@ def _calibration(m: Machine) -> Iterator[Caution]:
             )
 
 
-def _ramp(m: Machine) -> Iterator[Caution]:
+def _ramp(m: HeadFigures) -> Iterator[Caution]:
     """Ramp and acceleration are those the method assumes."""
     (low, high), interval, ratio = RAMP_INTERVAL_RANGE, m.ramp_interval, m.acceleration / ASSUMED_ACCELERATION
     if not low <= interval <= high:
@@ -230,7 +230,7 @@ def _ramp(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _breaking_loose(m: Machine) -> Iterator[Caution]:
+def _breaking_loose(m: HeadFigures) -> Iterator[Caution]:
     """The drive of a start and that of homing move the head."""
     method, homing = m.spec.method, m.spec.homing
     speed = speed_value(homing.speed)
@@ -256,7 +256,7 @@ def _breaking_loose(m: Machine) -> Iterator[Caution]:
             )
 
 
-def _motor(m: Machine) -> Iterator[Caution]:
+def _motor(m: HeadFigures) -> Iterator[Caution]:
     """The bridge model shows the current, and the motor stands it."""
     lag, most, homing = m.electrical_time_constant, m.spec.motor.max_current, m.spec.homing.drive_limit_counts
     start = max(m.coulomb_counts.values()) + m.spec.method.ir_counts

@@ -16,7 +16,7 @@ from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, DetentError, describe_sb1
 from detent.files.quantities import INCH
 from detent.methods.print_head.build import build_print_head
-from detent.methods.print_head.derive import Machine as Figures
+from detent.methods.print_head.derive import HeadFigures
 from detent.methods.print_head.run import print_head_machine
 from detent.methods.print_head.schema import EMITTER, PrintHeadSpec, speed_value
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, controlled_run_to, set_speed
@@ -238,7 +238,7 @@ def nominal_constants(spec: PrintHeadSpec) -> DriveConstants:
     nameplate = spec.disturbance.model_copy(
         update={"motor_constant": 0.0, "friction_right": 0.0, "friction_left": 0.0, "supply": spec.drive.supply}
     )
-    figures = Figures(spec.model_copy(update={"disturbance": nameplate}))
+    figures = HeadFigures(spec.model_copy(update={"disturbance": nameplate}))
     return DriveConstants(*map(round, (*figures.slope.values(), *figures.coulomb_counts.values())))
 
 
@@ -266,7 +266,7 @@ class MeasuringBench:
 
     def open_loop_error(self, constants: DriveConstants, speed: float, direction: int) -> float:
         """Error of the steady speed without trim, as a fraction of `speed` [m/s]; -1 if the head does not move."""
-        seconds = min(0.2 + SETTLING * Figures(self.spec).mechanical_time_constant, 4.0)
+        seconds = min(0.2 + SETTLING * HeadFigures(self.spec).mechanical_time_constant, 4.0)
         velocity, _ = self._run(constants, speed, direction, seconds, trim=False)
         if len(velocity) < round(seconds / TICK):
             return -1.0

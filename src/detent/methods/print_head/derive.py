@@ -20,7 +20,7 @@ RUN_UP_RESERVE = 1.05  # run-up before a print line, in stop distances (3.4)
 FRAME_RESERVE = 12  # emitters a turning point keeps away from a frame
 
 
-class Machine:
+class HeadFigures:
     """The true machine behind a specification, in the units its axis computer thinks in."""
 
     def __init__(self, spec: PrintHeadSpec) -> None:
@@ -79,11 +79,11 @@ class Machine:
 
 def derive(spec: PrintHeadSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = Machine(spec)
+    machine = HeadFigures(spec)
     return (*_line(machine), *_dynamics(machine), *_limits(machine))
 
 
-def _line(m: Machine) -> Iterator[Derived]:
+def _line(m: HeadFigures) -> Iterator[Derived]:
     """Units the axis computer thinks in, and the voltage/speed line that identification should find."""
     yield count_figure("drive counts per volt", m.counts_per_volt, "300 / supply", "count/V")
     text = f"{m.top_speed} ({m.top_speed / 6:.4g} in/s)"
@@ -98,7 +98,7 @@ def _line(m: Machine) -> Iterator[Derived]:
     yield Derived("acceleration from the IR counts", m.acceleration, "m/s^2", text, formula)
 
 
-def _dynamics(m: Machine) -> Iterator[Derived]:
+def _dynamics(m: HeadFigures) -> Iterator[Derived]:
     """How fast things happen."""
     yield quantity_figure("moving mass", m.mass, "kg", "carriage + belt + rotor inertia / r^2")
     yield quantity_figure("electrical time constant", m.electrical_time_constant, "s", "L / R")
@@ -113,7 +113,7 @@ def _dynamics(m: Machine) -> Iterator[Derived]:
     yield quantity_figure("print line at top speed", emitters * EMITTER, "m", formula)
 
 
-def _limits(m: Machine) -> Iterator[Derived]:
+def _limits(m: HeadFigures) -> Iterator[Derived]:
     """How far the axis is from what it cannot do."""
     ir_counts, top = m.spec.method.ir_counts, m.top_speed
     for direction in DIRECTIONS:

@@ -21,7 +21,7 @@ from detent.files.quantities import INCH
 from detent.methods.print_head import system as print_head
 from detent.methods.print_head.build import build_print_head
 from detent.methods.print_head.controller import load_line
-from detent.methods.print_head.derive import Machine as TrueMachine
+from detent.methods.print_head.derive import HeadFigures
 from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
 from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
@@ -334,7 +334,7 @@ class _Runner:
             self.result.strikes.append(Strike(character, line.number, offset))
 
     def _direction(self, side: str) -> Direction:
-        line, p, true = getattr(self.head, side), self.machine.params.controller, TrueMachine(self.spec)
+        line, p, true = getattr(self.head, side), self.machine.params.controller, HeadFigures(self.spec)
         return Direction(
             slope=line.slope,
             friction=line.friction,

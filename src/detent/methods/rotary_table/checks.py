@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from detent.axisfile import common_checks as common
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import BARELY, UNITS, Remedies, put
-from detent.methods.rotary_table.derive import TICK, Machine, counted, weakest_output
+from detent.methods.rotary_table.derive import TICK, TableFigures, counted, weakest_output
 from detent.methods.rotary_table.form_checks import FORMS, form_caution
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity as text
@@ -69,7 +69,7 @@ def _gear(spec: RotaryTableSpec) -> Iterator[Contradiction]:
 def _detector(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     """The coarse word tells motor turns apart, conversions end in time, comparators see zero crossings."""
     detector, strobe = spec.detector, spec.method.strobe_period
-    if Machine(spec).allowed_coarse_error <= 0:
+    if TableFigures(spec).allowed_coarse_error <= 0:
         # 1/(2 G) > 1/C + 1/(G F), times G
         least = math.floor(spec.ratio / (0.5 - 1 / detector.fine.counts) * (1 + BARELY)) + 1
         keys = "detector.coarse.counts mechanics.gear_ratio detector.fine.counts"
@@ -150,7 +150,8 @@ def _parts(bits: int) -> str:
 
 def _acceleration(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     """The acceleration is one for the interpolator, and brakes within a turn."""
-    m, speed, acceleration, bits = Machine(spec), spec.limits.speed, spec.limits.acceleration, spec.method.fraction_bits
+    m, bits = TableFigures(spec), spec.method.fraction_bits
+    speed, acceleration = spec.limits.speed, spec.limits.acceleration
     least = acceleration / spec.acceleration_word
     if acceleration < least * (1 - BARELY):
         yield _below(
@@ -224,12 +225,12 @@ RULES = (_gear, _detector, _clocks, _speeds, _acceleration, _positions, _machine
 
 def find_cautions(spec: RotaryTableSpec) -> Iterator[Caution]:
     """Look a rotary-table axis over."""
-    machine = Machine(spec)
+    machine = TableFigures(spec)
     for look in (*FORMS, _loop, _drive, _torque, _rest, _slow, _composition):
         yield from look(machine)
 
 
-def _loop(m: Machine) -> Iterator[Caution]:
+def _loop(m: TableFigures) -> Iterator[Caution]:
     """The loop is damped, and its word is never clipped."""
     spec, damping, most = m.spec, m.loop.damping, m.spec.largest_word
     if not spec.method.position_control:
@@ -266,7 +267,7 @@ def _loop(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _drive(m: Machine) -> Iterator[Caution]:
+def _drive(m: TableFigures) -> Iterator[Caution]:
     """The drive keeps to the motor's speed, and the interpolator's words are not rounded to nothing."""
     spec, full, most, bits = m.spec, m.spec.drive.full_speed, m.spec.motor.max_speed, m.spec.method.fraction_bits
     if full > most * (1 + BARELY):
@@ -295,7 +296,7 @@ def _drive(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _torque(m: Machine) -> Iterator[Caution]:
+def _torque(m: TableFigures) -> Iterator[Caution]:
     """The amplifier has the torque that is asked of it, and its limit acts."""
     spec, effort, load = m.spec, m.spec.limits.effort, m.spec.disturbance.load
     needed, steady, moves = m.accelerating_torque, m.resisting_torque, spec.method.position_control and m.is_stable
@@ -324,7 +325,7 @@ def _torque(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _rest(m: Machine) -> Iterator[Caution]:
+def _rest(m: TableFigures) -> Iterator[Caution]:
     """At rest the table is in position, and stays so."""
     spec, window, error, noise = m.spec, m.spec.method.in_position, m.resting_error, m.noise
     if m.breaking_word > spec.largest_word:
@@ -354,7 +355,7 @@ def _rest(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _slow(m: Machine) -> Iterator[Caution]:
+def _slow(m: TableFigures) -> Iterator[Caution]:
     """A slow jog does not stick, and a short way back is not a turn."""
     spec, method, mechanics = m.spec, m.spec.method, m.spec.mechanics
     step = m.deviation(mechanics.static - mechanics.coulomb) / spec.count
@@ -381,7 +382,7 @@ def _slow(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _composition(m: Machine) -> Iterator[Caution]:
+def _composition(m: TableFigures) -> Iterator[Caution]:
     """The two words of the detector make one angle."""
     spec, errors, allowed = m.spec, m.coarse_errors, m.allowed_coarse_error
     turn, total = text(math.tau / spec.ratio, "rad"), sum(errors.values())

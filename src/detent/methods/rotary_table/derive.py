@@ -19,7 +19,7 @@ TICK = 1e-4  # base tick [s] (`methods.rotary_table.system`)
 POINTS = 256  # places of a turn at which the errors of a resolver are looked at, those of `kernel.turn_table`
 
 
-class Machine:
+class TableFigures:
     """The machine behind a specification."""
 
     def __init__(self, spec: RotaryTableSpec) -> None:
@@ -134,12 +134,12 @@ def counted(counts: int) -> str:
 
 def derive(spec: RotaryTableSpec) -> tuple[Derived, ...]:
     """Compute all derived figures, in the order they are read."""
-    machine = Machine(spec)
+    machine = TableFigures(spec)
     loop = _loop(machine) if spec.method.position_control else ()
     return (*_words(machine), *_drive(machine), *loop, *_motion(machine), *_detector(machine))
 
 
-def _words(machine: Machine) -> Iterator[Derived]:
+def _words(machine: TableFigures) -> Iterator[Derived]:
     """What a count is, and a word; strobe, interrupt and task."""
     spec, method = machine.spec, machine.spec.method
     yield Derived("period T", spec.period, "count", f"{spec.period} counts", "G x fine counts: a turn of the table")
@@ -161,7 +161,7 @@ def _words(machine: Machine) -> Iterator[Derived]:
     yield Derived("interrupts in a turn at limits.speed", turn, "", f"{turn:.4g}", "360 deg / v / strobe period")
 
 
-def _drive(machine: Machine) -> Iterator[Derived]:
+def _drive(machine: TableFigures) -> Iterator[Derived]:
     """Inertia, stiffness, acceleration."""
     spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
     yield quantity_figure("inertia at the motor J", spec.inertia, "kg*m^2", "rotor + gear + table / G^2")
@@ -174,7 +174,7 @@ def _drive(machine: Machine) -> Iterator[Derived]:
         yield quantity_figure("torque of an acceleration", machine.accelerating_torque, "N*m", formula)
 
 
-def _loop(machine: Machine) -> Iterator[Derived]:
+def _loop(machine: TableFigures) -> Iterator[Derived]:
     """How the table follows, and how the loop settles."""
     loop = machine.loop
     error = machine.following_error(machine.speed)
@@ -193,7 +193,7 @@ def _loop(machine: Machine) -> Iterator[Derived]:
         yield quantity_figure("overshoot", passed, "rad", formula)
 
 
-def _motion(machine: Machine) -> Iterator[Derived]:
+def _motion(machine: TableFigures) -> Iterator[Derived]:
     """Cycle and rollover of a jog; what is in position, and how the table rests."""
     spec, method = machine.spec, machine.spec.method
     yield quantity_figure("cycle of a jog", math.tau / machine.speed, "s", "T / v: one rollover in each")
@@ -213,7 +213,7 @@ def _motion(machine: Machine) -> Iterator[Derived]:
         yield quantity_figure("deviation under the load", error, "rad", "torque / G / (stiffness x G x Kp)")
 
 
-def _detector(machine: Machine) -> Iterator[Derived]:
+def _detector(machine: TableFigures) -> Iterator[Derived]:
     """Composition and conversion (3.1)."""
     spec, detector = machine.spec, machine.spec.detector
     allowed = machine.allowed_coarse_error

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from detent.files.findings import Caution
 from detent.files.nearest import put
-from detent.methods.rotary_table.derive import TICK, Machine, counted
+from detent.methods.rotary_table.derive import TICK, TableFigures, counted
 from detent.units import format_quantity as text
 
 TURN_COUNTER = put("method.form", '"turn counter"')
@@ -20,7 +20,7 @@ def form_caution(key: str, came: str, sound: str, consequence: str) -> Caution:
     return Caution(key, came, sound, consequence, put(key, sound))
 
 
-def _angle(m: Machine) -> Iterator[Caution]:
+def _angle(m: TableFigures) -> Iterator[Caution]:
     """The angle goes on beyond a turn."""
     if m.spec.method.form == "raw":
         ends = "the deviation jumps by a turn and the table runs away (test 11); a jog ends after two turns at most"
@@ -36,7 +36,7 @@ def _angle(m: Machine) -> Iterator[Caution]:
         )
 
 
-def _start_angles(m: Machine) -> Iterator[Caution]:
+def _start_angles(m: TableFigures) -> Iterator[Caution]:
     """With the flag a jog succeeds from wherever it starts."""
     method, latency, lag = m.spec.method, m.latency_way, m.following_error(m.speed)
     if method.form != "flag" or (method.guarded and method.judge == "theoretical"):
@@ -57,7 +57,7 @@ def _start_angles(m: Machine) -> Iterator[Caution]:
     )
 
 
-def _race(m: Machine) -> Iterator[Caution]:
+def _race(m: TableFigures) -> Iterator[Caution]:
     """No interrupt comes between the halves of a rollover."""
     method = m.spec.method
     if method.update == "atomic" or method.form == "raw":
@@ -75,7 +75,7 @@ def _race(m: Machine) -> Iterator[Caution]:
     yield form_caution("method.update", f'"{method.update}": {value}', '"atomic"', f"{seen} (trap 3, test 15)")
 
 
-def _remaining(m: Machine) -> Iterator[Caution]:
+def _remaining(m: TableFigures) -> Iterator[Caution]:
     """The remaining angle has a sign, and the position is controlled."""
     spec = m.spec
     if not spec.method.signed_remaining:
@@ -92,7 +92,7 @@ def _remaining(m: Machine) -> Iterator[Caution]:
         yield form_caution("method.position_control", came, "true", f"{wrong}, and no place is kept (test 19)")
 
 
-def _near_boundary(m: Machine) -> Iterator[Caution]:
+def _near_boundary(m: TableFigures) -> Iterator[Caution]:
     """Without the turn counter no position is near the boundary."""
     spec = m.spec
     if spec.method.form == "turn counter" or not m.is_stable:

@@ -7,7 +7,7 @@ import pytest
 from tests.cascade_rig import Rig
 
 from detent.methods.cascade.build import build_cascade, motion_limits
-from detent.methods.cascade.derive import Machine, derive
+from detent.methods.cascade.derive import CascadeFigures, derive
 from detent.planning.profile import plan_move
 
 PID = ("method.structure=pid", "method.proportional=4 kV/m", "method.derivative=100 V*s/m")
@@ -131,28 +131,28 @@ def test_weight_that_is_fed_forward_causes_no_error(load_text, good_text):
 
 def test_pid_with_integral_follows_without_error(load_text, good_text):
     spec = load_text(good_text, *PID, "method.integral=20 kV/(m*s)", "method.feed_forward.velocity=0").spec
-    assert Machine(spec).following_error == 0.0
-    assert Machine(spec).velocity_demand == 0.0
+    assert CascadeFigures(spec).following_error == 0.0
+    assert CascadeFigures(spec).velocity_demand == 0.0
 
 
 def test_feed_forward_of_coulomb_ends_at_its_dead_band(load_text, good_text):
-    without = Machine(load_text(good_text, *SINGLE, "method.feed_forward.coulomb=0").spec).following_error
-    banded = Machine(load_text(good_text, *SINGLE, "method.feed_forward.dead_band=1 m/s").spec).following_error
+    without = CascadeFigures(load_text(good_text, *SINGLE, "method.feed_forward.coulomb=0").spec).following_error
+    banded = CascadeFigures(load_text(good_text, *SINGLE, "method.feed_forward.dead_band=1 m/s").spec).following_error
     assert banded == pytest.approx(without)
-    assert without > Machine(load_text(good_text, *SINGLE).spec).following_error > 0
+    assert without > CascadeFigures(load_text(good_text, *SINGLE).spec).following_error > 0
 
 
 def test_forces_of_the_harder_direction(load_text, good_text):
-    up = Machine(load_text(good_text, "mechanics.weight=50 N", "mechanics.friction.offset=4 N").spec)
+    up = CascadeFigures(load_text(good_text, "mechanics.weight=50 N", "mechanics.friction.offset=4 N").spec)
     assert up.needed(0.0) == pytest.approx(14 + 8 + 4 + 50)
     assert up.breaking() == pytest.approx(18 + 9.2 + 4 + 50)
     assert up.breaking(-1.0) == pytest.approx(20 + 9.2 - 4 + 50)
-    down = Machine(load_text(good_text, "mechanics.weight=-50 N").spec)
+    down = CascadeFigures(load_text(good_text, "mechanics.weight=-50 N").spec)
     assert down.needed(0.0) == pytest.approx(16 + 8 + 50)
 
 
 def test_a_voltage_drive_loses_force_with_speed(load_text, rotary_text):
-    machine = Machine(load_text(rotary_text, "drive.voltage_gain=1").spec)
+    machine = CascadeFigures(load_text(rotary_text, "drive.voltage_gain=1").spec)
     spec = machine.spec
     stalled = 10 * spec.effort_per_command
     assert machine.available(0.0) == pytest.approx(min(stalled, 3.0))

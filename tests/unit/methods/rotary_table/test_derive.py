@@ -5,7 +5,7 @@ import math
 import pytest
 
 from detent.kernel.turn_table import TURN
-from detent.methods.rotary_table.derive import Machine, derive, resolver_error, weakest_output
+from detent.methods.rotary_table.derive import TableFigures, derive, resolver_error, weakest_output
 from detent.methods.rotary_table.schema import FineTable
 from detent.sensing.resolver_counter import AbsoluteAngle, CompositionParams, ResolverParams, compose, fill_resolver
 
@@ -88,7 +88,7 @@ def test_the_simulated_axis_follows_as_the_figures_say(bench_of, overrides):
         bench.run(1e-4)
         torque = max(torque, bench.r.plant.amplifier.torque)
         error = max(error, bench.r.controller.positioner.dr / 65_536 * bench.spec.count)
-    machine = Machine(bench.spec)
+    machine = TableFigures(bench.spec)
     following, passed = machine.following_error(machine.speed), machine.overshoot(machine.speed)
     assert error == pytest.approx(following + passed, abs=0.001 * DEG)
     bench.run(1.0)
@@ -110,7 +110,7 @@ def test_no_positioning_of_the_simulated_axis_rests_farther_off(bench_of, overri
     for k in range(25):
         bench = bench_of((*overrides, f"position.1.angle={20 + 3.37 * k} deg")).run(0.1).go(1).run(7)
         errors.append(abs(bench.r.controller.positioner.oar - bench.r.controller.positioner.angle.aar))
-    assert Machine(bench.spec).resting_error == most
+    assert TableFigures(bench.spec).resting_error == most
     assert max(errors) <= most
     assert most == 1 or max(errors) > most / 3
 
@@ -186,7 +186,7 @@ ERRORS = (
 
 def test_coarse_errors_add_up(load_text, good_text):
     axis = load_text(good_text, *ERRORS)
-    errors = Machine(axis.spec).coarse_errors
+    errors = TableFigures(axis.spec).coarse_errors
     assert {name: round(math.degrees(error), 3) for name, error in errors.items()} == {
         "backlash": 0.5,
         "eccentricity": 0.3,
@@ -207,7 +207,7 @@ def test_coarse_errors_add_up(load_text, good_text):
 def test_composition_is_right_up_to_the_allowed_error(load_text, good_text, share, exact):
     spec = load_text(good_text, "detector.coarse.counts=1024").spec
     p, r = CompositionParams(ratio=90, fine=4096, coarse=1024), AbsoluteAngle()
-    error = round(share * Machine(spec).allowed_coarse_error / (2 * math.pi) * TURN)
+    error = round(share * TableFigures(spec).allowed_coarse_error / (2 * math.pi) * TURN)
     wrong = 0
     for theta in range(0, spec.period, 7):
         phase = ((theta << 32) // spec.period + error) % TURN
