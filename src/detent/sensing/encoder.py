@@ -113,3 +113,4 @@ def stand_at(p: EncoderParams, r: Encoder, position: float, seed: int) -> None:
     place_right(p, r)
     place_left(p, r)
     set_channels(p, r)
+    follow(p, r, position)  # rounding may have put it beside its edge

@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from detent.sensing.encoder import JITTER_LIMIT, Encoder, EncoderParams, is_one_edge, pass_left, pass_right, stand_at
 from detent.sensing.quadrature import Quadrature, count_edge
@@ -116,3 +118,10 @@ def test_one_edge_is_promised_only_where_jitter_cannot_make_it_two(origin):
     stand_at(p, r, 1001.5 * PITCH + origin, 1)
     places = np.array([999.9, 1000.4, 1000.5, 1001.1, 1001.9, 1002.5, 1002.6, 1003.1]) * PITCH + origin
     assert [is_one_edge(p, r, x) for x in places] == [False, False, True, True, True, True, False, False]
+
+
+@given(position=st.floats(-1.0, 1.0), pitch=st.floats(1e-7, 1e-3), origin=st.floats(-0.1, 0.1))
+def test_disc_stands_between_its_edges_at_power_on(position, pitch, origin):
+    p, r = EncoderParams(edge_pitch=pitch, origin=origin), Encoder()
+    stand_at(p, r, position, 1)
+    assert r.next_left <= position < r.next_right

@@ -73,13 +73,19 @@ def fire_until(c: PrintHeadController, lines: PrintHeadLines, begin: int, last: 
 
 
 @hot_step
-def take_edge(p: HeadParams, c: PrintHeadController, levels: int, when: int) -> None:
-    """New levels of the channels at `when` [us]: four are an emitter, and one against the motion may end a stop."""
-    change = count_edge(c.quadrature, levels & 1, levels >> 1)
+def take_edge(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines, begin: int, k: int) -> None:
+    """Edge `k` of the period that began at `begin`: four are an emitter, and one against the motion may end a stop.
+
+    Only these two change what is due, so the columns due before the edge need not be fired at the others.
+    """
+    change = count_edge(c.quadrature, lines.levels[k] & 1, lines.levels[k] >> 1)
     cycle = c.quadrature.count >> 2
     if cycle != c.cycle:
+        when = begin + lines.when_us[k]
+        fire_until(c, lines, begin, when)
         take_emitter(p, c, cycle, when)
     if change == -c.head.direction:
+        fire_until(c, lines, begin, begin + lines.when_us[k])
         on_reverse_edge(p, c.head)
         c.head.wake_us = next_wake(p, c.head)
 
@@ -90,9 +96,7 @@ def take_events(p: HeadParams, c: PrintHeadController, lines: PrintHeadLines) ->
     begin = c.head.now_us - PERIOD_US
     lines.fired = 0
     for k in range(lines.edges):
-        when = begin + lines.when_us[k]
-        fire_until(c, lines, begin, when)
-        take_edge(p, c, lines.levels[k], when)
+        take_edge(p, c, lines, begin, k)
     fire_until(c, lines, begin, begin + PERIOD_US - 1)
 
 

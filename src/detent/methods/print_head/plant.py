@@ -59,15 +59,21 @@ class PrintHeadPlant(Registers):
 
 
 @hot_step
-def report_edge(r: PrintHeadPlant, lines: PrintHeadLines, edge: float, pace: float) -> None:
-    """An edge at `edge`, with the carriage on its way at `pace` [us/m]: its time and the levels after it.
+def pace(r: PrintHeadPlant, x: float) -> float:
+    """How long the carriage took on its way to `x` [us/m]; 0 if it stands."""
+    return PERIOD_US / (x - r.sampled) if x != r.sampled else 0.0
+
+
+@hot_step
+def report_edge(r: PrintHeadPlant, lines: PrintHeadLines, edge: float, per_metre: float) -> None:
+    """An edge at `edge`, with the carriage on its way at `per_metre` [us/m]: its time and the levels after it.
 
     More than the lines can carry loses whole cycles, so that the levels stay in their sequence.
     """
     k = lines.edges
     if k == EDGES:
         k -= CYCLE
-    lines.when_us[k] = min(max(int((edge - r.sampled) * pace), 0), PERIOD_US - 1)
+    lines.when_us[k] = min(int((edge - r.sampled) * per_metre), PERIOD_US - 1)
     lines.levels[k] = r.encoder.channel_a | r.encoder.channel_b << 1
     lines.edges = k + 1
 
@@ -77,17 +83,18 @@ def sense(p: PrintHeadPlantParams, r: PrintHeadPlant, train: DriveTrain, lines: 
     """What the encoder saw in the last period."""
     e, x = r.encoder, train.position
     lines.edges = 0
-    if e.next_left <= x < e.next_right:
-        return
-    pace = PERIOD_US / (x - r.sampled) if x != r.sampled else 0.0
-    while x >= e.next_right:
-        edge = e.next_right
-        pass_right(p.encoder, e)
-        report_edge(r, lines, edge, pace)
-    while x < e.next_left:
-        edge = e.next_left
-        pass_left(p.encoder, e)
-        report_edge(r, lines, edge, pace)
+    if x >= e.next_right:
+        per_metre = pace(r, x)
+        while x >= e.next_right:
+            edge = e.next_right
+            pass_right(p.encoder, e)
+            report_edge(r, lines, edge, per_metre)
+    elif x < e.next_left:
+        per_metre = pace(r, x)
+        while x < e.next_left:
+            edge = e.next_left
+            pass_left(p.encoder, e)
+            report_edge(r, lines, edge, per_metre)
 
 
 @step
@@ -111,9 +118,9 @@ def observe(p: PrintHeadPlantParams, r: PrintHeadPlant, train: DriveTrain, lines
 @hot_step
 def take_over(p: PrintHeadPlantParams, r: PrintHeadPlant, lines: PrintHeadLines) -> None:
     """25 kHz trigger: timer and decoder take over what the computer put out; the bridge follows."""
-    trigger(r.timer, lines.count)
-    changed = r.timer.pulse != r.bridge.pulse or lines.right_left != r.latch.right_left
+    changed = lines.count != r.timer.pulse or lines.right_left != r.latch.right_left
     if changed or lines.transition != r.latch.transition:
+        trigger(r.timer, lines.count)
         r.latch.right_left = lines.right_left
         r.latch.transition = lines.transition
         steer(r.bridge, r.latch, r.timer.pulse, p.supply)
