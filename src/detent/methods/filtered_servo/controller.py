@@ -48,6 +48,7 @@ class FilteredLines(Registers):
 
     a: u2 = register("levels of channel A in the ten clocks of the tick, the first in bit 0", by=PLANT)
     b: u2 = register("levels of channel B in the ten clocks of the tick, the first in bit 0", by=PLANT)
+    changed: u1 = register("1 when a level changes in the tick, or noise comes", by=PLANT)
     stray: i1 = register("pulses that noise puts on the counting lines in the first clock, signed", by=PLANT)
     swallow: u4 = register("the counting line swallows pulses until `swallowed` is this", by=PLANT)
     mask: u4 = register("the strobe line loses strobes until `missed` is this", by=PLANT)
@@ -269,11 +270,10 @@ def leave_reset(c: FilteredController) -> None:
 @hot_step
 def is_quiet(c: FilteredController, lines: FilteredLines) -> bool:
     """True when no level changes in the tick, no noise and no strobe comes, and nothing is left to do."""
-    changes = (lines.a ^ c.channel_a * LEVELS) | (lines.b ^ c.channel_b * LEVELS)
-    return (changes | lines.stray | c.busy) == 0 and c.clock.left > CLOCKS
+    return (lines.changed | c.busy) == 0 and c.clock.left > CLOCKS
 
 
-@step
+@hot_step
 def work(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines, quiet: bool) -> None:
     """A tick in which something happens; on quiet lines it is a command pulse, whose moment does not matter."""
     steer_rate(p.generator, c.generator)
@@ -314,9 +314,10 @@ def protect(p: FilteredControllerParams, c: FilteredController, lines: FilteredL
 def end_tick(p: FilteredControllerParams, c: FilteredController, lines: FilteredLines) -> None:
     """What the clocks have left to say: the guard looks, and the axis may have arrived."""
     c.look -= 1
-    if c.look <= 0:
+    if unlikely(c.look <= 0):
         protect(p, c, lines)
-    watch_arrival(c)
+    if unlikely(c.settling | c.guard.awaited != 0):
+        watch_arrival(c)
 
 
 @controls(FilteredControllerParams)

@@ -55,17 +55,17 @@ def has_passed(edge: float, start: float, way: float, k: int, right: bool) -> bo
 
 @hot_step
 def clock_of(edge: float, start: float, way: float, k: int, right: bool) -> int:
-    """Clock, `k` or later, in which the slide passes an edge: near their quotient, as the places in its clocks say."""
+    """Clock, `k` or later, in which the slide passes an edge: at their quotient or beside it, as its places say."""
     first, ahead = k, edge - start
     k = max(int(ahead / way * CLOCKS) if abs(ahead) < abs(way) else CLOCKS - 1, first)
-    while k > first and has_passed(edge, start, way, k - 1, right):
+    if k > first and has_passed(edge, start, way, k - 1, right):
         k -= 1
-    while k < CLOCKS and not has_passed(edge, start, way, k, right):
+    elif k < CLOCKS and not has_passed(edge, start, way, k, right):
         k += 1
     return k
 
 
-@step
+@hot_step
 def pass_edges(p: EncoderParams, r: Encoder, lines: FilteredLines, start: float, x: float) -> None:
     """The disc follows the slide, going evenly from `start` to `x` [m]; new levels from the clock of each edge on."""
     right = x >= r.next_right
@@ -78,6 +78,7 @@ def pass_edges(p: EncoderParams, r: Encoder, lines: FilteredLines, start: float,
             pass_right(p, r)
         else:
             pass_left(p, r)
+        lines.changed = 1
         later = LEVELS << k & LEVELS
         lines.a = lines.a & ~later | r.channel_a * later
         lines.b = lines.b & ~later | r.channel_b * later
@@ -89,6 +90,7 @@ def disturb(p: InterferenceParams, r: Interference, tick: int, lines: FilteredLi
     interfere(p, r, tick)
     lines.stray = r.plus - r.minus
     lines.a ^= r.corrupt
+    lines.changed |= lines.stray != 0 or r.corrupt
     lines.swallow, lines.mask = r.removed + r.remove, r.lost + r.lose_sample
 
 
@@ -96,12 +98,14 @@ def disturb(p: InterferenceParams, r: Interference, tick: int, lines: FilteredLi
 def hold_levels(r: Encoder, lines: FilteredLines) -> None:
     """The disc stands: the same levels in all clocks of the tick."""
     lines.a, lines.b = r.channel_a * LEVELS, r.channel_b * LEVELS
+    lines.changed = 0
 
 
 @hot_step
 def sense(p: FilteredPlantParams, plant: FilteredPlant, x: float, tick: int, lines: FilteredLines) -> None:
     """What happened on the lines during the last tick; the slide stands at `x` [m] now."""
-    hold_levels(plant.encoder, lines)
+    if unlikely(lines.changed != 0):
+        hold_levels(plant.encoder, lines)
     if unlikely(x >= plant.encoder.next_right or x < plant.encoder.next_left):
         pass_edges(p.encoder, plant.encoder, lines, plant.sampled, x)
     plant.sampled = x
