@@ -6,7 +6,8 @@ sum (C: ``-ffp-contract=off``). Results are within one unit in the last place, f
 exponential too large or too small is infinite or 0, as in C.
 
 W. J. Cody, W. Waite: Software Manual for the Elementary Functions (1980): reduction by a constant in parts.
-FDLIBM 5.3 (Sun Microsystems, 1993; e_exp.c, k_sin.c, k_cos.c, e_rem_pio2.c): the constants, and the order of the sums.
+FDLIBM 5.3 (Sun Microsystems, 1993; e_exp.c, k_sin.c, k_cos.c, e_rem_pio2.c): the constants, and the sums, in the
+exponential in pairs.
 """
 
 from math import floor, inf, sqrt
@@ -17,6 +18,7 @@ from detent.kernel.step import step
 LOG2_E = 1.44269504088896338700
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 HIGHEST, LOWEST = 709.782712893383973096, -745.13321910194110842  # exponents beyond which the result is infinite, or 0
+TO_WHOLE = 6755399441055744.0  # 1.5 x 2^52: added and taken off again, it rounds to a whole number
 TWO_OVER_PI = 6.36619772367581382433e-01
 # A quarter turn in three parts of 33 bits, of which whole multiples up to 2^20 are exact, and what is left of it.
 HALF_PI_1, HALF_PI_2 = 1.57079632673412561417, 6.07710050630396597660e-11
@@ -28,24 +30,28 @@ FULL_TURN = 6.283185307179586
 
 @step
 def exp(x: float) -> float:
-    """Exponential: x = k ln 2 + r, and a rational function of r."""
+    """Exponential: x = n ln 2 + r, and a rational function of r."""
     if x > HIGHEST:
         return inf
     if x < LOWEST:
         return 0.0
     if x != x:  # noqa: PLR0124 - not a number
         return x
-    k = floor(x * LOG2_E + 0.5)
-    high, low = x - k * LN2_HIGH, k * LN2_LOW
+    n = (x * LOG2_E + TO_WHOLE) - TO_WHOLE
+    high, low = x - n * LN2_HIGH, n * LN2_LOW
     r = high - low
     t = r * r
-    c = 4.13813679705723846039e-08
-    c = 6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * c)
-    c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * c))
+    square = t * t
+    c = -2.77777777770155933842e-03 * t + 1.66666666666666019037e-01  # in pairs, which a processor sums side by side
+    c += square * ((6.61375632143793436117e-05 - 1.65339022054652515390e-06 * t) + square * 4.13813679705723846039e-08)
+    c = r - t * c
     y = 1.0 - ((low - (r * c) / (2.0 - c)) - high)
-    if k < -1000:
-        return y * power_of_two(k + 200) * power_of_two(-200)  # rounded once, where it is smaller than any normal one
-    return y * power_of_two(k - 2) * 4.0
+    k = int(n)
+    if abs(k) <= 1000:
+        return y * power_of_two(k)
+    if k > 0:
+        return y * power_of_two(k - 2) * 4.0
+    return y * power_of_two(k + 200) * power_of_two(-200)  # rounded once, where it is smaller than any normal one
 
 
 @step
