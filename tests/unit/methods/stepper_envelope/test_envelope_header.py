@@ -1,6 +1,8 @@
 """The step rule in C and the one that runs here: the same bits in every register after every call."""
 
 import ctypes
+import re
+import subprocess
 import tempfile
 from pathlib import Path
 
@@ -393,3 +395,19 @@ def test_whatever_the_host_does_the_bits_are_the_same(data):
         motor.compare()
         for _ in range(data.draw(st.integers(1, 4) | st.integers(1, 40), label="calls")):
             motor.call()
+
+
+GUIDE = Path(__file__).parents[4] / "docs/how-to/hand-an-envelope-to-firmware.md"
+
+
+@pytest.mark.parametrize("pause", [0, 1, 2])
+def test_the_guides_program_turns_whatever_the_pause(tmp_path, pause):
+    write_envelope_header(default_tables(COARSE_FINE, motor="group_a", pause=pause), tmp_path / "group_a.h")
+    program = re.findall(r"<!-- file: move.c -->\n```text\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)[0]
+    orders = "group_a_place(&motor, 0); go_to(6000); move_stop(-1, 1500); motor.rule.turns = 1;"
+    turn = f'{orders} wait("there and back"); return 0;'
+    begin, end = program.index("    group_a_place(&motor, 0);"), program.rindex("}")
+    (tmp_path / "turn.c").write_text(program[:begin] + turn + program[end:], encoding="utf-8")
+    subprocess.run([str(COMPILER), "-std=c99", "-o", "turn", "turn.c"], cwd=tmp_path, check=True)
+    told = subprocess.run(["./turn"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert told.startswith("there and back    at step 1500")
