@@ -21,7 +21,7 @@ import detent
 from detent.cli import app
 from detent.methods.print_head.run import SIGNALS
 from detent.page.words import GAP
-from detent.record.trace_files import load_trace
+from detent.record.trace_files import load_trace, save_trace
 
 pytestmark = [pytest.mark.compiled, pytest.mark.early]
 
@@ -667,12 +667,12 @@ def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
     assert files_in(tmp_path) == before
 
 
-def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace: Path) -> None:
-    import h5py
-
-    broken = shutil.copy(trace, tmp_path / "broken.h5")
-    with h5py.File(broken, "r+") as file:
-        file.attrs["complete"] = 0
+@pytest.mark.parametrize("kind", ["h5", "parquet"])
+def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace: Path, kind: str) -> None:
+    broken = tmp_path / f"broken.{kind}"
+    loaded = load_trace(trace)
+    loaded.attributes["complete"] = 0
+    save_trace(loaded, broken)
     draw = ("plot", broken, "--signals", "plant.train.velocity", "-o", tmp_path / "plot.png")
     study = ("analyse", broken, "--column", "position=plant.train.position")
     for words, asked in ((draw, ("--incomplete",)), (study, ("--column", "incomplete=yes"))):

@@ -76,12 +76,12 @@ def plot(
     as_json: Json = False,
 ) -> None:
     """Draw any recorded registers against time; without --signals, list them."""
+    from detent.record.trace import BROKEN_OFF, broke_off
     from detent.record.trace_files import load_trace
 
     loaded = load_trace(trace)
-    if not loaded.attributes.get("complete", 1) and not incomplete:
-        came, allowed = "a trace of a run that broke off", "a trace of a run that came to its end"
-        raise InputError.of_file(str(trace), came, allowed, "record again, or draw it as it is with --incomplete")
+    if broke_off(loaded.attributes) and not incomplete:
+        raise InputError.of_file(str(trace), *BROKEN_OFF, "record again, or draw it as it is with --incomplete")
     names = split_names(signals)
     if not names:
         rows = [{"name": n, "unit": loaded.units.get(n, ""), "doc": loaded.docs.get(n, "")} for n in loaded.signals]

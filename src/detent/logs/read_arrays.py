@@ -2,7 +2,7 @@
 
 import importlib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from detent.logs import raw_table
 from detent.logs.differences import scipy
 from detent.logs.headings import split_heading
 from detent.logs.mapping import FileOptions
+from detent.record.trace import BROKEN_OFF, broke_off
+from detent.record.trace_files import trace_attributes
 
 MAX_COLUMNAR = 2_000_000_000  # largest HDF5 or Parquet file read; what counts is how many numbers are taken from it
 MAX_BYTES = 500_000_000  # largest file of arrays read, HDF5 and Parquet aside
@@ -21,7 +23,6 @@ ALLOWED_MAT = "a MATLAB file with vectors of equal length"
 ALLOWED_NPZ = "an NPZ or NPY file with vectors of equal length"
 ALLOWED_HDF5 = "an HDF5 file with vectors of equal length"
 ALLOWED_PARQUET = "a Parquet file with columns of numbers"
-BROKEN_OFF = ("a trace of a run that broke off", "a trace of a run that came to its end")
 _DEEPEST = 4
 _DEEPEST_GROUP = 6
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")
@@ -70,7 +71,6 @@ def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
 
 def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
     """Read a Parquet file; the metadata ``unit`` of a field, as detent's traces have it, is its unit."""
-    del options
     check_file(path, MAX_COLUMNAR, ALLOWED_PARQUET)
     try:
         parquet: Any = importlib.import_module("pyarrow.parquet")
@@ -80,8 +80,20 @@ def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
         raise InputError.of_file(str(path), came, ALLOWED_PARQUET, remedy) from None
     with raw_table.whole(path, "Parquet", ALLOWED_PARQUET), parquet.ParquetFile(path) as file:
         raw_table.check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
+        notes = _broke_off(path, trace_attributes(file.schema_arrow.metadata), options)
         items = [_column(field, values) for field, values in zip(file.schema_arrow, file.read().columns, strict=True)]
-    return raw_table.table_of(str(path), items, ALLOWED_PARQUET)
+    table = raw_table.table_of(str(path), items, ALLOWED_PARQUET)
+    table.notes += notes
+    return table
+
+
+def _broke_off(path: Path, told: Mapping[str, Any], options: FileOptions) -> list[str]:
+    """What to note of a trace whose run broke off, where that was asked for; refuse it where not."""
+    if not broke_off(told) or not str(told.get("format", "")).startswith("detent trace"):
+        return []
+    if not options.incomplete:
+        raise InputError.of_file(str(path), *BROKEN_OFF, "record again, or state incomplete=yes with its columns")
+    return ["the run broke off: the trace is taken as far as it goes"]
 
 
 def _column(field: Any, column: Any) -> raw_table.Item:
@@ -143,14 +155,10 @@ def read_hdf5(path: Path, options: FileOptions) -> raw_table.RawTable:
 
     check_file(path, MAX_COLUMNAR, ALLOWED_HDF5)
     with raw_table.whole(path, "HDF5", ALLOWED_HDF5), h5py.File(path, "r") as file:
-        told: Any = file.attrs
-        whole = bool(told.get("complete", 1)) or not str(told.get("format", "")).startswith("detent trace")
-        if not whole and not options.incomplete:
-            raise InputError.of_file(str(path), *BROKEN_OFF, "record again, or state incomplete=yes with its columns")
+        broke = _broke_off(path, file.attrs, options)
         items, notes = _read_file(str(path), file, options.table.strip("/"))
-        notes += [] if whole else ["the run broke off: the trace is taken as far as it goes"]
     table = raw_table.table_of(str(path), items, ALLOWED_HDF5)
-    table.notes += notes
+    table.notes += notes + broke
     return table
 
 

@@ -17,6 +17,13 @@ from detent.files.text import nearest
 Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats or booleans
 Attribute = str | float | int  # what is known about a trace as a whole: the axis, the job, the seed
 TIME = "t"
+# Of a trace that a run left which broke off: what came, and what is allowed.
+BROKEN_OFF = ("a trace of a run that broke off", "a trace of a run that came to its end")
+
+
+def broke_off(attributes: Mapping[str, Any]) -> bool:
+    """True of a trace whose run did not come to its end."""
+    return not attributes.get("complete", 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -17,14 +17,14 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
 from detent.files.text import write_errors, writing
-from detent.record.trace import TIME, Attribute, Column, Trace, check_columns
+from detent.record.trace import BROKEN_OFF, TIME, Attribute, Column, Trace, broke_off, check_columns
 
 CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
@@ -128,7 +128,7 @@ class TraceWriter:
         self.rows = 0
         self._last_time = -np.inf
         # A copy of a trace that broke off stays one that broke off.
-        self._whole = bool(head.attributes.get("complete", 1))
+        self._whole = not broke_off(head.attributes)
         with ExitStack() as stack:
             self._disk = _Disk(stack.enter_context(writing(self.path)))
             self._file: Any = _h5py().File(self._disk, "w")
@@ -278,7 +278,15 @@ def _write_parquet(table: _Table, path: Path) -> None:
 
 
 def _write_table_csv(table: _Table, path: Path) -> None:
-    """A header row such as ``t [s],motor.current [A]``; descriptions and attributes are not in the file."""
+    """A header row such as ``t [s],motor.current [A]``; descriptions and attributes are not in the file.
+
+    Nor can it say that the run broke off: such a trace would pass for a whole one.
+    """
+    if broke_off(table.attributes):
+        raise DetentError(
+            f"{path}: came {BROKEN_OFF[0]}, which CSV cannot say; allowed: {BROKEN_OFF[1]}; save it as .h5 or "
+            '.parquet, or take the mark off it: attributes["complete"] = 1'
+        )
     units = table.units
     labels = {name: f"{name} [{units[name]}]" if units.get(name) else name for name in table.columns}
     write_csv(path, {labels[name]: values for name, values in table.columns.items()})
@@ -351,13 +359,18 @@ def load_trace(path: str | Path) -> Trace:
 def _load_parquet(path: Path) -> Trace:
     _, parquet = need_parquet()
     table = parquet.read_table(path)
-    head: dict[bytes, bytes] = table.schema.metadata or {}
-    attributes: dict[str, Attribute] = json.loads(head.get(b"detent", b"{}"))
+    attributes: dict[str, Attribute] = trace_attributes(table.schema.metadata)
     attributes.pop("format", None)
     told: dict[str, dict[bytes, bytes]] = {field.name: field.metadata or {} for field in table.schema}
     columns: dict[str, Column] = {name: table.column(name).to_numpy() for name in told}
     units, docs = ({name: held.get(key, b"").decode() for name, held in told.items()} for key in (b"unit", b"doc"))
     return Trace(columns=columns, units=units, docs=docs, attributes=attributes)
+
+
+def trace_attributes(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
+    """Attributes of a trace, with its ``format``, in the metadata of a Parquet file; none in a file of others."""
+    found: Any = json.loads((metadata or {}).get(b"detent", b"{}"))
+    return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
 
 
 def _load_csv(path: Path) -> Trace:

@@ -221,8 +221,25 @@ def test_a_run_that_breaks_off_leaves_what_it_recorded(tmp_path: Path) -> None:
     trace = load_trace(tmp_path / "run.h5")
     assert len(trace) == 10
     assert trace.attributes["complete"] == 0
-    save_trace(trace, tmp_path / "copy.h5")
-    assert load_trace(tmp_path / "copy.h5").attributes["complete"] == 0
+    convert_trace(tmp_path / "run.h5", tmp_path / "again.parquet")
+    for name in ("copy.h5", "copy.parquet"):
+        save_trace(trace, tmp_path / name)
+        assert load_trace(tmp_path / name).attributes["complete"] == 0
+    assert load_trace(tmp_path / "again.parquet").attributes["complete"] == 0
+
+
+def test_csv_cannot_say_that_a_run_broke_off(tmp_path: Path) -> None:
+    trace = Trace(columns=make_trace().columns, attributes={"complete": 0})
+    save_trace(trace, tmp_path / "run.h5")
+    told = r"run\.csv: came a trace of a run that broke off, which CSV cannot say; .*; save it as \.h5 or \.parquet"
+    with pytest.raises(DetentError, match=told):
+        save_trace(trace, tmp_path / "run.csv")
+    with pytest.raises(DetentError, match=told):
+        convert_trace(tmp_path / "run.h5", tmp_path / "run.csv")
+    assert not (tmp_path / "run.csv").exists()
+    trace.attributes["complete"] = 1
+    save_trace(trace, tmp_path / "run.csv")
+    assert len(load_trace(tmp_path / "run.csv")) == len(trace)
 
 
 def test_the_writer_refuses_what_does_not_follow(tmp_path: Path) -> None:
