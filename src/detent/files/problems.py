@@ -58,6 +58,10 @@ class Reporter:
         """True when the file or an override gives this key."""
         return path in self._overrides or path in self._places
 
+    def is_table(self, path: Path) -> bool:
+        """True when the file or an override gives a key inside this one."""
+        return any(len(path) < len(key) and key[: len(path)] == path for key in (*self._overrides, *self._places))
+
     def came(self, path: Path, value: object = None) -> str:
         """Value of a key as it was written."""
         text = self._overrides.get(path) or (self._places[path].text if path in self._places else _written(value))

@@ -206,7 +206,8 @@ def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: R
         # What the user changed last is to blame first.
         stated = [path for path in paths if path in layers.overrides] or list(filter(reporter.is_stated, paths))
         blamed = stated[0] if stated else paths[0]
-        came = reporter.came(blamed) if stated else "the default"
+        unstated = "a table of this name" if reporter.is_table(blamed) else "the default"
+        came = reporter.came(blamed) if stated else unstated
         allowed = _allowed_at(blamed, contradiction, reporter)
         yield reporter.problem(blamed, came, allowed, contradiction.remedy)
 

@@ -6,6 +6,7 @@ from the same declarations, so firmware and simulation cannot drift apart. Its t
 
 import ctypes
 import re
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -38,6 +39,7 @@ Axes = Any
 
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
+MARK = "\0mark"  # stands for the checksum of a header's code, until that is known
 METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
 
 BLUE, ORANGE = COLOURS[:2]
@@ -135,11 +137,14 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
 def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
     """Write tables, ramp list, registers and step rule of one motor as a C99 header that needs only <stdint.h>.
 
-    Every name in it begins with that of the motor, so that one firmware can include several. The rule is the
+    Every name in it begins with that of the motor, so that one firmware can include several; two headers of one motor,
+    as of two axes that call theirs alike, do not compile together. The rule is the
     ramp-limited one; the same calls leave the same bits in the same registers as in a simulation. The tables are
     arguments of the rule: firmware may run on the constants of the header, or on copies in RAM that it edits.
     """
-    write_text(path, _header(tables))
+    text = _header(tables)
+    code = text.partition("\n#ifndef")[2]  # without the comment in front: it may name another axis
+    write_text(path, text.replace(MARK, f"0x{zlib.crc32(code.encode()):08X}"))
 
 
 def _header(tables: EnvelopeTables) -> str:
@@ -165,6 +170,7 @@ def _header(tables: EnvelopeTables) -> str:
         rule=StepRule,
         timer=StepTimer,
         code=step_rule,
+        mark=MARK,
     )
 
 

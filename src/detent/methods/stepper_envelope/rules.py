@@ -14,6 +14,7 @@ from detent.files.nearest import BARELY, UNITS, Remedies, put
 from detent.files.problems import field_at
 from detent.methods.stepper_envelope import build
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
+from detent.methods.stepper_envelope.stage_job import unit_in_name
 from detent.planning.step_envelope import MAX_RAMP
 from detent.planning.step_ramp import LEAST_GAIN_HZ, MAX_HZ
 from detent.units import describe_kind
@@ -373,6 +374,20 @@ def _zone_speed(m: Motor) -> Found:
             )
 
 
+# ---- names
+
+
+def _names(spec: StepperEnvelopeSpec) -> Found:
+    """In a list of places the name of a motor is not a column of another one, with its unit."""
+    for name in spec.stepper:
+        other, unit = unit_in_name(name, spec.stepper)
+        if unit is not None:
+            whose = f"motor {other}" if other in spec.stepper else other
+            allowed = f'a name that is no column of {whose} in a list of places: there "{name}" is {whose} in {unit}'
+            apart = f"give motor {name} or {whose} another name" if other in spec.stepper else "give it another name"
+            yield wrong(f"stepper.{name}", allowed, apart)
+
+
 def _per_motor(look: Callable[[Motor], Found]) -> Callable[[StepperEnvelopeSpec], Found]:
     """A rule of the file from one of its motors."""
 
@@ -384,7 +399,7 @@ def _per_motor(look: Callable[[Motor], Found]) -> Callable[[StepperEnvelopeSpec]
     return rule
 
 
-RULES = tuple(map(_per_motor, (
+RULES = (_names, *map(_per_motor, (
     _steps, _timer, _places, _constants, _curve, _torques, _ramp, _start_frequency, _rotor_swing, _zone_places,
     _zone_overlap, _zone_speed,
 )))  # fmt: skip

@@ -15,7 +15,7 @@ columns than those of `CSV_KEYS` are passed over; with ``tile`` the file is a li
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
@@ -327,6 +327,16 @@ def _make_move(line: int, row: StageRow) -> tuple[StageMove | StageJog, int]:
     return StageMove(1, line, targets, by, row.dwell, label, row.turn, change), row.repeat
 
 
+def unit_in_name(name: str, motors: Iterable[str]) -> tuple[str, str | None]:
+    """Key and unit of a heading that ends in its unit, perhaps with further words, such as ``x_um`` of motor x."""
+    # A motor x_um before a motor x, which could have such a column too.
+    for key in sorted((*motors, "dwell"), key=len, reverse=True):
+        token = name.removeprefix(f"{key}_").partition("_")[0]
+        if name.startswith(f"{key}_") and token in _NAME_UNITS["s" if key == "dwell" else "m"]:
+            return key, token
+    return name, None
+
+
 class PlaceRows(CsvRows[StageRow]):
     """A list of places: a column for each motor, whatever else there is."""
 
@@ -359,28 +369,19 @@ class PlaceRows(CsvRows[StageRow]):
     def read_heading(self, index: int, cell: str) -> Column:
         """Read key and unit of a column; a slip of one that says something of the motion must not be passed over."""
         name, unit = split_heading(cell)
-        key, unit = self._match(name, unit)
+        key, unit = unit_in_name(name, self.model.motors) if unit is None else (name, unit)
         if key in self.model.motors or key in CSV_KEYS:
             return self.column_of(index, key, unit)
         head = name.partition("_")[0].lower()
         # By the first letter: wells of a plate have nothing to do with a dwell.
         near = [word for word in difflib.get_close_matches(head, ("dwell", "repeat"), cutoff=0.8) if head[0] == word[0]]
-        meant = self._match(name.lower(), unit)[0]  # motors have small letters
+        meant = name.lower()  # motors have small letters
+        meant = unit_in_name(meant, self.model.motors)[0] if unit is None else meant
         near += [meant] if meant in self.model.motors else []
         if not near:
             return Column()
         allowed = ", ".join(map(self.heading_of, (*self.model.motors, "dwell", "repeat")))
         return self.refuse_heading(index, f'the unknown column "{short(cell)}"', allowed, f'did you mean "{near[0]}"?')
-
-    def _match(self, name: str, unit: str | None) -> tuple[str, str | None]:
-        """Key and unit of a heading whose name may end in its unit and further words."""
-        # A motor x_um before a motor x, which could have such a column too.
-        for key in sorted((*self.model.motors, "dwell"), key=len, reverse=True):
-            usual = _NAME_UNITS["s" if key == "dwell" else "m"]
-            token = name.removeprefix(f"{key}_").partition("_")[0]
-            if unit is None and name.startswith(f"{key}_") and token in usual:
-                return key, token
-        return name, unit
 
     def _choose(self, motor: str) -> None:
         """Pass over all columns of a motor but one."""

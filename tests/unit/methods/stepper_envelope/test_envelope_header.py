@@ -326,6 +326,54 @@ def test_several_motors_in_one_firmware_do_not_know_of_each_other(tmp_path):
     assert pair[0].periods != pair[1].periods
 
 
+def names_of(tables: EnvelopeTables, folder: Path) -> set[str]:
+    """What a header defines for the whole program, without the motor in front."""
+    write_envelope_header(tables, folder / "any.h")
+    text = (folder / "any.h").read_text(encoding="utf-8")
+    found = re.findall(r"^#define (\w+)|^\} (\w+);|^static (?:const |inline )*\w+ \*?(\w+)[\[(]", text, re.MULTILINE)
+    motor = re.compile(f"{tables.motor}_", re.IGNORECASE)
+    assert all(motor.match("".join(name)) for name in found)
+    return {"".join(name)[len(tables.motor) :] for name in found}
+
+
+def test_no_name_of_a_motor_can_be_one_of_another(tmp_path):
+    """Motors a and a_x meet only where what is added to one ends in what is added to the other."""
+    added = names_of(default_tables(), tmp_path)
+    assert len(added) > 40
+    assert {"_ENVELOPE_H", "_registers", "_up", "_next", "_STEP"} <= added
+    assert [(one, other) for one in added for other in added if one != other and one.endswith(other)] == []
+
+
+ALIKE = ("a", "a_", "a_b", "a__b", "a_up", "r", "static", "int32")
+
+
+def test_motors_of_names_that_are_alike_are_all_there(tmp_path):
+    """Names that differ by an underscore, or that are keywords, types and locals of the header."""
+    tables = [default_tables(motor=name, turn=400 + 10 * k) for k, name in enumerate(ALIKE)]
+    library = compile_headers(tmp_path, *tables)
+    for k, each in enumerate(tables):
+        motor = Twins(each, library)
+        motor.start(1)
+        motor.run()
+        assert motor.at_rest == (400 + 10 * k, REST)
+
+
+def test_two_headers_of_one_motor_are_told(tmp_path):
+    """The second one vanished behind the guard of the first, and the compiler said nothing."""
+    for folder, turn in (("one", 5000), ("other", 6000), ("copy", 5000)):
+        (tmp_path / folder).mkdir()
+        write_envelope_header(default_tables(turn=turn), tmp_path / folder / "zoom_a.h")
+    source = tmp_path / "firmware.c"
+    source.write_text('#include "one/zoom_a.h"\n#include "copy/zoom_a.h"\n', encoding="utf-8")
+    compile_c(source, tmp_path, *STRICT)
+    source.write_text('#include "one/zoom_a.h"\n#include "other/zoom_a.h"\n', encoding="utf-8")
+    done = subprocess.run(
+        [str(COMPILER), "-std=c99", "-fsyntax-only", source], capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "Two headers of a motor zoom_a" in done.stderr
+
+
 @st.composite
 def random_tables(draw: st.DrawFn) -> EnvelopeTables:
     """Any ramp, extremes, zones of each direction, words, clock and pause."""

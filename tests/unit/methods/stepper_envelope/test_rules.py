@@ -50,6 +50,32 @@ PLACES = [
     given("all at the end", "extremes.turn=40 mm", "extremes.start=40 mm", "extremes.stop=40 mm", key="extremes.turn"),
 ]
 
+
+def renamed(text, first, second="group_b"):
+    """The zoom with other motors."""
+    return text.replace("stepper.group_a", f"stepper.{first}").replace("stepper.group_b", f"stepper.{second}")
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "meaning"),
+    [("x", "x_um", "motor x in um"), ("a_b_mm_c", "a_b", "motor a_b in mm"), ("x", "dwell_s", "dwell in s")],
+)
+def test_a_name_that_is_a_column_of_another_is_refused(good_text, load_text, one, other, meaning):
+    """A column x_um of a list of places went to motor x, and motor x_um stood still."""
+    name = max(one, other, key=len)
+    with pytest.raises(InputError) as caught:
+        load_text(renamed(good_text, one, other))
+    (problem,) = caught.value.problems
+    assert (problem.key, problem.came) == (f"stepper.{name}", "a table of this name")
+    assert f'there "{name}" is {meaning}' in problem.allowed
+    assert meaning.partition(" in ")[0] in problem.remedy or "dwell" in problem.allowed
+
+
+@pytest.mark.parametrize("names", [("x_um", "y"), ("x", "x_u"), ("x", "xum"), ("a__b", "a_b"), ("dwell_x", "x")])
+def test_names_that_are_alike_pass(good_text, load_text, names):
+    load_text(renamed(good_text, *names))
+
+
 ZONES = [
     edit("zone that overlaps the next", 'end = "13 mm"', 'end = "26 mm"', "38:1", f"{A}.zone.far.begin"),
     given("zone around the next", "zone.near.end=31 mm", key="zone.near.end"),
@@ -90,7 +116,7 @@ def test_rule_of_the_stage(bad, stage_text, load_text, golden):
 def test_every_rule_is_broken_by_an_entry_above(good_text, stage_text, load_text, monkeypatch):
     broken = broken_rules("stepper_envelope", [*FREQUENCIES, *PLACES, *ZONES], good_text, load_text, monkeypatch)
     broken |= broken_rules("stepper_envelope", STAGE, stage_text, load_text, monkeypatch)
-    assert broken == {rule.__name__ for rule in RULES} - {"_constants", "_curve", "_torques", "_ramp"}
+    assert broken == {rule.__name__ for rule in RULES} - {"_names", "_constants", "_curve", "_torques", "_ramp"}
 
 
 @pytest.mark.parametrize(
