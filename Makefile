@@ -26,7 +26,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 # The commands share one environment: under `make -j` two of them must not install into it at once.
 .NOTPARALLEL:
-.PHONY: help demo test test-wide test-long bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
+.PHONY: help demo test test-wide test-long test-lowest lock locked bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1#/' | awk -F'#' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -55,6 +55,27 @@ test-wide: venv-test ## thousands of numbered cases, dozens of logs, other proce
 
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)
+
+# Of every dependency the oldest release that pyproject.toml allows and that has a wheel for this Python. Old releases
+# warn of what new ones of their own dependencies will drop: that is theirs.
+LOWEST  := .venv-lowest
+OLDEST  := $(addprefix tests/unit/,axisfile cli files page record test_axis.py test_errors.py test_units.py) \
+           $(wildcard tests/unit/test_cli*.py $(addprefix tests/unit/methods/,*.py */test_schema.py */test_build.py))
+test-lowest: venv-dev ## files, pages, commands and a run of each method, with the oldest dependencies allowed
+	$(BIN)/uv venv --quiet --clear --seed --python '$(PYTHON)' $(LOWEST)
+	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --only-binary :all: --editable '.[test]'
+	$(LOWEST)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark \
+	    -W default::DeprecationWarning $(OLDEST) $(PYTEST_ARGS)
+
+LOCK := requirements-dev.txt
+lock: venv-dev ## write the versions of all that development needs, with their checksums, to requirements-dev.txt
+	env -u UV_INDEX -u UV_INDEX_URL -u UV_EXTRA_INDEX_URL -u UV_FIND_LINKS $(BIN)/uv pip compile --no-config --quiet \
+	    --default-index https://pypi.org/simple --universal --python-version 3.11 --only-binary :all: --upgrade \
+	    --generate-hashes --extra dev --custom-compile-command 'make lock' --output-file $(LOCK) pyproject.toml
+
+locked: venv-dev ## bring .venv to the versions of requirements-dev.txt, and to nothing else
+	$(BIN)/uv pip sync --quiet --python $(VENV) --require-hashes $(LOCK)
+	$(BIN)/uv pip install --quiet --python $(VENV) --no-deps --editable .
 
 bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, milliseconds to start
 	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)
@@ -96,4 +117,4 @@ docs: venv-dev ## build the documentation; a warning is an error
 check: lint types imports test docs bench-smoke ## all that a change must pass, but for the long tests
 
 clean: ## remove the environment and everything made
-	rm -rf $(VENV) $(VENV).lock docs/_build runs .pytest_cache .hypothesis .benchmarks .ruff_cache .import_linter_cache .coverage htmlcov
+	rm -rf $(VENV) $(VENV).lock $(LOWEST) docs/_build runs .pytest_cache .hypothesis .benchmarks .ruff_cache .import_linter_cache .coverage htmlcov

@@ -29,6 +29,30 @@ def test_no_dependency_is_explained_that_is_gone():
     assert set(rows) <= used | {"hatchling"}
 
 
+LOCK = (ROOT / "requirements-dev.txt").read_text(encoding="utf-8")
+
+
+def numbers(version):
+    return tuple(int(part) for part in version.split("."))
+
+
+@pytest.mark.parametrize("requirement", REQUIREMENTS)
+def test_the_lock_holds_what_is_asked_for(requirement):
+    name, bound = re.sub(r"\[.*\]", "", requirement).split(">=")
+    found = re.findall(rf"^{re.escape(name)}==([\d.]+)", LOCK, flags=re.MULTILINE)
+    assert found, f"{name} is not in requirements-dev.txt: make lock"
+    assert min(map(numbers, found)) >= numbers(bound), "make lock"
+
+
+def test_the_lock_has_checksums_and_names_no_place():
+    entries = re.split(r"^(?=\S)", re.sub(r"^ *#.*\n", "", LOCK, flags=re.MULTILINE), flags=re.MULTILINE)[1:]
+    assert len(entries) > len(REQUIREMENTS)
+    assert [
+        entry for entry in entries if not re.fullmatch(r"[^\n]* \\\n( {4}--hash=sha256:\w{64}( \\)?\n)+", entry)
+    ] == []
+    assert re.findall(r"https?:|file:|^-", LOCK, flags=re.MULTILINE) == []
+
+
 def test_oldest_python_is_the_same_everywhere():
     tool = (ROOT / "tools" / "environment.py").read_text(encoding="utf-8")
     major, minor = re.search(r"OLDEST_PYTHON = \((\d+), (\d+)\)", tool).groups()

@@ -13,6 +13,7 @@ import io
 import json
 import os
 import re
+import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -397,8 +398,10 @@ def _read_columns(path: Path, first: list[str]) -> list[Column]:
     kinds = ["i8" if re.fullmatch(r"\s*[+-]?\d+\s*", cell) else "f8" for cell in first]
     options: dict[str, Any] = {"delimiter": ",", "skiprows": 1, "ndmin": 1, "encoding": "utf-8-sig", "comments": None}
     try:
-        table = np.loadtxt(path, dtype=[(f"c{index}", kind) for index, kind in enumerate(kinds)], **options)
-    except ValueError:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # older NumPy cuts 0.5 down to 0 as well, with a warning
+            table = np.loadtxt(path, dtype=[(f"c{index}", kind) for index, kind in enumerate(kinds)], **options)
+    except (ValueError, DeprecationWarning):
         # Other people's tools write 0 for 0.0: then the first row misleads and every number is read as a float.
         table = np.loadtxt(path, dtype=[(f"c{index}", "f8") for index in range(len(kinds))], **options)
     return [np.ascontiguousarray(table[f"c{index}"]) for index in range(len(kinds))]
