@@ -695,3 +695,28 @@ def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...]) 
     told = "standard output: cannot be written (No space left on device); choose another place or make room\n"
     assert done.stderr == told
     assert done.returncode == 1
+
+
+@pytest.mark.compiled
+def test_output_through_links(tmp_path: Path, trace: Path) -> None:
+    """A report took the place of the link to it; a link to a folder that is not there was "File exists"."""
+    (tmp_path / "kept").mkdir()
+    for name, leads_to in (("out", "kept"), ("kept/report.html", "../report"), ("later", "new"), ("loop", "loop")):
+        (tmp_path / name).symlink_to(leads_to)
+    for folder in ("out", "later"):
+        answer = call("run", AXIS, "--job", LETTER, "--every", "0", "--no-compare", "--output", tmp_path / folder)
+        assert answer.status == 0, answer.err
+    assert (tmp_path / "kept" / "report.html").is_symlink()
+    assert "<title>" in (tmp_path / "report").read_text(encoding="utf-8")
+    assert (tmp_path / "new" / "report.html").is_file()
+    looped = ("--output", tmp_path / "loop")
+    (tmp_path / "loop.png").symlink_to("loop.png")
+    for words in (
+        ("run", AXIS, "--job", LETTER, *looped),
+        ("examples", "--copy", tmp_path / "loop"),
+        ("plot", trace, "--signals", "plant.train.velocity", "-o", tmp_path / "loop.png"),
+    ):
+        answer = call(*words)
+        assert answer.status == 2
+        assert answer.err.count("\n") == 1
+        assert "cannot be written (Too many levels of symbolic links); choose another place" in answer.err

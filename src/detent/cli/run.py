@@ -1,6 +1,7 @@
 """`detent run`: a job on the simulated axis, or a recording replayed on it."""
 
 import shlex
+import shutil
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import typer
 from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
 from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
 from detent.errors import DetentError
+from detent.files.text import writing
 
 TRACE_KINDS = ("h5", "csv", "parquet")
 
@@ -110,7 +112,8 @@ def _beside(folder: Path) -> Generator[Path]:
         yield Path(made)
         for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
             if (Path(made) / name).exists():
-                (Path(made) / name).replace(folder / name)
+                with writing(folder / name) as part:
+                    shutil.move(Path(made) / name, part)  # a link may lead to another disk
             else:
                 (folder / name).unlink(missing_ok=True)
 

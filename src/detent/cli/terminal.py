@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from detent.files.text import shown, write_errors
+from detent.files.text import end_of_links, shown, write_errors
 
 
 def discard_output() -> None:
@@ -76,7 +76,7 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
 def folder_for(option: str, folder: Path) -> Generator[None]:
     """Make a folder and let files be put into it; what keeps them out becomes an error that says what to do."""
     with write_errors(f"{option} {folder}"):
-        folder.mkdir(parents=True, exist_ok=True)
+        end_of_links(folder).mkdir(parents=True, exist_ok=True)
         yield
 
 

@@ -19,7 +19,9 @@ MAX_BYTES = {".csv": 8_000_000, ".txt": 8_000_000, ".toml": 1_000_000}
 than it is written by hand; a list so long comes from a program, which can write CSV."""
 
 # What is wrong with a place, where nothing is wrong with the disk.
-_NO_PLACE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL}
+_NO_PLACE = {
+    errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP,
+}  # fmt: skip
 FIGURES = (".png", ".svg", ".pdf")  # endings of pictures
 PACKED = ".gz"  # ending of a packed text file, after that of its kind: ``run.csv.gz``
 _CHECK_JOB = "check the name after --job"
@@ -196,16 +198,31 @@ def write_errors(path: Path | str) -> Generator[None]:
         raise kind(f"{path}: cannot be written ({reason}); choose another place or make room") from error
 
 
+def end_of_links(path: Path) -> Path:
+    """Where a path leads, there or not yet; an `OSError` where it leads nowhere, as a loop of links."""
+    with suppress(FileNotFoundError):
+        path.stat()
+    return Path(os.path.realpath(path))
+
+
 @contextmanager
 def writing(path: Path) -> Generator[Path]:
-    """Give the place to write a file to: at the end it gets its name, after a failure nothing is left of it."""
-    part = path.with_name(path.name + ".part")
+    """Give the place to write a file to: at the end it gets its name, after a failure nothing is left of it.
+
+    A link is written through, and stays one.
+    """
+    with write_errors(path):
+        end = end_of_links(path)
+        if end.exists() and not end.is_file():
+            kind = errno.EISDIR if end.is_dir() else errno.EINVAL
+            raise OSError(kind, os.strerror(kind) if end.is_dir() else "it is no file but a device")
+    part = end.with_name(end.name + ".part")
     try:
         with write_errors(path):
             yield part
             with part.open("rb+") as whole:
                 os.fsync(whole.fileno())
-            part.replace(path)
+            part.replace(end)
     except BaseException:
         with suppress(OSError):
             part.unlink()
