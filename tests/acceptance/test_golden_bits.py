@@ -53,6 +53,7 @@ class Job:
     run: Callable[[int], object]  # lets ticks pass, whatever the axis says
     acknowledge: Callable[[], object] = lambda: None  # the host's answer to an event
     feed: Callable[[str], tuple[Any, ...]] = lambda _: ()  # what the host has laid ready for `advance`, by motor
+    later: Callable[[int], object] = lambda _: None  # what the host itself keeps of the time goes on by so many ticks
 
 
 def print_head() -> Job:
@@ -125,13 +126,16 @@ def stepper_envelope() -> Job:
     def run(ticks: int) -> None:
         host.stage.pass_time(ticks * host.stage.tick)
 
+    def later(ticks: int) -> None:
+        host.stage.instant += ticks
+
     def answer() -> None:
         for motor in motors.values():
             acknowledge(motor.controller.rule)
 
     params = {name: motor.p for name, motor in motors.items()}
     state = {name: motor.r for name, motor in motors.items()}
-    return Job(params, state, (by(200), by(-150)), run, answer, lambda name: motors[name].feed)
+    return Job(params, state, (by(200), by(-150)), run, answer, lambda name: motors[name].feed, later)
 
 
 def cascade() -> Job:
