@@ -112,6 +112,47 @@ def test_a_second_process_takes_machine_code_from_the_cache(package):
     assert second < first / 3
 
 
+ANOTHER = "import numba, llvmlite, sys; {what}.__version__ = '0.1'"
+NO_FEATURES = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+
+
+@pytest.mark.wide
+def test_code_for_another_processor_is_not_taken(package):
+    """One cache on a disk that machines share; each compiles once, and finds its own again."""
+    assert package.run(SHORT_PROGRAM) == "False"
+    own = package.compiled
+    assert package.run(SHORT_PROGRAM, **NO_FEATURES) == "False"
+    both = package.compiled
+    assert len(package.folders) == 1
+    assert set(own) < set(both)
+    assert len(both) == 2 * len(own)
+    before = {name: (package.cache / name).stat().st_mtime_ns for name in both}
+    for told in ({}, NO_FEATURES):
+        assert package.run(SHORT_PROGRAM, **told) == "False"
+    assert {name: (package.cache / name).stat().st_mtime_ns for name in package.compiled} == before
+    # Nor under its name: what is kept says whose it is.
+    for name in own:
+        for other in set(both).difference(own):
+            if other.rpartition("-")[0] == name.rpartition("-")[0]:
+                shutil.copy(package.cache / other, package.cache / name)
+                assert cache.read_kept(package.cache / name) is None
+    assert package.run(SHORT_PROGRAM) == "False"
+    assert package.compiled == both
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("what", ["numba", "llvmlite"])
+def test_code_of_another_compiler_is_not_taken(package, what):
+    assert package.run(SHORT_PROGRAM) == "False"
+    own = package.compiled
+    program = f"{ANOTHER.format(what=what)}\n{textwrap.dedent(SHORT_PROGRAM)}"
+    assert package.run(program) == "False"
+    assert len(package.folders) == 2
+    assert len(package.compiled) == 2 * len(own)
+    assert package.run(SHORT_PROGRAM) == "False"
+    assert len(package.compiled) == 2 * len(own)
+
+
 def test_equal_names_in_two_rooms_do_not_meet(package):
     for room, factor in (("control", 2), ("drive", 3)):
         package.write(
