@@ -1,5 +1,25 @@
-"""`python -m detent`."""
+"""`detent` and `python -m detent`: how a command ends that is interrupted before anything of it is imported."""
 
-from detent.cli import main
+import os
+import signal
 
-main()
+
+def main() -> None:
+    """Entry point."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _leave)
+    from detent import cli
+    from detent.cli.terminal import heed_signals
+
+    heed_signals()
+    cli.main()
+
+
+def _leave(number: int, _frame: object) -> None:
+    os.write(2, b"Interrupted; no file was written or changed.\n")
+    os._exit(128 + number)
+
+
+if __name__ == "__main__":
+    main()

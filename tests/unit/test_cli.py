@@ -28,6 +28,8 @@ pytestmark = [pytest.mark.compiled, pytest.mark.early]
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
 VERBS = ("examples", "check", "run", "compare", "timing", "plot", "registers")
 STATE = "controller.head.state"
+EVIL = "a\x1b[2J\u202e\x9bb"  # clears a terminal, turns the order of reading, begins a command of a terminal
+STEERING = "[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]"
 OBSTACLE = ("--set", "disturbance.obstacle.position=7 in")
 
 
@@ -629,7 +631,27 @@ def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
     for override, text in told.items():
         answer = call("check", axis, "--set", override)
         assert text in answer.out + answer.err
-        assert not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", answer.out + answer.err)
+        assert not re.search(STEERING, answer.out + answer.err)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [f"fl{EVIL}y"],
+        ["check", f"--fl{EVIL}y"],
+        ["run", AXIS, "--job", LETTER, "--every", "0", "--output", f"no/{EVIL}", f"one{EVIL}"],
+        ["plot", f"{EVIL}.h5"],
+        ["check", AXIS, "--set", EVIL],
+        ["identify", f"{EVIL}.csv", "--method", EVIL],
+        ["registers", EVIL],
+    ],
+)  # fmt: skip
+def test_no_word_of_the_command_line_steers_the_terminal(words: list[str]) -> None:
+    """What click refuses, it showed raw."""
+    answer = call(*words)
+    assert answer.status == 2
+    assert "a\\x1b[2J\\u202e\\x9bb" in answer.err
+    assert not re.search(STEERING, answer.err)
 
 
 def files_in(folder: Path) -> dict[str, bytes]:

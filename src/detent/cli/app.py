@@ -1,5 +1,6 @@
 """The command `detent`: its verbs register themselves here, and its errors become one message and an exit status."""
 
+import io
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -15,6 +16,7 @@ from detent.files.text import shown
 from detent.kernel.cache import AT_FIRST_COMPILING
 
 DONE, NOT_DONE = 0, 1
+UsageError: Any = typer.BadParameter.__base__  # typer brings a click of its own, or uses the one that is installed
 LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
 
 
@@ -37,10 +39,21 @@ class Commands(TyperGroup):
             discard_output()
         except OSError as error:
             discard_output()
-            place = error.filename or "standard output"
+            place = shown(str(error.filename or "standard output"))
             sys.stderr.write(f"{place}: cannot be written ({error.strerror}); choose another place or make room\n")
             status = NOT_DONE
         raise typer.Exit(status)
+
+    def main(self, *args: Any, **more: Any) -> NoReturn:
+        """As click has it, but that no word of the command line steers the terminal that it is shown on."""
+        try:
+            status = super().main(*args, **more | {"standalone_mode": False})
+        except UsageError as error:
+            told = io.StringIO()
+            error.show(told)
+            sys.stderr.write(shown(told.getvalue()))
+            status = error.exit_code
+        sys.exit(status)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click hands it over
         """The list of verbs, each with its whole first sentence."""
@@ -57,7 +70,8 @@ class ListsMethods(TyperCommand):
         from detent.methods.registry import METHODS
 
         told = [f"{m.name}: {m.jobs}; {m.pace}." for m in METHODS.usable()]
-        self.epilog = " ".join(["Jobs and base ticks:", *told, *(f"Warning: {text}." for text in METHODS.refused)])
+        refused = [shown(f"Warning: {text}.") for text in METHODS.refused]
+        self.epilog = " ".join(["Jobs and base ticks:", *told, *refused])
         super().format_help(ctx, formatter)
 
 
@@ -65,7 +79,8 @@ app = typer.Typer(
     name="detent",
     cls=Commands,
     help="Positioning control as software: describe an axis in one file, check it, run a job on it.",
-    epilog="Exit status: 0 done, 1 the axis did not do it (the reason is shown), 2 wrong input.",
+    epilog="Exit status: 0 done, 1 the axis did not do it (the reason is shown), 2 wrong input. 130 Ctrl-C, "
+    "143 `kill`: no file is left half-written.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

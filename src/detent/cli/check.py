@@ -90,8 +90,11 @@ def envelope(
         raise DetentError(f"--motor: came {motor!r}; allowed: {', '.join(found)}; name a motor of the file")
     chosen = {motor: found[motor]} if motor else found
     folder = output or Path("envelope") / file.stem
-    with folder_for("--output", folder):
-        written = {name: [tables.save(folder / f"{name}.{kind}") for kind in KINDS] for name, tables in chosen.items()}
+    with folder_for("--output", folder) as made:
+        for name, tables in chosen.items():
+            for kind in KINDS:
+                tables.save(made / f"{name}.{kind}")
+    written = {name: [folder / f"{name}.{kind}" for kind in KINDS] for name in chosen}
     if as_json:
         print_json({name: chosen[name].to_dict() | {"files": [str(f) for f in written[name]]} for name in chosen})
         return

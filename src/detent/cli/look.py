@@ -110,12 +110,14 @@ def examples_command(
     """List the packaged example files, or copy them to start from."""
     found = examples()
     if copy is not None:
-        with folder_for("--copy", copy):
+        with folder_for("--copy", copy) as made:
             existing = [path.name for path in found if (copy / path.name).exists()]
             if existing:
                 told = f"it holds {', '.join(existing)} already; nothing was copied; choose another folder"
                 raise DetentError(f"--copy {copy}: {told}")
-            found = [Path(shutil.copyfile(path, copy / path.name)) for path in found]
+            for path in found:
+                shutil.copyfile(path, made / path.name)
+        found = [copy / path.name for path in found]
     if as_json:
         print_json([{"name": path.name, "path": str(path), "about": _about(path)} for path in found])
         return

@@ -1,12 +1,8 @@
 """`detent run`: a job on the simulated axis, or a recording replayed on it."""
 
 import shlex
-import shutil
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -14,7 +10,6 @@ import typer
 from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
 from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
 from detent.errors import DetentError
-from detent.files.text import writing
 
 TRACE_KINDS = ("h5", "csv", "parquet")
 
@@ -57,7 +52,9 @@ def run(
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
     wanted = [*axis.simulated.signals, *split_names(signals)]
     axis.check_signals(wanted)
-    with _beside(folder) as made, progress_bar(quiet=as_json) as progress:
+    # A report must not stand beside another run's trace.
+    files = ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS))
+    with folder_for("--output", folder, files) as made, progress_bar(quiet=as_json) as progress:
         store = made / "trace.h5" if kinds else None
         done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
@@ -100,22 +97,6 @@ def _trace_kinds(formats: str) -> list[str]:
 
         need_parquet()
     return list(dict.fromkeys(kinds))
-
-
-@contextmanager
-def _beside(folder: Path) -> Generator[Path]:
-    """A place to write to, until all is whole: only then the files of an earlier run give way, all of them.
-
-    A report must not stand beside another run's trace.
-    """
-    with folder_for("--output", folder), TemporaryDirectory(prefix=".run-", dir=folder) as made:
-        yield Path(made)
-        for name in ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS)):
-            if (Path(made) / name).exists():
-                with writing(folder / name) as part:
-                    shutil.move(Path(made) / name, part)  # a link may lead to another disk
-            else:
-                (folder / name).unlink(missing_ok=True)
 
 
 def _convert_trace(folder: Path, kinds: list[str]) -> None:

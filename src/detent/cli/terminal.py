@@ -3,19 +3,39 @@
 import json
 import math
 import os
+import signal
 import sys
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Collection, Generator, Iterable
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from detent.files.text import end_of_links, shown, write_errors
+from detent.files.text import abandon, end_of_links, placing, shown, write_errors
 
 
 def discard_output() -> None:
     """The reader has seen enough (`detent registers | head`): that is no error, and nothing more is written."""
     with suppress(OSError, ValueError):  # a stream without a file, as in tests
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def heed_signals() -> None:
+    """Let Ctrl-C, `kill` and a terminal that is closed end the command in a sentence, and leave no half-made file."""
+    for number in (signal.SIGINT, signal.SIGTERM, *([signal.SIGHUP] if sys.platform != "win32" else [])):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as `nohup` has it
+            signal.signal(number, _leave)
+
+
+def _leave(number: int, _frame: object) -> None:
+    """Say what was kept, and go at once: an exception would be raised anywhere, in HDF5 and in imports too."""
+    for other in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(other, signal.SIG_IGN)
+    kept = ", ".join(shown(str(path)) for path in abandon())
+    told = f"Interrupted; written, each whole: {kept}.\n" if kept else "Interrupted; no file was written or changed.\n"
+    with suppress(OSError):
+        # A progress bar hides the cursor.
+        os.write(2, ("\r\x1b[2K\x1b[?25h" if os.isatty(2) else "").encode() + told.encode(errors="backslashreplace"))
+    os._exit(128 + number)
 
 
 def print_json(data: Any) -> None:
@@ -73,11 +93,12 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
 
 
 @contextmanager
-def folder_for(option: str, folder: Path) -> Generator[None]:
-    """Make a folder and let files be put into it; what keeps them out becomes an error that says what to do."""
+def folder_for(option: str, folder: Path, others: Collection[str] = ()) -> Generator[Path]:
+    """Make a folder, and give the place to make its files in, as of `placing`; what keeps them out becomes an error."""
     with write_errors(f"{option} {folder}"):
         end_of_links(folder).mkdir(parents=True, exist_ok=True)
-        yield
+        with placing(folder, others) as made:
+            yield made
 
 
 @contextmanager
@@ -98,7 +119,7 @@ def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
 def say_compiling(why_unkept: str) -> None:
     """Say why the first run of an axis takes longer."""
     later = f"it cannot be kept ({why_unkept})" if why_unkept else "later runs start at once"
-    sys.stderr.write(f"First run: compiling the axis, up to 15 s; {later}.\n")
+    sys.stderr.write(f"First run: compiling the axis, up to 15 s; {shown(later)}.\n")
     sys.stderr.flush()
 
 

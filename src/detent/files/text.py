@@ -4,9 +4,10 @@ import errno
 import gzip
 import os
 import re
+import shutil
 import zlib
 from collections.abc import Collection, Generator, Iterable
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -176,6 +177,11 @@ def _check_size(path: Path, size: int, limit: int, allowed: str) -> None:
 
 # ---- what is written
 
+_PART = ".part"  # ending of a file that is not whole yet
+_MADE, _WHOLE = ".detent-", ".whole"  # folder in which files are made that belong together; once all of them are there
+_UNFINISHED: dict[Path, None] = {}  # what is being made now
+_WRITTEN: dict[Path, None] = {}  # what has been, in that order
+
 
 def check_target(path: str | Path, suffixes: Collection[str] = FIGURES, what: str = "a figure") -> Path:
     """Refuse a place that cannot take a file, before any work is done."""
@@ -216,17 +222,107 @@ def writing(path: Path) -> Generator[Path]:
         if end.exists() and not end.is_file():
             kind = errno.EISDIR if end.is_dir() else errno.EINVAL
             raise OSError(kind, os.strerror(kind) if end.is_dir() else "it is no file but a device")
-    part = end.with_name(end.name + ".part")
-    try:
-        with write_errors(path):
+    part = end.with_name(f"{end.name}{_PART}")
+    with write_errors(path), _held(part, path):
+        _UNFINISHED[part] = None
+        try:
             yield part
             with part.open("rb+") as whole:
                 os.fsync(whole.fileno())
             part.replace(end)
-    except BaseException:
+        except BaseException:
+            with suppress(OSError):
+                part.unlink()
+            raise
+        finally:
+            del _UNFINISHED[part]
+        _WRITTEN[path] = None
+
+
+@contextmanager
+def placing(folder: Path, others: Collection[str] = ()) -> Generator[Path]:
+    """Give a folder to make files in that belong together: at the end all get their names in `folder`, or none does.
+
+    Those of an earlier time stay until then; of `others`, names that such files may have, what was not made anew goes
+    with them. One process at a time places files into a folder. What a killed one left there is removed, or given its
+    names if all of it had been made.
+    """
+    with _held(folder, folder) as alone:
+        made = folder / f"{_MADE}{os.getpid()}"
+        for left in [*folder.glob(f"{_MADE}*")] if alone else [made]:
+            _finish(left)
+        _UNFINISHED[made] = None
+        try:
+            made.mkdir()
+            yield made
+            for name in others:
+                (made / name).touch()  # empty: it only goes
+            made.rename(made.with_suffix(_WHOLE))
+        except DetentError as error:
+            # Of the place that files are made in nobody need know.
+            error.args = tuple(str(text).replace(str(made), str(folder)) for text in error.args)
+            raise
+        finally:
+            _finish(made)
+            del _UNFINISHED[made]
+
+
+def _finish(made: Path) -> None:
+    """Give the files of a folder their names beside it if all are there, or remove it; may be broken off and repeated.
+
+    Earlier files go before the first comes: none stands beside one of another time.
+    """
+    whole = made.with_suffix(_WHOLE)
+    if whole.exists():
+        files = sorted(whole.iterdir())
+        for file in files:
+            end_of_links(made.parent / file.name).unlink(missing_ok=True)
+        for file in files:
+            name = made.parent / file.name
+            if file.stat().st_size and name.is_symlink():  # it may lead to another disk
+                with writing(name) as part:
+                    shutil.move(file, part)
+            elif file.stat().st_size:
+                _WRITTEN[file.replace(name)] = None
+        shutil.rmtree(whole)
+    shutil.rmtree(made, ignore_errors=True)
+
+
+@contextmanager
+def _held(place: Path, told: Path) -> Generator[bool]:
+    """Have a folder, or a file being made, for this process alone until it ends; False where no such locks are."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield False
+        return
+    with ExitStack() as stack:
+        while True:
+            held = os.open(place, os.O_RDONLY if place == told else os.O_RDONLY | os.O_CREAT, 0o666)
+            stack.callback(os.close, held)
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                remedy = "wait until that has ended, or choose another place"
+                raise DiskError(f"{told}: cannot be written (another process is writing there); {remedy}") from None
+            except OSError:  # of a network's disk
+                yield False
+                return
+            with suppress(FileNotFoundError):  # whoever had it gave it its name meanwhile
+                if os.path.samestat(os.fstat(held), place.stat()):
+                    break
+        yield True
+
+
+def abandon() -> list[Path]:
+    """Remove what is not whole, for a process that ends at once; the files that it has written."""
+    for made in list(_UNFINISHED):
         with suppress(OSError):
-            part.unlink()
-        raise
+            if made.suffix == _PART:
+                made.unlink()
+            else:
+                _finish(made)
+    return [path for path in _WRITTEN if path.exists()]
 
 
 def write_text(path: str | Path, text: str) -> Path:

@@ -1,12 +1,17 @@
 """What is written has its name only when it is whole."""
 
+import os
 import re
+import subprocess
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from detent.errors import DetentError
-from detent.files.text import write_text, writing
+import detent
+from detent.errors import DetentError, DiskError
+from detent.files.text import placing, write_text, writing
 
 
 def test_a_file_gets_its_name_at_the_end(tmp_path: Path) -> None:
@@ -106,3 +111,98 @@ def test_a_link_that_leads_nowhere_is_told(tmp_path, leads_to, reason):
     assert caught.value.exit_status == 2
     assert [path.name for path in tmp_path.iterdir()] == ["link.txt"]
     assert link.is_symlink()
+
+
+# ---- killed at each call that changes a folder
+
+# Ends the process, with nothing cleared up, before the call of a number that changes something below the folder.
+KILLED = """
+import os, sys
+from pathlib import Path
+from detent.files import text
+CHANGES = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.truncate"}
+last, folder = int(sys.argv[1]), Path(sys.argv[2])
+def at(event, args):
+    global last
+    if event in CHANGES and str(args[0]).startswith(str(folder)):
+        last -= 1
+        if last < 0:
+            os._exit(9)
+sys.addaudithook(at)
+with text.placing(folder, ("report.html", "trace.h5", "trace.csv")) as made:
+    text.write_text(made / "report.html", "new")
+    text.write_text(made / "trace.h5", "new")
+"""
+OLD = dict.fromkeys(("report.html", "trace.h5", "trace.csv"), "old")
+NEW = dict.fromkeys(("report.html", "trace.h5"), "new")
+
+
+def held(folder: Path) -> dict[str, str]:
+    return {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir() if file.is_file()}
+
+
+def killed_at(number: int, folder: Path) -> bool:
+    for name, text in OLD.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, str(number), str(folder)], capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(detent.__file__).parents[1])},
+    )  # fmt: skip
+    assert done.returncode in {0, 9}, done.stderr
+    return done.returncode == 9
+
+
+def test_killed_anywhere_files_that_belong_together_are_those_of_one_time(tmp_path: Path) -> None:
+    """A report could stand beside another run's trace, and the folder it was made in stayed for ever."""
+    outcomes: list[dict[str, str]] = []
+    for number in range(60):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        was_killed = killed_at(number, folder)
+        found = held(folder)
+        assert found.items() <= OLD.items() or found.items() <= NEW.items()
+        with pytest.raises(KeyError), placing(folder):  # one that fails on its own changes nothing more
+            raise KeyError
+        outcomes.append(held(folder))
+        assert [file for file in folder.iterdir() if file.is_dir()] == []
+        if not was_killed:
+            break
+    turn = outcomes.index(NEW)
+    assert 5 < turn < len(outcomes) - 4  # calls before all is there, and after
+    assert outcomes == [OLD] * turn + [NEW] * (len(outcomes) - turn)
+
+
+def test_a_message_names_the_place_that_a_file_will_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    with pytest.raises(DiskError) as told, placing(Path("out")) as made, writing(made / "trace.h5"):
+        raise OSError(28, "No space left")
+    assert str(told.value).startswith("out/trace.h5: cannot be written (No space left)")
+
+
+# ---- two at once
+
+
+def test_a_second_that_writes_the_same_is_refused_until_the_first_has_ended(tmp_path: Path) -> None:
+    """Both wrote into one file, which then got its name twice."""
+    for attempt in (lambda: writing(tmp_path / "told.txt"), lambda: placing(tmp_path)):
+        with attempt() as first:
+            with pytest.raises(DiskError, match="another process is writing there"), attempt():
+                pytest.fail("it was let in")
+            (first / "told.txt" if first.is_dir() else first).write_text("first")
+        assert held(tmp_path) == {"told.txt": "first"}
+
+
+def test_what_a_killed_one_left_of_a_file_does_not_stand_in_the_way(tmp_path: Path) -> None:
+    (tmp_path / "told.txt.part").write_text("of a process that was killed, and longer")
+    write_text(tmp_path / "told.txt", "whole")
+    assert held(tmp_path) == {"told.txt": "whole"}
+
+
+def test_a_folder_that_is_given_up_leaves_what_was_there(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("old")
+    with suppress(KeyError), placing(tmp_path, ("a", "b")) as made:
+        write_text(made / "a", "new")
+        raise KeyError
+    assert held(tmp_path) == {"a": "old"}
+    assert len(list(tmp_path.iterdir())) == 1
