@@ -29,8 +29,9 @@ _CHECK_JOB = "check the name after --job"
 _CHECK_LOG = "check the name of the recording"
 
 
-# Of a terminal or a browser: control codes beside tab and line feed, and marks that turn the order of reading.
-_STEERING = re.compile("[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+# Of a terminal, a browser or a picture: control codes beside tab and line feed, marks that turn the order of reading,
+# and bytes of a file's name that are no text.
+_STEERING = re.compile("[\0-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def shown(text: str) -> str:
@@ -317,11 +318,15 @@ def _held(place: Path, told: Path) -> Generator[bool]:
 def abandon() -> list[Path]:
     """Remove what is not whole, for a process that ends at once; the files that it has written."""
     for made in list(_UNFINISHED):
-        with suppress(OSError):
+        try:
             if made.suffix == _PART:
                 made.unlink()
             else:
                 _finish(made)
+        except FileNotFoundError:  # it got its name just now
+            _WRITTEN[made.with_suffix("")] = None
+        except OSError:
+            continue
     return [path for path in _WRITTEN if path.exists()]
 
 

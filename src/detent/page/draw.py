@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from detent.files.text import check_target, lines_of
+from detent.files.text import check_target, lines_of, shown
 from detent.page.chart import Chart
 from detent.page.figure import Figure
 from detent.page.plots import ABOVE, Axes, new_figure
@@ -58,9 +58,9 @@ def _parts(figure: Figure) -> list[Part]:
 
 
 def plain(text: str) -> str:
-    """Text without markup and without narrow spaces, which few fonts have."""
+    """Text without markup, as it may be shown, and without narrow spaces, which few fonts have."""
     bare = text.striptags() if isinstance(text, Markup) else text
-    return bare.replace(GAP, " ")
+    return shown(bare.replace(GAP, " "))
 
 
 def _write(canvas: Any, at: Any, title: str, caption: Sequence[str]) -> None:

@@ -4,6 +4,7 @@ matplotlib is loaded when a figure is drawn, never when this module is imported,
 """
 
 import importlib
+import warnings
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.files.text import check_target, writing
+from detent.files.text import check_target, shown, writing
 from detent.page.chart import thin_indices
 from detent.record.trace import Trace
 
@@ -71,11 +72,12 @@ def plot_signals(
         axes[-1].set_xlabel(f"time [{unit}]")
         title = " · ".join(str(trace.attributes[key]) for key in ("axis", "job") if key in trace.attributes)
         if title:
-            figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+            figure.suptitle(shown(title), x=0.01, ha="left", fontsize=11, fontweight="bold")
         figure.align_ylabels(axes)
 
 
 def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale: float) -> None:
+    labels, unit = [shown(name) for name in names], shown(unit)
     for index, name in enumerate(names):
         values = trace[name]
         kept = thin_indices(values, POINTS)
@@ -85,9 +87,9 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
         dash = ("-", "--", ":")[index // len(COLOURS) % 3]
         drawn = np.asarray(values[kept], dtype=np.float64)
         times = trace.time[kept] * scale
-        area.plot(times, drawn, dash, color=colour, linewidth=1.2, label=name, drawstyle=style)
+        area.plot(times, drawn, dash, color=colour, linewidth=1.2, label=labels[index], drawstyle=style)
     if len(names) == 1:
-        area.set_ylabel(f"{names[0]}\n[{unit}]" if unit else names[0])  # two lines, for the side of a low plot area
+        area.set_ylabel(f"{labels[0]}\n[{unit}]" if unit else labels[0])  # two lines, for the side of a low plot area
     else:
         area.set_ylabel(f"[{unit}]" if unit else "")
         area.legend(**ABOVE, ncols=3, fontsize=9)
@@ -101,7 +103,9 @@ def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
     mpl: Any = importlib.import_module("matplotlib")
     figures: Any = importlib.import_module("matplotlib.figure")
     # Around drawing and saving: matplotlib looks some settings up only when it writes.
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), warnings.catch_warnings():
+        # A letter that the font has not is drawn as a box.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         figure = figures.Figure(figsize=(width, height), layout="constrained")
         yield figure
         # The same figure gives the same file: no date inside, and places free of the last bits, in which the solver of

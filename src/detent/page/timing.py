@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from detent.errors import DetentError
-from detent.files.text import check_target
+from detent.files.text import check_target, shown
 from detent.page.chart import thin_indices
 from detent.page.plots import COLOURS, Axes, new_figure
 from detent.record.waveforms import Waveform, Waveforms
@@ -84,7 +84,7 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
     with new_figure(path, WIDTH, (depth + above) * ROW + (1.1 if waveforms.title else 0.75)) as figure:
         area: Axes = figure.subplots()
         if waveforms.title:
-            figure.suptitle(waveforms.title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+            figure.suptitle(shown(waveforms.title), x=0.01, ha="left", fontsize=11, fontweight="bold")
         area.set_xlim(0, scale.span)
         area.set_ylim(-depth, above + 0.1)
         _label_rows(area, rows, headings)
@@ -238,9 +238,9 @@ def _label_rows(area: Axes, rows: list[_Row], headings: list[tuple[str, float, s
     area.tick_params(axis="y", length=0, pad=4, labelsize=9)
     side = 1.055 if any(row.signal.is_float for row in rows) else 1.008
     for row in rows:
-        shown = textwrap.shorten(row.signal.doc, 2 * DOC_WIDTH, placeholder=" …")
+        doc = textwrap.shorten(row.signal.doc, 2 * DOC_WIDTH, placeholder=" …")
         area.text(
-            side, row.middle, textwrap.fill(shown, DOC_WIDTH), transform=area.get_yaxis_transform(), ha="left",
+            side, row.middle, textwrap.fill(doc, DOC_WIDTH), transform=area.get_yaxis_transform(), ha="left",
             va="center", fontsize=7, color=GREY, linespacing=1.0,
         )  # fmt: skip
 

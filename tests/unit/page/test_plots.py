@@ -1,14 +1,21 @@
 import dataclasses
 import re
+from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from detent.errors import DetentError
-from detent.files.text import check_target
+from detent.files.text import check_target, shown
+from detent.page.draw import draw_figures
+from detent.page.figure import Figure
 from detent.page.plots import plot_signals
+from detent.page.table import TextTable
+from detent.page.timing import plot_timing
 from detent.record.trace import Trace
+from detent.record.waveforms import Waveform, Waveforms
 
 
 @pytest.fixture
@@ -113,3 +120,36 @@ def test_a_target_can_be_refused_before_any_work(tmp_path: Path, name: str, says
     assert check_target(tmp_path / "a.PNG") == tmp_path / "a.PNG"
     with pytest.raises(DetentError, match=says):
         check_target(tmp_path / name)
+
+
+# ---- what a file says
+
+EVIL = "a\x1b[2J\u202e\x9b $x^{$ \\frac{ & <b> \udcff 日 \0"  # steers a terminal, is mathematics, is no XML, no UTF-8
+
+
+def draw_trace(path: Path) -> None:
+    columns = {"t": np.arange(3.0), EVIL: np.arange(3.0), "b": np.arange(3.0)}
+    plot_signals(
+        Trace(columns=columns, units={EVIL: EVIL, "b": EVIL}, attributes={"axis": EVIL, "job": EVIL}), ["*"], path
+    )
+
+
+def draw_timing(path: Path) -> None:
+    wave = Waveform("clocks.ck", 1, False, False, "", "", np.array([0, 5]), np.array([0, 1]))
+    plot_timing(Waveforms(0, 10, (wave,), EVIL), path)
+
+
+def draw_page(path: Path) -> None:
+    draw_figures([Figure(title=EVIL, caption=EVIL, table=TextTable(EVIL, (EVIL, EVIL), [(EVIL, EVIL)]).on_page)], path)
+
+
+@pytest.mark.parametrize("draw", [draw_trace, draw_timing, draw_page])
+@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+def test_no_name_steers_or_breaks_a_picture(draw: Callable[[Path], None], kind: str, tmp_path: Path) -> None:
+    """Control codes reached the picture raw, an SVG was no XML, and a letter without a shape came to the terminal."""
+    path = tmp_path / f"a.{kind}"
+    draw(path)
+    if kind == "svg":
+        texts = [text.text or "" for text in ET.parse(path).iter("{http://www.w3.org/2000/svg}text")]  # noqa: S314
+        assert any(text.startswith(shown(EVIL)[:20]) for text in texts)
+    assert b"\x1b[2J" not in path.read_bytes()

@@ -23,7 +23,7 @@ from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
-from detent.files.text import check_target, write_text
+from detent.files.text import check_target, shown, write_text
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -226,7 +226,7 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
         area.secondary_xaxis("top", functions=_line(first, step)).set_xlabel("position [mm]")
         per_step = format_quantity(tables.travel_per_step, "m", 4).replace("um", "µm")
         area.secondary_yaxis("right", functions=_line(0.0, step)).set_ylabel(f"speed [mm/s], {per_step} a step")
-        area.set_title(f"How fast may every step be? Motor {tables.motor}, axis {tables.axis}", pad=12)
+        area.set_title(shown(f"How fast may every step be? Motor {tables.motor}, axis {tables.axis}"), pad=12)
         figure.legend(loc="outside lower center", ncols=2, fontsize=9)
 
 

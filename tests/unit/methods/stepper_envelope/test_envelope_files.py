@@ -2,14 +2,17 @@ import csv
 import dataclasses
 import re
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from tests.stepper_rig import COARSE_FINE, MAX_HZ, RAMP, N, Rig, default_ramp, turn_envelopes
 
 from detent.errors import DetentError
+from detent.files.text import shown
 from detent.methods.stepper_envelope.envelope_files import (
     EnvelopeTables,
+    plot_envelope,
     write_envelope_csv,
     write_envelope_header,
 )
@@ -185,6 +188,13 @@ def test_no_name_ends_the_comment(tmp_path, name):
     assert "??" not in text
     assert text.index("*/") > text.index("An entry of a table")
     assert all(line.startswith(" *") for line in text[: text.index("*/")].splitlines()[1:-1])
+
+
+def test_no_name_steers_the_figure(tmp_path):
+    name = "a\x1b[2J\u202e $x^{$ \\frac{ <b> \udcff 日"
+    plot_envelope(tables(motor="m", axis=name), tmp_path / "m.svg")
+    drawn = ET.parse(tmp_path / "m.svg")  # noqa: S314 - our own
+    assert any(shown(name) in (text.text or "") for text in drawn.iter("{http://www.w3.org/2000/svg}text"))
 
 
 # ---- errors
