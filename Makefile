@@ -26,7 +26,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
 # The commands share one environment: under `make -j` two of them must not install into it at once.
 .NOTPARALLEL:
-.PHONY: help demo test test-wide test-long test-lowest lock locked bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
+.PHONY: help demo test test-wide test-long test-lowest tried lock locked bench bench-smoke coverage lint format types imports docs check clean venv-base venv-test venv-dev
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1#/' | awk -F'#' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -76,6 +76,9 @@ lock: venv-dev ## write the versions of all that development needs, with their c
 locked: venv-dev ## bring .venv to the versions of requirements-dev.txt, and to nothing else
 	$(BIN)/uv pip sync --quiet --python $(VENV) --require-hashes $(LOCK)
 	$(BIN)/uv pip install --quiet --python $(VENV) --no-deps --editable .
+
+tried: venv-test ## attack detent: kills, full disks, damaged files, hostile text; the figures of the page about that
+	$(PYTEST) -m "not bench" -n auto -p no:benchmark --tried docs/tried.toml $(PYTEST_ARGS)
 
 bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, milliseconds to start
 	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)

@@ -4,6 +4,7 @@ Each function returns the Markdown of one page's generated part; the page itself
 docs/_build/generated.
 """
 
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -242,7 +243,30 @@ def motor_section(title: str, entries: dict[str, dict[str, Any]], columns: tuple
     )
 
 
+ATTACKS = {
+    "kill": "Killed, interrupted, two at once",
+    "disk": "Full disks",
+    "cache": "Damaged caches",
+    "text": "Hostile text",
+    "reader": "Fuzzed inputs",
+    "bound": "Boundaries and long idle",
+}
+"""Kinds of `docs/tried.toml`, in the order of the page."""
+
+
+def tried() -> str:
+    """What was tried against detent: a table of each kind that was."""
+    attacks = tomllib.loads((Path(__file__).parent / "tried.toml").read_text(encoding="utf-8"))["attack"]
+    parts: list[str] = []
+    for kind, title in ATTACKS.items():
+        rows = [(a["what"], f"{a['times']:,}", a["outcome"], code(a["test"])) for a in attacks if a["kind"] == kind]
+        if rows:
+            parts.append(f"### {title}\n\n{table(('attacked', 'times', 'every time', 'test'), rows)}")
+    return "\n".join(parts)
+
+
 PAGES = {
+    "tried": tried,
     "registers": registers,
     "axis-file": axis_file,
     "command-line": command_line,

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -623,7 +623,7 @@ def test_text_is_written_where_the_terminal_cannot_show_it(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("example", [e.name for e in detent.examples() if "[axis]" in e.read_text(errors="ignore")])
-def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
+def test_no_name_steers_the_terminal(example: str, tmp_path: Path, tried: Callable[..., None]) -> None:
     """What a name, a file's name or --set held reached the terminal raw."""
     axis = tmp_path / "axis\x1b[2J.toml"
     shutil.copy(detent.example(example), axis)
@@ -632,6 +632,7 @@ def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
         answer = call("check", axis, "--set", override)
         assert text in answer.out + answer.err
         assert not re.search(STEERING, answer.out + answer.err)
+        tried("text", "names of axes, keys and files, on the terminal", "shown, with escapes")
 
 
 @pytest.mark.parametrize(
@@ -646,12 +647,13 @@ def test_no_name_steers_the_terminal(example: str, tmp_path: Path) -> None:
         ["registers", EVIL],
     ],
 )  # fmt: skip
-def test_no_word_of_the_command_line_steers_the_terminal(words: list[str]) -> None:
+def test_no_word_of_the_command_line_steers_the_terminal(words: list[str], tried: Callable[..., None]) -> None:
     """What click refuses, it showed raw."""
     answer = call(*words)
     assert answer.status == 2
     assert "a\\x1b[2J\\u202e\\x9bb" in answer.err
     assert not re.search(STEERING, answer.err)
+    tried("text", "words of the command line that are refused", "shown, with escapes")
 
 
 def files_in(folder: Path) -> dict[str, bytes]:
@@ -666,18 +668,21 @@ def files_in(folder: Path) -> dict[str, bytes]:
         ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out"),
         ("plot", "out/trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png"),
         ("compare", AXIS, "--figure", "out/comparison.html"),
+        ("timing", AXIS, "--at", "20 ms", "--vcd", "out/timing.vcd", "--figure", "out/timing.png"),
+        ("envelope", str(detent.example("zoom.toml")), "--output", "out"),
+        ("examples", "--copy", "out"),
     ],
 )
 def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
-    words: tuple[str, ...], tmp_path: Path, trace: Path
+    words: tuple[str, ...], tmp_path: Path, trace: Path, tried: Callable[..., None]
 ) -> None:
     """HDF5 that cannot write crashed the process at its end, and the earlier report was gone."""
     (tmp_path / "out").mkdir()
-    for name in ("report.html", "comparison.html", "timing.vcd", "plot.png"):
+    for name in ("report.html", "comparison.html", "timing.vcd", "timing.png", "plot.png", "group_a.csv"):
         (tmp_path / "out" / name).write_text("earlier")
     shutil.copy(trace, tmp_path / "out" / "trace.h5")
     before = files_in(tmp_path)
-    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000)); "
+    limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500)); "
     program = f"{limit}from detent.cli import main; main()"
     done = subprocess.run(
         [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False, cwd=tmp_path,
@@ -687,6 +692,7 @@ def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
     assert (done.returncode, len(told)) == (1, 1), done.stderr
     assert "cannot be written (File too large); choose another place or make room" in told[0]
     assert files_in(tmp_path) == before
+    tried("disk", f"`detent {words[0]}`", "one sentence, status 1, the earlier files")
 
 
 @pytest.mark.parametrize("kind", ["h5", "parquet"])
@@ -707,7 +713,7 @@ def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 @pytest.mark.parametrize("words", [("registers",), ("check", AXIS, "--json")])
-def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...]) -> None:
+def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...], tried: Callable[..., None]) -> None:
     source = {"PYTHONPATH": str(Path(detent.__file__).parents[1])}
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -717,6 +723,7 @@ def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...]) 
     told = "standard output: cannot be written (No space left on device); choose another place or make room\n"
     assert done.stderr == told
     assert done.returncode == 1
+    tried("disk", "standard output", "one sentence, status 1")
 
 
 @pytest.mark.compiled

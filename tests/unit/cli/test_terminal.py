@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -52,17 +53,21 @@ def python(code: str, cwd: Path) -> tuple[int, str]:
 @pytest.mark.parametrize(("number", "status"), BY)
 @pytest.mark.parametrize(("module", "words"), [("typer", ["examples"]), ("numpy", ["registers"])])
 def test_in_the_first_second_it_is_a_sentence(
-    number: int, status: int, module: str, words: list[str], tmp_path: Path
+    number: int, status: int, module: str, words: list[str], tmp_path: Path, tried: Callable[..., None]
 ) -> None:
     assert python(AT_IMPORT.format(module=module, number=int(number), words=words), tmp_path) == (status, NOTHING)
+    tried("kill", "Ctrl-C and `kill` while modules are imported", "one sentence, status 130 or 143")
 
 
 @pytest.mark.parametrize(("number", "status"), BY)
 @pytest.mark.parametrize("kind", ["writing(Path('told.txt'))", "placing(Path('.'))"])
-def test_a_half_made_file_goes_and_the_earlier_one_stays(number: int, status: int, kind: str, tmp_path: Path) -> None:
+def test_a_half_made_file_goes_and_the_earlier_one_stays(
+    number: int, status: int, kind: str, tmp_path: Path, tried: Callable[..., None]
+) -> None:
     (tmp_path / "told.txt").write_text("earlier")
     assert python(AT_WRITING.format(kind=kind, number=int(number), before=""), tmp_path) == (status, NOTHING)
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("told.txt", "earlier")]
+    tried("kill", "Ctrl-C and `kill` while a file is written", "one sentence, the earlier file, nothing beside it")
 
 
 def test_what_is_whole_is_named(tmp_path: Path) -> None:

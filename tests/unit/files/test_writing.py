@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -152,7 +153,9 @@ def killed_at(number: int, folder: Path) -> bool:
     return done.returncode == 9
 
 
-def test_killed_anywhere_files_that_belong_together_are_those_of_one_time(tmp_path: Path) -> None:
+def test_killed_anywhere_files_that_belong_together_are_those_of_one_time(
+    tmp_path: Path, tried: Callable[..., None]
+) -> None:
     """A report could stand beside another run's trace, and the folder it was made in stayed for ever."""
     outcomes: list[dict[str, str]] = []
     for number in range(60):
@@ -170,6 +173,8 @@ def test_killed_anywhere_files_that_belong_together_are_those_of_one_time(tmp_pa
     turn = outcomes.index(NEW)
     assert 5 < turn < len(outcomes) - 4  # calls before all is there, and after
     assert outcomes == [OLD] * turn + [NEW] * (len(outcomes) - turn)
+    what = "report and traces, killed before each call that changes their folder"
+    tried("kill", what, "never two runs side by side; the next command clears up", len(outcomes) - 1)
 
 
 def test_a_message_names_the_place_that_a_file_will_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,7 +188,9 @@ def test_a_message_names_the_place_that_a_file_will_have(tmp_path: Path, monkeyp
 # ---- two at once
 
 
-def test_a_second_that_writes_the_same_is_refused_until_the_first_has_ended(tmp_path: Path) -> None:
+def test_a_second_that_writes_the_same_is_refused_until_the_first_has_ended(
+    tmp_path: Path, tried: Callable[..., None]
+) -> None:
     """Both wrote into one file, which then got its name twice."""
     for attempt in (lambda: writing(tmp_path / "told.txt"), lambda: placing(tmp_path)):
         with attempt() as first:
@@ -191,6 +198,7 @@ def test_a_second_that_writes_the_same_is_refused_until_the_first_has_ended(tmp_
                 pytest.fail("it was let in")
             (first / "told.txt" if first.is_dir() else first).write_text("first")
         assert held(tmp_path) == {"told.txt": "first"}
+        tried("kill", "two at once, into one file or folder", "the second is refused in a sentence")
 
 
 def test_what_a_killed_one_left_of_a_file_does_not_stand_in_the_way(tmp_path: Path) -> None:

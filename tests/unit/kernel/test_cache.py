@@ -249,7 +249,7 @@ def test_a_cache_folder_that_cannot_be_made_does_not_stop_the_program(package, t
     assert package.run(SHORT_PROGRAM, DETENT_CACHE_DIR=str(blocked / "cache")) == "False"
 
 
-def test_damaged_code_is_dropped_and_compiled_anew(package):
+def test_damaged_code_is_dropped_and_compiled_anew(package, tried):
     """An empty file ended in "Aborted.", a flipped byte of machine code in a wrong trace."""
     first = package.run(SHORT_PROGRAM)
     files = [package.cache / name for name in package.compiled]
@@ -257,14 +257,23 @@ def test_damaged_code_is_dropped_and_compiled_anew(package):
     for k, file in enumerate(files):
         whole = bytearray(file.read_bytes())
         whole[len(whole) * 2 // 3] ^= 1 << k % 8
-        file.write_bytes((bytes(whole), b"", bytes(whole[:-1]), b"\0" * len(whole))[k % 4])
-        assert cache.read_kept(file) is None
+        damages = (bytes(whole), b"", bytes(whole[:-1]), b"\0" * len(whole))
+        for damage in damages:
+            file.write_bytes(damage)
+            assert cache.read_kept(file) is None
+        file.write_bytes(damages[k % 4])
     assert package.run(SHORT_PROGRAM) == first
     assert [package.cache / name for name in package.compiled] == files
     assert None not in [cache.read_kept(file) for file in files]
+    tried(
+        "cache",
+        "files of compiled steps: flipped, emptied, shortened, zeroed",
+        "compiled anew, same result",
+        4 * len(files),
+    )
 
 
-def test_no_flipped_bit_gets_through(tmp_path):
+def test_no_flipped_bit_gets_through(tmp_path, tried):
     file = tmp_path / "step-1.code"
     cache.keep(file, b"machine code")
     whole = file.read_bytes()
@@ -275,12 +284,14 @@ def test_no_flipped_bit_gets_through(tmp_path):
         file.write_bytes(flipped)
         assert cache.read_kept(file) is None
         assert not file.exists()
+    tried("cache", "every bit of a kept file, flipped", "found, the file removed", 8 * len(whole))
 
 
-def test_code_of_another_step_is_not_taken(tmp_path):
+def test_code_of_another_step_is_not_taken(tmp_path, tried):
     cache.keep(tmp_path / "one.code", b"machine code")
     (tmp_path / "one.code").rename(tmp_path / "other.code")
     assert cache.read_kept(tmp_path / "other.code") is None
+    tried("cache", "code of one step under the name of another", "not taken")
 
 
 def test_a_folder_in_the_place_of_a_file_is_left_alone(tmp_path):
@@ -290,10 +301,11 @@ def test_a_folder_in_the_place_of_a_file_is_left_alone(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["one.code"]
 
 
-def test_a_full_disk_costs_time_only(package):
+def test_a_full_disk_costs_time_only(package, tried):
     program = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + textwrap.dedent(SHORT_PROGRAM)
     assert package.run(program) == "False"
     assert [file for file in package.cache.rglob("*") if file.is_file()] == []
+    tried("disk", "the folder of compiled steps", "the same result, later")
 
 
 def test_a_folder_that_others_may_write_is_not_used(package):

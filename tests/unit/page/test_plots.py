@@ -145,7 +145,9 @@ def draw_page(path: Path) -> None:
 
 @pytest.mark.parametrize("draw", [draw_trace, draw_timing, draw_page])
 @pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
-def test_no_name_steers_or_breaks_a_picture(draw: Callable[[Path], None], kind: str, tmp_path: Path) -> None:
+def test_no_name_steers_or_breaks_a_picture(
+    draw: Callable[[Path], None], kind: str, tmp_path: Path, tried: Callable[..., None]
+) -> None:
     """Control codes reached the picture raw, an SVG was no XML, and a letter without a shape came to the terminal."""
     path = tmp_path / f"a.{kind}"
     draw(path)
@@ -153,3 +155,4 @@ def test_no_name_steers_or_breaks_a_picture(draw: Callable[[Path], None], kind: 
         texts = [text.text or "" for text in ET.parse(path).iter("{http://www.w3.org/2000/svg}text")]  # noqa: S314
         assert any(text.startswith(shown(EVIL)[:20]) for text in texts)
     assert b"\x1b[2J" not in path.read_bytes()
+    tried("text", "names, units and titles in pictures: PNG, SVG, PDF", "drawn, with escapes; no mathematics")
