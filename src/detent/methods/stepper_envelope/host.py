@@ -8,7 +8,7 @@ controller would know: the step counts. Whether the rotors followed is for an ob
 
 import ctypes
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -75,6 +75,19 @@ class StageMotor:
         """Table of a direction of motion, and of the other one."""
         up, down = self.tables.up, self.tables.down
         return (up, down) if heading > 0 else (down, up)
+
+    @property
+    def steps_left(self) -> int:
+        """Steps to the stop of its table, and from there to that of the other one where it has to turn."""
+        rule = self.controller.rule
+        first, second = self.along(rule.heading)
+        return abs(first.stop - self.position) + (abs(second.stop - first.stop) if rule.turns else 0)
+
+    @property
+    def longest(self) -> float:
+        """Time within which it comes to rest [s]: no run stays below its slowest frequency for long."""
+        steps = self.steps_left + self.table.drive.reversal_pause
+        return 2.0 * steps / min(float(self.tables.ramp.hz[0]), *self.tables.up.zones.limits)
 
     @property
     def resting(self) -> bool:
@@ -202,13 +215,19 @@ class StageHost:
         self.goal = {name: motor.place for name, motor in self.stage.motors.items()}
 
     def legs(self, move: StageMove) -> dict[str, Leg]:
-        """What each motor has to do for a move; motors that stand there already are left out."""
+        """What each motor has to do for a move; motors that stand there already are left out.
+
+        Where a manual run ended is not known before it is made: only now can a move from there be refused.
+        """
         found: dict[str, Leg] = {}
         for name in move.motors:
             motor = self.stage.motors[name]
-            self.goal[name] = move.targets[name] if name in move.targets else self.goal[name] + move.by[name]
+            goal = move.place_of(name, self.goal[name])
+            for key, came, allowed, remedy in move_faults(motor.table, name, move, motor.place, goal):
+                where = f"motor {name} at {text(motor.place, 'm')}" + (f", {key}" if key != name else "")
+                raise AxisError(f"{where}: came {came}; allowed: {allowed}; do: {remedy}")
             turn = None if move.turn is None else motor.table.step_inside(move.turn)
-            leg = Leg(motor.position, motor.table.step_inside(self.goal[name]), turn)
+            leg, self.goal[name] = Leg(motor.position, motor.table.step_inside(goal), turn), goal
             if leg.steps:
                 found[name] = leg
         return found
@@ -226,11 +245,11 @@ class StageHost:
                 second.move_stop(leg.target)
             start_move(motor.controller.rule, heading, int(leg.turn is not None))
 
-    def wait(self, legs: dict[str, Leg]) -> None:
-        """Wait until all motors have come to rest."""
-        limit = 1.0 + sum(self._longest(name, leg.steps) for name, leg in legs.items())
-        late = self.stage.wait_for(legs, limit)
-        for name in legs:
+    def wait(self, names: Collection[str]) -> None:
+        """Wait until these motors have come to rest."""
+        limit = 1.0 + sum(self.stage.motors[name].longest for name in names)
+        late = self.stage.wait_for(names, limit)
+        for name in names:
             rule = self.stage.motors[name].controller.rule
             if rule.state == FAULT:
                 raise AxisError(f"motor {name}: {STEP_FAULT_TEXT[rule.cause]}")
@@ -238,18 +257,11 @@ class StageHost:
                 late_after = f"did not come to rest within {text(limit, 's')}"
                 raise AxisError(f"motor {name}: {late_after}; look at its table in the report")
 
-    def _longest(self, name: str, steps: int) -> float:
-        """Time within which a motor makes some steps: no run stays below its slowest frequency for long [s]."""
-        tables = self.stage.motors[name].tables
-        return 2.0 * steps / min(float(tables.ramp.hz[0]), *tables.up.zones.limits)
-
     def run(self, move: StageMove) -> tuple[dict[str, Leg], bool]:
         """Make one move up to rest: what each motor did, and whether it could not stop where it was told to."""
-        legs, over = self.legs(move), False
+        legs = self.legs(move)
         self.start(legs)
-        if move.change is not None:
-            for name in legs:  # it is the only one
-                over = self._change(name, move.change.at, move.change.to)
+        over = move.change is not None and any(self._change(name, move.change.at, move.change.to) for name in legs)
         self.wait(legs)
         for name in legs if over else ():  # its new stop lay behind the nearest possible one: come back to it
             motor = self.stage.motors[name]
@@ -264,9 +276,9 @@ class StageHost:
         motor = self.stage.motors[name]
         rule = motor.controller.rule
         motor.controller.stop_at = motor.table.step_inside(at)
-        late = self.stage.wait_for([name], 1.0 + self._longest(name, motor.table.steps))
+        late = self.stage.wait_for([name], 1.0 + motor.longest)
         motor.controller.stop_at = NOWHERE
-        if late or motor.resting:
+        if late or motor.resting:  # a fault of the rule, which the host sees when it waits for the end
             return False
         acknowledge(rule)
         ahead, behind = motor.along(rule.direction)
@@ -275,8 +287,8 @@ class StageHost:
         self.goal[name] = to
         return edit.overrun
 
-    def jog(self, jog: StageJog) -> Leg:
-        """A manual run up to rest."""
+    def jog(self, jog: StageJog) -> dict[str, Leg]:
+        """A manual run up to rest: what the motor did; it is left out if it stood at the end of its travel."""
         motor = self.stage.motors[jog.motor]
         start, heading = motor.position, 1 if jog.speed > 0 else -1
         for table in (motor.tables.up, motor.tables.down):
@@ -290,9 +302,9 @@ class StageHost:
         self.stage.pass_time(jog.duration)
         release(rule)
         if not motor.resting:
-            self.wait({jog.motor: Leg(0, motor.table.steps)})
+            self.wait([jog.motor])
         self.goal[jog.motor] = motor.place
-        return Leg(start, motor.position)
+        return {jog.motor: Leg(start, motor.position)} if motor.position != start else {}
 
 
 def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
@@ -319,17 +331,40 @@ def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[tuple[in
             goal[move.motor] = math.nan  # where a manual run ends is not known before it is made
             continue
         for name in move.motors:
-            goal[name] = move.targets[name] if name in move.targets else goal[name] + move.by[name]
-            places = [goal[name], move.turn]
+            start, goal[name] = goal[name], move.place_of(name, goal[name])
+            faults = list(move_faults(spec.stepper[name], name, move, start, goal[name]))
+            yield from ((move.row, *fault) for fault in faults)
             if move.change is not None:
-                places += [move.change.at, move.change.to]
                 goal[name] = move.change.to
-            for place in places:
-                if place is not None and (told := _place_problem(spec.stepper[name], place)):
-                    yield move.row, name, *told
 
 
-def _place_problem(table: StepperTable, place: float) -> tuple[str, str, str] | None:
+def move_faults(
+    table: StepperTable, name: str, move: StageMove, start: float, goal: float
+) -> Iterator[tuple[str, str, str, str]]:
+    """What a motor at `start` cannot do of a move to `goal` [m], either NaN where it is not known.
+
+    Key, what came, what is allowed, and what to do: places outside its travel, and places that are not on its way.
+    """
+    change = () if move.change is None else (move.change.at, move.change.to)
+    outside = [told for place in (goal, move.turn, *change) if place is not None if (told := _outside(table, place))]
+    yield from ((name, *told) for told in outside)
+    if outside or math.isnan(start) or math.isnan(goal):
+        return
+    here, there = table.step_inside(start), table.step_inside(goal)
+    way = f"from {text(table.position_of(here), 'm', 6)} to {text(table.position_of(there), 'm', 6)}"
+    if move.turn is not None:
+        turn = table.step_inside(move.turn)
+        if (turn - here) * (there - turn) >= 0:
+            came, allowed = f"{text(move.turn, 'm', 6)} on the way {way}", "a place from which the motor comes back"
+            yield "turn", came, allowed, "set turn beyond both, or remove it"
+    if move.change is not None:
+        at = table.step_inside(move.change.at)
+        if at == here or (at - here) * (there - at) < 0:
+            came = f"{text(move.change.at, 'm', 6)}, which the motor does not pass {way}"
+            yield "changed_at", came, "a place on the way, its end included", "set it there, or correct the target"
+
+
+def _outside(table: StepperTable, place: float) -> tuple[str, str, str] | None:
     """What is wrong with a place: what came, what is allowed, and what to do."""
     lower, upper = table.mechanics.lower_end, table.upper_end
     # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.

@@ -175,7 +175,10 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
         plant = stage.motors[name].r.plant
         plant.rotor.peak_lag = abs(plant.rotor.lag)
         plant.gauge.peak_hz, plant.gauge.outside = 0.0, stage.instant
-    legs, over = ({move.motor: host.jog(move)}, False) if isinstance(move, StageJog) else host.run(move)
+    legs, over = (host.jog(move), False) if isinstance(move, StageJog) else host.run(move)
+    if isinstance(move, StageJog) and not legs:
+        made = f"motor {move.motor} made no step: it stands at the end of its travel"
+        result.warnings.append(f"move {move.number}: {made}")
     stage.pass_time(stage.spec.controller.settle_time)
     ready = stage.time
     motors = {name: _observe(host, name, leg, before[name], over=over) for name, leg in legs.items()}

@@ -221,6 +221,10 @@ class StageMove:
         """Motors that the move names."""
         return (*self.targets, *self.by)
 
+    def place_of(self, motor: str, before: float) -> float:
+        """Where a motor goes that was told to go to `before` by the move before [m]."""
+        return self.targets[motor] if motor in self.targets else before + self.by[motor]
+
 
 @dataclass(frozen=True, slots=True)
 class StageJog:

@@ -88,10 +88,67 @@ def test_a_stop_changed_on_the_way(spec):
     assert run.moves[1].motors["group_a"].steps > 100 + 300
 
 
-def test_a_change_at_a_place_that_the_motor_does_not_pass_changes_nothing(spec):
-    run = run_stage(spec, job(StageMove(1, 1, targets={"group_a": 1 * MM}, change=Change(2 * MM, 3 * MM))))
+@pytest.mark.parametrize(("at", "to"), [(0.5, 39), (1, 6)])  # on the way, and at its end
+def test_a_stop_moved_far_outwards_is_waited_for(spec, at, to):
+    """The wait was timed by the way to the stop of before."""
+    run = run_stage(spec, job(StageMove(1, 1, targets={"group_a": 1 * MM}, change=Change(at * MM, to * MM))))
+    assert run.done, run.failure
+    motor = run.moves[0].motors["group_a"]
+    assert (motor.stop, motor.steps, motor.overrun) == (pytest.approx(to * MM), to * 200, False)
+
+
+def test_a_reversal_is_waited_for_however_long_its_pause(spec):
+    table = spec.stepper["group_b"]
+    slow = table.model_copy(
+        update={
+            "drive": table.drive.model_copy(update={"reversal_pause": 255}),
+            "motor": table.motor.model_copy(update={"start_frequency": 150.0}),  # 66 Hz with load and reserve
+            "zone": {},
+        }
+    )
+    run = run_stage(
+        spec.model_copy(update={"stepper": {"group_b": slow}}),
+        job(StageMove(1, 1, targets={"group_b": 0.0}, turn=0.05 * MM)),
+    )
+    assert run.done, run.failure
+    assert run.moves[0].motors["group_b"].arrived > 255 / 68
+
+
+AFTER_A_JOG = {
+    "outside the travel": (StageMove(2, 2, by={"group_a": -10.7 * MM}), ["-10.17 mm", "from 0 m to 40 mm"]),
+    "turn short of the target": (StageMove(2, 2, targets={"group_a": 20 * MM}, turn=15 * MM), ["turn", "15 mm"]),
+    "not passed": (StageMove(2, 2, targets={"group_a": 9 * MM}, change=Change(0.1 * MM, 20 * MM)), ["changed_at"]),
+}
+
+
+@pytest.mark.parametrize(("move", "words"), AFTER_A_JOG.values(), ids=AFTER_A_JOG)
+def test_what_cannot_be_done_from_where_a_jog_ended_fails_before_the_motor_moves(spec, move, words):
+    run = run_stage(spec, job(StageJog(1, 1, "group_a", 5 * MM, 0.1), move))
+    place = run.moves[0].motors["group_a"].stop
+    assert not run.done
+    assert len(run.moves) == 1
+    assert 0 < place < 1 * MM
+    assert all(word in run.failure for word in ["move 2: motor group_a at", *words]), run.failure
+
+
+def test_a_way_after_a_jog_that_stays_inside_is_made_also_with_turn_and_change(spec):
+    moves = (
+        StageJog(1, 1, "group_a", 5 * MM, 0.1),
+        StageMove(2, 2, targets={"group_a": 3 * MM}, turn=4 * MM),
+        StageMove(3, 3, by={"group_a": -2 * MM}, change=Change(2 * MM, 0.0)),
+    )
+    run = run_stage(spec, job(*moves))
+    assert run.done, run.failure
+    assert [made.motors["group_a"].stop for made in run.moves[1:]] == pytest.approx([3 * MM, 0.0])
+
+
+def test_a_manual_run_into_the_end_that_the_motor_stands_at_moves_nothing(spec):
+    """Its record had the arrival of the move before: -50 ms."""
+    run = run_stage(spec, job(StageMove(1, 1, targets={"group_b": 0.1 * MM}), StageJog(2, 2, "group_a", -5 * MM, 0.1)))
     assert run.done
-    assert run.moves[0].motors["group_a"].stop == pytest.approx(1 * MM)
+    assert run.moves[1].motors == {}
+    assert run.moves[1].seconds == 0.0
+    assert run.warnings == ["move 2: motor group_a made no step: it stands at the end of its travel"]
 
 
 def test_a_manual_run_keeps_to_the_table_and_ends_at_the_travel(spec):
@@ -170,6 +227,11 @@ def test_a_fault_of_the_rule_ends_the_job(spec):
         (StageMove(1, 7, targets={"group_a": -1 * MM}), ["-1 mm", "go to 0 m"]),
         (StageMove(1, 7, by={"group_b": 31 * MM}), ["group_b", "31 mm", "30 mm"]),
         (StageMove(1, 7, targets={"group_a": 1 * MM}, turn=50 * MM), ["50 mm"]),
+        (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=15 * MM), ["turn", "15 mm", "beyond"]),
+        (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=20 * MM), ["turn", "beyond"]),
+        (StageMove(1, 7, targets={"group_a": 20 * MM}, turn=0.0), ["turn", "beyond"]),
+        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(2 * MM, 3 * MM)), ["changed_at", "2 mm"]),
+        (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(0.0, 3 * MM)), ["changed_at", "0 m"]),
         (StageMove(1, 7, targets={"group_a": 1 * MM}, change=Change(0.5 * MM, 50 * MM)), ["50 mm"]),
         (StageMove(1, 7, targets={"z": 1 * MM}), ["the motor z", "group_a, group_b"]),
         (StageJog(1, 7, "group_a", 30 * MM, 1.0), ["speed", "30 mm/s", "write 20 mm/s"]),
