@@ -43,7 +43,7 @@ from detent.planning.step_ramp import StepRamp
 
 TOP = len(RAMP) - 1
 L = len(RAMP)
-WHOLE = 0.5
+WHOLE = 0.5 + MAX_HZ**2 / CLOCK_HZ  # words are whole Hz, and a period is rounded up to a tick [Hz]
 """The machine's frequencies are whole Hz."""
 
 RELOAD_ERROR = 0.0025

@@ -156,7 +156,7 @@ static inline int next_step(const StepRuleParams *p, StepRule *r, const Tables *
 
 static inline void load_period(const StepTimerParams *p, StepTimer *r, int32_t word)
 {
-    r->period = p->reload ? word : (p->clock_hz + word / 2) / word;
+    r->period = p->reload ? word : (p->clock_hz + word - 1) / word;
     r->expires += r->period;
 }
 

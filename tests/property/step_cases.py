@@ -85,11 +85,6 @@ def assert_feasible(table: StepEnvelope) -> None:
         assert run[-1:].tolist() in ([], [0]), "the way ends at speed"
 
 
-def fastest_hz(rig: Rig, limit: np.ndarray) -> np.ndarray:
-    """What the timer makes of a limit, at most [Hz]: a word is rounded to the slower side, a period to whole ticks."""
-    return limit * (1 + 1e-9) if rig.p.controller.rule.reload else limit / (1 - limit / (2 * rig.clock_hz))
-
-
 @dataclass
 class Tables:
     """Ramp index that each table permits, by the position a step departs from, for the steps after `pulses`."""
@@ -111,7 +106,7 @@ def judge_steps(rig: Rig, course: Course, rests: list[int], tables: list[Tables]
     interval = np.where(up, course.position, course.position - 1)
     assert ((interval >= 0) & (interval < rig.zones.steps)).all(), "a step leaves the travel"
     limit = np.where(up, speed_limits(rig.zones)[interval], speed_limits(rig.down_zones)[interval])
-    assert (course.hz <= fastest_hz(rig, limit)).all(), "a step is faster than its zone"
+    assert (course.hz <= limit * (1 + 1e-9)).all(), "a step is faster than its zone"
     assert not (course.state == FAULT).any(), "a fault"
     path = np.concatenate([[0], course.index])
     assert np.abs(np.diff(path)).max(initial=0) <= 1, "the index changes by more than one from step to step"

@@ -1,5 +1,7 @@
 """Step timer and phase sequencer of a stepper: one pulse per period (stepper-envelope specification 2.2, block B5)."""
 
+import math
+
 from detent.kernel.registers import Registers, i8, register, u1
 from detent.kernel.step import hot_step
 
@@ -22,11 +24,14 @@ class StepTimer(Registers):
 
 @hot_step
 def load_period(p: StepTimerParams, r: StepTimer, word: int) -> None:
-    """Begin a period where the last one was over; a frequency costs a division, a reload value none."""
+    """Begin a period where the last one was over; a frequency costs a division, a reload value none.
+
+    The division is rounded up: no step is faster than its word.
+    """
     if p.reload:
         r.period = word
     else:
-        r.period = (p.clock_hz + word // 2) // word
+        r.period = (p.clock_hz + word - 1) // word
     r.expires += r.period
 
 
@@ -35,3 +40,8 @@ def pulse(r: StepTimer, direction: int) -> None:
     """Step pulse: the coil pattern moves on by one place."""
     r.phase = (r.phase + direction) & 3
     r.pulses += 1
+
+
+def word_within(hz: float, clock_hz: float, *, reload: bool) -> int:
+    """The fastest word of a frequency that is not above `hz`."""
+    return math.ceil(clock_hz / hz - 1e-9) if reload else math.floor(hz + 1e-9)

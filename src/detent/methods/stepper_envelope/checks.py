@@ -246,10 +246,13 @@ def _settling(m: MotorFigures) -> Iterator[Caution]:
 def _rounding(m: MotorFigures) -> Iterator[Caution]:
     """Frequencies are stored and made finely enough."""
     clock, words = m.spec.controller.timer, m.spec.controller.words
-    error, finer = m.rounding(clock, words), max(clock, 0.5 / MOST_ROUNDING * m.max_hz)
+    error = m.rounding(clock, words)
     if error > MOST_ROUNDING:
-        faster, reload = m.least("controller.timer", finer), m.put("controller.words", '"reload"')
-        by_clock = m.rounding(finer, words) <= MOST_ROUNDING
+        # A reload value is half a tick off at most, the period of a frequency a tick.
+        by_clock = m.rounding(max(clock, m.max_hz / MOST_ROUNDING), words) <= MOST_ROUNDING
+        ticks = 1.0 if words == "frequency" and by_clock else 0.5
+        faster = m.least("controller.timer", max(clock, ticks * m.max_hz / MOST_ROUNDING))
+        reload = m.put("controller.words", '"reload"')
         by_words = m.rounding(clock, "reload") <= MOST_ROUNDING
         yield Caution(
             f"rounding of the frequencies, {m.name}",

@@ -5,10 +5,8 @@ What the host lays ready are both tables. The loop is open: nothing comes back a
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from detent.control.step_rule import IDLE, PAUSE, STEP, StepRule, StepRuleParams, next_entry, next_step
-from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse
+from detent.control.step_timer import StepTimer, StepTimerParams, load_period, pulse, word_within
 from detent.kernel.loop import HostArray, controls
 from detent.kernel.registers import CONTROLLER, Registers, block, i1, i8, register, u1, u4
 from detent.kernel.step import hot_step, step
@@ -105,11 +103,9 @@ def load_rule(
     p: StepperControllerParams, ramp: StepRamp, limits: Sequence[float], clock_hz: int, *, reload: bool
 ) -> None:
     """Put ramp list and zone limits into the control unit, in the words of its timer."""
-    bounds = np.asarray(limits, float)
     words = ramp.words(clock_hz, reload=reload)
-    bound_words = np.ceil(clock_hz / bounds - 1e-9) if reload else np.floor(bounds)
     p.rule.ramp[: len(words)] = words.tolist()
-    p.rule.limit[: len(bounds)] = [int(word) for word in bound_words]
+    p.rule.limit[: len(limits)] = [word_within(hz, clock_hz, reload=reload) for hz in limits]
     p.rule.index_mask, p.rule.zone_shift = INDEX_MASK, INDEX_BITS
     p.rule.reload = p.timer.reload = int(reload)
     p.timer.clock_hz = clock_hz

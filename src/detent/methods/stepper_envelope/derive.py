@@ -86,8 +86,8 @@ class MotorFigures(Motor):
 
     def rounding(self, clock: float, words: str) -> float:
         """Largest relative error of the ramp's frequencies, stored as `words` and made by a timer's clock [Hz]."""
-        stored = self.ramp.hz if words == "reload" else np.rint(self.ramp.hz)
-        made = clock / np.rint(clock / stored)
+        period = np.rint(clock / self.ramp.hz) if words == "reload" else np.ceil(clock / np.rint(self.ramp.hz))
+        made = clock / period
         return float(np.max(np.abs(made / self.ramp.hz - 1)))
 
 

@@ -91,7 +91,7 @@ class EnvelopeTables:
         """Period that the timer loads for every step i of one of the tables, 0 at a sentinel, shape (N,) [tick]."""
         slower = np.maximum if self.reload else np.minimum
         words = table.of_steps(*self.words(), slower)
-        return words if self.reload else np.where(words, (self.clock_hz + words // 2) // np.maximum(words, 1), 0)
+        return words if self.reload else np.where(words, -(-self.clock_hz // np.maximum(words, 1)), 0)
 
 
 def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from detent.control.step_rule import FAULT, REST, acknowledge, deflect, release, start_move
+from detent.control.step_timer import word_within
 from detent.errors import STEP_FAULT_TEXT, AxisError, FileProblem, InputError
 from detent.kernel.loop import advance
 from detent.kernel.registers import Registers, block, i8, register
@@ -294,10 +295,8 @@ class StageHost:
         for table in (motor.tables.up, motor.tables.down):
             table.move_start(0 if table.direction > 0 else table.steps)
             table.move_stop(table.steps - table.start)
-        # A timer word on the slower side.
-        hz, rule = motor.table.hz(abs(jog.speed)), motor.controller.rule
-        reload = self.spec.controller.words == "reload"
-        word = math.ceil(self.spec.controller.timer / hz - 1e-9) if reload else math.floor(hz + 1e-9)
+        rule, reload = motor.controller.rule, self.spec.controller.words == "reload"
+        word = word_within(motor.table.hz(abs(jog.speed)), motor.p.controller.timer.clock_hz, reload=reload)
         deflect(motor.p.controller.rule, rule, word, len(motor.tables.ramp) - 1, heading)
         self.stage.pass_time(jog.duration)
         release(rule)

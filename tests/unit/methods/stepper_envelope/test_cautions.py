@@ -21,7 +21,7 @@ def found_in(load_text, text, *overrides):
     [
         (),
         (f"{A}.limits.travel=40.003 mm",),
-        ("controller.words=frequency",),
+        ("controller.words=frequency", "controller.timer=2 MHz"),
         ("controller.settle_time=6 ms",),
         (f"{A}.drive.reversal_pause=0", f"{A}.drive.start_safety=4.3"),
         (f"{A}.motor.rated_current=1 A",),

@@ -8,7 +8,7 @@ import pytest
 from detent import examples
 from detent.control.step_rule import INFEASIBLE, acknowledge
 from detent.errors import STEP_FAULT_TEXT, AxisError, InputError
-from detent.methods.load import read_axis
+from detent.methods.load import load_spec, read_axis
 from detent.methods.stepper_envelope.host import Leg, StageHost
 from detent.methods.stepper_envelope.run import run_stage, stage_signals
 from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog, StageMove
@@ -16,6 +16,7 @@ from detent.methods.stepper_envelope.stage_job import Change, StageJob, StageJog
 pytestmark = pytest.mark.compiled
 
 MM = 1e-3
+B = "stepper.group_b"
 ZOOM = next(path for path in examples() if path.name == "zoom.toml")
 
 
@@ -167,6 +168,17 @@ def test_after_a_manual_run_ways_count_from_where_it_ended(spec):
     moves = (StageJog(1, 1, "group_a", 5 * MM, 0.1), StageMove(2, 2, by={"group_a": 0.5 * MM}))
     run = run_stage(spec, job(*moves))
     assert run.moves[1].motors["group_a"].stop == pytest.approx(run.moves[0].motors["group_a"].stop + 0.5 * MM)
+
+
+@pytest.mark.parametrize("words", ["frequency", "reload"])
+def test_no_step_is_faster_than_a_limit_however_coarse_the_timer(words):
+    """With frequency words it ran at 19.23 mm/s."""
+    slow = load_spec(ZOOM, (f"controller.words={words}", "controller.timer=250 kHz", f"{B}.limits.speed=19.1 mm/s"))
+    moves = (StageMove(1, 1, targets={"group_b": 6 * MM}), StageJog(2, 2, "group_b", -19.1 * MM, 0.25))
+    run = run_stage(slow, job(*moves))
+    assert run.done, run.failure
+    for made in run.moves:
+        assert made.motors["group_b"].peak_hz == pytest.approx(250e3 / 66)
 
 
 def test_zones_hold_in_a_run(spec):
