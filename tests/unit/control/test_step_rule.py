@@ -250,6 +250,19 @@ def test_the_operator_ends_an_automatic_move():
     assert words(p, r) == []
 
 
+def test_the_operator_ends_the_reversals_of_an_automatic_move():
+    """The motor that he drives to a sentinel stands there: nothing is left of the move that would turn it."""
+    p, r = params(), motor()
+    start_move(r, 1, turns=1)
+    decide(p, r)
+    deflect(p, r, 500, 4, 1)
+    decide(p, r)
+    assert r.active == 0
+    words(p, r)
+    assert (r.position, r.direction, r.state, r.event) == (9, 1, REST, 1)
+    assert decide(p, r) == IDLE
+
+
 def test_a_reversal_slows_down_before_the_direction_line_toggles():
     p, r = params(), motor(10)
     high = np.full(40, 4, np.int16)

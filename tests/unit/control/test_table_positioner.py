@@ -338,6 +338,31 @@ def test_braking_path():
     assert interrupts == pytest.approx(start / INTERPOLATOR.acceleration, rel=0.05)
 
 
+@pytest.mark.parametrize("speed", [10.25, 30.5, 122.88])  # counts an interrupt
+def test_braking_begins_when_the_way_is_needed_and_not_before(speed):
+    word = round(speed * ONE)
+    r, left = Interpolator(irr=100_000 * ONE, speed=word), 0
+    while r.speed == word:
+        left = r.irr
+        interpolate(INTERPOLATOR, r, word)
+    # It finds less than v^2 / 2a left, by the way of an interrupt at most.
+    assert 0 < word**2 / (2 * INTERPOLATOR.acceleration) - left <= word
+
+
+@pytest.mark.parametrize("dial", [0, 1, 60])
+def test_a_stop_has_nothing_to_do_with_the_dial(dial):
+    """Turned down with the release, it would hold up what is left of the way."""
+    bench = jogging(1, 500)
+    bench.r.plus, bench.r.dial = 0, speed_word(dial)
+    run_pass(bench)
+    interrupts = 0
+    while bench.r.state == STOPPING and interrupts < 200:
+        bench.feed(round(bench.command))
+        interrupts += 1
+    assert interrupts == pytest.approx(speed_word(60) / bench.p.interpolator.acceleration, abs=3)  # v / a
+    assert (bench.r.state, bench.r.event) == (HOLD, 1)
+
+
 # -- ways to an angle
 
 

@@ -82,6 +82,13 @@ class TableFigures:
         return torque / self.spec.stiffness / self.spec.ratio / self.gain
 
     @property
+    def held_away(self) -> float:
+        """Largest distance from its target at which friction, a load and noise can hold a table at rest [rad]."""
+        load, counts = self.spec.disturbance.load, self.resting_error + self.noise + self.spec.method.in_position
+        pushed = 0.0 if load is None else self.deviation(abs(load.torque) / self.spec.ratio)
+        return counts * self.spec.count + pushed
+
+    @property
     def coarse_errors(self) -> dict[str, float]:
         """Largest errors of the coarse word against the fine one, by their source [rad]."""
         fine, coarse = self.spec.detector.fine, self.spec.detector.coarse

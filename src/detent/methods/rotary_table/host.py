@@ -113,8 +113,14 @@ class TableHost:
     # ------------------------------------------------------------------------------------------------------ times
 
     def stop_time(self, speed: float) -> float:
-        """Time after which a released jog is at rest at the latest, with a margin [s]."""
-        return MARGIN + 2 * (self.spec.method.task_period + speed / self.spec.limits.acceleration)
+        """Time after which a released jog is at rest at the latest, with a margin [s].
+
+        The target is a whole count: up to a count more than the braking path is made at the speed of the jog, or at
+        that of an interrupt's acceleration where it is the larger.
+        """
+        spec, method = self.spec, self.spec.method
+        count = spec.count / max(speed, spec.limits.acceleration * method.strobe_period)
+        return MARGIN + 2 * (method.task_period + speed / spec.limits.acceleration + count)
 
     def move_time(self, way: float, speed: float) -> float:
         """Time after which a positioning has ended at the latest, with a margin [s]."""

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from detent.errors import AxisError
 from detent.methods.rotary_table.build import ticks
+from detent.methods.rotary_table.derive import TableFigures
 from detent.methods.rotary_table.host import TableHost, dial_speed
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_job import Action, Go, Jog, Output, Stretches, join_stretches
@@ -103,24 +104,29 @@ class SequenceController:
         if not host.at_rest:
             raise AxisError(f"it did not come to rest within {format_quantity(limit, 's')}; {suspect(host)}")
         host.acknowledge()
-        if not self._settle():
-            away = (
-                "after the jog the table did not come within its window of where it is held: look at the step's error"
-            )
-            self._warn(step, f"{away}; friction, a load or noise of the detector keeps it away")
+        if self._settle():
+            return
+        # Stick and slip carry a table over its target by as much as friction can hold it away.
+        if host.way > 2 * TableFigures(host.spec).held_away:
+            waited = host.settling_time + host.spec.method.in_position_time
+            away = f"it is {format_quantity(host.way, 'rad')} from where it is held"
+            raise AxisError(f"{away} {format_quantity(waited, 's')} after the jog; {suspect(host)}")
+        away = "after the jog the table did not come within its window of where it is held: look at the step's error"
+        self._warn(step, f"{away}; friction, a load or noise of the detector keeps it away")
 
     def _warn(self, step: Action, text: str) -> None:
         """Note a warning, once for each step of the job."""
         self.warnings.setdefault(f"line {step.row}: {text}" if step.row else text)
 
     def _settle(self) -> bool:
-        """Let the loop take the table to where it is held; False if it does not get there."""
+        """Let the loop take the table to where it is held; False if it does not stay there."""
         host, method = self.host, self.host.spec.method
-        end, inside = host.tick + ticks(host.settling_time), 0
-        while host.tick < end and inside * method.strobe_period < method.in_position_time:
+        end, inside = host.tick + ticks(host.settling_time + method.in_position_time), 0
+        needed = max(1, round(method.in_position_time / method.strobe_period))
+        while host.tick < end and inside < needed:
             self._pass(method.strobe_period)
             inside = inside + 1 if host.in_position else 0
-        return host.in_position
+        return inside >= needed
 
     # ------------------------------------------------------------------------------------------------------- time
 

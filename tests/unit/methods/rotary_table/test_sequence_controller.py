@@ -183,6 +183,42 @@ def test_friction_that_keeps_the_table_from_its_window_is_a_warning():
     assert "did not come within its window" in next(iter(bench.controller.warnings))
 
 
+@pytest.mark.parametrize("speed", [0.1, 0.5, 2.0])  # deg/s; a count is 1.4 deg, an acceleration's word 0.6 deg/s
+def test_a_slow_jog_on_coarse_counts_comes_to_rest(speed):
+    """Up to a count more than its braking path is made at that speed: it was given up after 0.54 s."""
+    coarse = ["detector.fine.counts=64", "detector.coarse.counts=64", "mechanics.gear_ratio=4"]
+    bench = Bench(*coarse).do(Jog(1, math.radians(speed), duration=1.05))
+    assert not bench.host.is_moving
+    assert bench.host.way <= bench.host.spec.method.in_position * bench.host.spec.count
+
+
+PUSH = ["disturbance.load.at=0.1 s", "disturbance.load.duration=100 s"]
+
+
+def test_a_table_that_is_driven_away_is_no_jog_done():
+    """89.9 deg off and still turning at 26 deg/s was a warning."""
+    bench = Bench("method.position_control=false", "disturbance.load.torque=200 N*m", *PUSH)
+    with pytest.raises(AxisError, match=r"it is \d+\.\d+ deg from where it is held 353\.3 ms after the jog; nothing"):
+        bench.do(Jog(1, math.radians(30), duration=3.0))
+    assert bench.controller.warnings == {}
+
+
+def test_a_load_that_holds_the_table_away_is_a_warning():
+    bench = Bench("disturbance.load.torque=20 N*m", *PUSH).do(Jog(1, SPEED, duration=1.0))
+    assert "did not come within its window" in next(iter(bench.controller.warnings))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_table_whose_reading_leaves_the_window_again_and_again_has_not_settled(seed):
+    """Where it was read in the very last strobe decided."""
+    bench = Bench("detector.fine.noise=0.4 deg", f"detector.seed={seed}").do(Jog(1, SPEED, duration=0.5))
+    assert "did not come within its window" in next(iter(bench.controller.warnings))
+
+
+def test_a_window_that_takes_long_to_be_in_is_waited_for():
+    assert Bench("method.in_position_time=1 s").do(Jog(1, SPEED, duration=0.5)).controller.warnings == {}
+
+
 @pytest.mark.parametrize(
     ("overrides", "text"),
     [
