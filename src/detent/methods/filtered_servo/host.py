@@ -59,6 +59,10 @@ class FilteredHost(Host):
             shorter = "shorten it, lower the speed, or widen the counter"
             yield "sample_period", format_quantity(period, "s"), allowed, shorter
 
+    def in_counts(self, error: float) -> str:
+        """How far off that is, and what the axis itself counts: it does not see a part of a pulse."""
+        return f"{super().in_counts(error)} by its true position, P = {self.controller.deviation.deviation}"
+
     @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it runs."""

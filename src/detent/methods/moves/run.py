@@ -82,6 +82,12 @@ class Host(ABC):
         return f"{abs(error) / self.grid:.1f} pulses"
 
     @property
+    def is_noisy(self) -> bool:
+        """Whether noise may have moved a stop: interference has put in, taken away or spoilt something."""
+        lines = getattr(self.machine.state.plant, "interference", None)
+        return lines is not None and any(getattr(lines, register) for register in FAULTS.values())
+
+    @property
     def failure(self) -> str:
         """Why the axis has given up; empty while it has not."""
         return ""
@@ -210,7 +216,8 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
     start = float(plant.train.position)
     set_gauge(plant.gauge, host.machine.state.tick, start, to.position, host.tolerance)
     host.command(to)
-    arrived = host.wait(host.time_limit(to))
+    limit = host.time_limit(to)
+    arrived = host.wait(limit)
     ready = host.machine.time if arrived else math.nan
     if arrived and to.move.dwell > 0:
         host.stands(to.move.dwell)
@@ -220,23 +227,30 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
         switched=host.switched, ready=ready, settled=plant.gauge.outside * host.machine.tick, end=host.machine.time,
         overshoot=max(float(plant.gauge.beyond), 0.0), error=error, peak_speed=float(plant.gauge.peak_speed),
     ))  # fmt: skip
-    return _verdict(host, to, error, arrived=arrived)
+    return _verdict(host, to, error, math.nan if arrived else limit)
 
 
-def _verdict(host: Host, to: Destination, error: float, *, arrived: bool) -> str:
-    """Why a move failed; empty if it did not."""
+def _verdict(host: Host, to: Destination, error: float, waited: float) -> str:
+    """Why a move failed; empty if it did not. `waited` is the time that it did not arrive in, NaN if it did [s]."""
     where = f"move {to.move.number} to {format_quantity(to.position, 'm', 6)}"
     if host.failure:
         return f"{where}: {host.failure}"
-    if not arrived:
-        limit = format_quantity(host.time_limit(to), "s")
+    if not math.isnan(waited):
+        limit = format_quantity(waited, "s")
         return f"{where}: did not arrive within {limit}; it stands {_away(host, error)}; look at the report's figures"
     if abs(error) > host.tolerance:
-        return (
-            f"{where}: the axis says that it has arrived and stands {_away(host, error)}; look for pulses that noise "
-            "has added or removed, or for a force it cannot hold"
-        )
+        return f"{where}: the axis says that it has arrived and stands {_away(host, error)}; {_suspect(host)}"
     return ""
+
+
+def _suspect(host: Host) -> str:
+    """What to look at when an axis is not where it says: what there is, and noise only where there is any."""
+    noise = "pulses that noise has added or removed, or for " if host.is_noisy else ""
+    beyond = float(host.machine.state.plant.gauge.beyond)
+    if beyond > host.tolerance:
+        swing = f"it went {format_quantity(beyond, 'm')} beyond its target, and may still swing back"
+        return f"{swing}: give the loop more damping, or the move a dwell; look for {noise}a force it cannot hold"
+    return f"look for {noise}a force it cannot hold"
 
 
 def _away(host: Host, error: float) -> str:

@@ -287,12 +287,25 @@ def _settling(m: PhaseFigures) -> Iterator[Caution]:
         value, consequence = f"{m.gain_margin:.3g}", "the carriage oscillates about its target, or barely comes to rest"
         advice = "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)"
         yield Caution("gain margin of the position loop", value, f"at least {LEAST_GAIN_MARGIN:g}", consequence, advice)
+    elif m.overshoot > m.spec.arrived_steps:
+        value, allowed = f"{m.overshoot:.2g} steps", f"up to {m.spec.arrived_steps} steps, which count as arrived"
+        consequence = "the carriage runs past its target and swings back after the axis has said that it is ready"
+        yield Caution("overshoot of a move", value, allowed, consequence, _calmer(m))
     if rest > 2:
         value = f"{m.breakaway_counts:.3g} counts, {rest:.3g} steps of error"
         allowed = f"up to 2 steps, {2 * k1 * k3} counts"
         consequence = "friction holds the carriage off its target until the integral moves it"
         advice = put("method.position_gains", [math.ceil(m.breakaway_counts / (2 * k3)), k2, k3])
         yield Caution("drive that breaks the carriage loose", value, allowed, consequence, advice)
+
+
+def _calmer(m: PhaseFigures) -> str:
+    """What takes the overshoot away: a longer speed sample, a step of which is worth more damping."""
+    tap = m.spec.clock.sample_tap + 1
+    slower = PhaseFigures(m.spec.changed(clock={"sample_tap": tap}))
+    gains = "raise KP2 of method.position_gains, and KS2 or KS3 of method.speed_gains with it"
+    cures = 0 < slower.overshoot <= m.spec.arrived_steps and slower.gain_margin >= LEAST_GAIN_MARGIN
+    return remedy.least("clock.sample_tap", tap, gains) if cures else gains
 
 
 def _integral(m: PhaseFigures) -> Iterator[Caution]:

@@ -9,13 +9,20 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, count_figure, quantity_figure
 from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
 from detent.units import format_quantity
 
+if TYPE_CHECKING:
+    from detent.analysis.sampled_loop import SampledLoop
+
 STIFFEST = 1e3
 """Steps per sample that a step of error may be worth for the exact model of the loop to be worth its numbers."""
+
+SWING = 2 * math.pi
+"""Time in which the position loop has been farthest beyond its target, over the inverse of its natural frequency."""
 
 
 class PhaseFigures:
@@ -78,17 +85,37 @@ class PhaseFigures:
         self.integral_rate = spec.clock.oscillator / 2**spec.clock.integrate_tap / k1 / self.position_loop
 
     @cached_property
-    def gain_margin(self) -> float:
-        """By how much the gain may grow until position mode no longer settles, the winding's lag neglected."""
+    def _loop(self) -> "SampledLoop | None":
+        """Position mode, the winding's lag neglected; None for a loop too stiff to be worth the numbers."""
         from detent.analysis.sampled_loop import SampledLoop
 
         k1, k2, k3 = self.spec.method.position_gains
-        window = self.spec.sample_period
-        gain = k3 * self.gain
+        window, gain = self.spec.sample_period, k3 * self.gain
         if k1 * gain * window * min(window, 1 / self.decay) > STIFFEST:
-            return 0.0
-        loop = SampledLoop(gain=gain, sample_period=window, scale=k2, position_gain=k1, tau_m=1 / self.decay)
-        return loop.stability_limit() / gain
+            return None
+        return SampledLoop(gain=gain, sample_period=window, scale=k2, position_gain=k1, tau_m=1 / self.decay)
+
+    @cached_property
+    def gain_margin(self) -> float:
+        """By how much the gain may grow until position mode no longer settles."""
+        return 0.0 if self._loop is None else self._loop.stability_limit() / self._loop.gain
+
+    @cached_property
+    def overshoot(self) -> float:
+        """How far position mode takes the carriage beyond its target [step]; infinite where it does not settle.
+
+        It enters with the entry before the change of mode, and with what the velocity loop lags behind the table.
+        """
+        if self._loop is None or not self._loop.is_stable:
+            return math.inf
+        spec, window, transition = self.spec, self.spec.sample_period, self._loop.transition()
+        lag = spec.method.table_acceleration / spec.step / self.velocity_loop
+        speed = spec.table_velocity(spec.method.threshold + 1) / window + lag
+        state, reached = [-float(spec.method.threshold), speed, self._loop.scale * speed * window], 0.0
+        for _ in range(math.ceil(SWING / self.position_loop / window)):
+            state = (transition @ state).tolist()
+            reached = max(reached, state[0])
+        return reached
 
 
 def weakest_output(spec: PhaseServoSpec) -> float:
@@ -179,6 +206,10 @@ def _loops(m: PhaseFigures) -> Iterator[Derived]:
         ("position loop", m.position_loop, "sqrt(KP1 KP3 x (count of the drive word) k / (R m) / step)"),
     ):
         yield Derived(name, value, "rad/s", f"{value:.4g} rad/s", formula)
+    if math.isfinite(m.overshoot):
+        formula = "exact model of position mode, from the change of mode with the velocity loop's lag"
+        text = f"{m.overshoot:.2g} steps, {format_quantity(m.overshoot * m.spec.step, 'm')}"
+        yield Derived("overshoot of a move", m.overshoot, "step", text, formula)
     formula = "(KP2 KP3 velocity feedback + back-EMF) / (2 x position loop), without delays"
     yield Derived("damping of the position loop", m.damping, "", f"{m.damping:.3g}", formula)
     yield count_figure("drive that breaks loose", m.breakaway_counts, "static x R / k / (count of the drive word)")

@@ -38,7 +38,7 @@ class PhaseHost(Host):
         p, r, start = build_phase_servo(spec), PhaseServo(), spec.mechanics.start_position
         switch_on(p, r, start, spec.detector.seed)
         machine, home = Machine(p, r, spec.tick, recorder), round(start / spec.pitch) * spec.pitch
-        super().__init__(spec, machine, grid=spec.pitch, tolerance=2 * spec.step, home=home)
+        super().__init__(spec, machine, grid=spec.pitch, tolerance=spec.arrived_steps * spec.step, home=home)
         self._counts = 0
 
     def start(self) -> None:
@@ -101,6 +101,11 @@ class PhaseHost(Host):
         on_another = abs(pitches) > 0.5 and abs(pitches - round(pitches)) < 0.1
         name = "pitch" if wrong == 1 else "pitches"
         return f"{text}, on the positioning point {wrong} {name} off" if on_another else text
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether noise may have moved a stop."""
+        return self.spec.detector.jitter > 0 or super().is_noisy
 
     @property
     def switched(self) -> float:

@@ -150,7 +150,9 @@ class MethodTable(Table, frozen=True):
     speed_bits: int = optional("width of the speed counter", 8, ge=4, le=16)
     corrector: bool = optional("no zero while settling, dead band at stop (3.8)", default=True)
     integrator: bool = optional("integral of the error at stop (3.8)", default=True)
-    dead_band: int = optional("half width D of the dead band at stop, in steps", 1, ge=0, le=64)
+    dead_band: int = optional(
+        "half width D of the dead band at stop, in steps; D + 1, at least 2, count as arrived", 1, ge=0, le=64
+    )
     integral_limit: int = optional("largest magnitude of the integral", 127, ge=1, le=32767)
     ready_time: Time = optional("one-shot 108: from position mode to ready", 3e-3, gt=0.0, le=10.0)
     stop_time: Time = optional("one-shot 109: from position mode to stop", 20e-3, gt=0.0, le=20.0)
@@ -221,6 +223,12 @@ class PhaseServoSpec(AxisSpec, frozen=True):
     def peak_count(self) -> int:
         """Largest entry of the velocity table [pulses per sample]."""
         return math.floor(self.limits.speed / self.step * self.sample_period + 1e-9)
+
+    @property
+    def arrived_steps(self) -> int:
+        """Distance from a target that counts as arrived: two steps, or one more than the dead band leaves alone."""
+        shaped = self.method.corrector and not self.method.stop_always_off
+        return max(2, self.method.dead_band + 1) if shaped else 2
 
     def table_velocity(self, distance: int) -> int:
         """Entry of the velocity table for a distance in steps [pulses per sample] (7)."""

@@ -57,6 +57,48 @@ def test_every_move_of_the_phase_servo_ends_within_a_step_of_its_positioning_poi
         assert move.settled <= move.ready
 
 
+def test_what_swings_is_not_laid_to_noise():
+    """At 16 MHz the speed word is worth half the damping; the failure blamed noise that the axis did not have."""
+    run = run_moves(phase("clock.oscillator=16 MHz"), job({"target": 0.2 * INCH}))
+    assert not run.done
+    assert "beyond its target" in run.failure
+    assert "more damping" in run.failure
+    assert "noise" not in run.failure
+    assert run_moves(phase("clock.oscillator=16 MHz", "clock.sample_tap=13"), job({"target": 0.2 * INCH})).done
+
+
+def test_noise_is_named_where_there_is_some():
+    burst = ["disturbance.lines.burst.kind=+", "disturbance.lines.burst.at=5 ms", "disturbance.lines.burst.count=40"]
+    run = run_moves(phase(*burst), job({"target": 0.2 * INCH}))
+    assert not run.done
+    assert sum(run.faults.values()) == 40
+    assert "pulses that noise has added or removed" in run.failure
+
+
+@pytest.mark.parametrize("half_width", [1, 4])
+def test_what_the_dead_band_leaves_alone_counts_as_arrived(half_width):
+    """Every move was missed beyond 2 steps, though the servo is told to leave D of them alone."""
+    push = ["force=9 N", "at=0.1 s", "duration=10 s"]
+    over = [f"disturbance.push.{key}" for key in push]
+    host = phase(f"method.dead_band={half_width}", "protection.stuck_time=0 s", *over)
+    run = run_moves(host, job({"target": 0.2 * INCH, "dwell": 0.15}))
+    assert run.done, run.failure
+    assert host.tolerance == pytest.approx((half_width + 1) * host.spec.step)
+    assert (half_width == 1) == (run.worst_error < 2 * host.spec.step)
+
+
+def test_a_slide_that_stands_off_says_what_it_counts():
+    """It stood half a pulse short by its true position, and the axis counts whole ones."""
+    sticky = [f"mechanics.friction.{side}.static=9 N" for side in ("right", "left")]
+    weak = filtered("method.in_position=0", "method.position_gain=0.2", "method.timeout=0.5 s", *sticky)
+    run = run_moves(weak, job({"target": weak.home + 2e-3, "speed": 0.01}))
+    assert not run.done
+    # The time of its way and ramps, 0.22 s, counts too; it was told with that of the way that was left at the end.
+    assert "did not arrive within 720 ms" in run.failure
+    assert f"by its true position) short of it to the left, P = {weak.controller.deviation.deviation};" in run.failure
+    assert weak.controller.deviation.deviation == pytest.approx(run.moves[0].error / weak.spec.pulse, abs=1)
+
+
 def test_a_long_move_takes_its_time_and_peaks_at_the_tables_velocity(moves):
     long = next(move for move in moves.moves if abs(move.target - move.start) > 0.29)
     assert long.peak_speed == pytest.approx(0.346, rel=0.01)
