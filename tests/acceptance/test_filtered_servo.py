@@ -501,20 +501,24 @@ def test_20_the_filter_quietens_the_drive():
     assert (conventional["E"].min(), conventional["E"].max()) == (-4, 5)
 
 
-@pytest.mark.parametrize("delay", [0, 1, 7, 23, 51, 333])
-def test_20_range_of_the_filtered_error(delay):
+@pytest.mark.parametrize(("delay", "most"), [(0, 22), (1, 21), (7, 22), (23, 22), (51, 21), (333, 22)])
+def test_20_range_of_the_filtered_error(delay, most):
     # How command and sample clock lie to one another (the delay of the command, in ticks) decides whether a command
-    # pulse ever comes just before the movement pulse that makes room for it: then P is one more for some microseconds.
+    # pulse ever comes just before the movement pulse that makes room for it. Where none does, P is 20 or 21 and the
+    # range of every tick is that of the specification; where one does, P is 22 for some ticks, and E one more.
     rig = Rig(CONTINUOUS_PWM)
     rig.run_ticks(delay)
     rig.command_rate(1037)
     rig.run(4.0)
-    error = rig.record(4.0, ["controller.deviation.error"])["controller.deviation.error"]
-    lowest, highest = np.quantile(error, [5e-4, 1 - 5e-4])
-    assert lowest == pytest.approx(-1.4, rel=0.1)
-    assert highest == pytest.approx(0.8, rel=0.1)
-    assert lowest - 0.05 <= error.min()
-    assert error.max() <= highest + 1.05
+    names = ["controller.deviation.error", "controller.deviation.deviation", "controller.filter.output"]
+    run = rig.record(4.0, names)
+    error, p, y = (run[name] for name in names)
+    assert (error == p - y).all()
+    assert (p.min(), p.max()) == (20, most)
+    assert error.min() == pytest.approx(-1.4, rel=0.1)
+    assert error[p < 22].max() == pytest.approx(0.8, rel=0.01)
+    assert np.mean(p == 22) < 2e-4
+    assert error.max() <= 0.8 + (most - 21) + 1e-3
 
 
 def test_20_the_long_window_is_unstable():

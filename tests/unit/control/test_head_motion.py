@@ -124,6 +124,20 @@ def test_kept_drive_is_not_used(p, c, cause):
     assert steady_value(p, c, 1, s) == (170 * s >> 8) + 36
 
 
+def test_ramp_interval_takes_the_slope_of_each_direction(p, c):
+    """VC1 is that of the right, VC2 of the left: 170 s/256 and 120 s/256 together."""
+    c.left.slope = 120
+    expected = round(133_000 * (240 / 240) / ((170 * 240 >> 8) + (120 * 240 >> 8)))
+    assert ramp_interval(p, c, 240) == expected
+    c.left.slope, c.right.slope = 170, 120
+    assert ramp_interval(p, c, 240) == expected
+    assert steady_value(p, c, 1, 240) == (120 * 240 >> 8) + 36
+    assert steady_value(p, c, -1, 240) == (170 * 240 >> 8) + 28
+    # With friction, of each direction its own as well.
+    p.span_steady, c.left.friction = 1, 5
+    assert ramp_interval(p, c, 240) == round(133_000 / ((170 * 240 >> 8) + 5 + (120 * 240 >> 8) + 36))
+
+
 def test_ramp_interval_has_two_readings(p, c):
     assert [ramp_interval(p, c, s) for s in (240, 60)] == [418, 426]
     p.span_steady = 1

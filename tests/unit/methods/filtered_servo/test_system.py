@@ -292,6 +292,19 @@ def test_a_reset_by_the_host_leaves_the_fault(make):
     assert (d.state, g.command) == (RUN, before + 100)
 
 
+def test_a_reset_empties_the_filter_of_fixed_point_too():
+    """Its accumulator holds the speed of before in fractions, and would drive the slide away from where it stands."""
+    rig = Rig("method.filter=fixed")
+    rig.command_rate(1000)
+    rig.run(0.1)
+    assert rig.c.filter.accumulator > 0
+    assert rig.c.filter.output > 0
+    rig.c.deviation.state = FAULT
+    reset(rig.c)
+    rig.run_ticks(1)
+    assert (rig.c.deviation.state, rig.c.filter.accumulator, rig.c.filter.output) == (RUN, 0, 0.0)
+
+
 def test_a_reset_while_the_slide_coasts_counts_on_without_a_false_pulse():
     rig = Rig("method.counter_bits=12")
     overrun(rig)
