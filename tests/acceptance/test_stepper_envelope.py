@@ -8,6 +8,7 @@ import ast
 import inspect
 import math
 import textwrap
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,11 +36,14 @@ from detent import example
 from detent.control import step_rule
 from detent.control.step_comparison import BRAKING_DISTANCE, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import FAULT, INFEASIBLE, REST, STEP, StepRule, follow
-from detent.kernel.loop import advance
 from detent.methods.load import load_spec
-from detent.methods.stepper_envelope.build import changed, stepper_motor
+from detent.methods.stepper_envelope.build import changed, instant, stepper_motor
+from detent.methods.stepper_envelope.host import StageHost, stage_registers
+from detent.methods.stepper_envelope.run import StageRun, run_stage
+from detent.methods.stepper_envelope.stage_job import StageJob, StageMove
 from detent.planning.step_envelope import StepEnvelope, Zone, ZoneMap, envelope_memory
 from detent.planning.step_ramp import StepRamp
+from detent.record.recorder import Recorder
 
 TOP = len(RAMP) - 1
 L = len(RAMP)
@@ -400,12 +404,22 @@ def test_14_coarse_and_fine_zones(reload):
 
 
 def test_14_ramps_lie_in_the_coarse_zone_in_both_directions(reload):
-    rig = Rig(N, COARSE_FINE, at=N, reload=reload)
-    course = rig.start(-1).course()
-    fine = (course.position > 2000) & (course.position <= 2600)
-    fine |= (course.position > 5000) & (course.position <= 6000)
-    assert course.hz[fine] == close(1000.0, reload)
-    assert (course.hz[~fine][L:-L] > 1000).all()
+    fine = np.zeros(N, bool)
+    fine[2000:2600] = fine[5000:6000] = True
+    for at, heading in ((0, 1), (N, -1)):
+        course = Rig(N, COARSE_FINE, at=at, reload=reload).start(heading).course()
+        interval = course.position - (heading < 0)
+        assert sorted(interval.tolist()) == list(range(N))  # every step of the way, once
+        hz = np.zeros(N)
+        hz[interval] = course.hz
+        # The envelope of a way is the same from either end: so are its frequencies, and its time.
+        assert {i: hz[i] for i in ZONE_EVENTS} == {i: close(value, reload) for i, value in ZONE_EVENTS.items()}
+        assert hz[fine] == close(1000.0, reload)
+        assert hz[fine].max() <= 1000.0
+        assert (hz[~fine][L:-L] > 1000).all()
+        assert course.seconds == seconds(3.3945)
+        rig = Rig(N, COARSE_FINE, at=at, reload=reload).start(heading).run()
+        assert (rig.position, rig.lost) == (N - at, 0)
 
 
 def test_14_a_sudden_change_at_the_boundaries_loses_steps(reload):
@@ -588,6 +602,21 @@ def test_22_rewriting_does_not_depend_on_the_travel():
     assert written == {2 * L}
 
 
+def test_22_on_the_machine_nothing_of_an_edit_depends_on_the_travel(reload):
+    seen = set()
+    for steps in (2000, 10**4, 10**5, 10**6):
+        rig = Rig(steps, turn=1500, reload=reload).start().run_to(600)
+        tracemalloc.start()
+        edit = rig.edit_stop(900)
+        memory = tracemalloc.get_traced_memory()[1]  # what is worked on
+        tracemalloc.stop()
+        rig.run()
+        assert (rig.position, rig.lost, edit.overrun) == (900, 0, False)
+        seen.add((edit.written, rig.seconds))
+        assert memory < 60 * L
+    assert seen == {(2 * L, rig.seconds)}
+
+
 # ------------------------------------------------------------------------------------------------------------- manual
 
 
@@ -679,17 +708,58 @@ def test_28_two_motors_run_as_if_alone():
     assert [rig.position for rig in rigs] == [6000, 6000]
 
 
-def test_28_two_motors_on_the_rig_run_as_if_alone():
-    alone = [group_a().run(), group_b().run()]
-    rigs = [group_a(), group_b()]
-    no_trace = (np.zeros((1, 1), np.uint8), np.zeros(0, np.int64), 0)
-    for _ in range(0, 3_000_000, 50):
-        for rig in rigs:
-            advance(rig.p, rig.r, 50, *no_trace, *rig.tables)
-    for single, rig in zip(alone, rigs, strict=True):
-        assert rig.lost == single.lost == 0
-        assert rig.rotor.peak_lag == single.rotor.peak_lag
-        assert rig.position == single.position
+MOVES = {"group_a": 30e-3, "group_b": 30e-3}  # 6000 steps each, of 8000 and 6000; group B through its fine zone
+
+
+def stage_steps(moves: dict[str, float]) -> tuple[StageRun, dict[str, np.ndarray]]:
+    """A job of one move on the packaged zoom, and the frequency of each step of each motor, read off its record."""
+    spec = load_spec(example("zoom.toml"), ())
+    plain = spec.stepper["group_a"].model_copy(update={"zone": {}})
+    spec = spec.model_copy(update={"stepper": spec.stepper | {"group_a": plain}})
+    signals = [f"{name}.controller.timer.{register}" for name in moves for register in ("pulses", "period")]
+    recorder = Recorder(stage_registers(spec), signals, every=25, period=instant(spec))
+    parts: list[np.ndarray] = []
+    recorder.pass_on(parts.append, 0)
+    run = run_stage(spec, StageJob("both", "moves", (StageMove(1, 1, targets=moves),), tuple(moves)), recorder=recorder)
+    rows, found = np.concatenate(parts), {}
+    for name in moves:
+        pulses, first = np.unique(rows[f"{name}.controller.timer.pulses"], return_index=True)
+        assert pulses[-1] == 6000
+        assert len(pulses) in {6000, 6001}  # a row for every step, and one for rest
+        found[name] = 1e6 / rows[f"{name}.controller.timer.period"][first[pulses > 0]]
+    return run, found
+
+
+def test_28_two_motors_of_a_stage_run_as_if_alone():
+    together, hz = stage_steps(MOVES)
+    assert together.done
+    assert hz["group_b"][2000:3000] == pytest.approx(FINE_HZ)
+    assert len(hz["group_a"]) == len(hz["group_b"]) == 6000
+    assert hz["group_a"][2000:3000] == pytest.approx(MAX_HZ)
+    for name, target in MOVES.items():
+        alone, single = stage_steps({name: target})
+        assert single[name].tolist() == hz[name].tolist()  # no frequency differs
+        assert alone.moves[0].motors[name] == together.moves[0].motors[name]
+
+
+@pytest.mark.parametrize("motors", [1, 2, 5])
+def test_29_motors_of_a_stage_cost_and_hold_as_many_times_one(motors):
+    zoom = load_spec(example("zoom.toml"), ())
+    many = zoom.model_copy(update={"stepper": {f"m{k}": zoom.stepper["group_b"] for k in range(motors)}})
+    one = zoom.model_copy(update={"stepper": {"m0": zoom.stepper["group_b"]}})
+    host = StageHost(many)
+    host.run(StageMove(1, 1, targets={f"m{k}": (k + 1) * 0.5e-3 for k in range(motors)}))
+    end = host.stage.instant
+    for k, (name, motor) in enumerate(host.stage.motors.items()):
+        alone = StageHost(one)
+        alone.run(StageMove(1, 1, targets={"m0": (k + 1) * 0.5e-3}))
+        alone.stage.pass_time((end - alone.stage.instant) * alone.stage.tick)
+        (single,) = alone.stage.motors.values()
+        assert motor.position == (k + 1) * 100, name
+        assert bytes(motor.r) == bytes(single.r), name  # no cross coupling, in any register
+        assert motor.r.tick == single.r.tick == end  # as many ticks, each with what one motor does in it
+    tables = [table for motor in host.stage.motors.values() for table in (motor.tables.up, motor.tables.down)]
+    assert sum(table.entries.nbytes for table in tables) == motors * 2 * 2 * (6000 + 1)
 
 
 @pytest.mark.parametrize("motors", [1, 2, 5])
