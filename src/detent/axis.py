@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,11 @@ from detent.methods.load import AxisFile, read_axis
 from detent.methods.method import Job, Method, Result, Shown, Simulated
 from detent.methods.registry import METHODS, bringing
 from detent.page.frame import Comparison
+from detent.page.parts import Note
 from detent.record.capture import capture
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves
+from detent.record.run import Level
 from detent.record.trace import Trace
 from detent.record.trace_files import TraceWriter, load_trace, save_trace
 from detent.record.waveforms import Waveforms, save_vcd
@@ -284,9 +286,20 @@ class Run:
         """The figures a person wants first: name and text."""
         return self.axis.method.summary(self.axis.spec, self.result)
 
+    @property
+    def level(self) -> Level:
+        """Of the verdict: "good" when it was done, "warn" when it was done and `result.warnings` say more, "bad"."""
+        return self.result.level
+
+    @cached_property
+    def cautions(self) -> tuple[str, ...]:
+        """What `Axis.check` warns of: it was known before the run."""
+        return tuple(map(str, self.axis.check().warnings))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
-        return {"axis": self.axis.name, "file": self.axis.file.file} | self.result.to_dict()
+        told = {"axis": self.axis.name, "file": self.axis.file.file, "verdict": self.verdict}
+        return told | self.result.to_dict() | {"check": list(self.cautions)}
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
@@ -294,7 +307,9 @@ class Run:
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.simulated.seed)} | self.settings
         shown = Shown(trace=self.trace, comparisons=self.comparisons, settings=settings)
-        write_page(path, self.axis.method.page(self.axis.spec, self.result, shown))
+        page = self.axis.method.page(self.axis.spec, self.result, shown)
+        checked = [Note("warning", f"Known before the run, from detent check: {text}") for text in self.cautions]
+        write_page(path, replace(page, notes=[*page.notes, *checked]))
         return Path(path)
 
     def save(self, path: str | Path) -> Path:

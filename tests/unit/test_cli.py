@@ -403,7 +403,8 @@ def test_a_run_as_json_has_every_figure_and_the_files(tmp_path: Path) -> None:
     assert answer.status == 0
     data = answer.data
     assert set(data) == {
-        "axis", "file", "job", "kind", "pages", "done", "failure", "warnings", "time_ready", "time_end",
+        "axis", "file", "verdict", "job", "kind", "level", "pages", "done", "failure", "warnings", "check",
+        "time_ready", "time_end",
         "print_time", "characters", "characters_per_second", "columns", "missed", "worst_error", "rms_error",
         "turn_arounds", "repositions", "peak_current", "energy", "width", "speeds", "identified", "lines", "notes",
         "files",

@@ -185,3 +185,17 @@ def test_wrong_input_is_one_message_and_status_2(name: str) -> None:
     assert answer.out == ""
     assert re.search(pattern, answer.err), answer.err
     assert "Traceback" not in answer.err
+
+
+def test_a_run_says_what_check_knows_and_is_amber_by_its_own_evidence() -> None:
+    unstable = ("--set", "method.velocity_gain=3000 V*s/m")
+    answer = call(*RUN, *unstable, "--trace", "h5", "-o", "out")
+    first, *rest = answer.out.splitlines()
+    assert answer.status == 0
+    assert first.startswith("slide_moves.toml: done on cascade axis, but the command was at its limit for ")
+    assert any(line.split()[:3] == ["check", "3", "warnings;"] for line in rest)
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert page.count("Known before the run, from detent check: ") == 3
+    data = call(*RUN, *unstable, "--every", "0", "--json").data
+    assert (data["level"], len(data["check"]), data["verdict"]) == ("amber", 3, first)
+    assert data["warnings"][0].startswith("the command was at its limit for ")

@@ -11,6 +11,7 @@ from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethod
 from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
 from detent.errors import DetentError
 
+STYLES = {"good": "bold green", "warn": "bold yellow", "bad": "bold red"}  # of a verdict
 TRACE_KINDS = ("h5", "csv", "parquet")
 
 REPLAY = (
@@ -113,11 +114,14 @@ def _convert_trace(folder: Path, kinds: list[str]) -> None:
 
 def _print_run(done: Any, written: list[Path]) -> None:
     result = done.result
-    say(done.verdict, "bold green" if done.done else "bold red")
+    say(done.verdict, STYLES[done.level])
     for name, text in done.summary():
         say(f"  {name:<20} {text}")
     for text in result.warnings:
         say(f"  warning: {text}", "yellow")
+    if number := len(done.cautions):
+        told = f"{number} warning{'s' if number > 1 else ''}; `detent check` shows {'them' if number > 1 else 'it'}"
+        say(f"  {'check':<20} {told}", "yellow")
     notes = getattr(result.job, "notes", ())
     for note in notes[:5]:
         say(f"  note: {note}")

@@ -12,7 +12,7 @@ counted right does so ever after. Such a force is no fault by itself: what comes
 command at its limit, a speed, a following error.
 """
 
-from detent.kernel.registers import Registers, f8, i1, i4, i8, register, u1
+from detent.kernel.registers import Registers, block, f8, i1, i4, i8, register, u1
 from detent.kernel.step import hot_step, step
 
 STUCK, JUMPED, REVERSED = 2, 3, 4
@@ -33,6 +33,18 @@ class GuardParams(Registers):
     saturated: i4 = register("samples with the command at its limit until that is a fault", unit="count")
     stuck: i4 = register("samples at rest under effort that breaks it loose until that is a fault", unit="count")
     reversed: i4 = register("samples of such an effort in which the axis may speed up against it", unit="count")
+
+
+class Conduct(Registers):
+    """How the axis has behaved, for whoever judges a run: nothing in it decides. `forget_conduct` begins anew."""
+
+    looks: i8 = register("looks of the guard", unit="count")
+    limited: i8 = register("of these with the command at its limit", unit="count")
+    place: i8 = register("movement over them", unit="count")
+    lowest: i8 = register("lowest place among them", unit="count")
+    highest: i8 = register("highest place among them", unit="count")
+    heading: i1 = register("direction of the last movement: 1 or -1; 0 none yet")
+    turns: i8 = register("movements against the one before", unit="count")
 
 
 class Guard(Registers):
@@ -56,6 +68,26 @@ class Guard(Registers):
     efforts: f8 = register("sum of the effort over them", unit="V")
     answer: f8 = register("sum of the effort times what the speed against it grew by", unit="V.count")
     proven: u1 = register("1 once a weighed effort has sped the axis up in its own direction: the sensor counts right")
+    conduct: Conduct = block("how the axis has behaved")
+
+
+def forget_conduct(g: Guard) -> None:
+    """A stretch begins that is to be judged for itself."""
+    g.conduct = Conduct()
+
+
+@step
+def note_conduct(c: Conduct, limited: int, moved: int) -> None:
+    """One look: whether the command has room left, and whether the axis goes to and fro."""
+    c.looks += 1
+    if limited:
+        c.limited += 1
+    c.place += moved
+    c.lowest, c.highest = min(c.lowest, c.place), max(c.highest, c.place)
+    if moved * c.heading < 0:
+        c.turns += 1
+    if moved != 0:
+        c.heading = 1 if moved > 0 else -1
 
 
 @step
@@ -166,6 +198,7 @@ def watch(p: GuardParams, g: Guard, late: int, side: int, limited: int, pushing:
     g.saturated = lasting(limited, g.saturated)
     if 0 < p.saturated <= g.saturated:
         trip(g, SATURATED)
+    note_conduct(g.conduct, limited, moved)
     watch_effort(p, g, pushing, moved)
     watch_speed(p, g, moved)
     return 0 if g.code == NO_ARRIVAL else g.code

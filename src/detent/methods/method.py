@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
+    from detent.record.run import Level
     from detent.record.trace import Trace
 
 SpecT = TypeVar("SpecT", bound=AxisSpec)
@@ -58,6 +59,16 @@ class Result(Protocol):
     @property
     def warnings(self) -> Sequence[str]:
         """What looks wrong about the run."""
+        ...
+
+    @property
+    def level(self) -> "Level":
+        """Of its verdict: not done is bad, done with warnings is warn."""
+        ...
+
+    @property
+    def doubt(self) -> str:
+        """What happened, of the first warning."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,6 +145,7 @@ class Method(Protocol[SpecT]):
     reports: ClassVar[str]  # place of the report of a run: ``page(spec, result, trace, comparisons, settings)``
     says: ClassVar[tuple[str, str]] = ("{job}: every move arrived on {axis}.", "Not done: {failure}")
     """Whether the job was done, in a sentence: when it was, and when it was not."""
+    doubts: ClassVar[str] = "{job}: done on {axis}, but {doubt}."  # the same when something looks wrong about it
     reports_comparisons: bool = True  # whether the report of a run shows the comparisons unless told otherwise
 
     def brought(self, place: str) -> Any:
@@ -229,7 +241,8 @@ class Method(Protocol[SpecT]):
     def verdict(self, axis: str, result: Any) -> str:
         """Whether the job was done on the axis of that name, in a sentence."""
         done, failed = self.says
-        return (done if result.done else failed).format(job=result.job.name, axis=axis, failure=result.failure)
+        said = {"good": done, "warn": self.doubts, "bad": failed}[result.level]
+        return said.format(job=result.job.name, axis=axis, failure=result.failure, doubt=result.doubt)
 
     def summary(self, spec: SpecT, result: Any) -> list[tuple[str, str]]:
         """The figures of a run that a person wants first."""

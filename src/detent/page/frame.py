@@ -3,15 +3,14 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from detent.page.chart import Chart
 from detent.page.figure import Figure
 from detent.page.parts import Note
 from detent.page.table import TextTable
 from detent.page.words import GAP, count
-
-Level = Literal["good", "warn", "bad"]  # colour and sign of a badge
+from detent.record.run import Level
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

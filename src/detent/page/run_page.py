@@ -34,13 +34,16 @@ def run_headline(
 ) -> Headline:
     """Headline of a run, with `words` for one that is done and one that is not.
 
-    Of a run that is not done `lead` says how far it came, and the failure follows. `doubt` is the verdict of one that
-    was done and is not as it should be.
+    Of a run that is not done `lead` says how far it came, and the failure follows; of one with warnings what happened,
+    of the first of these, stands in front. `doubt` is a verdict of fewer words for that.
     """
     done, not_done = words
+    verdicts = {"good": done, "warn": doubt or f"{done}, with {count(len(run.warnings), 'warning')}", "bad": not_done}
+    if run.level == "warn":
+        lead = f"{run.doubt[:1].upper()}{run.doubt[1:]}. {lead}"
     return Headline(
-        level=("warn" if doubt else "good") if run.done else "bad",
-        verdict=(doubt or done) if run.done else not_done,
+        level=run.level,
+        verdict=verdicts[run.level],
         name=run.job.name,
         kicker=f"Simulated run of the axis {axis_name}",
         lead=lead if run.done else f"{lead} {run.failure[:1].upper()}{run.failure[1:].rstrip('.')}.",

@@ -29,6 +29,9 @@ class SampleRun:
     done: bool = True
     failure: str = ""
     job: Job = Job()
+    warnings: tuple[str, ...] = ()
+    level: str = "good"
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -47,9 +50,12 @@ def trace() -> Trace:
 def test_the_headline_says_what_became_of_the_run() -> None:
     good = run_headline("a", SampleRun(), "All of it.")
     assert (good.level, good.verdict, good.name, good.lead) == ("good", "Done", "moves.csv", "All of it.")
-    assert run_headline("a", SampleRun(), "All.", doubt="Done, but").level == "warn"
+    warned = SampleRun(warnings=("it stood; wait",), level="warn", doubt="it stood")
+    doubted = run_headline("a", warned, "All of it.")
+    assert (doubted.level, doubted.verdict, doubted.lead) == ("warn", "Done, with 1 warning", "It stood. All of it.")
+    assert run_headline("a", warned, "All.", doubt="Done, but").verdict == "Done, but"
     failed = run_headline(
-        "a", SampleRun(done=False, failure="it stood."), "Half of it.", words=("Printed", "Not printed")
+        "a", SampleRun(done=False, failure="it stood.", level="bad"), "Half of it.", words=("Printed", "Not printed")
     )
     assert (failed.level, failed.verdict, failed.lead) == ("bad", "Not printed", "Half of it. It stood.")
     assert page_title("a", SampleRun(done=False)) == "moves.csv on a: not done"

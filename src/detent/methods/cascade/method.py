@@ -72,7 +72,7 @@ class CascadeMethod(Method[CascadeSpec]):
 
     def verdict(self, axis: str, result: Any) -> str:
         """Whether every move was in position, or that the recording was replayed."""
-        replayed = result.done and result.job.kind == "replay"
+        replayed = result.level == "good" and result.job.kind == "replay"
         return f"{result.job.name}: replayed on {axis}." if replayed else super().verdict(axis, result)
 
     def summary(self, spec: CascadeSpec, result: Any) -> list[tuple[str, str]]:

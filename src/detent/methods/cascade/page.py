@@ -125,8 +125,7 @@ def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
     )
     doubt, rest = "", error(run.worst_error)
     if run.worst_error > run.tolerance:
-        doubt = "Done, but beside its targets"
-        lead += f", but the load stood up to {rest} beside its target while the loop was in position."
+        doubt, lead = "Done, but beside its targets", f"{lead}."
     else:
         lead += f"; at the end of each move the load stood within {rest} of its target."
     return run_headline(spec.axis.name, run, lead, doubt=doubt, words=("Every move in position", "Not done"))

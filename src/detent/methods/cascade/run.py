@@ -15,7 +15,7 @@ from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
 from detent.planning.profile import plan_move
 from detent.record.machine import AnyRecorder, Progress
-from detent.record.run import RunRecord
+from detent.record.run import Evidence, RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
 
@@ -121,6 +121,9 @@ def run_cascade_moves(
     """
     targets = check_cascade_job(spec, job)
     host = CascadeHost(spec, recorder)
+    evidence = Evidence(
+        host.controller.guard, host.period, spec.encoder.resolution, spec.method.in_position, spec.unit("m")
+    )
     result = CascadeRun(job, tolerance=spec.method.in_position, max_command=spec.largest_command)
     place = spec.mechanics.start_position
     try:
@@ -130,7 +133,7 @@ def run_cascade_moves(
         for done, (move, target) in enumerate(zip(job.moves, targets, strict=True), 1):
             if result.failure:
                 break
-            if _make_move(host, result, move, place, target) == FAULT:
+            if _make_move(host, result, evidence, move, place, target) == FAULT:
                 result.failure = f"move {move.number} to {_text(spec, target, 6)}: {_cause(host)}"
             place = target
             if progress is not None:
@@ -141,11 +144,13 @@ def run_cascade_moves(
     finally:
         host.machine.close()
     result.time_end, result.done = host.time, not result.failure
-    result.warnings += _unseen(spec, result)
+    result.warnings = [*_unseen(spec, result), *evidence.warnings()]
     return result
 
 
-def _make_move(host: CascadeHost, result: CascadeRun, move: Move, place: float, target: float) -> int:
+def _make_move(  # noqa: PLR0913 - a move, who makes it, and who judges
+    host: CascadeHost, result: CascadeRun, evidence: Evidence, move: Move, place: float, target: float
+) -> int:
     """One move and its dwell, put into the result; the event that ended it."""
     gauge, load, peaks = host.state.plant.gauge, host.state.plant.machine.load, host.controller.peaks
     limits = replace(motion_limits(host.spec), speed=move.speed or host.spec.limits.speed)
@@ -159,7 +164,10 @@ def _make_move(host: CascadeHost, result: CascadeRun, move: Move, place: float, 
         arrived, event = host.time, _arrive(host)
     if event == ARRIVED:
         ready = host.time
-        event = host.pass_samples(math.ceil(move.dwell / host.period - 1e-9)) if move.dwell > 0 else 0
+        event = _stand(host, evidence, move) if move.dwell > 0 else 0
+    evidence.take()
+    if event != FAULT:
+        evidence.take_error(f"move {move.number}", target - load.position)
     made = CascadeMove(
         number=move.number,
         label=move.label,
@@ -179,6 +187,17 @@ def _make_move(host: CascadeHost, result: CascadeRun, move: Move, place: float, 
         in_position=not math.isnan(ready),
     )
     result.moves.append(made)
+    return event
+
+
+def _stand(host: CascadeHost, evidence: Evidence, move: Move) -> int:
+    """The dwell, and the event that ended it; in its second half the axis has only to stand."""
+    samples = math.ceil(move.dwell / host.period - 1e-9)
+    event = host.pass_samples(samples // 2) if samples > 1 else 0
+    evidence.take()
+    if not event:
+        event = host.pass_samples(samples - samples // 2)
+        evidence.take(f"after move {move.number}", rest=True)
     return event
 
 

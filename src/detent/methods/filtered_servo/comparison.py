@@ -237,7 +237,7 @@ def _driven(
     host = FilteredHost(roomy, recorder)
     host.start()
     go_to(host.controller, ENDLESS, round(rate * PER_PULSE))
-    host.stands(seconds)
+    host.stands(round(seconds / host.machine.tick))
     return host, recorder
 
 
@@ -247,7 +247,7 @@ def _stop(spec: FilteredServoSpec, rate: float, stretch: float) -> float:
     host, recorder = _driven(spec, rate, moment, (deviation,), max(1, math.ceil(stretch)))
     generator = host.controller.generator
     go_to(host.controller, generator.command, generator.rate)  # the command stops where it is
-    host.stands(STOP_TIME * stretch)
+    host.stands(round(STOP_TIME * stretch / host.machine.tick))
     host.machine.close()
     trace = recorder.trace()
     after = trace[deviation][trace.time > moment]

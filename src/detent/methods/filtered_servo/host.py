@@ -5,7 +5,7 @@ from detent.control.deviation_counter import FAULT, GUARDED
 from detent.control.guard import await_arrival
 from detent.control.pulse_generator import PER_PULSE
 from detent.errors import SERVO_FAULT_TEXT
-from detent.methods.filtered_servo.build import build_filtered_servo
+from detent.methods.filtered_servo.build import GUARD_PERIOD, build_filtered_servo
 from detent.methods.filtered_servo.controller import go_to
 from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.methods.filtered_servo.system import TICK, FilteredServo, advance_by_clocks, switch_on
@@ -22,7 +22,7 @@ class FilteredHost(Host):
         switch_on(p, r, home, round(spec.method.sample_period * 1e6), spec.encoder.seed)
         machine = Machine(p, r, TICK, recorder, by_clocks=advance_by_clocks)
         within = (spec.method.in_position + 1) * spec.pulse
-        super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=home)
+        super().__init__(spec, machine, grid=spec.pulse, tolerance=within, home=home, look=GUARD_PERIOD)
 
     def command(self, to: Destination) -> None:
         """Ask for the pulses; a sample period of the move takes effect with the next window."""
@@ -74,9 +74,9 @@ class FilteredHost(Host):
         speed, lower, upper = format_quantity(limits.speed, "m/s"), "0 m", format_quantity(limits.travel, "m")
         return describe_fault(self.controller.guard, self.spec.protection, speed, lower, upper)
 
-    def stands(self, dwell: float) -> None:
+    def stands(self, ticks: int) -> None:
         """Let the axis stand; that it comes into position again after a disturbance is no news."""
-        left = round(dwell / self.machine.tick)
+        left = ticks
         while left > 0:
             left -= self.machine.pass_ticks(left)
             self.controller.event = 0

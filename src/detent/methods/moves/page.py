@@ -147,11 +147,7 @@ def _headline(view: MoveView, figures: MoveFigures) -> Headline:
     if error := figures.error:
         counts = f"{number(error.value / view.unit.size, 2)} {view.unit.words}"
         lead += f" At the end of every dwell the axis stood within {length(error.value)} ({counts}) of its target."
-    if not figures.early:
-        return run_headline(view.spec.axis.name, run, lead)
-    moves = count(len(figures.early), "move")
-    lead += f" But in {moves} it said that it had arrived before it was there for good."
-    return run_headline(view.spec.axis.name, run, lead, doubt="Done, but ready too early")
+    return run_headline(view.spec.axis.name, run, lead, doubt="Done, but ready too early" if figures.early else "")
 
 
 def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
@@ -179,12 +175,6 @@ def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
 
 def _notes(figures: MoveFigures) -> list[Note]:
     notes = warnings(figures.run.warnings)
-    if early := figures.earliest:
-        text = (
-            f"{whose(early.of)}: the axis said that it had arrived {number(early.value * 1e3)} ms before it was "
-            "within the tolerance for good; what the host does in that time is done beside the target"
-        )
-        notes.append(Note("warning", text))
     noise = interference_text(figures.run)
     return [*notes, Note("note", f"interference on the pulse lines: {noise}")] if noise else notes
 

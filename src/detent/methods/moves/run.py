@@ -13,12 +13,14 @@ from typing import Any, ClassVar
 from detent.errors import MOST_PROBLEMS, AxisError, FileProblem, InputError
 from detent.methods.moves.job import Move, MoveJob
 from detent.record.machine import Machine, Progress
-from detent.record.run import RunRecord
+from detent.record.run import Evidence, RunRecord
 from detent.sensing.gauge import set_gauge
 from detent.units import format_quantity
 
 FAULTS = {"inserted": "inserted", "removed": "removed", "lost samples": "lost", "corrupted": "corrupted"}
 """What interference does to the pulse lines, and the register that counts it."""
+
+SOONEST = 1e-6  # an axis that says so by less than this before it is within the tolerance says so in time [s]
 
 Wrong = Iterator[tuple[str, str, str, str]]  # problems of a move: key, what came, what is allowed and what to do
 
@@ -37,11 +39,20 @@ class Host(ABC):
 
     own_pace: ClassVar[str] = "this axis has one of its own"  # why a move can bring neither speed nor sample period
 
-    def __init__(self, spec: Any, machine: Machine[Any, Any], *, grid: float, tolerance: float, home: float) -> None:
+    def __init__(  # noqa: PLR0913 - an axis, and what is measured of it
+        self, spec: Any, machine: Machine[Any, Any], *, grid: float, tolerance: float, home: float, look: float = 0.0
+    ) -> None:
         self.spec, self.machine, self.controller = spec, machine, machine.state.controller
         self.grid = grid  # distance of two places at which it can stand [m]
         self.tolerance = tolerance  # error that counts as arrived [m]
         self.home = home  # where it stands at power-on [m]
+        # What its guard saw, which looks every `look` [s]; 0: it has none.
+        self.evidence = Evidence(self.controller.guard if look else None, look, self.count, tolerance)
+
+    @property
+    def count(self) -> float:
+        """Way per count of its sensor [m]."""
+        return self.grid
 
     def start(self) -> None:
         """Wait until the axis takes commands."""
@@ -73,9 +84,9 @@ class Host(ABC):
         arrived, self.controller.event = bool(self.controller.event), 0
         return arrived
 
-    def stands(self, dwell: float) -> None:
-        """Let the axis stand [s]."""
-        self.machine.pass_time(dwell)
+    def stands(self, ticks: int) -> None:
+        """Let the axis stand."""
+        self.machine.pass_ticks(ticks)
 
     def in_counts(self, error: float) -> str:
         """An error [m] in the unit of the axis."""
@@ -142,6 +153,15 @@ class MoveRecord:
         """From the command until the axis stayed within the tolerance [s]."""
         return max(self.settled - self.begin, 0.0)
 
+    @property
+    def early(self) -> float:
+        """By how much the axis said that it had arrived before it was there for good [s]; NaN if it did not say so."""
+        return self.settled - self.ready
+
+    def arrived_within(self, tolerance: float) -> bool:
+        """Whether it ended within the tolerance [m], and the axis said so."""
+        return not math.isnan(self.ready) and abs(self.error) <= tolerance
+
 
 @dataclass
 class MoveRun(RunRecord[MoveJob]):
@@ -207,7 +227,20 @@ def run_moves(host: Host, job: MoveJob, *, progress: Progress | None = None) -> 
     if lines := getattr(plant, "interference", None):
         result.faults = {name: getattr(lines, register) for name, register in FAULTS.items()}
     result.done = not result.failure and len(result.moves) == len(result.job.moves)
+    result.warnings = [*_early(result), *host.evidence.warnings()]
     return result
+
+
+def _early(run: MoveRun) -> Iterator[str]:
+    """The axis said that it had arrived, and was not there for good."""
+    early = [move for move in run.moves if move.arrived_within(run.tolerance) and move.early > SOONEST]
+    if early:
+        worst = max(early, key=lambda move: move.early)
+        yield (
+            f"in {len(early)} of {len(run.moves)} moves the axis said that it had arrived before it was there for "
+            f"good, in move {worst.number} by {format_quantity(worst.early, 's', 3)}; what the host does in that time "
+            "is done beside the target; widen the tolerance, or lower the gains until it comes to rest at once"
+        )
 
 
 def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
@@ -220,14 +253,25 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
     arrived = host.wait(limit)
     ready = host.machine.time if arrived else math.nan
     if arrived and to.move.dwell > 0:
-        host.stands(to.move.dwell)
+        _stand(host, to)
+    host.evidence.take()
     error = to.position - float(plant.train.position)
     result.moves.append(MoveRecord(
         number=to.move.number, label=to.move.label, begin=begin, start=start, target=to.position,
         switched=host.switched, ready=ready, settled=plant.gauge.outside * host.machine.tick, end=host.machine.time,
         overshoot=max(float(plant.gauge.beyond), 0.0), error=error, peak_speed=float(plant.gauge.peak_speed),
     ))  # fmt: skip
+    host.evidence.take_error(f"move {to.move.number}", error)
     return _verdict(host, to, error, math.nan if arrived else limit)
+
+
+def _stand(host: Host, to: Destination) -> None:
+    """The dwell; in its second half the axis has had time to come to rest, and has only to stand."""
+    ticks = max(1, round(to.move.dwell / host.machine.tick))
+    host.stands(ticks // 2)
+    host.evidence.take()
+    host.stands(ticks - ticks // 2)
+    host.evidence.take(f"after move {to.move.number}", rest=True)
 
 
 def _verdict(host: Host, to: Destination, error: float, waited: float) -> str:

@@ -3,11 +3,9 @@
 import math
 from collections.abc import Callable
 
-from detent.methods.moves.run import MoveRecord, MoveRun
+from detent.methods.moves.run import SOONEST, MoveRecord, MoveRun
 from detent.page.run_page import median_of, worst
 from detent.page.words import GAP, CountUnit, count, duration, length, milliseconds, number
-
-SOONEST = 1e-6  # an axis that says so by less than this before it is within the tolerance says so in time [s]
 
 FAULT_WORDS = {
     "inserted": ("pulse put in", "pulses put in"),
@@ -20,7 +18,7 @@ FAULT_WORDS = {
 
 def arrived(run: MoveRun, move: MoveRecord) -> bool:
     """Whether a move ended within the tolerance, and the axis said so."""
-    return not math.isnan(move.ready) and abs(move.error) <= run.tolerance
+    return move.arrived_within(run.tolerance)
 
 
 def settled(run: MoveRun, move: MoveRecord) -> float:
@@ -45,8 +43,8 @@ class MoveFigures:
         self.there = [move for move in moves if arrived(run, move)]
         self.went = [move for move in self.there if abs(move.target - move.start) > run.tolerance]  # and went anywhere
         # Those of which the axis said so before they were within the tolerance for good, and the earliest of them [s].
-        self.early = [move for move in self.there if move.settled - move.ready > SOONEST]
-        self.earliest = worst(self.early, lambda move: move.settled - move.ready)
+        self.early = [move for move in self.there if move.early > SOONEST]
+        self.earliest = worst(self.early, lambda move: move.early)
         self.longest = worst(self.went, lambda move: move.move_time)  # time to settle [s]
         self.overshoot = worst(moves, lambda move: move.overshoot)  # farthest beyond a target [m]
         self.error = worst(moves, lambda move: abs(move.error))  # largest magnitude at the end of a dwell [m]

@@ -38,8 +38,14 @@ class PhaseHost(Host):
         p, r, start = build_phase_servo(spec), PhaseServo(), spec.mechanics.start_position
         switch_on(p, r, start, spec.detector.seed)
         machine, home = Machine(p, r, spec.tick, recorder), round(start / spec.pitch) * spec.pitch
-        super().__init__(spec, machine, grid=spec.pitch, tolerance=spec.arrived_steps * spec.step, home=home)
+        tolerance = spec.arrived_steps * spec.step
+        super().__init__(spec, machine, grid=spec.pitch, tolerance=tolerance, home=home, look=spec.sample_period)
         self._counts = 0
+
+    @property
+    def count(self) -> float:
+        """A step of the resolver [m]."""
+        return self.spec.step
 
     def start(self) -> None:
         """Wait until the axis has locked, settled on the nearest positioning point and is ready."""

@@ -33,6 +33,7 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
     compares = ("comparison:compare_drives",)
     sums_up, reports = "page:summary_rows", "page:print_page"
     says = "Printed {job} on {axis}.", "Not printed: {failure}"
+    doubts = "Printed {job} on {axis}, but {doubt}."
     reports_comparisons = False
 
     def sample_job(self, spec: PrintHeadSpec) -> "PrintJob":

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from detent.files.quantities import INCH
 from detent.methods.print_head.detail import SIGNALS, how_figures
 from detent.methods.print_head.printed_page import PAGE
-from detent.methods.print_head.run import ERROR_BIN, ERROR_BINS, LineRecord, PrintRun
+from detent.methods.print_head.run import COLUMN_LIMIT, ERROR_BIN, ERROR_PLACES, LineRecord, PrintRun
 from detent.methods.print_head.schema import COLUMN, PrintHeadSpec
 from detent.page.chart import POINTS, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
 from detent.page.figure import Figure
@@ -31,9 +31,6 @@ from detent.page.table import Cell, bar_cell, left_out, long_table
 from detent.page.words import GAP, arrow, count, duration, further, inches_per_second, length, number
 from detent.record.trace import Trace
 
-COLUMN_LIMIT = COLUMN / 2  # largest column error to be called good [m]
-
-ERROR_PLACES = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN  # middle of each bin [m], right of the place > 0
 MOST_NOTES = 20  # notes about the job on the page: more than anybody reads
 UM = 1e6
 
@@ -87,26 +84,18 @@ def _plain(value: int, word: str = "") -> str:
     return count(value, word).replace(GAP, " ")
 
 
-def beyond(run: PrintRun, limit: float) -> int:
-    """Columns that landed farther than `limit` [m] from their place."""
-    return int((run.errors_right + run.errors_left)[np.abs(ERROR_PLACES) > limit].sum())
-
-
 # ---- what came out, in one glance
 
 
 def _headline(spec: PrintHeadSpec, run: PrintRun) -> Headline:
-    asked, off, words = count(len(run.job.lines), "line"), beyond(run, COLUMN_LIMIT), ("Printed", "Not printed")
+    asked, words = count(len(run.job.lines), "line"), ("Printed", "Not printed")
     if not run.done:
         return run_headline(spec.axis.name, run, stopped_after(len(run.lines), asked, run.print_time), words=words)
     characters, pages = count(run.job.characters, "character"), count(run.job.pages, "page")
     lead = f"{asked} and {characters} on {pages} in {duration(run.print_time)}."
-    if off:
-        whose = "its" if off == 1 else "their"
-        lead += f" {count(off, 'column')} landed more than {length(COLUMN_LIMIT)} from {whose} place."
-    elif run.columns:
+    doubt = "Printed, but off its columns" if run.beyond else ""
+    if run.columns and not doubt:
         lead += f" Every column of dots landed within {length(run.worst_error)} of its place."
-    doubt = "Printed, but off its columns" if off else ""
     return run_headline(spec.axis.name, run, lead, doubt=doubt, words=words)
 
 
@@ -119,8 +108,7 @@ def _cards(run: PrintRun) -> list[Card]:
     ]
     if run.columns:
         below = f"rms {length(run.rms_error)}, allowed {length(COLUMN_LIMIT)}"
-        off = beyond(run, COLUMN_LIMIT) > 0
-        shown.append(card("Worst column error", length(run.worst_error), below, bad=off))
+        shown.append(card("Worst column error", length(run.worst_error), below, bad=run.beyond > 0))
     if lines:
         fastest = max(line.speed for line in lines)
         at_top = f"in {count(sum(line.speed == fastest for line in lines))} of {count(len(lines))} lines"

@@ -24,10 +24,11 @@ from detent.methods.print_head.controller import load_line
 from detent.methods.print_head.derive import HeadFigures
 from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
-from detent.methods.print_head.schema import EMITTER, SPEED_STEP, PrintHeadSpec
+from detent.methods.print_head.schema import COLUMN, EMITTER, SPEED_STEP, PrintHeadSpec
 from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
 from detent.record.machine import AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
+from detent.units import format_quantity
 
 NOT_FIRED = -(1 << 31)
 
@@ -165,6 +166,11 @@ class PrintRun(RunRecord[PrintJob]):
         return self.characters / self.print_time if self.print_time > 0 else 0.0
 
     @property
+    def beyond(self) -> int:
+        """Columns that landed farther from their place than is good."""
+        return int((self.errors_right + self.errors_left)[np.abs(ERROR_PLACES) > COLUMN_LIMIT].sum())
+
+    @property
     def speeds(self) -> dict[int, int]:
         """Lines printed per speed value [1/6 in/s]."""
         return dict(sorted(Counter(line.speed_value for line in self.lines).items(), reverse=True))
@@ -181,7 +187,9 @@ class PrintRun(RunRecord[PrintJob]):
 
 
 ERROR_BIN = 1e-7  # width of a bin of the column errors [m]
+COLUMN_LIMIT = COLUMN / 2  # largest column error to be called good [m]
 ERROR_BINS = 6001  # bins of the column errors: 0.3 mm to either side; what lies beyond counts in the end bins
+ERROR_PLACES = (np.arange(ERROR_BINS) - ERROR_BINS // 2) * ERROR_BIN  # middle of each bin [m], right of the place > 0
 MOST_STRIKES = 20_000  # characters kept one by one for the picture of the pages; the figures count all
 
 
@@ -320,6 +328,12 @@ class _Runner:
             result.failure = (
                 f"{result.missed} of {result.columns + result.missed} columns were not fired; look at the encoder "
                 "(missing edges, jitter)"
+            )
+        if result.beyond:
+            result.warnings.append(
+                f"{result.beyond} of {result.columns} columns landed more than {format_quantity(COLUMN_LIMIT, 'm', 3)} "
+                "from their place; print to the right and to the left does not line up; look at the column errors and "
+                "at the encoder (jitter, missing edges)"
             )
         result.done = not result.failure and len(result.lines) == len(self.job.lines)
         return result

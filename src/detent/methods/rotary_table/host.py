@@ -21,6 +21,7 @@ from detent.methods.rotary_table.sequence_file import find_faults
 from detent.methods.rotary_table.sequence_job import Go, Jog, SequenceJob, Step
 from detent.methods.rotary_table.system import TICK, RotaryTable, switch_on
 from detent.record.machine import AnyRecorder, Machine
+from detent.record.run import Evidence
 from detent.units import format_quantity
 
 MARGIN = 0.5  # what a step may take longer than twice the time of its way [s]
@@ -48,6 +49,13 @@ class TableHost:
         """Wait for the first interrupt, which takes the angle over and holds the table there."""
         while self.positioner.state == POWER_ON:
             self.machine.pass_ticks(1)
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the guard has seen, to be judged by an observer; its window is that of the axis and a count."""
+        look = self.machine.params.controller.look_interrupts * self.spec.method.strobe_period
+        window = (self.spec.method.in_position + 1) * self.spec.count
+        return Evidence(self._controller.guard, look, self.spec.count, window, "rad")
 
     # ------------------------------------------------------------------------------------------------------ panel
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from detent.methods.rotary_table.detail import AHEAD, DETECTED, POINTS, VELOCITY, degree_curve, step_section
-from detent.methods.rotary_table.run import SequenceRun, StepRecord
+from detent.methods.rotary_table.run import SequenceRun, StepRecord, is_off
 from detent.methods.rotary_table.schema import RotaryTableSpec
 from detent.methods.rotary_table.sequence_controller import Change
 from detent.methods.rotary_table.summary import SequenceFigures, rollovers, times, turns, whose
@@ -88,18 +88,9 @@ def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
     if error is None:
         return run_headline(name, run, lead)
     off = f"{angle(error.value)} ({CountUnit(spec.count, 'count').counts(error.value)})"
-    if not _is_off(spec, run, error.value):
-        return run_headline(name, run, f"{lead} In every positioning it came to within {off} of its target.")
-    lead += (
-        f" But in {whose(error.of)} it stood {off} beside its target while the axis said that it was in position: the "
-        "detector cannot see what backlash and eccentricity of the gear do to the table."
-    )
-    return run_headline(name, run, lead, doubt="Done, but beside its targets")
-
-
-def _is_off(spec: RotaryTableSpec, run: SequenceRun, error: float) -> bool:
-    """The table stands farther off than window and resolution of the detector allow."""
-    return abs(error) > run.in_position + spec.count
+    if is_off(run, error.value):
+        return run_headline(name, run, lead, doubt="Done, but beside its targets")
+    return run_headline(name, run, f"{lead} In every positioning it came to within {off} of its target.")
 
 
 def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
@@ -111,7 +102,7 @@ def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
     if error := figures.error:
         value, word = unit.counts(error.value).split(" ")
         below = f"{angle(error.value)}, {whose(error.of)}; window {unit.counts(run.in_position)}"
-        shown.append(Card("Worst error at rest", value, word, below, bad=_is_off(spec, run, error.value)))
+        shown.append(Card("Worst error at rest", value, word, below, bad=is_off(run, error.value)))
     if deviation := figures.deviation:
         value, word = turns(run.travel).split(" ")
         crossed = f"end of the turn crossed {times(run.crossings)}" if run.crossings else "within the turn"
@@ -240,7 +231,7 @@ def _row(spec: RotaryTableSpec, run: SequenceRun, step: StepRecord, longest: flo
         error = _error(run, step)
         row += [
             f"{math.degrees(step.travel):+.3f}".replace("-", "\u2212"),
-            offset_cell(error / spec.count, longest, over=_is_off(spec, run, error)),
+            offset_cell(error / spec.count, longest, over=is_off(run, error)),
             degrees(step.peak_deviation),
             count(step.crossings) if step.crossings else "",
             count(step.rollovers) if step.rollovers else "",

@@ -1,6 +1,7 @@
 """A sequence on a simulated rotary table, from power-on: what an observer beside the table sees."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -178,7 +179,7 @@ class _WatchedTable(TableObserver):
     def __init__(self, host: TableHost, result: SequenceRun, progress: Progress | None) -> None:
         super().__init__(host.spec, host.machine)
         self._host, self._result, self._progress = host, result, progress
-        self._count = result.job.count
+        self._count, self._evidence = result.job.count, host.evidence
         self._number = self._told = 0
         self._start = self._first = self.angle
         self._controller = SequenceController(host, result.job.inputs, self._watch)
@@ -218,6 +219,9 @@ class _WatchedTable(TableObserver):
             rollovers=positioner.rollovers - rollovers,
         )
         self._result.steps.append(record)
+        self._evidence.take(f"in step {number}", rest=record.kind == "wait")
+        if record.kind == "go" and not failure:
+            self._evidence.take_error(f"step {number}", record.error)
         if not failure:
             return ""
         line = f" (line {step.row})" if step.row else ""
@@ -263,12 +267,24 @@ class _WatchedTable(TableObserver):
             )
         return ""
 
+    def _beside(self) -> Iterator[str]:
+        """In position for the axis, and beside its target for who looks at the table."""
+        steps = [step for step in self._result.steps if step.kind == "go" and is_off(self._result, step.error)]
+        if steps:
+            worst = max(steps, key=lambda step: abs(step.error))
+            off, counts = format_quantity(abs(worst.error), "rad", 3), abs(worst.error) / self._result.count
+            yield (
+                f"in step {worst.number} the table stood {off} ({counts:.2g} counts) beside its target while the axis "
+                "said that it was in position; the detector cannot see what backlash and eccentricity of the gear do "
+                "to the table; lower mechanics.backlash, or widen method.in_position"
+            )
+
     def finish(self) -> None:
         """Totals."""
         result, controller = self._result, self._controller
         result.time_end = self._host.machine.time
         result.inputs, result.outputs = controller.inputs, controller.outputs
-        result.warnings = list(controller.warnings)
+        result.warnings = [*self._beside(), *controller.warnings, *self._evidence.warnings()]
         result.travel = sum(abs(step.travel) for step in result.steps)
         net = self.angle - self._first
         # A turn is whole that ends where it began, within the window.
@@ -281,6 +297,11 @@ class _WatchedTable(TableObserver):
         if result.done and controller.coming:
             names = ", ".join(f'"{name}"' for name in controller.coming)
             result.warnings.append(f"the sequence ended before all of these inputs had come: {names}")
+
+
+def is_off(run: SequenceRun, error: float) -> bool:
+    """The table stands farther off than window and resolution of the detector allow."""
+    return abs(error) > run.in_position + run.count
 
 
 def describe_step(spec: RotaryTableSpec, step: Action) -> str:

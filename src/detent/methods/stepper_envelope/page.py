@@ -8,12 +8,12 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.methods.stepper_envelope.detail import detail_section
-from detent.methods.stepper_envelope.run import StageRun
+from detent.methods.stepper_envelope.run import PULL_OUT_LAG, StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJog
 from detent.methods.stepper_envelope.stage_plan import plan_figure
 from detent.methods.stepper_envelope.stage_trace import MadeSteps, Runs, motor_runs, recorded_steps, runs_chart
-from detent.methods.stepper_envelope.summary import MM, PULL_OUT_LAG, Motion, StageFigures, margin_text, stated
+from detent.methods.stepper_envelope.summary import MM, Motion, StageFigures, margin_text, stated
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -111,15 +111,7 @@ def _cards(figures: StageFigures) -> list[Card]:
 
 def _notes(figures: StageFigures) -> list[Note]:
     job = figures.run.job
-    notes = warnings(figures.run.warnings) + [
-        Note(
-            "warning",
-            f"move {count(move.number)}: the stop of {name} was changed to {stated(motor.target * MM)}{GAP}mm when the "
-            "motor was too fast to stop there; it stopped as soon as it could and came back",
-        )
-        for move, name, motor, _ in figures.motions
-        if motor.overrun
-    ]
+    notes = warnings(figures.run.warnings)
     return [*notes, Note("note", f"how {job.name} was read: {'; '.join(job.notes)}")] if job.notes else notes
 
 

@@ -1,5 +1,6 @@
 """A job on a simulated stepper stage, from power-on: what its host commands, and what an observer of rotors sees."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -10,7 +11,8 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import AnyRecorder, Progress
-from detent.record.run import RunRecord
+from detent.record.run import EDGE, RunRecord
+from detent.units import format_quantity
 
 MOTOR_SIGNALS = (
     "controller.rule.position", "controller.rule.index", "controller.rule.state", "controller.rule.direction",
@@ -22,6 +24,11 @@ MOTOR_SIGNALS = (
 def stage_signals(spec: StepperEnvelopeSpec) -> tuple[str, ...]:
     """Registers that a run records unless told otherwise."""
     return tuple(f"{name}.{signal}" for name in spec.stepper for signal in MOTOR_SIGNALS)
+
+
+PULL_OUT_LAG = 2.0
+"""Lag from which on the field pulls the rotor the wrong way: half a period of the torque curve, which has four steps
+(stepper-envelope specification 7.2) [step]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +170,7 @@ def run_stage(
     result.time_end = host.stage.time
     result.failure = result.failure or _verdict(spec, result)
     result.done = not result.failure
+    result.warnings = list(_doubts(spec, result))
     return result
 
 
@@ -216,6 +224,40 @@ def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, o
         overrun=over,
         naive=pulses / start_hz(table),
     )
+
+
+def _doubts(spec: StepperEnvelopeSpec, result: StageRun) -> Iterator[str]:
+    """What looks wrong about a run whose rotors kept their steps: how near they came to losing them."""
+    for move, name, motor in result.made:
+        if motor.overrun:
+            yield (
+                f"move {move.number}: the stop of {name} was changed to {format_quantity(motor.target, 'm')} when the "
+                "motor was too fast to stop there; it stopped as soon as it could and came back; change it earlier"
+            )
+    made = result.made
+    lagging = max(made, key=lambda one: one[2].peak_lag, default=None)
+    if lagging and lagging[2].peak_lag >= PULL_OUT_LAG:
+        move, name, motor = lagging
+        yield (
+            f"in move {move.number} the rotor of {name} was {motor.peak_lag:.3g} steps from its field; from "
+            f"{PULL_OUT_LAG:g} the field pulls it the wrong way, and only luck kept its steps; lower "
+            "limits.acceleration or limits.speed of the motor"
+        )
+    weak = min(made, key=lambda one: one[2].margin, default=None)
+    if weak and weak[2].margin < 1.0:
+        move, name, motor = weak
+        yield (
+            f"in move {move.number} the motor {name} had {100 * motor.margin:.3g} % of the torque that its ramp needs; "
+            "it falls behind its field; lower limits.acceleration or limits.speed of the motor, or raise drive.supply"
+        )
+    off = max(made, key=lambda one: abs(one[2].rest_lag), default=None)
+    if off and abs(off[2].rest_lag) > EDGE * spec.controller.tolerance:
+        move, name, motor = off
+        yield (
+            f"in move {move.number} the rotor of {name} stood {abs(motor.rest_lag):.2g} steps from its place when the "
+            f"time to settle was over, at the edge of controller.tolerance, {spec.controller.tolerance:g}; the next "
+            "machine of this kind ends outside; raise controller.settle_time, or lower friction_torque"
+        )
 
 
 def _verdict(spec: StepperEnvelopeSpec, result: StageRun) -> str:

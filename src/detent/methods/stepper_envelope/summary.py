@@ -4,15 +4,12 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
+from detent.methods.stepper_envelope.run import PULL_OUT_LAG, MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.page.run_page import Worst, worst
 from detent.page.words import GAP, count, duration, milliseconds, number
 
 MM = 1e3  # mm per m
-PULL_OUT_LAG = 2.0
-"""Lag from which on the field pulls the rotor the wrong way: half a period of the torque curve, which has four steps
-(stepper-envelope specification 7.2) [step]."""
 
 
 class Motion(NamedTuple):

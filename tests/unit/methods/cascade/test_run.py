@@ -215,3 +215,9 @@ def test_progress_is_told_to_the_end():
     told = []
     run_cascade_moves(linear(), THERE_AND_BACK, progress=lambda share, text: told.append((share, text)))
     assert told == [(0.5, "move 1 of 2"), (1.0, "move 2 of 2")]
+
+
+def test_a_run_of_an_unstable_loop_is_not_green(slide):
+    unstable = run_cascade_moves(linear("method.velocity_gain=3000 V*s/m"), THERE_AND_BACK)
+    assert (slide.level, unstable.level, unstable.done) == ("good", "warn", True)
+    assert unstable.doubt.startswith("the command was at its limit for ")

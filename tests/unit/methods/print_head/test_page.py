@@ -21,9 +21,10 @@ from detent.files.text import shown
 from detent.methods.load import load_spec
 from detent.methods.print_head.detail import SIGNALS
 from detent.methods.print_head.diablo630 import parse_diablo
-from detent.methods.print_head.page import COLUMN_LIMIT, beyond, error_chart, marks_of, print_page, summary_rows
+from detent.methods.print_head.page import error_chart, marks_of, print_page, summary_rows
 from detent.methods.print_head.print_job import load_job, parse_text
 from detent.methods.print_head.run import (
+    COLUMN_LIMIT,
     ERROR_BIN,
     ERROR_BINS,
     LineRecord,
@@ -168,7 +169,9 @@ def test_columns_off_their_place_spoil_the_headline(letter: Played) -> None:
     spec, run, trace = letter
     off = with_errors(run, 0.0, -COLUMN_LIMIT - 2e-7, 1e-6)
     line = replace(run.lines[0], worst_error=off.worst_error)
-    page = print_page(spec, replace(off, lines=[line, *run.lines[1:]]), trace)
+    page = print_page(
+        spec, replace(off, lines=[line, *run.lines[1:]], warnings=["1 column landed beside its place; look"]), trace
+    )
     assert page.headline.level == "warn"
     assert cards_of(page)["Worst column error"] == ("106 µm", True)
     assert "1 column " in page.headline.lead.replace(GAP, " ")
@@ -178,11 +181,11 @@ def test_columns_off_their_place_spoil_the_headline(letter: Played) -> None:
     assert (sum(map(sum, over)), over[0][7]) == (1, True)
 
 
-@given(st.lists(st.floats(-250e-6, 250e-6), max_size=20), st.floats(0, 200e-6))
-def test_columns_beyond_a_limit_are_counted_on_both_sides(errors: list[float], limit: float) -> None:
+@given(st.lists(st.floats(-250e-6, 250e-6), max_size=20))
+def test_columns_beyond_the_limit_are_counted_on_both_sides(errors: list[float]) -> None:
     run = with_errors(PrintRun(parse_text("x")), *errors)
     bins = np.abs(np.round(np.array(errors) / ERROR_BIN)) * ERROR_BIN
-    assert beyond(run, limit) == np.count_nonzero(bins > limit)
+    assert run.beyond == np.count_nonzero(bins > COLUMN_LIMIT)
 
 
 def test_a_run_without_columns_shows_no_column_error(letter: Played) -> None:

@@ -347,6 +347,7 @@ def test_what_is_wrong_is_marked_in_the_table_and_where_the_rotor_stands_after_i
 def test_a_stop_that_was_passed_is_a_warning() -> None:
     late = StageMove(1, 1, targets={"group_a": 20 * MM}, change=Change(8 * MM, 8.2 * MM), label="late")
     page = stage_page(*play("zoom.toml", moves(late)))
-    assert page.headline.level == "good"
+    assert page.headline.level == "warn"
+    assert plain(page.headline.lead).startswith("Move 1: the stop of group_a was changed")
     assert page.notes[0].level == "warning"
     assert plain(page.notes[0].text).startswith("move 1: the stop of group_a was changed to 8.2 mm when the motor was")
