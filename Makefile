@@ -115,6 +115,7 @@ imports: venv-dev ## do the rooms import downwards only?
 
 docs: venv-dev ## build the documentation; a warning is an error
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@! grep -rlE '<(script|img|link)[^>]*(src|href)="(https?:)?//' docs/_build/html --include='*.html' || { echo "these pages load something from the network" >&2; exit 1; }
 	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
 
 check: lint types imports test docs bench-smoke ## all that a change must pass, but for the long tests

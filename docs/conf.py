@@ -10,6 +10,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from latex2mathml.converter import convert
+
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "docs")]
 
@@ -35,6 +38,10 @@ autodoc_typehints = "signature"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
+# Formulas as MathML, which every browser draws by itself: the built pages need no network.
+html_math_renderer = "mathml"
+myst_update_mathjax = False
+
 html_theme = "furo"
 html_title = f"detent {release}"
 html_static_path = ["_static"]
@@ -47,9 +54,20 @@ def keep_bars(_app: Any, _what: str, _name: str, _object: object, _options: obje
     lines[:] = [re.sub(r"\|(\w+)\|", r"\|\1\|", line) for line in lines]
 
 
+def put_formula(display: str) -> Any:
+    """What writes a formula into a page: MathML in the line, or as a block of its own."""
+
+    def visit(page: Any, node: Any) -> None:
+        page.body.append(convert(node.astext(), display=display))
+        raise nodes.SkipNode
+
+    return visit
+
+
 def setup(app: Any) -> None:
     """Make the generated parts before any page is read."""
     app.connect("autodoc-process-docstring", keep_bars)
+    app.add_html_math_renderer("mathml", (put_formula("inline"), None), (put_formula("block"), None))
     import figures
     import figures_cascade
     import figures_house

@@ -380,10 +380,10 @@ def damping() -> None:
 
 def feedback_table() -> None:
     """The comparison as a table, for the page."""
-    import generate
+    from detent.cli.docs import table
 
     _, heads, rows = feedback().table
-    text = generate.table(("", *heads[1:]), [tuple(row) for row in rows])
+    text = table(("", *heads[1:]), [tuple(row) for row in rows])
     (FOLDER / "feedback.md").write_text(text, encoding="utf-8")
 
 

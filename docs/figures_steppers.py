@@ -407,14 +407,13 @@ def jerk() -> None:
 
 def methods_table() -> None:
     """The comparison with the other methods as a table, for the page."""
-    import generate
-
+    from detent.cli.docs import table
     from detent.methods.stepper_envelope.comparison import compare_steps
 
     spec = zoom().spec
     only = spec.model_copy(update={"stepper": {MOTOR: spec.stepper[MOTOR]}})
     _, heads, rows = compare_steps(only)[0].table
-    text = generate.table(tuple(heads), [tuple(row) for row in rows])
+    text = table(tuple(heads), [tuple(row) for row in rows])
     (FOLDER / "step-methods.md").write_text(text, encoding="utf-8")
 
 

@@ -5,9 +5,10 @@ import re
 
 import pytest
 from tests.docs.pages import ROOT
-from tests.reference import GENERATE, reference_rows
+from tests.reference import reference_rows
 
 import detent
+from detent.cli import docs
 from detent.control import head_computer
 from detent.errors import SB1_TEXT
 from detent.methods.registry import METHODS
@@ -37,7 +38,7 @@ DOCUMENTED = {
 }
 
 
-OPTIONS = [(name, option) for name, command in GENERATE.commands().items() for option in command.params]
+OPTIONS = [(name, option) for name, command in docs.commands().items() for option in command.params]
 
 
 @pytest.mark.parametrize("leaf", [pytest.param(leaf, id=name) for name, leaf in LEAVES])
@@ -59,7 +60,7 @@ def test_option_of_a_command_has_help(command, option):
 
 
 def test_every_command_says_what_it_does():
-    assert all(command.help for command in GENERATE.commands().values())
+    assert all(command.help for command in docs.commands().values())
 
 
 def test_every_status_bit_of_the_axis_computer_has_a_text():
@@ -67,22 +68,22 @@ def test_every_status_bit_of_the_axis_computer_has_a_text():
     assert {getattr(head_computer, name) for name in names} == set(SB1_TEXT)
 
 
-@pytest.mark.parametrize("name", list(GENERATE.PAGES))
+@pytest.mark.parametrize("name", list(docs.PAGES))
 def test_a_page_includes_each_generated_part(name):
     page = (ROOT / "docs" / "reference" / f"{name}.md").read_text(encoding="utf-8")
     assert f"{{include}} ../_build/generated/{name}.md" in page
-    assert GENERATE.PAGES[name]().count("\n|") >= 3 or name == "command-line"
+    assert docs.PAGES[name]().count("\n|") >= 3 or name == "command-line"
 
 
 def test_generated_parts_hold_every_register_key_command_and_motor():
-    registers, keys = GENERATE.registers(), GENERATE.axis_file()
+    registers, keys = docs.registers(), docs.axis_file()
     assert all(f"`{leaf.path}`" in registers for _, leaf in LEAVES)
     assert all(f"`{row.key.rpartition('.')[2]}`" in keys for _, row in KEYS)
     for page in (registers, keys):
         sections = [line for line in page.splitlines() if line.startswith("## ")]
         assert [line.lower() for line in sections] == [f"## {method.title.lower()}" for method in METHODS.values()]
-    text = GENERATE.command_line()
-    assert all(f"\n## {name}\n" in "\n" + text for name in GENERATE.commands())
+    text = docs.command_line()
+    assert all(f"\n## {name}\n" in "\n" + text for name in docs.commands())
     assert all(
         f"`{option}" in text or f" {option}" in text for _, p in OPTIONS for option in p.opts if option[0] == "-"
     )

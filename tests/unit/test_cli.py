@@ -26,7 +26,7 @@ from detent.record.trace_files import load_trace, save_trace
 pytestmark = [pytest.mark.compiled, pytest.mark.early]
 
 AXIS, LETTER = str(detent.example("print_head.toml")), str(detent.example("letter.txt"))
-VERBS = ("examples", "check", "run", "compare", "timing", "plot", "registers")
+VERBS = ("examples", "new", "keys", "docs", "check", "run", "compare", "timing", "plot", "registers")
 STATE = "controller.head.state"
 EVIL = "a\x1b[2J\u202e\x9bb"  # clears a terminal, turns the order of reading, begins a command of a terminal
 STEERING = "[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]"

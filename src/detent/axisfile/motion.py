@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin
 from pydantic import create_model
 from pydantic.fields import FieldInfo
 
-from detent.files.fields import Table, Unit, table_of
+from detent.files.fields import Table, Unit, extra_of, table_of
 from detent.units import describe_kind
 
 TableT = TypeVar("TableT", bound=Table)
@@ -69,8 +69,11 @@ def _rotary_field(field: FieldInfo) -> tuple[Any, FieldInfo] | None:
     below = table_of(field)
     if below is not None and field.default_factory is below:
         made.default_factory = rotary_model(below)
+    turned = extra_of(field, "turned")
     if field.examples and units:
-        made.examples = [f'"{describe_kind(units[0].symbol)[1]}"']
+        made.examples = [turned or f'"{describe_kind(units[0].symbol)[1]}"']
+    if extra_of(field, "start"):
+        made.json_schema_extra = cast("dict[str, Any]", field.json_schema_extra) | {"start": turned}
     return (Annotated[annotation, *units] if units else annotation), made
 
 

@@ -112,9 +112,9 @@ class ScrewTable(Table, frozen=True):
     """Screw and slide."""
 
     travel_per_revolution: Length = required(
-        "lead of the screw: slide travel per motor turn", '"5 mm"', ge=1e-5, le=10.0
+        "lead of the screw: slide travel per motor turn", '"5 mm"', start='"20 mm"', ge=1e-5, le=10.0
     )
-    moving_mass: Mass = optional("slide with its load", 0.0, ge=0.0, le=1e5)
+    moving_mass: Mass = optional("slide with its load", 0.0, start='"110 kg"', ge=0.0, le=1e5)
     screw_inertia: Inertia = optional("screw and coupling", 0.0, ge=0.0, le=10.0)
     start_position: Length = optional(
         "where the slide stands at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0

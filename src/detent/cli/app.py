@@ -108,6 +108,15 @@ COLUMNS = (
 Columns = Annotated[list[str] | None, option("--column", "ROLE=COLUMN", COLUMNS)]
 
 
+def unknown_method(verb: str, word: str, also: str = "") -> DetentError:
+    """What to say where neither a method nor what else would do was named."""
+    from detent.files.text import did_you_mean
+    from detent.methods.registry import METHODS
+
+    remedy = did_you_mean(word.replace("-", "_").replace(" ", "_"), METHODS, "name one of these")
+    return DetentError(f"{verb}: came {word!r}; allowed: {', '.join(METHODS)}{also and f', or {also}'}; {remedy}")
+
+
 def main() -> NoReturn:
     """Entry point."""
     for stream in (sys.stdout, sys.stderr):

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from detent import examples
-from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option
+from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option, unknown_method
 from detent.cli.terminal import folder_for, print_json, progress_bar, split_names, tell
 from detent.errors import DetentError, InputError
 
@@ -166,8 +166,7 @@ def _registers_of(method: str) -> Any:
     if method in METHODS:
         return METHODS[method].registers()
     if not Path(method).exists():
-        allowed = ", ".join(METHODS)
-        raise DetentError(f"registers: came {method!r}; allowed: {allowed}, or an axis file; name one of these")
+        raise unknown_method("registers", method, "an axis file")
     from detent.axis import load
 
     return load(method).simulated.registers

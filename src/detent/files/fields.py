@@ -71,21 +71,46 @@ class Table(BaseModel, frozen=True):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def required(doc: str, example: str, *, allowed: str = "", alias: str | None = None, **bounds: float) -> Any:
-    """Declare a key that must be stated."""
+def required(  # noqa: PLR0913 - each word is one that a key may have
+    doc: str,
+    example: str,
+    *,
+    allowed: str = "",
+    alias: str | None = None,
+    start: str = "",
+    turned: str = "",
+    **bounds: float,
+) -> Any:
+    """Declare a key that must be stated; a starting file has its example, or what shall stand there in its place.
+
+    `turned` is the example of a rotary axis.
+    """
     constraints: dict[str, Any] = dict(bounds)
-    extra: dict[str, Any] = {"allowed": allowed}
+    extra: dict[str, Any] = {"allowed": allowed, "start": start, "turned": turned}
     return Field(description=doc, examples=[example], alias=alias, json_schema_extra=extra, **constraints)
 
 
-def optional(
-    doc: str, default: object, *, derived: str = "", allowed: str = "", alias: str | None = None, **bounds: float
+def optional(  # noqa: PLR0913 - the same
+    doc: str,
+    default: object,
+    *,
+    derived: str = "",
+    allowed: str = "",
+    alias: str | None = None,
+    start: str = "",
+    turned: str = "",
+    **bounds: float,
 ) -> Any:
-    """Declare a key that may be left out."""
+    """Declare a key that may be left out; `start` is what a starting file says all the same, `turned` if it turns."""
     constraints: dict[str, Any] = dict(bounds)
     constraints["default_factory" if callable(default) else "default"] = default
-    extra: dict[str, Any] = {"allowed": allowed, "derived": derived}
+    extra: dict[str, Any] = {"allowed": allowed, "derived": derived, "start": start, "turned": turned}
     return Field(description=doc, alias=alias, json_schema_extra=extra, **constraints)
+
+
+def begun() -> Any:
+    """Declare a table that may be left out, but that a starting file has."""
+    return Field(default=None, json_schema_extra={"start": "true"})
 
 
 def rows(doc: str) -> Any:
@@ -103,9 +128,13 @@ class Naming:
     example: str  # a name that would do
 
 
-def named(doc: str, naming: Naming, **bounds: int) -> Any:
-    """Declare tables that the user names, as in ``[position.3]``; the field's type is ``dict[str, SomeTable]``."""
+def named(doc: str, naming: Naming, *, start: bool = False, **bounds: int) -> Any:
+    """Declare tables that the user names, as in ``[position.3]``; the field's type is ``dict[str, SomeTable]``.
+
+    A starting file has one where `start` says so, or where there must be one.
+    """
     extra: dict[str, Any] = {"name": naming.placeholder, "pattern": naming.pattern, "allowed": naming.allowed}
+    extra |= {"start": "true"} if start else {}
     constraints: dict[str, Any] = dict(bounds)
     if "min_length" not in bounds:
         constraints["default_factory"] = dict
@@ -170,7 +199,7 @@ def list_example(field: FieldInfo) -> str:
 
 
 def extra_of(field: FieldInfo, name: str) -> str:
-    """Word kept beside a field by `required` or `optional` (``allowed``, ``derived``)."""
+    """Word kept beside a field by `required` or `optional` (``allowed``, ``derived``, ``start``, ``turned``)."""
     extra = field.json_schema_extra
     return str(cast("dict[str, object]", extra).get(name, "")) if isinstance(extra, dict) else ""
 

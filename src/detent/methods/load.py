@@ -80,21 +80,25 @@ def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
 
 
 def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
-    """Method the file names, for its motion; without a name the likeliest, so that the rest is checked too."""
+    """Method the file names, for its motion; without one nothing else can be said: each has its own keys."""
     name, stated = _stated(source, overrides, METHOD_KEY)
-    if not isinstance(name, str):
-        known = {method: dict(leaf_fields(method.spec)) for method in METHODS.usable()}
-        likeliest = copy.copy(max(known, key=lambda method: sum(path in known[method] for path in source.places)))
-        likeliest.rules = ()  # what does not go together depends on the method, which is only guessed
-        return likeliest
-    if name in METHODS:
+    if name is None and not source.is_whole:  # it may stand in a line that was left out
+        raise InputError(source.problems)
+    if name is None:
+        reporter = Reporter(source.file, source.places, {}, AxisSpec)
+        header = source.tables.get(METHOD_KEY[0], {})
+        if not isinstance(header, dict):
+            error = {"type": "model_type", "loc": METHOD_KEY[:1], "input": header}
+            raise InputError([reporter.from_errors([error])])
+        remedy = "add one of these in [axis]; `detent new METHOD` writes a file to start from"
+        raise InputError([reporter.problem(METHOD_KEY, "nothing", _all_methods(), remedy)])
+    if isinstance(name, str) and name in METHODS:
         method = METHODS[name]
         turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
         return method.turned() if turns else method
-    remedy = did_you_mean(name.replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
+    remedy = did_you_mean(str(name).replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
     reporter = Reporter(source.file, source.places, overridden, Table)
-    # Nothing else can be said: another method would have other keys.
     problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
 

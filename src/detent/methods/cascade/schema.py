@@ -20,7 +20,7 @@ from detent.axisfile.tables import (
     usual_stiction,
 )
 from detent.errors import DetentError
-from detent.files.fields import Table, optional, required
+from detent.files.fields import Table, begun, optional, required
 from detent.files.quantities import (
     Acceleration,
     Current,
@@ -58,12 +58,16 @@ class CascadeAxisTable(AxisTable, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
-    travel: Length = required("free way between both ends", '"0.5 m"', gt=0.0, le=1e5)
+    travel: Length = required("free way between both ends", '"0.5 m"', turned='"360 deg"', gt=0.0, le=1e5)
     lowest: Length = optional("position of the lower end", 0.0, ge=-1e5, le=1e5)
-    speed: Velocity = required("largest speed ever commanded", '"0.5 m/s"', gt=0.0, le=1e4)
-    acceleration: Acceleration = required("largest acceleration ever commanded", '"5 m/s^2"', gt=0.0, le=1e7)
+    speed: Velocity = required("largest speed ever commanded", '"0.5 m/s"', turned='"360 deg/s"', gt=0.0, le=1e4)
+    acceleration: Acceleration = required(
+        "largest acceleration ever commanded", '"5 m/s^2"', turned='"3600 deg/s^2"', gt=0.0, le=1e7
+    )
     jerk: Jerk | None = optional("largest jerk ever commanded; none: trapezoids of the speed", None, gt=0.0, le=1e10)
-    effort: Force = required("largest force (rotary: torque) of the drive on the axis", '"500 N"', ge=1e-9, le=1e7)
+    effort: Force = required(
+        "largest force (rotary: torque) of the drive on the axis", '"500 N"', turned='"0.9 N*m"', ge=1e-9, le=1e7
+    )
 
 
 class CascadeMotorTable(MotorTable, frozen=True):
@@ -76,10 +80,14 @@ class DriveTable(Table, frozen=True):
     """Converter and amplifier."""
 
     input: Literal["force", "current", "voltage"] = optional(
-        "what the amplifier imposes: a force (rotary: a torque), the current of the motor, or its voltage", "force"
+        "what the amplifier imposes: a force (rotary: a torque), the current of the motor, or its voltage",
+        "force",
+        start='"current"',
     )
     effort_per_volt: ForcePerVoltage = optional("input force: force per volt of command", 1.0, ge=1e-9, le=1e9)
-    current_per_volt: CurrentPerVoltage = optional("input current: current per volt of command", 1.0, ge=1e-9, le=1e6)
+    current_per_volt: CurrentPerVoltage = optional(
+        "input current: current per volt of command", 1.0, start='"0.4 A/V"', ge=1e-9, le=1e6
+    )
     voltage_gain: float = optional("input voltage: volts at the motor per volt of command", 1.0, ge=1e-6, le=1e6)
     command_limit: Voltage = optional("largest command that the converter puts out", 10.0, ge=1e-6, le=1e6)
     command_step: Voltage = optional("step of the converter; 0: none", 0.0, ge=0.0, le=1e3)
@@ -121,14 +129,20 @@ class MechanicsTable(Table, frozen=True):
 
     travel_per_revolution: Length | None = optional(
         "travel of the axis per motor turn, such as the lead of a screw; rotary: 360 deg without a gear",
-        None, derived="rotary with a motor: 360 deg; needed where a linear axis has a motor", ge=1e-6, le=1e3,
+        None, derived="rotary with a motor: 360 deg; needed where a linear axis has a motor",
+        start='"10 mm"', turned='"360 deg"', ge=1e-6, le=1e3,
     )  # fmt: skip
     motor_mass: Mass = optional(
         "what moves on the motor's side of the coupling, without [motor]'s rotor; rotary: moment of inertia",
         0.0, ge=0.0, le=1e7,
     )  # fmt: skip
     load_mass: Mass = optional(
-        "what moves on the load's side of the coupling; rotary: moment of inertia", 0.0, ge=0.0, le=1e7
+        "what moves on the load's side of the coupling; rotary: moment of inertia",
+        0.0,
+        start='"30 kg"',
+        turned='"0.001 kg*m^2"',
+        ge=0.0,
+        le=1e7,
     )
     weight: Force = optional("load's weight along the axis, + pulls in the negative direction", 0.0, ge=-1e7, le=1e7)
     pendulum: Torque = optional("rotary: weight of a load that hangs down at position 0, m g l", 0.0, ge=0.0, le=1e7)
@@ -147,7 +161,9 @@ class MechanicsTable(Table, frozen=True):
 class EncoderTable(Table, frozen=True):
     """Encoder that is read once per sample."""
 
-    resolution: Length = required("travel per count; 0: the position itself", '"1 um"', ge=0.0, le=1e3)
+    resolution: Length = required(
+        "travel per count; 0: the position itself", '"1 um"', turned='"0.01 deg"', ge=0.0, le=1e3
+    )
     delay: int = optional("samples until a position is read", 0, ge=0, le=MOST_SAMPLES - 1)
     velocity_span: int = optional("samples that the velocity is a difference over", 1, ge=1, le=MOST_SAMPLES)
     velocity_filter: Time = optional("time constant of the filter behind it; 0: none", 0.0, ge=0.0, le=10.0)
@@ -169,9 +185,9 @@ class FeedForwardTable(Table, frozen=True):
 
     velocity: float = optional(
         "share of the reference's velocity in the velocity demand (PID: 1 lets the derivative act on the error)",
-        0.0, ge=0.0, le=2.0,
+        0.0, start="1.0", ge=0.0, le=2.0,
     )  # fmt: skip
-    acceleration: float = optional("share of the command that accelerates all masses", 0.0, ge=0.0, le=2.0)
+    acceleration: float = optional("share of the command that accelerates all masses", 0.0, start="1.0", ge=0.0, le=2.0)
     viscous: float = optional(
         "share of the command against viscous friction, back-EMF included; of both directions the mean",
         0.0, ge=0.0, le=2.0,
@@ -188,10 +204,19 @@ class MethodTable(Table, frozen=True):
 
     structure: Literal["cascade", "pid"] = optional("position P over velocity P or PI, or a position PID", "cascade")
     sample_period: Time = optional("period of the loops", 1e-3, ge=1e-6, le=0.1)
-    position_gain: float = optional("cascade: velocity demand per position error [1/s]; needed", 0.0, ge=0.0, le=1e6)
-    velocity_gain: VoltagePerVelocity = optional("cascade: command per velocity error; needed", 0.0, ge=0.0, le=1e9)
+    position_gain: float = optional(
+        "cascade: velocity demand per position error [1/s]; needed", 0.0, start="40.0", ge=0.0, le=1e6
+    )
+    velocity_gain: VoltagePerVelocity = optional(
+        "cascade: command per velocity error; needed", 0.0, start='"130 V*s/m"', turned='"2 V*s/rad"', ge=0.0, le=1e9
+    )
     velocity_integral: VoltagePerLength = optional(
-        "cascade: command per velocity error and time; 0: P", 0.0, ge=0.0, le=1e12
+        "cascade: command per velocity error and time; 0: P",
+        0.0,
+        start='"2 kV/m"',
+        turned='"30 V/rad"',
+        ge=0.0,
+        le=1e12,
     )
     velocity_limit: Velocity = optional(
         "cascade: largest velocity demand", math.nan, derived="1.25 x limits.speed", gt=0.0, le=1e5
@@ -232,7 +257,7 @@ class CascadeSpec(AxisSpec, frozen=True):
 
     axis: CascadeAxisTable
     limits: LimitsTable
-    motor: CascadeMotorTable | None = None
+    motor: CascadeMotorTable | None = begun()
     drive: DriveTable = Field(default_factory=DriveTable)
     mechanics: MechanicsTable = Field(default_factory=MechanicsTable)
     encoder: EncoderTable

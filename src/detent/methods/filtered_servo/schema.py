@@ -43,7 +43,7 @@ class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
     travel: Length = required("free way of the slide between its two ends", '"0.5 m"', gt=0.0, le=100.0)
-    speed: Velocity = required("largest speed ever commanded", '"125 mm/s"', gt=0.0, le=100.0)
+    speed: Velocity = required("largest speed ever commanded", '"125 mm/s"', start='"100 mm/s"', gt=0.0, le=100.0)
     effort: Force = required("largest force of the motor on the slide at standstill", '"280 N"', ge=1e-3, le=1e6)
 
 
@@ -89,6 +89,7 @@ class MethodTable(Table, frozen=True):
     coefficient: float = optional(
         "A = TS/Tf: share of a new sample in the filter's output (3.4)",
         0.25,
+        start="0.5",
         allowed="a number from 1/4096 up to 1; 1 means no filter, above it the output swings",
         ge=2.0**-12,
         le=1.0,
@@ -106,9 +107,9 @@ class MethodTable(Table, frozen=True):
     position_gain: float = optional("K1: drive counts per pulse of following error", 1.0, ge=1e-3, le=100.0)
     position_bits: int = optional("width of the position counter; beyond it the drive goes off", 12, ge=8, le=16)
     command_acceleration: Acceleration = optional(
-        "acceleration of the commanded speed; 0 jumps to it", 0.0, ge=0.0, le=1e4
+        "acceleration of the commanded speed; 0 jumps to it", 0.0, start='"0.5 m/s^2"', ge=0.0, le=1e4
     )
-    in_position: int = optional("following error that counts as in position, in pulses", 2, ge=0, le=1000)
+    in_position: int = optional("following error that counts as in position, in pulses", 2, start="4", ge=0, le=1000)
     in_position_time: Time = optional("how long it must last", 50e-3, gt=0.0, le=10.0)
     timeout: Time = optional(
         "time from the end of the command until a move that is not in position has failed", 2.0, gt=0.0, le=1000.0

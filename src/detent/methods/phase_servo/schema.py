@@ -57,17 +57,23 @@ class PhaseServoAxisTable(AxisTable, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
-    travel: Length = required("free way of the carriage between its two ends", '"14 in"', gt=0.0, le=10.0)
-    speed: Velocity = required(
-        "largest velocity of the table, rounded down to a whole count per speed sample", '"0.35 m/s"', gt=0.0, le=10.0
+    travel: Length = required(
+        "free way of the carriage between its two ends", '"14 in"', start='"300 mm"', gt=0.0, le=10.0
     )
-    effort: Current = required("current limit of the bridge", '"6 A"', ge=1e-3, le=1000.0)
+    speed: Velocity = required(
+        "largest velocity of the table, rounded down to a whole count per speed sample",
+        '"0.35 m/s"',
+        start='"0.25 m/s"',
+        gt=0.0,
+        le=10.0,
+    )
+    effort: Current = required("current limit of the bridge", '"6 A"', start='"3 A"', ge=1e-3, le=1000.0)
 
 
 class DriveTable(Table, frozen=True):
     """Supply, bridge and PWM."""
 
-    supply: Voltage = required("each side of the split supply, ES", '"24 V"', ge=0.1, le=1000.0)
+    supply: Voltage = required("each side of the split supply, ES", '"24 V"', start='"48 V"', ge=0.1, le=1000.0)
     bridge_resistance: Resistance = optional("closed switch, sense resistor and wiring", 0.0, ge=0.0, le=1e5)
     pwm_bits: int = optional("width of drive word and sawtooth (3.9)", 8, ge=4, le=12)
 
@@ -75,7 +81,9 @@ class DriveTable(Table, frozen=True):
 class MechanicsTable(Table, frozen=True):
     """Pulley, wire and carriage."""
 
-    pulley_circumference: Length = required("carriage travel per motor turn", '"50.8 mm"', ge=1e-4, le=10.0)
+    pulley_circumference: Length = required(
+        "carriage travel per motor turn", '"50.8 mm"', start='"40 mm"', ge=1e-4, le=10.0
+    )
     carriage_mass: Mass = required("carriage with its load", '"0.6 kg"', gt=0.0, le=1000.0)
     pulley_inertia: Inertia = optional("pulley and detector disc", 0.0, ge=0.0, le=0.1)
     start_position: Length = optional(

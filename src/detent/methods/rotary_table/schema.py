@@ -224,7 +224,7 @@ class RotaryTableSpec(AxisSpec, frozen=True):
     mechanics: MechanicsTable
     detector: DetectorTable = Field(default_factory=DetectorTable)
     method: MethodTable = Field(default_factory=MethodTable)
-    position: dict[str, PositionTable] = named("a position by its number", POSITION_NUMBER, max_length=128)
+    position: dict[str, PositionTable] = named("a position by its number", POSITION_NUMBER, start=True, max_length=128)
     protection: TableProtectionTable = Field(default_factory=TableProtectionTable)
     disturbance: DisturbanceTable = Field(default_factory=DisturbanceTable)
 

@@ -73,10 +73,10 @@ class ControllerTable(Table, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the motor must never exceed."""
 
-    travel: Length = required("free way between its two ends", '"40 mm"', gt=0.0, le=100.0)
-    speed: Velocity = required("largest speed ever commanded", '"20 mm/s"', gt=0.0, le=100.0)
+    travel: Length = required("free way between its two ends", '"40 mm"', start='"200 mm"', gt=0.0, le=100.0)
+    speed: Velocity = required("largest speed ever commanded", '"20 mm/s"', start='"60 mm/s"', gt=0.0, le=100.0)
     acceleration: Acceleration = required(
-        "acceleration of the linear part of the ramp (3.1)", '"0.2 m/s^2"', gt=0.0, le=1e4
+        "acceleration of the linear part of the ramp (3.1)", '"0.2 m/s^2"', start='"1 m/s^2"', gt=0.0, le=1e4
     )
 
 
@@ -87,11 +87,13 @@ class MotorTable(Table, frozen=True):
     steps_per_turn: int = required(
         "full steps per turn", "200", allowed="a multiple of 4 from 4 to 10000", ge=4, le=10000
     )
-    holding_torque: Torque = required("holding torque, both phases at the rated current", '"60 mN*m"', ge=1e-5, le=1e3)
-    rotor_inertia: Inertia = required("rotor, without load", '"9 g*cm^2"', ge=1e-10, le=1.0)
-    resistance: Resistance | None = optional("winding, per phase", None, ge=1e-3, le=1e4)
-    inductance: Inductance | None = optional("winding, per phase", None, ge=1e-6, le=10.0)
-    rated_current: Current | None = optional("per phase", None, ge=1e-3, le=1e3)
+    holding_torque: Torque = required(
+        "holding torque, both phases at the rated current", '"60 mN*m"', start='"270 mN*m"', ge=1e-5, le=1e3
+    )
+    rotor_inertia: Inertia = required("rotor, without load", '"9 g*cm^2"', start='"35 g*cm^2"', ge=1e-10, le=1.0)
+    resistance: Resistance | None = optional("winding, per phase", None, start='"5.3 ohm"', ge=1e-3, le=1e4)
+    inductance: Inductance | None = optional("winding, per phase", None, start='"6.6 mH"', ge=1e-6, le=10.0)
+    rated_current: Current | None = optional("per phase", None, start='"1 A"', ge=1e-3, le=1e3)
     start_frequency: Frequency | None = optional(
         "frequency at which the bare rotor starts without losing steps",
         None,
@@ -140,8 +142,10 @@ class DriveTable(Table, frozen=True):
 class MechanicsTable(Table, frozen=True):
     """Spindle and what it moves."""
 
-    travel_per_revolution: Length = required("lead of the spindle: travel per motor turn", '"1 mm"', ge=1e-6, le=10.0)
-    moving_mass: Mass = optional("stage, lens group or other mass that is moved", 0.0, ge=0.0, le=1e4)
+    travel_per_revolution: Length = required(
+        "lead of the spindle: travel per motor turn", '"1 mm"', start='"8 mm"', ge=1e-6, le=10.0
+    )
+    moving_mass: Mass = optional("stage, lens group or other mass that is moved", 0.0, start='"500 g"', ge=0.0, le=1e4)
     screw_inertia: Inertia = optional("spindle", 0.0, ge=0.0, le=10.0)
     coupling_inertia: Inertia = optional("coupling", 0.0, ge=0.0, le=10.0)
     friction_torque: Torque = optional("Coulomb friction at the shaft", 0.0, ge=0.0, le=1e3)

@@ -1,0 +1,88 @@
+"""`detent new` and `detent keys`: an axis file to start from, and what an axis file may say."""
+
+import shlex
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from detent.cli.app import Json, Set, app, option, unknown_method
+from detent.cli.terminal import print_json, print_table, tell
+from detent.errors import DetentError
+
+NAME = typer.Argument(help="Control method; `detent keys` lists them.", show_default=False)
+NEW = "The file, a new one. Default: METHOD.toml"
+SEARCH = "Only keys with this word in name, unit, range, default or meaning."
+ABOUT = "Control method, or an axis file of it: one that turns has its own units. Default: every method."
+
+
+@app.command()
+def new(
+    method: Annotated[str, NAME],
+    file: Annotated[Path | None, typer.Argument(help=NEW, show_default=False)] = None,
+    overrides: Set = None,
+    *,
+    as_json: Json = False,
+) -> None:
+    """Write an axis file to start from: every key with its unit, range, default and meaning; it checks and runs."""
+    from detent.files.text import check_target, write_text
+    from detent.methods.registry import METHODS
+    from detent.methods.start import starting_axis
+
+    if method not in METHODS:
+        raise unknown_method("new", method)
+    target = check_target(file or Path(f"{method}.toml"), (".toml",), "an axis file")
+    if target.exists():
+        raise DetentError(f"{target}: it is there already; nothing was written; choose another name")
+    write_text(target, starting_axis(METHODS[method], target, overrides or []))
+    if as_json:
+        print_json({"method": method, "files": [str(target)]})
+        return
+    name = shlex.quote(str(target))
+    tell(f"Wrote {target}. Next: detent check {name}, then detent run {name} --job JOB.")
+    tell(f"A job is {METHODS[method].jobs}; `detent examples` lists some.")
+
+
+@app.command()
+def keys(
+    method: Annotated[str, typer.Argument(help=ABOUT)] = "",
+    search: Annotated[str, option("--search", "WORD", SEARCH)] = "",
+    *,
+    as_json: Json = False,
+) -> None:
+    """List what an axis file may say: every key with its unit, range, default and meaning."""
+    from detent.files.keys import key_rows
+
+    found = {title: key_rows(model) for title, model in _models(method).items()}
+    known = {row.key.rpartition(".")[2] for rows in found.values() for row in rows}
+    found = {title: [row for row in rows if row.holds(search)] for title, rows in found.items()}
+    if not any(found.values()):
+        from detent.files.text import did_you_mean
+
+        remedy = did_you_mean(search, known, "search for a shorter word, or list all without --search")
+        raise DetentError(f"--search: came {search!r}, which no key has; {remedy}")
+    if as_json:
+        print_json([{"method": name} | asdict(row) for name, rows in found.items() for row in rows])
+        return
+    for title, rows in found.items():
+        heads = ("key", "SI unit", "default", "what it may be", "meaning")
+        cells = [(r.key, r.unit, "needed" if r.required else r.default or "none", r.allowed, r.doc) for r in rows]
+        if cells:
+            print_table(title, heads, cells)
+
+
+def _models(word: str) -> dict[str, Any]:
+    """Models of the files to tell of, by the name of the method."""
+    from detent.methods.registry import METHODS
+
+    if not word:
+        return {method.name: method.spec for method in METHODS.usable()}
+    if word in METHODS:
+        return {word: METHODS[word].spec}
+    if not Path(word).exists():
+        raise unknown_method("keys", word, "an axis file")
+    from detent.methods.load import load_spec
+
+    spec = load_spec(word)
+    return {spec.axis.method: type(spec)}

@@ -1,0 +1,59 @@
+"""An axis file to start from: made from a method's schema, so that it knows every key that the method knows today."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from detent.errors import InputError
+from detent.files.keys import starting_file
+from detent.files.overrides import apply_overrides
+from detent.files.source import parse_source
+from detent.methods.load import METHOD_KEY, MOTION_KEY, axis_of
+from detent.methods.method import Method
+
+HEAD = """\
+# An axis of the method {name}: {title}.
+#
+# Lines that begin with a key are needed, and hold an axis that runs: replace them by yours. Behind a # without a space
+# stands what may be stated too, with the value that holds otherwise, or an example where that follows from other keys.
+#
+#   detent check {file}              shows every value in effect, what follows from them, and what looks wrong
+#   detent run {file} --job JOB      does a job: {jobs}
+#   detent keys {name} --search WORD      looks a key up
+
+"""
+
+
+def starting_axis(method: Method[Any], file: Path, overrides: Sequence[str] = ()) -> str:
+    """Text of an axis file of a method with every key, those of the overrides stated; refused where it would be wrong.
+
+    Parameters
+    ----------
+    method : Method
+        The control method.
+    file : path
+        Where it will be; the axis gets its name.
+    overrides : sequence of str
+        ``"dotted.key=value"``, as of `load_spec`.
+    """
+    turned = method.turned() if method.rotary else method
+    stated: dict[str, Any] = {}
+    apply_overrides(stated, overrides, turned.spec)
+    motion = stated.get(MOTION_KEY[0], {}).get(MOTION_KEY[1])
+    model = turned.spec if motion == "rotary" else method.spec
+    tables: dict[str, Any] = {"axis": {"name": file.stem[:80], METHOD_KEY[1]: method.name}}
+    texts, problems = apply_overrides(tables, overrides, model)
+    if problems:
+        raise InputError(problems)
+    paths = [("axis", "name"), METHOD_KEY, *texts]
+    text = HEAD.format(name=method.name, title=method.title, file=file.name, jobs=method.jobs)
+    text += starting_file(model, {path: _at(tables, path) for path in paths})
+    axis_of(parse_source(str(file), text), overrides)
+    return text
+
+
+def _at(tables: Any, path: Sequence[str]) -> object:
+    """Value at a path of nested tables."""
+    for part in path:
+        tables = tables[part]
+    return tables
