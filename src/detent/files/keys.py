@@ -66,15 +66,24 @@ def key_rows(model: type[Table]) -> tuple[KeyRow, ...]:
     )
 
 
-def starting_file(model: type[Table], stated: Mapping[Path, object]) -> str:
+def starting_file(model: type[Table], stated: Mapping[Path, object], given: Mapping[Path, object] | None = None) -> str:
     """Text of a file with every key: those stated here or needed to begin with as they are, the others as comments.
 
     Taken out of its comment, a key has the value that holds without it, or an example where that is made from others.
+    What is `given` from elsewhere, as by a catalogue, is a comment too.
     """
-    return "\n".join(_table_lines(model, (), stated, live=True)).strip() + "\n"
+    return "\n".join(_table_lines(model, (), _Values(stated, given or {}), live=True)).strip() + "\n"
 
 
-def _table_lines(table: type[Table], path: Path, stated: Mapping[Path, object], *, live: bool) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class _Values:
+    """Values that a starting file has, by path: those it states, and those that hold without being stated."""
+
+    stated: Mapping[Path, object]
+    given: Mapping[Path, object]
+
+
+def _table_lines(table: type[Table], path: Path, values: _Values, *, live: bool) -> Iterator[str]:
     """Keys of a table, then the tables below it; one that may be left out is a comment as a whole."""
     mark, below = "" if live else "#", list[tuple[FieldInfo, type[Table], Path]]()
     if path:
@@ -82,23 +91,24 @@ def _table_lines(table: type[Table], path: Path, stated: Mapping[Path, object], 
     for key, field in keys_of(table).items():
         inside, own = table_of(field), (*path, key)
         if inside is None:
-            yield from _key_lines(field, own, stated, live=live)
+            yield from _key_lines(field, own, values, live=live)
         elif is_named(field):
-            names = {known[len(own)] for known in stated if known[: len(own)] == own} or {example_of(field)}
+            names = {known[len(own)] for known in values.stated if known[: len(own)] == own} or {example_of(field)}
             below += [(field, inside, (*own, name)) for name in sorted(names)]
         elif not is_rows(field):
             below.append((field, inside, own))
     for field, inside, own in below:
         begun = field.is_required() or field.default_factory is inside or bool(extra_of(field, "start"))
-        meant = any(known[: len(own)] == own for known in stated)
-        yield from _table_lines(inside, own, stated, live=live and (begun or meant))
+        meant = any(known[: len(own)] == own for known in values.stated)
+        yield from _table_lines(inside, own, values, live=live and (begun or meant))
 
 
-def _key_lines(field: FieldInfo, path: Path, stated: Mapping[Path, object], *, live: bool) -> Iterator[str]:
+def _key_lines(field: FieldInfo, path: Path, values: _Values, *, live: bool) -> Iterator[str]:
     """Meaning, range and default of a key as a comment, then the key."""
-    text, is_stated = toml_text(stated.get(path)), path in stated
-    text = text if is_stated else extra_of(field, "start") or example_of(field) or _default_example(field)
-    needed = is_stated or field.is_required() or bool(extra_of(field, "start"))
+    start, is_stated = extra_of(field, "start"), path in values.stated
+    known = values.stated if is_stated else values.given
+    text = toml_text(known[path]) if path in known else start or example_of(field) or _default_example(field)
+    needed = is_stated or (path not in values.given and (field.is_required() or bool(start)))
     default = default_text(field)
     told = f"; default: {default or 'nothing'}" if not field.is_required() and default != text.strip('"') else ""
     about = f"{field.description}: {describe_allowed(field)}{told}"

@@ -1,11 +1,12 @@
 """An axis file to start from: made from a method's schema, so that it knows every key that the method knows today."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
 from detent.errors import InputError
 from detent.files.keys import starting_file
+from detent.files.locate import Path
 from detent.files.overrides import apply_overrides
 from detent.files.source import parse_source
 from detent.methods.load import METHOD_KEY, MOTION_KEY, axis_of
@@ -24,7 +25,7 @@ HEAD = """\
 """
 
 
-def starting_axis(method: Method[Any], file: Path, overrides: Sequence[str] = ()) -> str:
+def starting_axis(method: Method[Any], file: FilePath, overrides: Sequence[str] = ()) -> str:
     """Text of an axis file of a method with every key, those of the overrides stated; refused where it would be wrong.
 
     Parameters
@@ -47,12 +48,19 @@ def starting_axis(method: Method[Any], file: Path, overrides: Sequence[str] = ()
         raise InputError(problems)
     paths = [("axis", "name"), METHOD_KEY, *texts]
     text = HEAD.format(name=method.name, title=method.title, file=file.name, jobs=method.jobs)
-    text += starting_file(model, {path: _at(tables, path) for path in paths})
+    text += starting_file(model, {path: _at(tables, path) for path in paths}, _from_catalogue(method, tables, texts))
     axis_of(parse_source(str(file), text), overrides)
     return text
 
 
-def _at(tables: Any, path: Sequence[str]) -> object:
+def _from_catalogue(method: Method[Any], tables: dict[str, Any], paths: Iterable[Path]) -> dict[Path, object]:
+    """Constants of the motors that are named among these values: the file need not state them."""
+    named = [path for path in paths if path[-2:] == ("motor", "catalogue")]
+    found = [(path[:-1], method.catalogue and method.catalogue.constants(_at(tables, path))) for path in named]
+    return {(*around, key): value for around, constants in found for key, value in (constants or {}).items()}
+
+
+def _at(tables: Any, path: Sequence[str]) -> Any:
     """Value at a path of nested tables."""
     for part in path:
         tables = tables[part]

@@ -86,6 +86,17 @@ def test_what_is_overridden_is_stated_and_opens_its_table():
     assert (tables["mechanics"]["weight"], tables["axis"]["name"]) == ("20 N", "lift")
 
 
+def test_what_the_catalogue_gives_is_no_more_than_a_comment():
+    text = start("cascade", "motor.catalogue=maxon RE 65 353297", "motor.resistance=0.4 ohm")
+    assert '#torque_constant = "123 mN*m/A"' in text
+    assert tomllib.loads(text)["motor"] == {"catalogue": "maxon RE 65 353297", "resistance": "0.4 ohm"}
+
+
+def test_a_motor_that_the_catalogue_lacks_is_refused():
+    with pytest.raises(InputError, match=r"--set motor\.catalogue"):
+        start("cascade", "motor.catalogue=maxon RE 1")
+
+
 def test_motors_have_the_names_that_overrides_give_them():
     tables = tomllib.loads(start("stepper_envelope", "stepper.y.limits.travel=80 mm", "stepper.z.limits.travel=9 mm"))
     assert {name: motor["limits"]["travel"] for name, motor in tables["stepper"].items()} == {"y": "80 mm", "z": "9 mm"}
