@@ -96,11 +96,16 @@ class Reporter:
         what = f"the unknown table [{dotted(path)}]" if is_table else f'the unknown key "{_shortened(key)}"'
         place = f"in {self._header(tuple(around))}" if around else "at the top of the file"
         near = nearest_key(self._root, path)
-        elsewhere = [known for known, _ in leaf_fields(self._root) if known[-1] == key]
+        leaves = [known for known, _ in leaf_fields(self._root)]
+        elsewhere = [known for known in leaves if known[-1] == key]
+        alike = nearest(key, {known[-1] for known in leaves}, 0.8)
         if near:
             remedy = f'did you mean "{near}"?'
         elif elsewhere:
             remedy = f"move it to {self._header(named_as(min(elsewhere, key=len)[:-1], path))}"
+        elif alike and not is_table:
+            home = min((known for known in leaves if known[-1] == alike), key=len)
+            remedy = f'did you mean "{alike}", in {self._header(named_as(home[:-1], path))}?'
         else:
             remedy = "remove it" + self._axis(", or look the key up with `detent check` or in the reference")
         return self.problem(path, what, f"{place}: {', '.join(keys)}", remedy)

@@ -9,7 +9,7 @@ at which the motor starts and stops directly, and the frequency that each furthe
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import hypot, pi, sqrt
+from math import hypot, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +86,18 @@ class MeasuredPullOut:
         return 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class MicrosteppedPullOut:
+    """Curve of full steps for a drive that makes each of several pulses: the field turns as fast as with full steps."""
+
+    whole: PullOut
+    microsteps: int  # pulses of a full step
+
+    def __call__(self, hz: float) -> float:
+        """Pull-out torque at a pulse frequency of `hz` [N m]."""
+        return self.whole(hz / self.microsteps)
+
+
 def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float) -> float:
     """Frequency at which a rotor swings about a step: sqrt(teeth T_hold / J) / 2 pi, teeth a quarter of the steps."""
     return sqrt(steps_per_turn / 4 * holding_torque / inertia) / (2 * pi)
@@ -95,18 +107,29 @@ def natural_frequency(steps_per_turn: int, holding_torque: float, inertia: float
 class StepperMotor:
     """What a stepper can do with its load."""
 
-    steps_per_turn: int  # 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
+    steps_per_turn: int  # full ones: 200 for 1.8 degrees, 96 for 3.75 degrees, 360 for 1 degree
     rotor_inertia: float  # [kg m^2]
     holding_torque: float  # peak of the static torque curve [N m]
     pull_out: PullOut
-    unloaded_start_hz: float  # start frequency of the bare rotor [Hz]
+    unloaded_start_hz: float  # start frequency of the bare rotor on full steps [Hz]
     load_inertia: float  # all that turns with the rotor, the moved mass included [kg m^2]
     friction_torque: float  # Coulomb friction at the shaft [N m]
+    microsteps: int = 1  # pulses of a full step; frequencies and angles below are those of pulses
 
     @property
     def step_angle(self) -> float:
-        """Angle of one step [rad]."""
-        return 2 * pi / self.steps_per_turn
+        """Angle of one step, or microstep [rad]."""
+        return 2 * pi / (self.steps_per_turn * self.microsteps)
+
+    @property
+    def incremental_torque(self) -> float:
+        """Torque that a rotor at rest feels when the field goes on by one pulse: T_hold sin(90 deg / N) [N m]."""
+        return self.holding_torque * sin(pi / 2 / self.microsteps)
+
+    @property
+    def swinging_hz(self) -> float:
+        """Pulse frequency at which the full steps come in time with the swing of the rotor [Hz]."""
+        return self.natural_hz * self.microsteps
 
     @property
     def inertia(self) -> float:
@@ -119,8 +142,8 @@ class StepperMotor:
         return natural_frequency(self.steps_per_turn, self.holding_torque, self.inertia)
 
     def start_hz(self, safety: float = 2.1) -> float:
-        """Frequency at which the loaded motor starts and stops without losing steps [Hz]."""
-        return self.unloaded_start_hz / sqrt(1 + self.load_inertia / self.rotor_inertia) / safety
+        """Frequency at which the loaded motor starts and stops without losing steps; one speed with any microsteps."""
+        return self.microsteps * self.unloaded_start_hz / sqrt(1 + self.load_inertia / self.rotor_inertia) / safety
 
     def acceleration_limit(self, max_acceleration: float, safety: float = 2.0) -> Callable[[float], float]:
         """Acceleration that motor and load allow [step/s^2], as a function of the step frequency [Hz]."""

@@ -86,9 +86,9 @@ def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
 
 
 @step
-def lost_steps(p: RotorParams, r: StepperRotor) -> int:
-    """Commanded less actual position of a rotor that has come to rest, in whole steps."""
-    return math.floor(r.commanded - r.angle / p.step_angle + 0.5)
+def lost_steps(p: RotorParams, r: StepperRotor, microsteps: int = 1) -> int:
+    """Commanded less actual position of a rotor that has come to rest, in pulses: of whole full steps."""
+    return math.floor((r.commanded - r.angle / p.step_angle) / microsteps + 0.5) * microsteps
 
 
 def fill_curve(p: RotorParams, pull_out: Callable[[float], float], max_hz: float) -> None:

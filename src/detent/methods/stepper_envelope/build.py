@@ -10,6 +10,7 @@ from detent.planning.step_envelope import MAX_RAMP, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import (
     FirstOrderPullOut,
     MeasuredPullOut,
+    MicrosteppedPullOut,
     PullOut,
     StepperMotor,
     StepRamp,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from detent.methods.stepper_envelope.system import StepperParams
 
 ROTOR_STEP = 2e-6  # time step of the rotor (7.2) [s], in whole ticks of the timer, rounded down; 1 or more
+LONGEST_PAUSE = 255  # periods that the waiting time of a reversal counts
 DAMPING = 0.4  # damping of the rotor against its field, over sqrt(teeth T_hold J): a fifth of the critical one (7.2)
 UNLOADED_STARTS = 3.0  # start frequency of a bare rotor over its natural one where nobody states it; 3.1 with 7.1
 
@@ -52,13 +54,17 @@ def stepper_motor(table: StepperTable) -> StepperMotor:
         start = UNLOADED_STARTS * natural_frequency(motor.steps_per_turn, held, motor.rotor_inertia)
     load = table.mechanics
     return StepperMotor(
-        motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start, load.inertia, load.friction_torque
-    )
+        motor.steps_per_turn, motor.rotor_inertia, held, pull_out(table), start, load.inertia, load.friction_torque,
+        table.drive.microsteps,
+    )  # fmt: skip
 
 
 def pull_out(table: StepperTable) -> PullOut:
     """Pull-out torque of a motor against step frequency, in the way the file states it; NaN without its constants."""
     motor, drive = table.motor, table.drive
+    if drive.microsteps > 1:
+        whole = pull_out(changed(table, "drive.microsteps", 1))
+        return MicrosteppedPullOut(whole, drive.microsteps)
     if motor.pull_out == "points":
         return MeasuredPullOut(tuple(motor.curve_frequency), tuple(motor.curve_torque))
     if motor.pull_out == "first order":
@@ -168,8 +174,9 @@ def build_stepper(spec: StepperEnvelopeSpec, name: str, tables: MotorTables) -> 
     clock_hz = p.plant.clock_hz = round(spec.controller.timer)
     load_rule(p.controller, tables.ramp, tables.up.zones.limits, clock_hz, reload=reload)
     p.controller.rule.literal = table.method.rule == "literal"
-    p.controller.pause, p.controller.instant_ticks = table.drive.reversal_pause, instant_ticks(spec)
-    p.plant.tolerance = spec.controller.tolerance
+    p.controller.pause = min(table.drive.reversal_pause * table.drive.microsteps, LONGEST_PAUSE)
+    p.controller.instant_ticks = instant_ticks(spec)
+    p.plant.tolerance = spec.controller.tolerance * table.drive.microsteps
     r, inertia = p.plant.rotor, motor.inertia
     r.dt, r.teeth, r.step_angle, r.inertia = instant(spec), motor.steps_per_turn / 4, motor.step_angle, inertia
     r.torque, r.friction = motor.holding_torque, motor.friction_torque

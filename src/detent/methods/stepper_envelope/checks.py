@@ -33,7 +33,7 @@ def find_cautions(spec: StepperEnvelopeSpec) -> Iterator[Caution]:
     """Look a stepper-envelope axis over: each motor, then what they share."""
     motors = [MotorFigures(spec, name) for name in spec.stepper]
     for m in motors:
-        for look in (_start, _reserves, _safety, _resonance, _ways, _current, _unused):
+        for look in (_start, _reserves, _microsteps, _safety, _resonance, _ways, _current, _unused):
             for found in look(m):
                 yield Caution(f"{m.name}: {found.name}", found.value, found.limit, found.consequence, found.remedy)
     yield from _settling(max(motors, key=_settling_time))
@@ -42,8 +42,9 @@ def find_cautions(spec: StepperEnvelopeSpec) -> Iterator[Caution]:
 
 def _start(m: MotorFigures) -> Iterator[Caution]:
     """A start, a stop or a reversal loses no step."""
-    ratio, swinging, curve = m.start_hz / m.natural_hz, START_RESERVE * m.natural_hz, m.motor.pull_out
-    safety = m.table.drive.start_safety * bare_start_hz(m.table) / m.natural_hz
+    swing, curve = m.motor.swinging_hz, m.motor.pull_out
+    ratio, swinging = m.start_hz / swing, START_RESERVE * swing
+    safety = m.table.drive.start_safety * bare_start_hz(m.table) / swing
     share = min(curve(hz) for hz in (m.start_hz, swinging)) / curve(0.0)
     if ratio > START_RESERVE * (1 + BARELY):
         yield Caution(
@@ -100,6 +101,20 @@ def _reserves(m: MotorFigures) -> Iterator[Caution]:
         )
 
 
+def _microsteps(m: MotorFigures) -> Iterator[Caution]:
+    """Friction does not take single microsteps away."""
+    torque, friction = m.motor.incremental_torque, m.motor.friction_torque
+    if m.motor.microsteps > 1 and friction > torque * (1 + BARELY):
+        fine = max(1, math.floor(math.pi / 2 / math.asin(min(friction / m.motor.holding_torque, 1.0)) + BARELY))
+        yield Caution(
+            "drive.microsteps",
+            f"{m.motor.microsteps}, {text(torque, 'N*m')} for one of them",
+            f"up to {fine}: a pulse then turns the rotor against the friction of {text(friction, 'N*m')}",
+            "the rotor moves only after several pulses: it runs smoothly, but stands no better than its error at rest",
+            m.put("drive.microsteps", fine),
+        )
+
+
 def _safety(m: MotorFigures) -> Iterator[Caution]:
     """Both divisors are what age, temperature and resonance call for."""
     for name, consequence in (
@@ -113,8 +128,10 @@ def _safety(m: MotorFigures) -> Iterator[Caution]:
 
 
 def _resonance(m: MotorFigures) -> Iterator[Caution]:
-    """No speed is that of the rotor's swing."""
-    low, high = (bound * m.natural_hz for bound in RESONANCE)
+    """No speed is that of the rotor's swing; a field that goes on in quarters of a step or less does not excite it."""
+    if m.motor.microsteps >= 4:
+        return
+    low, high = (bound * m.motor.swinging_hz for bound in RESONANCE)
     speeds = {f"zone.{name}.speed": zone.speed for name, zone in m.table.zone.items()}
     for name, speed in ({"limits.speed": m.table.limits.speed} | speeds).items():
         hz = m.table.hz(speed)
@@ -125,7 +142,7 @@ def _resonance(m: MotorFigures) -> Iterator[Caution]:
                 name,
                 f"{text(speed, 'm/s')}, {text(hz, 'Hz')}",
                 f"below {text(low, 'Hz')} or above {text(high, 'Hz')}: the natural frequency is "
-                f"{text(m.natural_hz, 'Hz')}",
+                f"{text(m.motor.swinging_hz, 'Hz')}",
                 "the steps come in time with the swing of the rotor: noise, vibration, at worst lost steps",
                 m.least(name, high * m.table.step) if high <= m.max_hz else slower,
             )

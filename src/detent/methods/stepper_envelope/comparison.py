@@ -25,7 +25,6 @@ from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, number
 from detent.planning.profile import MotionLimits, move_sections
 from detent.planning.step_envelope import StepEnvelope
-from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import Progress
 from detent.units import format_quantity
 
@@ -53,7 +52,7 @@ class Course:
 
     seconds: float  # from the start signal to the end of the last period [s]
     lost: int  # steps that the rotor is off in the end
-    peak_lag: float  # largest distance of the rotor from its field [step]
+    peak_lag: float  # largest distance of the rotor from its field [full step]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,8 +162,7 @@ def _course(spec: StepperEnvelopeSpec, name: str, method: str, way: int) -> Cour
     start_move(motor.controller.rule, 1)
     motor.advance_to(1 << 60, 0, until_event=True)
     motor.advance_to(motor.r.tick + round(SETTLING / motor.p.plant.rotor.dt), 0, until_event=False)
-    rotor = motor.r.plant.rotor
-    return Course(motor.rested, lost_steps(motor.p.plant.rotor, rotor), float(rotor.peak_lag))
+    return Course(motor.rested, motor.lost, float(motor.r.plant.rotor.peak_lag) / table.drive.microsteps)
 
 
 # ---- beside a profile of limited jerk

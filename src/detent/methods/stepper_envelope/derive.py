@@ -120,9 +120,10 @@ def _steps(m: MotorFigures) -> Iterator[Row]:
     table = m.table
     whole = table.steps * table.step
     rest = f", {format_quantity(whole, 'm', 7)}" if table.limits.travel - whole > 1e-6 * table.step else ""
-    hz = f"{format_quantity(m.max_hz, 'Hz')}, {m.max_hz / m.motor.steps_per_turn * 60:.4g} rpm"
-    yield "step", table.step, "m", "", "travel per revolution / steps per turn"
-    yield "step angle", m.motor.step_angle, "rad", "", "1 turn / steps per turn"
+    per_turn, finer = m.motor.steps_per_turn * m.motor.microsteps, " / microsteps" if m.motor.microsteps > 1 else ""
+    hz = f"{format_quantity(m.max_hz, 'Hz')}, {m.max_hz / per_turn * 60:.4g} rpm"
+    yield "step", table.step, "m", "", f"travel per revolution / steps per turn{finer}"
+    yield "step angle", m.motor.step_angle, "rad", "", f"1 turn / steps per turn{finer}"
     yield "travel", table.steps, "count", f"{table.steps} steps{rest}", "limits.travel / step, rounded down"
     yield "largest frequency f_max", m.max_hz, "Hz", hz, "limits.speed / step"
 
@@ -132,13 +133,17 @@ def _rotor(m: MotorFigures) -> Iterator[Row]:
     text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.motor.load_inertia / m.motor.rotor_inertia:.3g} x rotor"
     yield "inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2"
     yield "natural frequency", m.natural_hz, "Hz", "", "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
-    speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.natural_hz
+    speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.motor.swinging_hz
     text = f"{format_quantity(m.start_hz, 'Hz')} ({speed}), {relative:.3g} x natural"
     formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
     yield "start frequency", m.start_hz, "Hz", text, formula
     # The distance from its step at which friction can hold a resting rotor.
     error = math.asin(min(m.motor.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
-    text = f"{error:.3g} steps, {format_quantity(error * m.table.step, 'm')}"
+    kind, way = "full steps" if m.motor.microsteps > 1 else "steps", error * m.table.step * m.motor.microsteps
+    text = f"{error:.3g} {kind}, {format_quantity(way, 'm')}"
+    if m.motor.microsteps > 1:
+        formula = "holding torque x sin(90 deg / microsteps)"
+        yield "incremental torque of a microstep", m.motor.incremental_torque, "N*m", "", formula
     yield "error at rest", error, "count", text, "asin(friction / holding torque) / 90 deg, at most"
 
 

@@ -180,13 +180,14 @@ def _rotor_figures(shown: ShownMotion, trace: Trace | None) -> list[Figure]:
     charts = _rotor_charts(shown, rows, events)
     return [
         Figure(title="How the rotor followed", caption=followed, charts=charts, events=events),
-        Figure(title="Coming to rest", caption=rest, charts=_rest_charts(motion, rows, tolerance)),
+        Figure(title="Coming to rest", caption=rest, charts=_rest_charts(shown, rows, tolerance)),
     ]
 
 
 def _rotor_charts(shown: ShownMotion, rows: Stretch, events: Sequence[Event]) -> list[Chart]:
     table = shown.table
     period, direction, velocity, rotor_lag = (rows[name] for name in of(shown.motion.name, NEEDED_ROTOR))
+    rotor_lag = rotor_lag / shown.table.drive.microsteps
     # A step per period, 0 at rest.
     hz = np.divide(shown.spec.controller.timer, period, out=np.zeros(len(period)), where=period > 0)
     field = table.step * hz * direction
@@ -207,12 +208,12 @@ def _rotor_charts(shown: ShownMotion, rows: Stretch, events: Sequence[Event]) ->
     ])  # fmt: skip
 
 
-def _rest_charts(motion: Motion, rows: Stretch, limit: float) -> list[Chart]:
+def _rest_charts(shown: ShownMotion, rows: Stretch, limit: float) -> list[Chart]:
     """How the rotor comes to rest after the last step; one that lost steps comes to none of its own."""
-    end = float(rows.t[-1])
+    motion, end = shown.motion, float(rows.t[-1])
     begin = max(motion.seconds - 0.4 * max(end - motion.seconds, 0.01), 0.0)
     part = slice(int(np.searchsorted(rows.t, begin)), None)
-    lag = rows[f"{motion.name}.plant.rotor.lag"][part]
+    lag = rows[f"{motion.name}.plant.rotor.lag"][part] / shown.table.drive.microsteps
     if motion.motor.lost or len(lag) < 2:
         return []
     reach = max(float(np.abs(lag).max()), limit)

@@ -26,6 +26,7 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperT
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.methods.stepper_envelope.system import Stepper, switch_on, tables, take_over
 from detent.planning.step_envelope import StepEnvelope
+from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import LONGEST_STRETCH, AnyRecorder
 from detent.units import format_quantity as text
 
@@ -89,6 +90,11 @@ class StageMotor:
         """Time within which it comes to rest [s]: no run stays below its slowest frequency for long."""
         steps = self.steps_left + self.table.drive.reversal_pause
         return 2.0 * steps / min(float(self.tables.ramp.hz[0]), *self.tables.up.zones.limits)
+
+    @property
+    def lost(self) -> int:
+        """Steps lost so far, of a rotor at rest; with microsteps the pulses of whole full steps."""
+        return lost_steps(self.p.plant.rotor, self.r.plant.rotor, self.table.drive.microsteps)
 
     @property
     def resting(self) -> bool:

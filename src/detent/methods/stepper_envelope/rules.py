@@ -32,7 +32,7 @@ TORQUE_KEYS = (
     "drive.supply drive.current drive.bridge_resistance motor.pull_out motor.resistance motor.inductance "
     "motor.rated_current motor.pull_out_torque motor.corner_frequency motor.curve_frequency motor.curve_torque"
 )
-STEP_KEYS = "mechanics.travel_per_revolution motor.steps_per_turn"
+STEP_KEYS = "mechanics.travel_per_revolution motor.steps_per_turn drive.microsteps"
 PLACE_KEYS = "limits.travel mechanics.lower_end"
 LOAD_KEYS = "mechanics.travel_per_revolution mechanics.moving_mass mechanics.screw_inertia mechanics.coupling_inertia"
 START_KEYS = (

@@ -9,7 +9,6 @@ from detent.methods.stepper_envelope.build import start_hz, stepper_motor
 from detent.methods.stepper_envelope.host import Leg, StageHost, StageMotor, check_stage_job
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
-from detent.plant.stepper_rotor import lost_steps
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import EDGE, RunRecord
 from detent.units import format_quantity
@@ -198,7 +197,7 @@ def _make_move(host: StageHost, move: StageMove | StageJog, result: StageRun) ->
 
 def _counted(motor: StageMotor) -> tuple[int, int]:
     """Pulses made and steps lost so far."""
-    return int(motor.controller.timer.pulses), lost_steps(motor.p.plant.rotor, motor.r.plant.rotor)
+    return int(motor.controller.timer.pulses), motor.lost
 
 
 def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, over: bool) -> MotorMove:
@@ -217,8 +216,8 @@ def _observe(host: StageHost, name: str, leg: Leg, before: tuple[int, int], *, o
         steps=pulses,
         missed=table.step_inside(host.goal[name]) - motor.position,
         lost=lost,
-        rest_lag=float(plant.rotor.lag),
-        peak_lag=float(plant.rotor.peak_lag),
+        rest_lag=float(plant.rotor.lag) / table.drive.microsteps,
+        peak_lag=float(plant.rotor.peak_lag) / table.drive.microsteps,
         peak_hz=float(plant.gauge.peak_hz),
         margin=float(stepper_motor(table).torque_margin(used).min()),
         overrun=over,

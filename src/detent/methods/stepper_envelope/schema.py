@@ -66,7 +66,7 @@ class ControllerTable(Table, frozen=True):
     )
     settle_time: Time = optional("time a motor is given to come to rest after its last step", 50e-3, ge=0.0, le=10.0)
     tolerance: float = optional(
-        "distance of the rotor from its step that counts as at rest, in steps", 0.5, ge=0.01, le=2.0
+        "distance of the rotor from its step that counts as at rest, in full steps", 0.5, ge=0.01, le=2.0
     )
 
 
@@ -134,9 +134,16 @@ class DriveTable(Table, frozen=True):
         "current per phase that the drive is set to", None, derived="motor.rated_current", ge=1e-3, le=1e3
     )
     bridge_resistance: Resistance = optional("switches and wiring, per phase", 0.0, ge=0.0, le=1e4)
+    microsteps: int = optional(
+        "pulses that the drive makes a full step of; steps and step frequencies of tables and traces are then "
+        "microsteps, those of the motor stay full steps",
+        1, ge=1, le=256,
+    )  # fmt: skip
     torque_safety: float = optional("SF: the pull-out torque is divided by it (3.1)", 2.0, ge=1.0, le=20.0)
     start_safety: float = optional("the start frequency is divided by it: age and temperature", 2.1, ge=1.0, le=20.0)
-    reversal_pause: int = optional("waiting time of a reversal, in periods of the start frequency", 1, ge=0, le=255)
+    reversal_pause: int = optional(
+        "waiting time of a reversal, in periods of the start frequency, of full steps", 1, ge=0, le=255
+    )
 
 
 class MechanicsTable(Table, frozen=True):
@@ -203,8 +210,8 @@ class StepperTable(Table, frozen=True):
 
     @property
     def step(self) -> float:
-        """Travel per step [m]."""
-        return self.mechanics.travel_per_revolution / self.motor.steps_per_turn
+        """Travel per pulse, a step or a microstep [m]."""
+        return self.mechanics.travel_per_revolution / (self.motor.steps_per_turn * self.drive.microsteps)
 
     @property
     def held_torque(self) -> float:

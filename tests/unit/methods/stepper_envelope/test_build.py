@@ -72,6 +72,7 @@ CHANGES = {
     "drive.torque_safety": ("2.05", ()),
     "drive.start_safety": ("2.2", ()),
     "drive.reversal_pause": ("2", ()),
+    "drive.microsteps": ("2", ()),
     "mechanics.travel_per_revolution": ("1.1 mm", ()),
     "mechanics.moving_mass": ("1 kg", ()),
     "mechanics.screw_inertia": ("0.7 g*cm^2", ()),
