@@ -6,29 +6,42 @@
 'print head'
 """
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from detent.axis import Axis, Run, Timing, load, load_trace
+    from detent.errors import DetentError, InputError
     from detent.identify.identified import identify_axis
 
 __version__ = "0.1.0"
 
-__all__ = ["Axis", "Run", "Timing", "__version__", "example", "examples", "identify_axis", "load", "load_trace"]
+_PLACES = {
+    "detent.axis": ("Axis", "Run", "Timing", "load", "load_trace"),
+    "detent.errors": ("DetentError", "InputError"),
+    "detent.identify.identified": ("identify_axis",),
+}
+"""Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
+
+__all__ = [
+    "Axis", "DetentError", "InputError", "Run", "Timing", "__version__", "example", "examples", "identify_axis", "load",
+    "load_trace",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """The API loads when it is first used, so that `import detent` and `detent --help` stay quick."""
-    if name in ("Axis", "Run", "Timing", "load", "load_trace"):
-        from detent import axis
+    """Load a word of the API at its first use."""
+    place = next((place for place, names in _PLACES.items() if name in names), None)
+    if place is None:
+        raise AttributeError(f"module 'detent' has no attribute {name!r}; it has {', '.join(__all__)}")
+    globals()[name] = found = getattr(import_module(place), name)
+    return found
 
-        return getattr(axis, name)
-    if name == "identify_axis":
-        from detent.identify.identified import identify_axis
 
-        return identify_axis
-    raise AttributeError(f"module 'detent' has no attribute {name!r}; it has {', '.join(__all__)}")
+def __dir__() -> list[str]:
+    """Give the words of the API, for completion; the rooms inside are not for typing."""
+    return sorted([*__all__, "__doc__", "__file__", "__name__", "__path__"])
 
 
 def examples() -> list[Path]:

@@ -5,12 +5,13 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.tables import AxisSpec
 from detent.errors import DetentError
+from detent.files.screen import Block, OnScreen, Screen
 from detent.methods.check import CheckReport, check_spec
-from detent.methods.load import AxisFile, read_axis
+from detent.methods.load import AxisFile, axis_of_tables, read_axis
 from detent.methods.method import Job, Method, Result, Shown, Simulated
 from detent.methods.registry import METHODS, bringing
 from detent.page.frame import Comparison
@@ -23,11 +24,14 @@ from detent.record.trace import Trace
 from detent.record.trace_files import TraceWriter, load_trace, save_trace
 from detent.record.waveforms import Waveforms, save_vcd
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
 
 
-@dataclass(frozen=True)
-class Axis:
+@dataclass(frozen=True, repr=False)
+class Axis(OnScreen):
     """An axis as its file describes it: `file` is the specification with the origin of every value."""
 
     file: AxisFile
@@ -51,6 +55,38 @@ class Axis:
     def simulated(self) -> Simulated:
         """What the simulation takes of it: registers, base tick, usual signals."""
         return self.method.simulated(self.spec)
+
+    def screen(self) -> Screen:
+        """Its method, and what its file states."""
+        stated = [(key, self.file.texts[key], origin) for key, origin in self.file.origins.items()]
+        blocks = [Block("", ("key", "value", "origin"), stated, 28, ".check().rows has every value in effect")]
+        title = f"{self.name}, an axis of the method {self.method.title}\n{self.file.file}"
+        return Screen(title, blocks, ".check()  .run(job)  .replace({KEY: value})  .compare()  .timing(at, duration)")
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> "Axis":
+        """Make the same axis with other values.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            By dotted key, ``{"limits.speed": 0.5}``, or by table, ``{"limits": {"speed": "500 mm/s"}}``: a number of a
+            key with a dimension is in its SI unit, as in `spec`; text has a unit, as in a file; None takes a value
+            back to its default. Keys that are not named keep their values.
+        **tables
+            The same by the name of a table: ``limits={"speed": 0.5}``.
+
+        Returns
+        -------
+        Axis
+            A new one, checked as a whole; what follows from the values, such as a catalogue motor's constants, follows
+            from the new ones.
+
+        Raises
+        ------
+        InputError
+            Everything that is wrong with the new values.
+        """
+        return Axis(self.file.replaced({**(changes or {}), **tables}))
 
     def check(self) -> CheckReport:
         """Effective values, derived figures and warnings."""
@@ -224,18 +260,40 @@ class Axis:
         return Timing(waveforms)
 
 
-@dataclass(frozen=True)
-class Timing:
+@dataclass(frozen=True, repr=False)
+class Timing(OnScreen):
     """Clocked signals over a short stretch: `waveforms` has each as its changes over time."""
 
     waveforms: Waveforms
 
-    def plot(self, path: str | Path) -> Path:
-        """Draw the timing diagram into a PNG, SVG or PDF file."""
+    def screen(self) -> Screen:
+        """Its stretch, and each signal with the number of its changes."""
+        w = self.waveforms
+        rows = [(one.name, one.unit, f"{len(one.times) - 1} changes", one.doc) for one in w.signals]
+        title = f"Timing of {w.title}: {w.begin * 1e-12:.9g} s to {w.end * 1e-12:.9g} s"
+        return Screen(title, [Block("", (), rows, 28, ".waveforms.signals")], ".plot()  .save('timing.vcd')")
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Draw the timing diagram.
+
+        Parameters
+        ----------
+        path : path, optional
+            PNG, SVG or PDF file that it is written to as well.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Shown by a notebook; `savefig` writes it.
+
+        Raises
+        ------
+        DetentError
+            There are too many signals for a diagram, or the file cannot be written.
+        """
         from detent.page.timing import plot_timing
 
-        plot_timing(self.waveforms, path)
-        return Path(path)
+        return plot_timing(self.waveforms, path)
 
     def save(self, path: str | Path) -> Path:
         """Write a VCD file, which GTKWave and Surfer open."""
@@ -243,8 +301,8 @@ class Timing:
         return Path(path)
 
 
-@dataclass
-class Run:
+@dataclass(repr=False)
+class Run(OnScreen):
     """What an axis did with a job.
 
     Attributes
@@ -282,6 +340,12 @@ class Run:
         """Whether the job was done, in a sentence."""
         return self.axis.method.verdict(self.axis.name, self.result)
 
+    def screen(self) -> Screen:
+        """The verdict, the figures that a person wants first, and what was recorded."""
+        held = "nothing was recorded" if self.trace is None else self.trace.screen().title
+        told = "\n".join([self.verdict, *(f"warning: {one}" for one in self.result.warnings)])
+        return Screen(told, [Block("", (), self.summary(), 28)], f"{held}; .result  .trace  .plot()  .report(path)")
+
     def summary(self) -> list[tuple[str, str]]:
         """The figures a person wants first: name and text."""
         return self.axis.method.summary(self.axis.spec, self.result)
@@ -317,12 +381,36 @@ class Run:
         save_trace(self._trace(), path)
         return Path(path)
 
-    def plot(self, signals: Iterable[str], path: str | Path, t_range: tuple[float, float] | None = None) -> Path:
-        """Draw signals against time into a PNG, SVG or PDF file."""
+    def plot(
+        self,
+        signals: str | Iterable[str] = "*",
+        path: str | Path | None = None,
+        t_range: tuple[float, float] | None = None,
+    ) -> "Figure":
+        """Draw signals against time, one plot area per unit.
+
+        Parameters
+        ----------
+        signals : str or iterable of str
+            Names of recorded signals, or patterns such as ``"controller.*"``. Default: all that were recorded.
+        path : path, optional
+            PNG, SVG or PDF file that it is written to as well.
+        t_range : (float, float), optional
+            First and last moment, since power-on [s].
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Shown by a notebook; `savefig` writes it.
+
+        Raises
+        ------
+        DetentError
+            A signal is unknown, nothing was recorded, or the file cannot be written.
+        """
         from detent.page.plots import plot_signals
 
-        plot_signals(self._trace(), list(signals), path, t_range)
-        return Path(path)
+        return plot_signals(self._trace(), [signals] if isinstance(signals, str) else list(signals), path, t_range)
 
     def _trace(self) -> Trace:
         if self.trace is None:
@@ -330,15 +418,31 @@ class Run:
         return self.trace
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Axis:
-    """Load an axis file (TOML); `overrides`, ``"dotted.key=value"``, replace or add values and are checked like it.
+def load(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> Axis:
+    """Load an axis.
+
+    Parameters
+    ----------
+    source : path or mapping
+        Axis file (TOML), or what one says, as nested dictionaries; there a number of a key with a dimension is in its
+        SI unit, text has a unit as in a file.
+    overrides : sequence of str
+        ``"dotted.key=value"``: replace or add values, and are checked like them.
 
     Raises
     ------
     InputError
         Everything that is wrong with it, each with its line, what came, what is allowed and what to do.
+
+    Examples
+    --------
+    >>> import detent
+    >>> axis = detent.load(detent.example("cascade.toml"))
+    >>> softer = axis.replace({"method.position_gain": 30.0, "limits": {"speed": "300 mm/s"}})
+    >>> softer.spec.method.position_gain, softer.spec.limits.speed
+    (30.0, 0.3)
     """
-    return Axis(read_axis(path, overrides))
+    return Axis(axis_of_tables(source, overrides) if isinstance(source, Mapping) else read_axis(source, overrides))
 
 
 __all__ = ["Axis", "Run", "Timing", "load", "load_trace"]

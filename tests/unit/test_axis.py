@@ -1,3 +1,4 @@
+import ast
 import subprocess
 import sys
 import tomllib
@@ -30,8 +31,19 @@ def run() -> detent.Run:
 def test_the_words_of_the_package_are_those_it_promises() -> None:
     for name in detent.__all__:
         assert getattr(detent, name) is not None
-    with pytest.raises(AttributeError, match="no attribute 'Gripper'; it has Axis, Run, "):
+    with pytest.raises(AttributeError, match="no attribute 'Gripper'; it has Axis, DetentError, "):
         _ = detent.Gripper
+
+
+def test_completion_offers_the_words_of_the_package_before_any_is_used() -> None:
+    code = (
+        "import detent, sys; print(dir(detent)); assert 'detent.axis' not in sys.modules; detent.load; "
+        "print(dir(detent))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    before, after = map(ast.literal_eval, done.stdout.splitlines())
+    assert before == after
+    assert {name for name in before if not name.startswith("_")} == set(detent.__all__) - {"__version__"}
 
 
 def test_the_version_is_the_projects() -> None:
@@ -100,6 +112,63 @@ def test_a_file_with_errors_tells_all_of_them(tmp_path: Path) -> None:
     assert {problem.key for problem in caught.value.problems} == {
         "limits.travel", "mechanics.carriage_mas", "drive.supply",
     }  # fmt: skip
+
+
+def test_an_axis_with_other_values_is_the_one_that_a_file_would_give() -> None:
+    cascade = detent.example("cascade.toml")
+    axis = detent.load(cascade, ["limits.speed=400 mm/s"])
+    other = axis.replace({"limits.travel": 0.4, "method": {"position_gain": np.float64(30.0)}}, drive={"delay": 2})
+    written = ["limits.speed=400 mm/s", "limits.travel=400 mm", "method.position_gain=30", "drive.delay=2"]
+    assert other.spec == detent.load(cascade, written).spec
+    assert axis.spec == detent.load(cascade, ["limits.speed=400 mm/s"]).spec
+    origins = {row.key: row.origin for row in other.check().rows}
+    assert origins["limits.speed"] == "--set"
+    assert origins["limits.travel"] == "replace"
+    assert origins["limits.jerk"] == f"{cascade} line 16"
+    again = other.replace({"drive.delay": 1, "limits.jerk": None})
+    assert again.spec.method.position_gain == 30.0
+    assert again.spec.limits.jerk == detent.load(cascade).replace({"limits.jerk": None}).spec.limits.jerk != 200.0
+
+
+def test_what_follows_from_a_replaced_value_follows_from_the_new_one() -> None:
+    axis = detent.load(AXIS)
+    other = axis.replace(motor={"catalogue": "maxon A-max 26 110940"})
+    assert other.spec.motor.resistance != axis.spec.motor.resistance
+    assert other.check().to_dict()["derived"] != axis.check().to_dict()["derived"]
+
+
+def test_an_axis_needs_no_file() -> None:
+    tables = tomllib.loads(AXIS.read_text(encoding="utf-8"))
+    axis = detent.load(tables)
+    assert axis.spec == detent.load(AXIS).spec
+    tables["drive"]["supply"] = 38.0
+    assert detent.load(tables).spec == axis.spec
+    assert {row.origin.split()[0] for row in axis.check().rows} == {"dictionary", "default", "catalogue"}
+    assert axis.run(LETTER, every=0).to_dict()["file"] == "dictionary"
+    with pytest.raises(InputError) as caught:
+        detent.load({"axis": {"name": "a", "method": "cascade"}, "limits": {"speed": 1.0, "travell": 2.0}})
+    problems = {(problem.file, problem.line, problem.key) for problem in caught.value.problems}
+    assert {("dictionary", 0, "limits.travell"), ("dictionary", 0, "encoder")} <= problems
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"method.position_gian": 3.0}, r'^replace method\.position_gian: .* did you mean "position_gain"\?'),
+        ({"limits.speed": "3 V"}, r"^replace limits\.speed: came 3 V; allowed: a velocity"),
+        ({"limits.speed": -1.0}, r"^replace limits\.speed: came -1\.0 m/s; allowed: a velocity above 0"),
+        ({"limits.speed": float("nan")}, r"^replace limits\.speed: came nan m/s"),
+        ({"limits.speed": True}, r"^replace limits\.speed: came true"),
+        ({"limits.speed": {"top": 1.0}}, r"^replace limits\.speed: came a table"),
+        ({"limits": 3}, r"^replace limits: came 3; allowed: the table"),
+        ({"axis.method": "cascde"}, r'^replace axis\.method: .* did you mean "cascade"\?'),
+        ({"limits.travel": None}, r"limits\.travel: came nothing"),
+        ({"limits": 3, "limits.speed": 1.0}, r"^limits\.speed: came a value in limits, which is one itself"),
+    ],
+)
+def test_values_that_will_not_do_are_refused_as_those_of_a_file(changes: dict[str, Any], says: str) -> None:
+    with pytest.raises(DetentError, match=says):
+        detent.load(detent.example("cascade.toml")).replace(changes)
 
 
 def test_a_run_tells_what_happened(run: detent.Run) -> None:
@@ -225,10 +294,43 @@ def test_the_report_is_one_file_with_its_small_print(run: detent.Run, tmp_path: 
 
 
 def test_signals_are_drawn(run: detent.Run, tmp_path: Path) -> None:
-    path = run.plot(["plant.train.velocity", "controller.head.*"], tmp_path / "plot.svg", (7.0, 8.5))
-    text = path.read_text(encoding="utf-8")
+    run.plot(["plant.train.velocity", "controller.head.*"], tmp_path / "plot.svg", (7.0, 8.5))
+    text = (tmp_path / "plot.svg").read_text(encoding="utf-8")
     for word in ("plant.train.velocity", "controller.head.drive_cmd", "[count]", "time [s]", "print head · letter.txt"):
         assert word in text
+
+
+def test_a_figure_needs_no_file(run: detent.Run, tmp_path: Path) -> None:
+    figure: Any = run.plot(["plant.train.velocity", "plant.train.current"], t_range=(7.0, 8.5))
+    assert [area.get_ylabel().split("\n")[0] for area in figure.axes] == ["plant.train.velocity", "plant.train.current"]
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    figure.savefig(tmp_path / "own.svg", metadata={"Date": None})
+    text = (tmp_path / "own.svg").read_text(encoding="utf-8")
+    assert "plant.train.velocity" in text  # text stays text, as in a file that `plot` itself writes
+    assert len(run.plot(t_range=(7.0, 7.1)).axes) == len({run.trace.units[name] for name in run.trace.signals})
+
+
+def test_whatever_stands_at_a_prompt_takes_one_screen(run: detent.Run) -> None:
+    for name in ("print_head.toml", "cascade.toml", "stage.toml"):
+        axis = detent.load(detent.example(name))
+        for shown in (axis, axis.check(), axis.file):
+            assert_one_screen(shown)
+    for shown in (run, run.trace, run.result, run.result.job, run.axis.timing(7.6, 1e-3)):
+        assert_one_screen(shown)
+    assert repr(run).startswith("Printed letter.txt on print head.")
+    assert "worst 5.7 µm" in repr(run)
+    checked = detent.load(detent.example("cascade.toml"), ["method.position_gain=250"]).check()
+    assert all(str(one)[:60] in repr(checked) for one in checked.warnings)
+    assert len(checked.warnings) > 0
+
+
+def assert_one_screen(shown: Any) -> None:
+    lines = repr(shown).split("\n")
+    assert 2 <= len(lines) <= 36
+    assert max(map(len, lines)) <= 110
+    page = shown._repr_html_()
+    assert page.count("<table>") == page.count("</table>") > 0
+    assert page.count("<tr>") >= 3
 
 
 def test_progress_is_told() -> None:

@@ -117,32 +117,17 @@ def _write(
 
 def _print(done: "Identified", outside: list[str]) -> None:
     found = done.found
-    say(_verdict_line(done), COLOURS[done.verdict])
+    say(done.sentence, COLOURS[done.verdict])
     _print_refusals(done)
     for text in outside:
         say(f"  not as the axis file: {text}", "yellow")
     tell()
     _print_logs(found)
     if found.estimates:
-        _print_constants(done)
+        print_table(*done.table)
         _print_ladder(found)
     if found.horizons:
         _print_horizons(found)
-
-
-def _verdict_line(done: "Identified") -> str:
-    from detent.page.words import count
-
-    found = done.found
-    logs = " and ".join([log.name for log in found.logs[:2]]) if len(found.logs) < 3 else f"{len(found.logs)} logs"
-    number = len(found.estimates)
-    if done.verdict == "trusted":
-        return f"Trusted: {count(number, 'constant')} of {logs}."
-    if done.verdict == "refused":
-        return f"Refused: nothing in {logs} is trusted."
-    names = [one.name for one in found.estimates if one not in found.trusted]
-    are = "are" if len(names) > 1 else "is"
-    return f"Partly trusted: {number - len(names)} of {number} constants of {logs}; {', '.join(names)} {are} not."
 
 
 def _print_refusals(done: "Identified") -> None:
@@ -181,23 +166,6 @@ def _print_logs(found: Any) -> None:
     if found.notes:
         say(f"  {'; '.join(found.notes)}", "dim")
     tell()
-
-
-def _print_constants(done: "Identified") -> None:
-    from detent.identify.page.words import is_known, written
-
-    rows: list[tuple[str, ...]] = []
-    for one in done.found.estimates:
-        text = written(one)
-        known = is_known(one)
-        scale = 1e3 if one.unit == "s" else 1.0
-        limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
-        trust = "yes" if one in done.found.trusted else "no"
-        value = f"{text.value} ± {text.half}" if known else "not told by the data"
-        rows.append((one.name, value, limits, text.unit, trust))
-    by = done.found.estimates[0].method
-    title = f"Constants, by {by}" if done.trusted else f"What came out by {by}; nothing of it is trusted"
-    print_table(title, ("", "value", "95 % interval", "unit", "trusted"), rows)
 
 
 def _print_ladder(found: Any) -> None:

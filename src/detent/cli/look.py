@@ -46,7 +46,8 @@ def timing(
         progress(1.0, "drawing")
         # The VCD file first: it takes any number of signals, a picture does not.
         saved = found.save(vcd)
-        files = [found.plot(figure), saved]
+        found.plot(figure)
+        files = [figure, saved]
     if as_json:
         print_json({"signals": [s.name for s in found.waveforms.signals], "files": [str(path) for path in files]})
         return

@@ -1,12 +1,12 @@
-"""Values of ``--set``: which key they are for, what they mean, and what is wrong with them."""
+"""Values over those of a file, of ``--set`` or of a program: for which keys, what they mean, what is wrong."""
 
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, cast
 
 from pydantic.fields import FieldInfo
 
-from detent.errors import FileProblem
+from detent.errors import DetentError, FileProblem
 from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_fields, named_as, options_of, unit_of
 from detent.files.locate import Path
 from detent.files.problems import dotted
@@ -79,6 +79,93 @@ def _override_value(field: FieldInfo, text: str) -> object:
     # After a line break anything could follow.
     kinds: tuple[type, ...] = (list,) if is_list(field) else (bool, int, float)
     return value if len(tables) == 1 and type(value) in kinds else text
+
+
+# ---- values from a program
+
+
+def nested(changes: Mapping[Any, Any], before: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Tables of changes, over those made before; a key may be dotted, and None takes a value back.
+
+    >>> nested({"limits.speed": 0.5, "axis": {"name": "a"}}, {"limits": {"speed": 1.0, "travel": 2.0}})
+    {'limits': {'speed': 0.5, 'travel': 2.0}, 'axis': {'name': 'a'}}
+    """
+    made: dict[str, Any] = {
+        key: nested(one) if isinstance(one, Mapping) else one for key, one in (before or {}).items()
+    }
+    value: Any
+    for key, value in changes.items():
+        *around, last = str(key).split(".")
+        table = made
+        for part in around:
+            below = table.setdefault(part, {})
+            if not isinstance(below, dict):
+                raise DetentError(
+                    f"{key}: came a value in {part}, which is one itself; allowed: a value or a table; leave one out"
+                )
+            table = cast("dict[str, Any]", below)
+        held = table.get(last)
+        is_table = isinstance(value, Mapping)
+        table[last] = nested(cast("Mapping[Any, Any]", value), as_table(held)) if is_table else _plain(value)
+    return made
+
+
+def _plain(value: Any) -> Any:
+    """A value without the types of NumPy: an array as a list, a number as one of Python."""
+    plain = value.tolist() if hasattr(value, "tolist") else value
+    return [_plain(one) for one in cast("list[Any]", plain)] if isinstance(plain, list | tuple) else plain
+
+
+def apply_changes(tables: dict[str, Any], changes: Mapping[str, Any], model: type[Table]) -> dict[Path, str]:
+    """Put values of a program over those of a file: by path each as it would be written there.
+
+    A number of a dimensional key is in the SI unit of the key, as numbers of a program are.
+    """
+    units = {pattern: unit_of(field) for pattern, field in leaf_fields(model)}
+    texts: dict[Path, str] = {}
+    for path, value in _leaves(changes):
+        if value is None:
+            _take_out(tables, path)
+            continue
+        unit = next((unit for pattern, unit in units.items() if fits(pattern, path)), "")
+        written = _with_unit(value, unit)
+        table = tables
+        for key in path[:-1]:
+            if not isinstance(table.get(key), dict):
+                table[key] = {}  # where a value stood: validation says that it is one
+            table = table[key]
+        table[path[-1]] = written | as_table(table.get(path[-1])) if isinstance(written, dict) else written
+        texts[path] = _text(written)
+        # Of a table in place of a value, the value is what is wrong.
+        values = (path[:length] for length in range(1, len(path)) if any(fits(one, path[:length]) for one in units))
+        texts.update(dict.fromkeys(values, "a table"))
+    return texts
+
+
+def _leaves(tables: Mapping[str, Any], prefix: Path = ()) -> Iterator[tuple[Path, Any]]:
+    for key, value in tables.items():
+        if isinstance(value, dict) and value:
+            yield from _leaves(cast("dict[str, Any]", value), (*prefix, key))
+        else:
+            yield (*prefix, key), value
+
+
+def _with_unit(value: Any, unit: str) -> Any:
+    if isinstance(value, list):
+        return [_with_unit(one, unit) for one in cast("list[Any]", value)]
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{float(value)!r} {unit}" if is_number and unit else value
+
+
+def _text(value: Any) -> str:
+    """A value as messages show what was written."""
+    return value if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _take_out(tables: dict[str, Any], path: Path) -> None:
+    for key in path[:-1]:
+        tables = as_table(tables.get(key))
+    tables.pop(path[-1], None)
 
 
 def as_table(value: object) -> dict[str, Any]:

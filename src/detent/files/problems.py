@@ -1,7 +1,7 @@
 """What validation found, told to a person: from pydantic's errors to `FileProblem`."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
 from pydantic.fields import FieldInfo
@@ -36,16 +36,25 @@ MAX_ELEMENTS = 3  # wrong numbers of a list shown in a message
 class Reporter:
     """Makes problems of one file (and its overrides) with their places."""
 
-    def __init__(self, file: str, places: dict[Path, Place], overrides: dict[Path, str], root: type[Table]) -> None:
+    def __init__(
+        self,
+        file: str,
+        places: dict[Path, Place],
+        overrides: dict[Path, str],
+        root: type[Table],
+        changed: Mapping[Path, str] | None = None,
+    ) -> None:
         self._file = file
         self._places = places
         self._overrides = overrides
         self._root = root
+        self._changed = changed or {}  # of overrides by a program, what they are called
 
     def problem(self, path: Path, came: str, allowed: str, remedy: str) -> FileProblem:
         """Problem of a key, at its place."""
         if path in self._overrides:
-            return FileProblem("--set", 0, 0, dotted(path), came, allowed, remedy)
+            named = self._changed.get(path, "--set")
+            return FileProblem(named, 0, 0, dotted(path), came, allowed, remedy)
         place = find_place(self._places, path)
         return FileProblem(self._file, place.line, place.column, dotted(path), came, allowed, remedy)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
+from detent.files.screen import Block, OnScreen, Screen
 from detent.files.text import write_text
 from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
@@ -16,6 +17,7 @@ from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_jo
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
+from detent.page.table import TextTable
 
 if TYPE_CHECKING:
     from detent.record.machine import Progress
@@ -29,8 +31,8 @@ _STAGES = {
 """Shares of the whole at which the parts of an identification begin and end, and what is said meanwhile."""
 
 
-@dataclass(frozen=True)
-class Identified:
+@dataclass(frozen=True, repr=False)
+class Identified(OnScreen):
     """What was found in the logs of an axis.
 
     Attributes
@@ -54,6 +56,46 @@ class Identified:
     def verdict(self) -> Verdict:
         """Whether the constants can be trusted."""
         return self.found.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The same in a sentence, with the logs that it is about."""
+        from detent.page.words import count
+
+        found = self.found
+        logs = " and ".join([log.name for log in found.logs[:2]]) if len(found.logs) < 3 else f"{len(found.logs)} logs"
+        number = len(found.estimates)
+        if self.verdict == "trusted":
+            return f"Trusted: {count(number, 'constant')} of {logs}."
+        if self.verdict == "refused":
+            return f"Refused: nothing in {logs} is trusted."
+        names = [one.name for one in found.estimates if one not in found.trusted]
+        are = "are" if len(names) > 1 else "is"
+        return f"Partly trusted: {number - len(names)} of {number} constants of {logs}; {', '.join(names)} {are} not."
+
+    @property
+    def table(self) -> TextTable:
+        """Every constant with its limits, and whether it is trusted; no row where nothing could be fitted."""
+        from detent.identify.page.words import is_known, written
+
+        rows: list[tuple[str, ...]] = []
+        for one in self.found.estimates:
+            text = written(one)
+            known = is_known(one)
+            scale = 1e3 if one.unit == "s" else 1.0
+            limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
+            trust = "yes" if one in self.found.trusted else "no"
+            value = f"{text.value} ± {text.half}" if known else "not told by the data"
+            rows.append((one.name, value, limits, text.unit, trust))
+        by = self.found.estimates[0].method if rows else ""
+        title = f"Constants, by {by}" if self.trusted else f"What came out by {by}; nothing of it is trusted"
+        return TextTable(title, ("", "value", "95 % interval", "unit", "trusted"), rows)
+
+    def screen(self) -> Screen:
+        """The verdict, what is refused and what to do about it, and the constants."""
+        refused = [(f"{one.subject}: {one.text}", one.record) for one in self.refusals]
+        blocks = [Block(*self.table), Block("Not trusted", ("why", "what to do"), refused, 8, ".refusals")]
+        return Screen(self.sentence, blocks, ".constants  .refusals  .save('axis.toml')  .report('report.html')")
 
     @property
     def constants(self) -> dict[str, Estimate]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import InputError
+from detent.files.screen import OnScreen
 from detent.logs.headings import EFFORTS
 
 Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
@@ -96,8 +97,8 @@ class Source:
     offset: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Log:
+@dataclass(frozen=True, eq=False, repr=False)
+class Log(OnScreen):
     """A recorded run."""
 
     name: str  # name of the file

@@ -10,6 +10,7 @@ from typing import Any
 from detent.files.fields import held_leaves
 from detent.files.findings import Caution, Derived
 from detent.files.problems import dotted, format_value
+from detent.files.screen import Block, OnScreen, Screen
 from detent.methods.load import AxisFile
 from detent.methods.registry import METHODS
 
@@ -25,8 +26,8 @@ class EffectiveRow:
     doc: str  # meaning of the key
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
-class CheckReport:
+@dataclasses.dataclass(frozen=True, slots=True, repr=False)
+class CheckReport(OnScreen):
     """Everything `detent check` has to show."""
 
     file: str  #: the file as the user named it
@@ -35,6 +36,19 @@ class CheckReport:
     rows: tuple[EffectiveRow, ...]  #: every value in effect, in the order of the schema
     derived: tuple[Derived, ...]  #: what follows from them
     warnings: tuple[Caution, ...]  #: what looks wrong; empty for a sound axis
+
+    def screen(self) -> Screen:
+        """Warnings, what follows from the values, and, in a notebook, the values."""
+        number = len(self.warnings)
+        told = f"{number} warning{'s' if number > 1 else ''}" if number else "no warnings"
+        title = "\n".join([f"{self.name} ({self.method}): {told}", self.file, *map(str, self.warnings)])
+        figures = [(figure.name, figure.text, figure.formula) for figure in self.derived]
+        values = [(row.key, row.value, row.origin) for row in self.rows]
+        blocks = [
+            Block("What follows from its values", ("figure", "value", "from"), figures, 24, ".derived has all"),
+            Block("Every value in effect", ("key", "value", "origin"), values, 0),
+        ]
+        return Screen(title, blocks, f"{len(values)} values in effect: .rows")
 
     def to_dict(self) -> dict[str, Any]:
         """Give the report as plain data for ``--json``."""

@@ -2,7 +2,7 @@
 
 import copy
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -14,29 +14,39 @@ from detent.axisfile.tables import AxisSpec
 from detent.errors import FileProblem, InputError
 from detent.files.fields import Table, example_of, held_leaves, is_named, leaf_fields, table_of, unit_of
 from detent.files.findings import Contradiction
-from detent.files.locate import Path
-from detent.files.overrides import apply_overrides, as_table, filled, put_value
+from detent.files.locate import Path, Place
+from detent.files.overrides import apply_changes, apply_overrides, as_table, filled, nested, put_value
 from detent.files.problems import Reporter, bad_names, dotted, field_at, key_path
 from detent.files.read import told_errors
+from detent.files.screen import OnScreen
 from detent.files.source import Source, read_source
 from detent.files.text import did_you_mean
 from detent.methods.method import Method
 from detent.methods.registry import METHODS
 from detent.units import QuantityError, parse_quantity
 
+DICTIONARY = "dictionary"  # where an axis that has no file comes from
 METHOD_KEY: Path = ("axis", "method")
 MOTION_KEY: Path = ("axis", "motion")
 
 
-@dataclass(frozen=True, slots=True)
-class AxisFile:
+@dataclass(frozen=True, slots=True, repr=False)
+class AxisFile(OnScreen):
     """A specification and where each of its values came from."""
 
     file: str  # the file as the user named it
     spec: AxisSpec  # the specification of its method, in SI units
-    # by dotted key: "line 12", "--set" or "catalogue NAME"; keys left to their default are absent
+    # by dotted key: "line 12", "--set", "replace" or "catalogue NAME"; keys left to their default are absent
     origins: dict[str, str]
     texts: dict[str, str]  # by dotted key: the value as written, where it was written
+    # what it was made of, from which `replaced` makes another: text, values of ``--set``, values of a program
+    source: Source
+    overrides: tuple[str, ...] = ()
+    changes: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    def replaced(self, changes: Mapping[str, Any]) -> "AxisFile":
+        """The same with other values, checked as a whole."""
+        return axis_of(self.source, self.overrides, nested(changes, self.changes))
 
 
 @dataclass(slots=True)
@@ -45,6 +55,7 @@ class _Layers:
 
     tables: dict[str, Any]
     overrides: dict[Path, str] = field(default_factory=dict[Path, str])
+    changed: dict[Path, str] = field(default_factory=dict[Path, str])  # of overrides by a program, what they are called
     catalogue: dict[Path, str] = field(default_factory=dict[Path, str])
     problems: list[FileProblem] = field(default_factory=list[FileProblem])
     doubtful: set[Path] = field(default_factory=set[Path])
@@ -60,28 +71,36 @@ def read_axis(path: FilePath | str, overrides: Sequence[str] = ()) -> AxisFile:
     return axis_of(read_source(path), overrides)
 
 
-def axis_of(source: Source, overrides: Sequence[str] = ()) -> AxisFile:
-    """Check a source that has been read; parameters and errors as `load_spec`."""
+def axis_of_tables(tables: Mapping[str, Any], overrides: Sequence[str] = ()) -> AxisFile:
+    """Check what a file would say, given as nested dictionaries."""
+    return axis_of(Source(DICTIONARY, {}, {(): Place(0, 0, "")}), overrides, nested(tables))
+
+
+def axis_of(source: Source, overrides: Sequence[str] = (), changes: dict[str, Any] | None = None) -> AxisFile:
+    """Check a source that has been read, with values of a program over it; parameters and errors as `load_spec`."""
     if not source.is_readable:
         raise InputError(source.problems)
-    method = _method_of(source, overrides)
+    changes = changes or {}
+    method = _method_of(source, overrides, changes)
     model = method.spec
     tables = copy.deepcopy(source.tables)
     texts, problems = apply_overrides(tables, overrides, model)
-    layers = _Layers(tables, texts, problems=problems)
-    reporter = Reporter(source.file, source.places, layers.overrides, model)
+    written = apply_changes(tables, changes, model)
+    named = dict.fromkeys(written, DICTIONARY if source.file == DICTIONARY else "replace")
+    layers = _Layers(tables, texts | written, named, problems=problems)
+    reporter = Reporter(source.file, source.places, layers.overrides, model, named)
     _apply_catalogue(layers, reporter, method)
     layers.problems += [reporter.wrong_name(path, field) for path, field in bad_names(model, layers.tables)]
     spec = _validated(layers, reporter, method, is_whole=source.is_whole)
     problems = [*source.problems, *layers.problems]
     if problems:
         raise InputError(problems)
-    return AxisFile(source.file, spec, *_origins(source, layers, spec))
+    return AxisFile(source.file, spec, *_origins(source, layers, spec), source, tuple(overrides), changes)
 
 
-def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
+def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]) -> Method[Any]:
     """Method the file names, for its motion; without one nothing else can be said: each has its own keys."""
-    name, stated = _stated(source, overrides, METHOD_KEY)
+    name, stated = _stated(source, overrides, changes, METHOD_KEY)
     if name is None and not source.is_whole:  # it may stand in a line that was left out
         raise InputError(source.problems)
     if name is None:
@@ -94,20 +113,23 @@ def _method_of(source: Source, overrides: Sequence[str]) -> Method[Any]:
         raise InputError([reporter.problem(METHOD_KEY, "nothing", _all_methods(), remedy)])
     if isinstance(name, str) and name in METHODS:
         method = METHODS[name]
-        turns = method.rotary is not None and _stated(source, overrides, MOTION_KEY)[0] == "rotary"
+        turns = method.rotary is not None and _stated(source, overrides, changes, MOTION_KEY)[0] == "rotary"
         return method.turned() if turns else method
     remedy = did_you_mean(str(name).replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
-    reporter = Reporter(source.file, source.places, overridden, Table)
+    reporter = Reporter(source.file, source.places, overridden, Table, {METHOD_KEY: stated})
     problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
 
 
-def _stated(source: Source, overrides: Sequence[str], path: Path) -> tuple[object, bool]:
-    """Value of a key that decides how the others are read, and whether an override gives it."""
+def _stated(source: Source, overrides: Sequence[str], changes: dict[str, Any], path: Path) -> tuple[object, str]:
+    """Value of a key that decides how the others are read, and what overrides the file with it; empty where it does."""
+    changed = _value_at(changes, path)
+    if changed is not None:
+        return changed, DICTIONARY if source.file == DICTIONARY else "replace"
     parts = [text.partition("=") for text in overrides]
     values = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == dotted(path)]
-    return (values[-1], True) if values else (_value_at(source.tables, path), False)
+    return (values[-1], "--set") if values else (_value_at(source.tables, path), "")
 
 
 def _all_methods() -> str:
@@ -260,7 +282,7 @@ def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, st
     for path, _, _ in held_leaves(spec):
         key = dotted(path)
         if path in layers.overrides:
-            origins[key], texts[key] = "--set", layers.overrides[path]
+            origins[key], texts[key] = layers.changed.get(path, "--set"), layers.overrides[path]
         elif path in source.places:
             origins[key], texts[key] = f"line {source.places[path].line}", source.places[path].text.strip("\"'")
         elif path in layers.catalogue:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from detent.files.screen import Block, OnScreen, Screen
 from detent.page.chart import Chart
 from detent.page.figure import Figure
 from detent.page.parts import Note
@@ -107,8 +108,20 @@ class Comparison(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class TableComparison:
+class ComparisonOnScreen(OnScreen):
+    """A comparison that shows itself as its table."""
+
+    __slots__ = ()
+
+    table: TextTable
+
+    def screen(self) -> Screen:
+        """The table."""
+        return Screen(self.table.title, [Block("", self.table.heads, self.table.rows)])
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class TableComparison(ComparisonOnScreen):
     """A comparison that is a table and no more."""
 
     table: TextTable

@@ -4,11 +4,13 @@ matplotlib is loaded when a figure is drawn, never when this module is imported,
 """
 
 import importlib
+import io
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -49,17 +51,17 @@ STYLE: dict[str, Any] = {
 
 
 def plot_signals(
-    trace: Trace, signals: Sequence[str], path: str | Path, t_range: tuple[float, float] | None = None
-) -> None:
-    """Draw signals over time, one plot area per unit, above one another."""
-    path = check_target(path)
+    trace: Trace, signals: Sequence[str], path: str | Path | None = None, t_range: tuple[float, float] | None = None
+) -> Figure:
+    """Draw signals over time, one plot area per unit, above one another; into a file too where one is named."""
+    path = None if path is None else check_target(path)
     names = trace.match(signals)
     if not names:
-        raise DetentError(f"{path}: no signal was asked for; name one of: {', '.join(trace.signals)}")
+        raise DetentError(f"{path or 'plot'}: no signal was asked for; name one of: {', '.join(trace.signals)}")
     if t_range:
         trace = trace.between(*t_range)
     if not len(trace):
-        raise DetentError(f"{path}: the trace holds no rows, so there is nothing to draw")
+        raise DetentError(f"{path or 'plot'}: the trace holds no rows, so there is nothing to draw")
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(trace.units.get(name, ""), []).append(name)
@@ -74,6 +76,7 @@ def plot_signals(
         if title:
             figure.suptitle(shown(title), x=0.01, ha="left", fontsize=11, fontweight="bold")
         figure.align_ylabels(axes)
+    return figure
 
 
 def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale: float) -> None:
@@ -97,17 +100,40 @@ def _draw_group(area: Axes, trace: Trace, names: Sequence[str], unit: str, scale
         area.set_yticks([0, 1], ["off", "on"])
 
 
+@cache
+def _kind() -> Any:
+    """Class of the figures: matplotlib's, which keeps its look when it is written and shows itself in a notebook."""
+    from matplotlib.figure import Figure as Plain
+
+    mpl: Any = importlib.import_module("matplotlib")
+
+    base = cast("Any", Plain)  # its stubs leave **kwargs untyped
+
+    class StyledFigure(base):
+        def savefig(self, fname: Any, **options: Any) -> None:
+            # matplotlib looks some settings up only when it writes.
+            with mpl.rc_context(STYLE):
+                super().savefig(fname, **options)
+
+        def _repr_png_(self) -> bytes:
+            picture = io.BytesIO()
+            self.savefig(picture, format="png", dpi=100)
+            return picture.getvalue()
+
+    return StyledFigure
+
+
 @contextmanager
-def new_figure(path: Path, width: float, height: float) -> Generator[Figure]:
+def new_figure(path: Path | None, width: float, height: float) -> Generator[Figure]:
     """Give an empty figure [in] and write it at the end, without pyplot: no window, no global state."""
     mpl: Any = importlib.import_module("matplotlib")
-    figures: Any = importlib.import_module("matplotlib.figure")
-    # Around drawing and saving: matplotlib looks some settings up only when it writes.
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         # A letter that the font has not is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        figure = figures.Figure(figsize=(width, height), layout="constrained")
+        figure = _kind()(figsize=(width, height), layout="constrained")
         yield figure
+        if path is None:
+            return
         # The same figure gives the same file: no date inside, and places free of the last bits, in which the solver of
         # the layout goes by where its variables lie in memory.
         figure.get_layout_engine().execute(figure)

@@ -17,7 +17,7 @@ import numpy as np
 from detent.errors import DetentError
 from detent.files.text import check_target, shown
 from detent.page.chart import thin_indices
-from detent.page.plots import COLOURS, Axes, new_figure
+from detent.page.plots import COLOURS, Axes, Figure, new_figure
 from detent.record.waveforms import Waveform, Waveforms
 
 MAX_SIGNALS = 40  # more rows than these do not fit a page that can be read
@@ -67,14 +67,16 @@ class _Scale:
 _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 
 
-def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple[int, str]] = ()) -> None:
+def plot_timing(
+    waveforms: Waveforms, path: str | Path | None = None, *, marks: Sequence[tuple[int, str]] = ()
+) -> Figure:
     """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
-    path = check_target(path)
+    path = None if path is None else check_target(path)
     count = len(waveforms.signals)
     if not 1 <= count <= MAX_SIGNALS:
         raise DetentError(
-            f"{path}: came {count or 'no'} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be read; name "
-            "those that matter, or look at all of them in a VCD file"
+            f"{path or 'plot'}: came {count or 'no'} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be "
+            "read; name those that matter, or look at all of them in a VCD file"
         )
     # The unit that gives the axis of time numbers from 2 to 2000.
     unit_ps, unit = _unit_of((waveforms.end - waveforms.begin) / 2)
@@ -104,6 +106,7 @@ def plot_timing(waveforms: Waveforms, path: str | Path, *, marks: Sequence[tuple
         for row in rows:
             if not row.signal.is_float and row.signal.bits > 1:
                 _write_values(area, row, _segments(row.signal, scale), per_inch)
+    return figure
 
 
 def _unit_of(time: float) -> tuple[int, str]:

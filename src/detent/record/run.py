@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from detent.control.guard import forget_conduct
+from detent.files.screen import OnScreen
 from detent.units import format_quantity
 
 Level = Literal["good", "warn", "bad"]  # of a verdict: green, amber, red
@@ -19,8 +20,8 @@ EDGE = 0.9  # share of the window from which an error at rest is at its edge
 JobT = TypeVar("JobT")
 
 
-@dataclass
-class RunRecord(Generic[JobT]):
+@dataclass(repr=False)
+class RunRecord(OnScreen, Generic[JobT]):
     """Outcome of a job; each method adds what its runs have beside. Times since power-on [s]."""
 
     job: JobT  # what was asked; it has a name and a kind

@@ -3,6 +3,7 @@
 Columns are called by the dotted path of the register they came from (``motor.current``). The first is always ``t`` [s].
 """
 
+import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError
+from detent.files.screen import Block, OnScreen, Screen
 from detent.files.text import nearest
 
 Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats or booleans
@@ -26,8 +28,8 @@ def broke_off(attributes: Mapping[str, Any]) -> bool:
     return not attributes.get("complete", 1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trace:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Trace(OnScreen):
     """What a run recorded: columns of equal length over time, with units.
 
     A `DetentError` tells why columns do not make a trace: no ``t`` in front, unequal lengths, values not numbers.
@@ -55,6 +57,18 @@ class Trace:
             for name in mapping:
                 if name not in self.columns:
                     raise DetentError(f"trace: a {kind} is given for {name!r}, which is not one of its columns")
+
+    def screen(self) -> Screen:
+        """How long it is, and each column with its unit and its range."""
+        whose = ", ".join(str(self.attributes[key]) for key in ("axis", "job") if key in self.attributes)
+        title = f"Trace{f' of {whose}' if whose else ''}: {len(self)} rows"
+        if len(self):
+            title += f", {self.time[0]:.6g} s to {self.time[-1]:.6g} s"
+        rows = [(name, self.units.get(name, ""), *_range(self.columns[name]), self.docs.get(name, "")) for name in self]
+        heads = ("column", "unit", "least", "largest", "what it is")
+        return Screen(
+            title, [Block("", heads, rows, 24, ".signals names all")], 'trace["NAME"]  .to_pandas()  .to_xarray()'
+        )
 
     def __len__(self) -> int:
         return len(self.columns[TIME])
@@ -98,6 +112,50 @@ class Trace:
             raise DetentError(f"trace: no rows from {start:g} s to {stop:g} s; it holds {held}; choose a time in there")
         return replace(self, columns={name: values[first:last] for name, values in self.columns.items()})
 
+    def to_pandas(self) -> Any:
+        """Give the columns as a table of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column per signal, shape (n,), over the time ``t`` [s] as its index; `attrs` holds ``units``, ``docs`` and
+            the attributes of the trace.
+
+        Raises
+        ------
+        DetentError
+            pandas is not installed.
+        """
+        pandas = _extra("pandas")
+        index = pandas.Index(self.time, name=TIME)
+        table = pandas.DataFrame({name: self.columns[name] for name in self.signals}, index=index)
+        table.attrs = {"units": dict(self.units), "docs": dict(self.docs), **self.attributes}
+        return table
+
+    def to_xarray(self) -> Any:
+        """Give the columns as a data set of xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable per signal, shape (n,), over the dimension ``t`` [s]; each has its unit as ``units`` and what it
+            is as ``long_name``, from which xarray labels its plots.
+
+        Raises
+        ------
+        DetentError
+            xarray is not installed.
+        """
+        xarray = _extra("xarray")
+        described = {
+            name: (TIME, values, {"units": self.units.get(name, ""), "long_name": self.docs.get(name, name)})
+            for name, values in self.columns.items()
+        }
+        time = {TIME: (TIME, self.time, {"units": "s", "long_name": "time"})}
+        return xarray.Dataset(
+            {name: described[name] for name in self.signals}, coords=time, attrs=dict(self.attributes)
+        )
+
     def match(self, patterns: Sequence[str]) -> tuple[str, ...]:
         """Find the columns that a person means by names, or by patterns with ``*`` such as ``motor.*``.
 
@@ -110,6 +168,24 @@ class Trace:
                 raise unknown_column(pattern, list(self.signals))
             found.update(dict.fromkeys(names))
         return tuple(found)
+
+
+def _range(values: Column) -> tuple[str, str]:
+    """Least and largest value as text; NaN counts for nothing."""
+    if not len(values) or (values.dtype.kind == "f" and np.isnan(values).all()):
+        return "", ""
+    return f"{float(np.nanmin(values)):.5g}", f"{float(np.nanmax(values)):.5g}"
+
+
+def _extra(name: str) -> Any:
+    """A module that an extra of the same name installs."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise DetentError(
+            f'this needs {name}, which is not installed; do: pip install "detent[{name}]", or take the columns as they '
+            'are: trace["NAME"]'
+        ) from error
 
 
 def unknown_column(name: str, known: Sequence[str]) -> DetentError:

@@ -30,6 +30,7 @@ from vcd.common import Timescale, TimescaleUnit, VarType
 from vcd.writer import VCDWriter
 
 from detent.errors import DetentError
+from detent.files.screen import OnScreen
 from detent.files.text import writing
 from detent.kernel.registers import Leaf
 
@@ -59,8 +60,8 @@ class Phase:
             raise DetentError(f"phase: changes_at {self.changes_at!r} and pulse {self.pulse!r} are given; give one")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Waveform:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Waveform(OnScreen):
     """One signal over time: each value holds from its moment to the next.
 
     Parameters
@@ -98,8 +99,8 @@ class Waveform:
         return self.name.rpartition(".")[0]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Waveforms:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Waveforms(OnScreen):
     """Signals over one stretch of time.
 
     Parameters

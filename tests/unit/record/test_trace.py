@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 
@@ -97,3 +99,30 @@ def test_a_unit_or_description_of_no_column_is_refused(kind: str, word: str) -> 
 
 def test_rows_at_one_moment_are_allowed() -> None:
     assert len(Trace(columns={"t": np.array([0.0, 0.0, 1.0])})) == 3
+
+
+def test_pandas_gets_the_columns_over_time_with_units() -> None:
+    trace = make_trace()
+    table = trace.to_pandas()
+    assert table.index.name == "t"
+    assert table.index.tolist() == trace.time.tolist()
+    assert list(table.columns) == list(trace.signals)
+    assert table["head.drive_cmd"].dtype == np.int16
+    assert table.attrs == {"units": trace.units, "docs": trace.docs, "axis": "demo"}
+
+
+def test_xarray_gets_variables_with_units() -> None:
+    trace = make_trace()
+    found = trace.to_xarray()
+    assert found.sizes == {"t": 4}
+    assert found["motor.current"].values.tolist() == trace["motor.current"].tolist()
+    assert found["motor.current"].attrs == {"units": "A", "long_name": "winding current"}
+    assert found["t"].attrs["units"] == "s"
+    assert found.attrs == {"axis": "demo"}
+
+
+@pytest.mark.parametrize("name", ["pandas", "xarray"])
+def test_what_is_not_installed_is_said_with_what_installs_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(DetentError, match=rf'needs {name}, which is not installed; do: pip install "detent\[{name}\]"'):
+        getattr(make_trace(), f"to_{name}")()

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from detent.errors import InputError
+from detent.files.screen import OnScreen
 from detent.identify.fit import untold
 from detent.identify.fit.constants import Constants, constants_of
 from detent.identify.fit.equations import LOSS, Run, make_kernel, make_run
@@ -39,8 +40,8 @@ _WAYS: dict[Instruments, str] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(OnScreen):
     """Constants of an axis, their limits, and what of them can be trusted.
 
     Attributes

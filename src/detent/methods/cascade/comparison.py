@@ -18,6 +18,7 @@ from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
 from detent.methods.cascade.units import Units, milliseconds
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, number
 from detent.planning.profile import MotionLimits, Numbers, plan_move
@@ -56,8 +57,8 @@ class ProfileCase:
         return f"{self.shape}, {self.feed}"
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ProfileComparison:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class ProfileComparison(ComparisonOnScreen):
     """Result of `compare_profiles`."""
 
     way: float  #: of the move [m] or [rad]

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from detent.errors import DetentError
+from detent.files.screen import OnScreen
 from detent.logs.headings import EFFORTS
 from detent.logs.log import Log
 from detent.methods.cascade.host import CascadeHost, Rows
@@ -36,8 +37,8 @@ START_SPAN, START_SAMPLES = 0.012, 8  # time from which the velocity at the begi
 STILL = 5  # samples on both sides through which a recorded reference that stands does not change
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ReplayJob:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class ReplayJob(OnScreen):
     """A recording, as far as an axis can replay it; arrays of shape (n,), n >= 3, all finite.
 
     One with neither a reference nor an effort, or with arrays that do not fit together, is a `DetentError`.
@@ -138,7 +139,7 @@ class Compared:
         return float(np.linalg.norm(self.difference)) / norm if norm else math.nan
 
 
-@dataclass
+@dataclass(repr=False)
 class ReplayRun(RunRecord[ReplayJob]):
     """A recording beside its simulation. Times [s] count from the recording's first sample.
 

@@ -68,7 +68,7 @@ class CascadeMove:
         return max(self.settled - self.begin, 0.0) if self.in_position else math.nan
 
 
-@dataclass
+@dataclass(repr=False)
 class CascadeRun(RunRecord[MoveJob]):
     """Outcome of a list of moves on a cascade axis. Times [s], lengths [m] or angles [rad].
 

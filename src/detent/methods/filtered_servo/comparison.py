@@ -24,6 +24,7 @@ from detent.methods.filtered_servo.system import TICK, FilteredServo
 from detent.methods.method import untold
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, number
 from detent.record.machine import Progress
@@ -72,8 +73,8 @@ class FeedbackCase:
     speed_word: Numbers  #: y [count]; shape (n,)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FeedbackComparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class FeedbackComparison(ComparisonOnScreen):
     """Result of `compare_feedback`."""
 
     cases: tuple[FeedbackCase, ...]  #: conventional, with filter, long window, small multiplier

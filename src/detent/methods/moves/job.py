@@ -16,6 +16,7 @@ from detent.files.fields import Table, optional, rows
 from detent.files.quantities import Angle, AngularVelocity, Length, Time, Velocity
 from detent.files.read import Row, check_values, read_tables
 from detent.files.read_csv import CsvRows
+from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import decode_utf8, read_data
 
@@ -97,8 +98,8 @@ class Move:
         check_values(MoveRow, f"move {self.number}", {name: getattr(self, name) for name in names})
 
 
-@dataclass(frozen=True, slots=True)
-class MoveJob:
+@dataclass(frozen=True, slots=True, repr=False)
+class MoveJob(OnScreen):
     """A list of moves."""
 
     name: str  #: name of the file, without its folders

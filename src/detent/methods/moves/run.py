@@ -163,7 +163,7 @@ class MoveRecord:
         return not math.isnan(self.ready) and abs(self.error) <= tolerance
 
 
-@dataclass
+@dataclass(repr=False)
 class MoveRun(RunRecord[MoveJob]):
     """Outcome of a list of moves. Times [s], lengths [m], current [A], energy [J].
 

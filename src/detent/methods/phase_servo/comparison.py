@@ -22,6 +22,7 @@ from detent.methods.phase_servo.schema import PhaseServoSpec
 from detent.methods.phase_servo.system import PhaseServo
 from detent.page.chart import Chart, Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.parts import Event
 from detent.page.run_page import happened
 from detent.page.table import TextTable
@@ -63,8 +64,8 @@ Whole = NDArray[np.int64]
 # ---- noise on the pulse lines
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoiseComparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class NoiseComparison(ComparisonOnScreen):
     """Result of `compare_noise`."""
 
     pulses: tuple[int, ...]  #: numbers of spurious pulses in one move, rising
@@ -242,8 +243,8 @@ class HoldCase:
         return found | {"integral": [int(integral.min()), int(integral.max())]}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HoldComparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class HoldComparison(ComparisonOnScreen):
     """Result of `compare_hold`."""
 
     #: without a push; settling for ever, as the file has it, and with the integrator but no dead band

@@ -23,6 +23,7 @@ from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_p
 from detent.methods.print_head.system import TICK, PrintHead, switch_on
 from detent.page.chart import Curve, Panel, Timeline, line_chart, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.table import TextTable
 from detent.record.machine import Machine, Progress
 from detent.record.recorder import Recorder
@@ -67,8 +68,8 @@ class DriveStart:
         return float(self.t[after]) if after < len(self.t) else inf
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DriveComparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DriveComparison(ComparisonOnScreen):
     """Result of `compare_drives`.
 
     Attributes

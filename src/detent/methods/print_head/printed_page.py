@@ -13,6 +13,8 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+from detent.files.screen import OnScreen
+
 WHEEL_PITCH = 12  # columns of a glyph on a ten-pitch wheel: its ink where the spacing says nothing about the glyph
 NARROWEST_PITCH = 6  # columns of the narrowest pitch, twenty characters per inch
 LINE = 16  # height of a line at six lines per inch [1/96 in]
@@ -109,8 +111,8 @@ class ByteAccount:
     noted: int = 0  # bytes covered by a `JobNote`
 
 
-@dataclass(frozen=True, slots=True)
-class PrintJob:
+@dataclass(frozen=True, slots=True, repr=False)
+class PrintJob(OnScreen):
     """A print job read whole."""
 
     name: str  # name of the file, for messages and reports

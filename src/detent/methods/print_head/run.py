@@ -108,7 +108,7 @@ class Strike:
     offset: float
 
 
-@dataclass
+@dataclass(repr=False)
 class PrintRun(RunRecord[PrintJob]):
     """Outcome of a print job. Times [s], lengths [m], current [A], energy [J].
 

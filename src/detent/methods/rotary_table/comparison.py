@@ -20,6 +20,7 @@ from detent.methods.rotary_table.schema import DisturbanceTable, PositionTable, 
 from detent.methods.rotary_table.system import TICK, RotaryTable
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.parts import Event, Numbers
 from detent.page.table import Cell, Table, TextTable, offset_cell
 from detent.page.words import GAP, angle, degrees, number
@@ -89,8 +90,8 @@ class Start:
     thrown_back: bool  # the table has lost half a turn or more
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AngleComparison:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AngleComparison(ComparisonOnScreen):
     """Result of `compare_angle`."""
 
     speed: float  #: of the crossings and of the starts [rad/s]

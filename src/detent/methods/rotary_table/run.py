@@ -54,7 +54,7 @@ class StepRecord:
     rollovers: int  #: of the positioner
 
 
-@dataclass
+@dataclass(repr=False)
 class SequenceRun(RunRecord[SequenceJob]):
     """Outcome of a sequence. Times since power-on [s], angles of the table [rad].
 

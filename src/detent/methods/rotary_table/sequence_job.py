@@ -18,6 +18,7 @@ from detent.errors import FileProblem
 from detent.files.fields import optional, required
 from detent.files.quantities import AngularVelocity, Time
 from detent.files.read import Row, check_values
+from detent.files.screen import OnScreen
 
 MOST_STEPS = 100_000  # steps of a job at most, repeats counted
 LONGEST_TIME = 1e5  # longest wait, longest jog and latest input of a job [s]: more than a day
@@ -205,8 +206,8 @@ Action = Go | Jog | Wait | Output  # a step of a job whose loops are written out
 Stretches = tuple[tuple[float, float], ...]  # times [s] in which a signal is on: from, to; in order, apart
 
 
-@dataclass(frozen=True, slots=True)
-class SequenceJob:
+@dataclass(frozen=True, slots=True, repr=False)
+class SequenceJob(OnScreen):
     """A program of the sequence controller; `sequence_file.find_faults` tells whether it can be run at all."""
 
     name: str  #: name of the file, without its folders

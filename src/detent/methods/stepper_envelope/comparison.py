@@ -20,6 +20,7 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.summary import MM, stated, time_text
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
+from detent.page.frame import ComparisonOnScreen
 from detent.page.parts import Numbers
 from detent.page.table import Cell, Table, TextTable
 from detent.page.words import GAP, count, number
@@ -55,8 +56,8 @@ class Course:
     peak_lag: float  # largest distance of the rotor from its field [full step]
 
 
-@dataclass(frozen=True, slots=True)
-class StepComparison:
+@dataclass(frozen=True, slots=True, repr=False)
+class StepComparison(ComparisonOnScreen):
     """One motor with each method over several ways, upwards from its lower end.
 
     Attributes
@@ -187,8 +188,8 @@ class Profile:
         return np.where(np.arange(len(t)) < after, np.interp(t, self.t, self.speed), np.nan)
 
 
-@dataclass(frozen=True, slots=True)
-class JerkComparison:
+@dataclass(frozen=True, slots=True, repr=False)
+class JerkComparison(ComparisonOnScreen):
     """The envelope's run of one motor beside a time-optimal profile of limited jerk with the same limits.
 
     Attributes

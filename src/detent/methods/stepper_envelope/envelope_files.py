@@ -23,6 +23,7 @@ from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
+from detent.files.screen import OnScreen
 from detent.files.text import check_target, shown, write_text
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
@@ -54,8 +55,8 @@ BESIDE = 0.17  # part of the travel that the name of an extreme may take, beside
 LABEL: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EnvelopeTables:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class EnvelopeTables(OnScreen):
     """Both tables of one motor, and what firmware must know to use them."""
 
     motor: str  # name of the motor, the prefix of all names in C
@@ -302,8 +303,8 @@ def _line(begin: float, slope: float) -> tuple[Callable[[Numbers], Numbers], Cal
 # ---- all of them
 
 
-@dataclass(frozen=True)
-class Envelope:
+@dataclass(frozen=True, repr=False)
+class Envelope(OnScreen):
     """Tables of one stepper.
 
     Attributes

@@ -101,7 +101,7 @@ class StageMoveRecord:
         return max(rests, default=self.begin) - self.begin
 
 
-@dataclass
+@dataclass(repr=False)
 class StageRun(RunRecord[StageJob]):
     """Outcome of a job on a stage.
 

@@ -30,6 +30,7 @@ from detent.files.fields import Table, optional
 from detent.files.quantities import Length, Time, Velocity
 from detent.files.read import Row, check_values, example_value, read_tables
 from detent.files.read_csv import Column, CsvRows, split_heading
+from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import MAX_SHOWN, read_text, short
 from detent.methods.moves.job import MOST_MOVES, MoveFile, expand_moves
@@ -267,8 +268,8 @@ class StageJog:
         return (self.motor,)
 
 
-@dataclass(frozen=True, slots=True)
-class StageJob:
+@dataclass(frozen=True, slots=True, repr=False)
+class StageJob(OnScreen):
     """A list of moves of a stage.
 
     Attributes
