@@ -141,7 +141,7 @@ def whole(path: Path, kind: str, allowed: str, remedy: str = "save it again, or 
     """Turn whatever a library stumbles over in a damaged file into an error that says what to do."""
     try:
         yield
-    except InputError:
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # noqa: BLE001 - parsers raise whatever the damage makes them stumble over
         came = f"a file that is no {kind} file ({short(str(error) or type(error).__name__)})"

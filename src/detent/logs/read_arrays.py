@@ -180,7 +180,8 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item],
         raise raw_table.no_table(path, wanted, (name or "/" for name in groups), "none: it holds no datasets")
     taken = below if wanted else groups.get(chosen, [])
     singles = [dataset for dataset in found if dataset.size == 1 and dataset not in taken][: raw_table.MAX_CONSTANTS]
-    cells = sum(int(dataset.size) for dataset in taken)
+    # A cell may be a text or a table of any width: what counts is its memory, in numbers of eight bytes.
+    cells = sum(int(dataset.size) * max(1, dataset.dtype.itemsize // 8) for dataset in taken if _is_vector(dataset))
     if cells > raw_table.MAX_CELLS or len(taken) > raw_table.MAX_COLUMNS:
         came = f"{len(taken)} datasets of {cells} numbers"
         remedy = "state one group as table=, or cut the recording into pieces"
@@ -231,5 +232,6 @@ def _item(dataset: Any) -> raw_table.Item:
     unit = next((value for value in units if value is not None), "")
     if isinstance(unit, bytes):
         unit = unit.decode("utf-8", "replace")
-    value = dataset[()] if dataset.dtype.kind in "biufVSO" else None
+    is_single = dataset.size == 1 and dataset.dtype.kind in "biufSO"
+    value = dataset[()] if is_single or _is_vector(dataset) else None
     return raw_table.Item(name, value, str(unit) if isinstance(unit, str) else split_heading(name)[1])

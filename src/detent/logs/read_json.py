@@ -76,8 +76,11 @@ def _array(value: Any) -> Any:
     if not isinstance(value, list):
         return value
     try:
-        array: NDArray[Any] = np.array(cast("list[Any]", value))
-        return array if array.dtype.kind in "biuf" else np.array(cast("list[Any]", value), dtype=np.float64)
+        # As objects first: an array of texts is as wide in every cell as the longest is.
+        cells: NDArray[Any] = np.array(cast("list[Any]", value), dtype=np.object_)
+        whole = set(map(type, cells.ravel().tolist())) <= {int, bool, float}
+        array: NDArray[Any] = np.array(cast("list[Any]", value), dtype=None if whole else np.float64)
+        return array if array.dtype.kind in "biuf" else array.astype(np.float64)
     except (ValueError, TypeError, OverflowError):
         return None
 

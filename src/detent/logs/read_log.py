@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from detent.errors import InputError
+from detent.files.apart import read_apart
 from detent.files.text import kind_of, short
 from detent.logs.agreement import find_disagreements
 from detent.logs.choose import choose_columns, make_draft
@@ -30,6 +31,7 @@ READERS: dict[str, Callable[[Path, FileOptions], RawTable]] = {
 }  # fmt: skip
 """Reader of each kind of file, by the ending of its name."""
 
+ALLOWED = "a recording"
 _TEXTS = frozenset(kind for kind, reader in READERS.items() if reader in {read_csv, read_json})
 _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 SLOW = frozenset({"supply", "temperature", "enabled"})  # recorded only now and then: they keep their last value
@@ -40,7 +42,7 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     """Read a recording of a machine, and find what is wrong with it."""
     stated = load_mapping(mapping) if isinstance(mapping, str | Path) else mapping or ColumnMapping()
     stated = stated.overridden(parse_options(options))
-    table = read_table(path, stated.file)
+    table = read_table(path, stated.file, apart=True)
     chosen = choose_columns(table, stated)
     if "time" in chosen:
         mend_rotation(table, chosen["time"])
@@ -59,8 +61,8 @@ def read_log(path: str | Path, mapping: ColumnMapping | str | Path | None = None
     return _finish(Path(path).name, table, draft)
 
 
-def read_table(path: str | Path, options: FileOptions | None = None) -> RawTable:
-    """Read the columns of a recording."""
+def read_table(path: str | Path, options: FileOptions | None = None, *, apart: bool = False) -> RawTable:
+    """Read the columns of a recording; `apart`: in a process of its own, but for text tables, which have no need."""
     path = Path(path)
     kind = kind_of(path)
     is_packed = path.suffix.lower() == ".gz"
@@ -68,7 +70,8 @@ def read_table(path: str | Path, options: FileOptions | None = None) -> RawTable
         came = f'a name that ends in "{path.suffix}"' if path.suffix else "a name without an ending"
         remedy = "give the file the ending of its kind, or save it as one of these"
         raise InputError.of_file(str(path), came, f"{', '.join(READERS)}; text also with .gz", remedy)
-    return READERS[kind](path, options or FileOptions())
+    reader, options = READERS[kind], options or FileOptions()
+    return read_apart(reader, path, ALLOWED, options) if apart and reader is not read_csv else reader(path, options)
 
 
 def clean(draft: Draft) -> None:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
+from detent.files.apart import read_apart
 from detent.files.text import write_errors, writing
 from detent.record.trace import BROKEN_OFF, TIME, Attribute, Column, Trace, broke_off, check_columns
 
@@ -337,19 +338,20 @@ def load_trace(path: str | Path) -> Trace:
         The file is absent, is not a trace, or has a suffix detent does not read.
     """
     path = Path(path)
-    readers: dict[str, Callable[[Path], Trace]] = {
-        ".h5": _load_hdf5, ".hdf5": _load_hdf5, ".csv": _load_csv, ".parquet": _load_parquet,
-    }  # fmt: skip
     suffix = path.suffix.lower()
-    if suffix not in readers:
-        raise InputError.of_file(str(path), f"suffix {suffix!r}", ", ".join(readers), "give a trace in one of these")
+    if suffix not in _LOADERS:
+        raise InputError.of_file(str(path), f"suffix {suffix!r}", ", ".join(_LOADERS), "give a trace in one of these")
     if not path.is_file():
         raise InputError.of_file(str(path), "no such file", "a trace file", "check the name and the folder")
+    return _load(path) if suffix == ".csv" else read_apart(_load, path, "a trace")
+
+
+def _load(path: Path) -> Trace:
     try:
-        return readers[suffix](path)
-    except InputError:
+        return _LOADERS[path.suffix.lower()](path)
+    except (InputError, MemoryError):
         raise
-    except (OSError, ValueError, KeyError, TypeError, DetentError) as error:
+    except Exception as error:
         if isinstance(error, DetentError) and not str(error).startswith("trace:"):
             raise
         came = " ".join(str(error).split()) or type(error).__name__
@@ -405,6 +407,11 @@ def _read_columns(path: Path, first: list[str]) -> list[Column]:
         # Other people's tools write 0 for 0.0: then the first row misleads and every number is read as a float.
         table = np.loadtxt(path, dtype=[(f"c{index}", "f8") for index in range(len(kinds))], **options)
     return [np.ascontiguousarray(table[f"c{index}"]) for index in range(len(kinds))]
+
+
+_LOADERS: dict[str, Callable[[Path], Trace]] = {
+    ".h5": _load_hdf5, ".hdf5": _load_hdf5, ".csv": _load_csv, ".parquet": _load_parquet,
+}  # fmt: skip
 
 
 def need_parquet() -> tuple[Any, Any]:

@@ -179,7 +179,7 @@ def test_parquet_without_pyarrow_names_the_extra(tmp_path: Path, monkeypatch: py
         save_trace(make_trace(), tmp_path / "run.parquet")
     (tmp_path / "old.parquet").write_bytes(b"")
     with pytest.raises(DetentError, match=r'pip install "detent\[parquet\]"'):
-        load_trace(tmp_path / "old.parquet")
+        trace_files._load(tmp_path / "old.parquet")
 
 
 def make_head(**attributes: str) -> Trace:
