@@ -23,7 +23,7 @@ release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 version = release
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
-exclude_patterns = ["_build", "explanation/trust-table.md"]
+exclude_patterns = ["_build", "explanation/trust-table.md", "explanation/endurance-table.md"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False  # types of other packages are named in signatures, and their inventories need a network
 

@@ -222,10 +222,3 @@ def alone() -> dict[str, Alone]:
         hold_field(s)
         found[f"rotor of a stepper, {name}"] = rotor_alone(q, s, LONG, LONG // 10)
     return found
-
-
-if __name__ == "__main__":
-    for name, share in driven().items():
-        print(f"{name}: {share:.2e} of the energy put in is missing")  # noqa: T201 - figures for a person
-    for name, (first, most, last) in alone().items():
-        print(f"{name}: {first:.6g} J, most {most / first - 1:+.2e}, at the end {last / first - 1:+.2e}")  # noqa: T201

@@ -13,7 +13,19 @@ from tests import energy
 from tests.cascade_rig import TICK as CASCADE_TICK
 from tests.cascade_rig import Rig as CascadeRig
 from tests.cascade_rig import make_params
-from tests.endurance import CLOCKS, COUNTS, DAY, Clocks, before, boundaries, first_difference, move, stood
+from tests.endurance import (
+    CLOCKS,
+    COUNTS,
+    DAY,
+    PAGE,
+    Clocks,
+    before,
+    boundaries,
+    first_difference,
+    move,
+    page,
+    stood,
+)
 from tests.rotary_table_rig import RATIO, T
 from tests.rotary_table_rig import Rig as TableRig
 
@@ -173,7 +185,7 @@ def test_a_plant_left_alone_never_gains_energy(plant: str) -> None:
 @pytest.mark.parametrize(
     ("plant", "share"),
     [
-        # It stands for the rest of the tick in which it turns round: 1e-8 of its energy each time.
+        # It stands for the rest of the tick in which it turns round: 4e-6 of its energy each time.
         ("carriage", 0.1),
         ("motor and load", 1e-6),
         ("motor and load, with backlash", 1e-6),
@@ -185,3 +197,11 @@ def test_without_losses_energy_stays(plant: str, share: float) -> None:
     name, _, more = plant.partition(", ")
     first, _, last = alone()[f"{name}, lossless{', ' * bool(more)}{more}"]
     assert first * (1 - share) <= last <= first * (1 + 1e-13)
+
+
+# ---- what is told of it
+
+
+@wide
+def test_the_page_holds_these_figures() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page()
