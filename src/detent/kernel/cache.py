@@ -13,6 +13,7 @@ import os
 import re
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -23,6 +24,7 @@ STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "err
 DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # a method's part of a step
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made
+OLD_PART = 3600.0  # age of a file that nobody writes any more; one takes milliseconds [s]
 _REMEDY = "set DETENT_CACHE_DIR to a folder of yours"
 AT_FIRST_COMPILING: list[Callable[[str], object]] = []  # called, once, by `tell_compiling`
 
@@ -75,6 +77,9 @@ def compiled_folder() -> tuple[Path | None, str]:
     with suppress(OSError):  # one that can only be read is as good
         os.utime(folder)
         _forget_old(folder.parent, keep=folder)
+        for part in folder.glob("*.part"):  # of a process that was killed
+            if time.time() - part.stat().st_mtime > OLD_PART:
+                part.unlink()
     return folder, ""
 
 

@@ -351,6 +351,16 @@ def test_every_module_that_declares_a_step_is_in_the_hash():
     assert PACKAGE / "methods" / "print_head" / "controller.py" in declared
 
 
+def test_what_a_killed_process_left_goes_and_what_another_writes_stays(tmp_path, monkeypatch):
+    monkeypatch.setenv("DETENT_CACHE_DIR", str(tmp_path))
+    folder, _ = cache.compiled_folder.__wrapped__()
+    for name, age in (("killed.code.1.part", 2 * cache.OLD_PART), ("now.code.2.part", 1.0), ("old.code", 1e6)):
+        (folder / name).touch()
+        os.utime(folder / name, (time.time() - age,) * 2)
+    assert cache.compiled_folder.__wrapped__() == (folder, "")
+    assert sorted(file.name for file in folder.iterdir()) == ["now.code.2.part", "old.code"]
+
+
 def test_only_the_youngest_folders_are_kept(tmp_path):
     names = [f"hash{k}" for k in range(cache.KEPT_FOLDERS + 3)]
     now = time.time()
