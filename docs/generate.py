@@ -35,7 +35,7 @@ def tried() -> str:
 def write_all(folder: Path = GENERATED) -> None:
     """Write every page whose text has changed."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, make in {**PAGES, "tried": tried}.items():
+    for name, make in {**PAGES, "what-was-tried": tried}.items():
         target, text = folder / f"{name}.md", make()
         if not target.exists() or target.read_text(encoding="utf-8") != text:
             target.write_text(text, encoding="utf-8")
