@@ -692,6 +692,7 @@ def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
     told = [line for line in done.stderr.splitlines() if not line.startswith("First run")]
     assert (done.returncode, len(told)) == (1, 1), done.stderr
     assert "cannot be written (File too large); choose another place or make room" in told[0]
+    assert told[0].startswith(("out/", "--output out", "--copy out"))  # the place as it was given
     assert files_in(tmp_path) == before
     tried("disk", f"`detent {words[0]}`", "one sentence, status 1, the earlier files")
 
