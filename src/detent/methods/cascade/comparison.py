@@ -16,6 +16,7 @@ from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.page import POINTS
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
 from detent.methods.cascade.units import Units, milliseconds
+from detent.methods.moves.run import time_to_settle
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import ComparisonOnScreen
@@ -43,7 +44,7 @@ class ProfileCase:
     feed: str  #: one of `FEEDS`
     duration: float  #: of the reference [s]
     peak_following: float  #: largest magnitude of the following error
-    settling: float  #: from the end of the reference until the load stayed within the window [s]; NaN if it did not
+    approach: float  #: from the end of the reference until the load stayed within the window [s]; NaN if it did not
     twist_after: float  #: twist of the coupling after that end, peak to peak; NaN for a rigid axis
     peak_command: float  #: largest magnitude of the command [V]
     t: Numbers  #: time since the begin of the move, at every sample [s], shape (n,)
@@ -86,13 +87,13 @@ class ProfileComparison(ComparisonOnScreen):
     @property
     def table(self) -> TextTable:
         """The figures of the four cases."""
-        heads = ("profile", "takes", "largest following error", "settles after", "twist after that", "peak command")
+        heads = ("profile", "takes", "largest following error", "final approach", "twist in it", "peak command")
         rows = [
             (
                 case.name,
                 milliseconds(case.duration),
                 self.units.error(case.peak_following),
-                "not" if math.isnan(case.settling) else milliseconds(case.settling),
+                "not" if math.isnan(case.approach) else milliseconds(case.approach),
                 "rigid" if math.isnan(case.twist_after) else self.units.error(case.twist_after),
                 f"{number(case.peak_command)} V",
             )
@@ -239,7 +240,7 @@ def _case(spec: CascadeSpec, limits: MotionLimits, shape: str, feed: str) -> Pro
         feed=feed,
         duration=duration,
         peak_following=float(np.abs(rows["controller.law.position_error"]).max()),
-        settling=max(settled - duration, 0.0) if resting else math.nan,
+        approach=time_to_settle(duration, settled, rested=resting),
         twist_after=float(np.ptp(twist[profile.count - 1 :])) if spec.swing else math.nan,
         peak_command=float(np.abs(rows["controller.law.command"]).max()),
         t=np.arange(len(rows), dtype=np.float64) * host.period,

@@ -76,9 +76,10 @@ def cascade_page(
 def cascade_summary(spec: CascadeSpec, run: CascadeRun) -> list[tuple[str, str]]:
     """Name and text of each figure of a run of moves; what a run did not come to is left out."""
     units, found = units_of(spec), _worst_figures(run)
-    after = f"from the end of the reference until within {units.error(run.tolerance)} for good"
+    within = f"until within {units.error(run.tolerance)} for good"
     figures: dict[str, tuple[str, Callable[[float], str], str]] = {
-        "settling": ("settling", milliseconds, f"worst {{}}, {after}"),
+        "settling": ("settling", milliseconds, f"worst {{}}, from the command {within}"),
+        "approach": ("final approach", milliseconds, f"worst {{}}, from the end of the reference {within}"),
         "peak_following": ("following error", units.error, "worst {}"),
         "overshoot": ("overshoot", units.error, "worst {}"),
         "rest": ("error at rest", units.error, "worst {}, of the load"),
@@ -100,10 +101,11 @@ def arrived(run: CascadeRun) -> int:
 
 def _worst_figures(run: CascadeRun) -> dict[str, Worst[CascadeMove]]:
     """The largest of each figure of the moves, with whose it is; what no move has is left out."""
-    settled = [move for move in run.moves if not math.isnan(move.settling)]
+    settled = [move for move in run.moves if not math.isnan(move.settled) and move.in_position]
     resting = [move for move in run.moves if move.in_position]
     found = {
-        "settling": worst(settled, lambda move: move.settling),
+        "settling": worst(settled, attrgetter("settling")),
+        "approach": worst(settled, attrgetter("approach")),
         "rest": worst(resting, lambda move: abs(move.error)),
     }
     for name in ("peak_following", "overshoot", "peak_speed", "peak_command"):
@@ -139,9 +141,9 @@ def _cards(spec: CascadeSpec, run: CascadeRun) -> list[Card]:
         time_card(run.seconds, "dwells included" if run.done else "until it stopped"),
     ]
     found, limit = _worst_figures(run), spec.method.following_error
-    if one := found.get("settling"):
+    if one := found.get("approach"):
         below = f"after the reference's end, within {error(run.tolerance)}; {_whose(one.of)}"
-        shown.append(card("Longest settling", milliseconds(one.value), below))
+        shown.append(card("Longest final approach", milliseconds(one.value), below))
     if one := found.get("peak_following"):
         below = f"{_whose(one.of)}; the drive goes off at {error(limit)}"
         shown.append(card("Largest following error", error(one.value), below, bad=one.value > limit))
@@ -307,7 +309,8 @@ def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
         f"from [{place}]": lambda move: units.position(move.start),
         f"to [{place}]": lambda move: units.position(move.target),
         "reference [ms]": lambda move: number(round((move.arrived - move.begin) * 1e3, 6)),
-        "settles after [ms]": lambda move: number(round(move.settling * 1e3, 6)),
+        "settled after [ms]": lambda move: number(round(move.settling * 1e3, 6)),
+        "of it final approach [ms]": lambda move: number(round(move.approach * 1e3, 6)),
         f"following error [{lag.name}]": following,
         f"overshoot [{off.name}]": lambda move: number(move.overshoot * off.factor, 2),
         f"error [{off.name}]": error,
@@ -317,7 +320,7 @@ def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
     heads = [(name, name != "in position") for name in columns]
     rows = [[cell(move) for cell in columns.values()] for move in run.moves]
     caption = (
-        "The reference takes its time; then the load settles within the window. Following error is the largest of the "
-        "move; error is target less position of the load at the end of the move."
+        "Settled is counted from the command; its final approach begins where the reference ends. Following error is "
+        "the largest of the move; error is target less position of the load at the end of the move."
     )
     return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))

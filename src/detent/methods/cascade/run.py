@@ -13,6 +13,7 @@ from detent.methods.cascade.controller import ARRIVED, FAULT
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.moves.job import Move, MoveJob
+from detent.methods.moves.run import time_to_settle
 from detent.planning.profile import plan_move
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import Evidence, RunRecord
@@ -59,13 +60,13 @@ class CascadeMove:
 
     @property
     def settling(self) -> float:
-        """From the end of the reference until the load stayed within the window [s]; NaN if it did not."""
-        return max(self.settled - self.arrived, 0.0) if self.in_position else math.nan
+        """From the begin of the reference until the load stayed within the window [s]; NaN if it did not."""
+        return time_to_settle(self.begin, self.settled, rested=self.in_position)
 
     @property
-    def move_time(self) -> float:
-        """From the begin of the reference until the load stayed within the window [s]; NaN if it did not."""
-        return max(self.settled - self.begin, 0.0) if self.in_position else math.nan
+    def approach(self) -> float:
+        """From the end of the reference until the load stayed within the window [s]; NaN if it did not."""
+        return time_to_settle(self.arrived, self.settled, rested=self.in_position)
 
 
 @dataclass(repr=False)
@@ -108,7 +109,7 @@ class CascadeRun(RunRecord[MoveJob]):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
-        moves = [asdict(m) | {"error": m.error, "settling": m.settling} for m in self.moves]
+        moves = [asdict(m) | {"error": m.error, "settling": m.settling, "approach": m.approach} for m in self.moves]
         return super().to_dict() | {"moves": moves}
 
 

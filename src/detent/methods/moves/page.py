@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from detent.methods.moves.run import MoveRecord, MoveRun
-from detent.methods.moves.summary import MoveFigures, arrived, interference_text, settled, whose
+from detent.methods.moves.summary import MoveFigures, arrived, interference_text, whose
 from detent.page.chart import Band, Chart, Curve, Heap, Panel, Timeline, histogram_chart, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -58,7 +58,7 @@ class ShownMove:
     @property
     def settled(self) -> float:
         """When it was within the tolerance for good [s]; NaN if it was not."""
-        return settled(self.run, self.move)
+        return self.move.settling
 
     @property
     def to_go(self) -> Numbers:
@@ -157,7 +157,7 @@ def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
     shown = [made, time_card(figures.seconds, pace)]
     if longest := figures.longest:
         below = f"median; worst {milliseconds(longest.value)}, {whose(longest.of)}"
-        median = median_of(figures.went, lambda move: move.move_time)
+        median = median_of(figures.went, lambda move: move.settling)
         shown.append(card("Settled after", milliseconds(median), below))
     for title, found, limit in (
         ("Worst overshoot", figures.overshoot, math.inf),
@@ -343,7 +343,7 @@ def _every_move(run: MoveRun) -> Figure:
 
 
 def _row(run: MoveRun, move: MoveRecord, longest: float, *, labelled: bool) -> list[str | Cell]:
-    ready, there = move.ready - move.begin, settled(run, move)
+    ready, there = move.ready - move.begin, move.settling
     way = way_cell(1 if move.target > move.start else -1, number(_way(move) * MM, 4))
     return [
         count(move.number),

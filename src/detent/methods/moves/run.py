@@ -131,6 +131,15 @@ def check_job(host: Host, job: MoveJob) -> list[Destination]:
     return found
 
 
+def time_to_settle(since: float, outside: float, *, rested: bool) -> float:
+    """Time from `since` until an axis stays within its tolerance for good [s], NaN where it does not.
+
+    It was `outside` for the last time then, and `rested` within it. From the command it is the settling of a move, from
+    where its reference has ended the final approach: what those words mean of every method.
+    """
+    return max(outside - since, 0.0) if rested else math.nan
+
+
 @dataclass(frozen=True, slots=True)
 class MoveRecord:
     """How one move went; lengths in metres, times in seconds since power-on."""
@@ -142,16 +151,21 @@ class MoveRecord:
     target: float  #: where it had to go
     switched: float  #: when position mode was entered; NaN for an axis of one mode
     ready: float  #: when the axis said that it had arrived
-    settled: float  #: when it was outside the tolerance for the last time
+    settled: float  #: when it was outside the tolerance for the last time; NaN if it stayed outside
     end: float  #: end of the dwell
     overshoot: float  #: how far it went beyond the target, 0 if it did not
     error: float  #: target less position at the end of the dwell
     peak_speed: float  #: largest speed [m/s]
 
     @property
-    def move_time(self) -> float:
-        """From the command until the axis stayed within the tolerance [s]."""
-        return max(self.settled - self.begin, 0.0)
+    def settling(self) -> float:
+        """From the command until within the tolerance for good [s]; NaN for a move that ended outside."""
+        return time_to_settle(self.begin, self.settled, rested=not math.isnan(self.settled))
+
+    @property
+    def approach(self) -> float:
+        """The same from the mode switch [s]; NaN for an axis of one mode too."""
+        return time_to_settle(self.switched, self.settled, rested=not math.isnan(self.settled + self.switched))
 
     @property
     def early(self) -> float:
@@ -256,9 +270,10 @@ def _make_move(host: Host, to: Destination, result: MoveRun) -> str:
         _stand(host, to)
     host.evidence.take()
     error = to.position - float(plant.train.position)
+    outside = plant.gauge.outside * host.machine.tick if abs(error) <= host.tolerance else math.nan
     result.moves.append(MoveRecord(
         number=to.move.number, label=to.move.label, begin=begin, start=start, target=to.position,
-        switched=host.switched, ready=ready, settled=plant.gauge.outside * host.machine.tick, end=host.machine.time,
+        switched=host.switched, ready=ready, settled=outside, end=host.machine.time,
         overshoot=max(float(plant.gauge.beyond), 0.0), error=error, peak_speed=float(plant.gauge.peak_speed),
     ))  # fmt: skip
     host.evidence.take_error(f"move {to.move.number}", error)

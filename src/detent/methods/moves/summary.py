@@ -21,16 +21,6 @@ def arrived(run: MoveRun, move: MoveRecord) -> bool:
     return move.arrived_within(run.tolerance)
 
 
-def settled(run: MoveRun, move: MoveRecord) -> float:
-    """Time from the command until within the tolerance for good [s]; NaN for a move that ended outside."""
-    return move.move_time if abs(move.error) <= run.tolerance else math.nan
-
-
-def approach(move: MoveRecord) -> float:
-    """Time from the mode switch until within the tolerance for good [s]; NaN for an axis of one mode."""
-    return math.nan if math.isnan(move.switched) else max(move.settled - move.switched, 0.0)
-
-
 class MoveFigures:
     """Extremes and medians of a run, done or not; None and NaN where no move has the figure."""
 
@@ -45,7 +35,7 @@ class MoveFigures:
         # Those of which the axis said so before they were within the tolerance for good, and the earliest of them [s].
         self.early = [move for move in self.there if move.early > SOONEST]
         self.earliest = worst(self.early, lambda move: move.early)
-        self.longest = worst(self.went, lambda move: move.move_time)  # time to settle [s]
+        self.longest = worst(self.went, lambda move: move.settling)  # time to settle [s]
         self.overshoot = worst(moves, lambda move: move.overshoot)  # farthest beyond a target [m]
         self.error = worst(moves, lambda move: abs(move.error))  # largest magnitude at the end of a dwell [m]
         self.peak_speed = worst(moves, lambda move: move.peak_speed)  # [m/s]
@@ -60,8 +50,8 @@ def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
         rate = f", {number(run.moves_per_second)} {words} per second" if run.done else ""
         rows.append(("time", duration(figures.seconds) + rate))
     switched = [move for move in figures.went if not math.isnan(move.switched)]
-    rows += _times(figures.went, lambda move: move.move_time, "settling", f"from the command {within}")
-    rows += _times(switched, approach, "final approach", f"from the mode switch {within}")
+    rows += _times(figures.went, lambda move: move.settling, "settling", f"from the command {within}")
+    rows += _times(switched, lambda move: move.approach, "final approach", f"from the mode switch {within}")
     for name, found in (("overshoot", figures.overshoot), ("error at rest", figures.error)):
         if found:
             rows.append((name, f"worst {length(found.value)}, {unit.counts(found.value)} ({whose(found.of)})"))

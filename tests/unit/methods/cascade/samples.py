@@ -77,7 +77,7 @@ def case(shape: str, feed: str, **changes: Any) -> ProfileCase:
     scale = 12.5e-3 if feed == FEEDS[0] else 40e-6
     usual: dict[str, Any] = {
         "shape": shape, "feed": feed, "duration": 0.6 if shape == SHAPES[0] else 0.625, "peak_following": scale,
-        "settling": 0.12 if feed == FEEDS[0] else 0.0, "twist_after": 4.4e-6, "peak_command": 2.4, "t": t,
+        "approach": 0.12 if feed == FEEDS[0] else 0.0, "twist_after": 4.4e-6, "peak_command": 2.4, "t": t,
         "speed": np.sin(t), "following": scale * np.sin(9 * t), "twist": 3e-6 * np.cos(900 * t),
     }  # fmt: skip
     return ProfileCase(**usual | changes)

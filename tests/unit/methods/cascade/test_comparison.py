@@ -72,7 +72,7 @@ def test_plain_data_holds_no_curves_and_progress_is_told():
     told = []
     data = compare_profiles(linear(), progress=lambda share, text: told.append((share, text))).to_dict()
     assert set(data["cases"][0]) == {
-        "shape", "feed", "duration", "peak_following", "settling", "twist_after", "peak_command",
+        "shape", "feed", "duration", "peak_following", "approach", "twist_after", "peak_command",
     }  # fmt: skip
     assert [share for share, _ in told] == [0.25, 0.5, 0.75, 1.0]
     assert told[0][1] == "trapezoid, no feed-forward"

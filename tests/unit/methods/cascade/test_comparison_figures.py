@@ -48,7 +48,7 @@ def test_the_terminal_has_a_row_for_each_way() -> None:
     assert rows[0] == ("trapezoid, no feed-forward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V")
     assert [row[0] for row in rows][3] == "limited jerk, feed-forward"
     first = rigid_comparison().cases[0]
-    never = replace(rigid_comparison(), cases=(replace(first, settling=math.nan), *rigid_comparison().cases[1:]))
+    never = replace(rigid_comparison(), cases=(replace(first, approach=math.nan), *rigid_comparison().cases[1:]))
     assert never.table.rows[0][3:5] == ("not", "rigid")
     assert comparison(rotary=True).table.title.startswith("A move of 14.3")
 

@@ -100,7 +100,7 @@ def test_a_run_that_failed_says_where_and_why(linear: CascadeSpec) -> None:
     assert [card.title for card in page.cards if card.bad] == ["Moves in position", "Largest following error"]
     assert "200\u202fms" in cards_of(page)["Peak command"].below
     assert "move 1" in cards_of(page)["Worst error at rest"].below
-    error, last = (table_of(page).rows[1][column] for column in (8, -1))
+    error, last = (table_of(page).rows[1][column] for column in (9, -1))
     assert isinstance(last, Cell)
     assert last.over
     # No bar is longer than its column, wherever the axis stopped.
@@ -113,7 +113,7 @@ def test_a_load_that_stands_beside_its_target_gets_no_praise(linear: CascadeSpec
     assert page.headline.level == "warn"
     assert [card.title for card in page.cards if card.bad] == ["Worst error at rest"]
     assert [(note.level, note.text) for note in page.notes] == [("warning", "look <here>")]
-    errors = [row[8] for row in table_of(page).rows]
+    errors = [row[9] for row in table_of(page).rows]
     assert [(cell.text, cell.over) for cell in errors if isinstance(cell, Cell)] == [("+8.0", False), ("−70", True)]
 
 
@@ -153,7 +153,7 @@ def test_every_move_stands_in_the_table(linear: CascadeSpec) -> None:
     table = table_of(cascade_page(linear, cascade_run(), None))
     assert len(table.rows) == 2
     first = [cell.text for cell, _ in table.cells(table.rows[0])]
-    assert first == ["1", "0.000", "0.000", "100.000", "1000", "40", "40", "2", "+8.0", "2.50", "✔"]
+    assert first == ["1", "0.000", "0.000", "100.000", "1000", "1040", "40", "40", "2", "+8.0", "2.50", "✔"]
 
 
 # ---- figures over time
@@ -246,7 +246,8 @@ def test_each_figure_is_named_with_whose_it_is(linear: CascadeSpec) -> None:
     assert dict(cascade_summary(linear, cascade_run(move(1), move(2, peak_speed=0.5)))) == {
         "moves": "2 of 2 in position",
         "time": "3 s",
-        "settling": "worst 40 ms (move 1), from the end of the reference until within 50 µm for good",
+        "settling": "worst 1040 ms (move 1), from the command until within 50 µm for good",
+        "final approach": "worst 40 ms (move 1), from the end of the reference until within 50 µm for good",
         "following error": "worst 80 µm (move 2)",
         "overshoot": "worst 4 µm (move 2)",
         "error at rest": "worst 8.0 µm (move 2), of the load",
@@ -260,7 +261,7 @@ def test_what_a_failed_run_did_not_come_to_is_left_out(linear: CascadeSpec) -> N
     run.moves = run.moves[1:]
     rows = dict(cascade_summary(linear, run))
     assert rows["moves"] == "0 of 2 in position"
-    assert not {"settling", "error at rest"} & set(rows)
+    assert not {"settling", "final approach", "error at rest"} & set(rows)
     run.moves.clear()
     assert list(dict(cascade_summary(linear, run))) == ["moves"]
 

@@ -51,7 +51,9 @@ def test_every_move_is_in_position_and_the_load_stands_at_its_target(slide):
         assert move.in_position
         assert abs(move.error) < slide.tolerance
         assert move.begin < move.arrived < move.ready <= move.end
-        assert move.settling >= 0.0
+        assert move.approach >= 0.0
+        assert move.settling == pytest.approx(move.settled - move.begin)
+        assert move.approach == pytest.approx(max(0.0, move.settling - (move.arrived - move.begin)))
         assert move.peak_command < slide.max_command
         assert move.limited == 0.0
     assert slide.moves[-1].target == pytest.approx(0.01)
@@ -128,7 +130,7 @@ def test_a_following_error_beyond_its_limit_switches_the_drive_off():
     assert math.isnan(move.arrived)
     assert math.isnan(move.ready)
     assert math.isnan(move.settling)
-    assert math.isnan(move.move_time)
+    assert math.isnan(move.approach)
     assert run.worst_error == 0.0
 
 

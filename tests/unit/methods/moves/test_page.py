@@ -182,7 +182,7 @@ def test_the_approach_is_magnified_in_counts_and_keeps_the_numbers_of_the_events
 
 
 def test_a_move_that_ended_outside_has_no_stretch_within_the_tolerance() -> None:
-    run = run_of(record(1, 0.0, 0.02, error=30e-6), asked=2)
+    run = run_of(record(1, 0.0, 0.02, settled=math.nan, error=30e-6), asked=2)
     assert chart_of(page_of(run, trace_of(run)), "approach-place")["bands"][0]["spans"] == []
 
 
@@ -196,7 +196,7 @@ def test_every_move_stands_in_the_table() -> None:
         record(1, 0.0, 0.02, error=-1.5e-6),
         record(2, 0.02, 0.02, ready=0.6 + 0.003, settled=0.5),
         record(3, 0.02, 0.0, settled=0.7 + 0.085),
-        record(4, 0.0, 0.01, ready=math.nan, error=422e-6),
+        record(4, 0.0, 0.01, settled=math.nan, ready=math.nan, error=422e-6),
         asked=4,
     )
     rows = rows_of(page_of(run))

@@ -11,7 +11,7 @@ from detent.methods.filtered_servo.host import FilteredHost
 from detent.methods.filtered_servo.system import FilteredServo
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob, load_moves, text_job
-from detent.methods.moves.run import run_moves
+from detent.methods.moves.run import run_moves, time_to_settle
 from detent.methods.phase_servo import method as phase_method
 from detent.methods.phase_servo.host import PhaseHost
 from detent.methods.phase_servo.system import PhaseServo
@@ -55,6 +55,24 @@ def test_every_move_of_the_phase_servo_ends_within_a_step_of_its_positioning_poi
         assert move.target / PITCH == pytest.approx(round(move.target / PITCH), abs=1e-9)
         assert move.begin <= move.switched < move.ready < move.end + 1e-12
         assert move.settled <= move.ready
+
+
+def test_settling_is_counted_from_the_command_and_the_final_approach_from_the_mode_switch(moves):
+    """One meaning for every method, by one function."""
+    assert time_to_settle(2.0, 2.5, rested=True) == 0.5
+    assert time_to_settle(2.0, 1.5, rested=True) == 0.0  # it never was outside
+    assert math.isnan(time_to_settle(2.0, 2.5, rested=False))
+    far = max(moves.moves, key=lambda move: move.settling)
+    assert far.settling == far.settled - far.begin
+    assert far.approach == far.settled - far.switched
+    assert 0 < far.approach < 3e-3 < far.settling
+
+
+def test_a_move_that_ends_outside_has_not_settled():
+    run = run_moves(phase("clock.oscillator=16 MHz"), job({"target": 0.2 * INCH}))
+    assert math.isnan(run.moves[0].settling)
+    assert math.isnan(run.moves[0].approach)
+    assert not math.isnan(run.moves[0].switched)
 
 
 def test_what_swings_is_not_laid_to_noise():

@@ -70,7 +70,7 @@ def test_a_move_of_no_way_does_not_shorten_the_median() -> None:
     figures = MoveFigures(run_of(far, *(record(n, 0.02, 0.02, settled=0.0) for n in range(2, 6))))
     assert len(figures.there) == 5
     assert figures.went == [far]
-    assert figures.longest == Worst(far.move_time, far)
+    assert figures.longest == Worst(far.settling, far)
 
 
 def test_ready_before_there_for_good_is_told() -> None:
