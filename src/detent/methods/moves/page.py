@@ -5,7 +5,7 @@ It knows no method: what one shows of itself comes as a `MoveView`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -232,7 +232,13 @@ def _move_figures(view: MoveView, figures: MoveFigures, trace: Trace | None) -> 
     if move is None or rows is None:
         return []
     shown = ShownMove(figures.run, move, why, rows)
-    return [_whole_figure(view, shown), *_approach_figures(view, shown)]
+    found = [_whole_figure(view, shown), *_approach_figures(view, shown)]
+    # The longest shows what a shorter one does not come to: top speed, and what limits it.
+    longest = max(recorded_whole(trace, figures.run.moves), key=_way)
+    rows = stretch(trace, needed, longest.begin, longest.end)
+    if rows is not None and _way(longest) > _way(move) + figures.run.tolerance:
+        found.append(_whole_figure(view, ShownMove(figures.run, longest, "the longest move", rows), name="longest"))
+    return found
 
 
 def _telling(figures: MoveFigures, trace: Trace) -> tuple[MoveRecord | None, str]:
@@ -261,18 +267,19 @@ def _events(view: MoveView, shown: ShownMove) -> list[Event]:
     return events if arrived(shown.run, shown.move) else [*events, Event(lasted, "the run ends here")]
 
 
-def _whole_figure(view: MoveView, shown: ShownMove) -> Figure:
+def _whole_figure(view: MoveView, shown: ShownMove, name: str = "move") -> Figure:
     move, events = shown.move, _events(view, shown)
     side = "right" if move.target > move.start else "left"
     # The command itself comes shortly before the first row.
     marks = [Event(max(event.t, float(shown.rows.t[0])), event.text) for event in events]
     timeline = Timeline(
-        name="move", t=shown.rows.t, label="time since the command", bands=view.bands(shown), events=marks
+        name=name, t=shown.rows.t, label="time since the command", bands=view.bands(shown), events=marks
     )
+    panels = [replace(panel, name=panel.name.replace("move", name, 1)) for panel in view.panels(shown)]
     return Figure(
         title=f"Move {count(move.number)}, {length(_way(move))} to the {side}",
         caption=f"Shown is {shown.why}. {view.captions[0]}",
-        charts=time_charts(timeline, view.panels(shown)),
+        charts=time_charts(timeline, panels),
         events=events,
     )
 

@@ -12,6 +12,7 @@ from detent.methods.moves.run import MoveRun
 from detent.page.figure import Figure
 from detent.page.frame import Page
 from detent.page.table import Cell, TextTable
+from detent.page.words import GAP
 from detent.record.trace import Trace
 
 
@@ -163,6 +164,20 @@ def test_the_move_that_was_ready_too_early_comes_before_the_middle_one() -> None
     late = record(3, 0.02, 0.04, settled=0.7 + 0.084), record(4, 0.04, 0.0, settled=0.8 + 0.085)
     run = run_of(record(1, 0.0, 0.03), record(2, 0.03, 0.02), *late)
     assert shown(page_of(run, trace_of(run))).title.startswith("Move 4, ")
+
+
+def test_the_longest_move_is_drawn_beside_the_one_of_middle_length() -> None:
+    """It never was: what limits an axis is seen in no shorter one."""
+    run = run_of(record(1, 0.0, 0.02), record(2, 0.02, 0.025), record(3, 0.025, 0.02), record(4, 0.02, 0.01))
+    page = page_of(run, trace_of(run))
+    assert ids_of(page)[-1] == "longest-speed"
+    titles = [figure.title for section in page.sections for figure in section.shown if figure.title.startswith("Move ")]
+    assert [title.replace(GAP, " ") for title in titles] == [
+        "Move 3, 5.00 mm to the left", "Move 1, 20 mm to the right",
+    ]  # fmt: skip
+    # Moves of one length have one picture.
+    alike = run_of(record(1, 0.0, 0.02), record(2, 0.02, 0.0))
+    assert "longest-speed" not in ids_of(page_of(alike, trace_of(alike)))
 
 
 def test_the_approach_is_magnified_in_counts_and_keeps_the_numbers_of_the_events() -> None:

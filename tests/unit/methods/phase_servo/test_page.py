@@ -57,6 +57,7 @@ def test_the_figures_of_a_whole_run(moves: Played) -> None:
     page = moves_page(PhaseView(moves[0]), *moves[1:], (), {"seed": "1"})
     assert [chart["id"] for chart in page.charts] == [
         "job", "rest", "move-speed", "move-to-go", "move-drive", "approach-place", "approach-words",
+        "longest-speed", "longest-to-go", "longest-drive",
     ]  # fmt: skip
     assert (page.headline.level, page.settings, page.paper, list(page.notes)) == ("good", {"seed": "1"}, None, [])
     unit = PhaseView(moves[0]).unit
