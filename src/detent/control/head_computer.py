@@ -24,6 +24,13 @@ OBSTRUCTION, IMPLAUSIBLE, OVERRUN = 0x08, 0x10, 0x20
 
 NO_OPERATION, PRINT, RUN, SET_SPEED, CONTROLLED_RUN, CALCULATE, POSITION_HIGH, POSITION_LOW, REFUSED = range(9)
 
+LOWEST_FAST_PASS = 84
+"""Speed value, 14 in/s, from which a fast calibration pass lies far enough from the slow one at 10 in/s to tell slope
+from friction. An axis that must stay slower makes no passes: its defaults stay in use, and it says so."""
+
+SLOWEST_PASS = 10
+"""How many times as long as at 10 in/s the slow pass may take. A head that creeps tells no speed."""
+
 STALL_MARGIN = 20
 """Counts above friction from which the head must move: below them standing still is no fault (3.2, 7.3)."""
 

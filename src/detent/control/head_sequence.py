@@ -31,6 +31,7 @@ from detent.control.head_computer import (
     LOW_START,
     LOW_STEADY,
     LOW_STOP,
+    LOWEST_FAST_PASS,
     NO_OPERATION,
     NOT_CALIBRATED,
     OBSTRUCTION,
@@ -39,6 +40,7 @@ from detent.control.head_computer import (
     REFUSED,
     RUNAWAY_US,
     SET_SPEED,
+    SLOWEST_PASS,
     STALL_MARGIN,
     STALL_US,
     HeadComputer,
@@ -46,7 +48,15 @@ from detent.control.head_computer import (
     is_motion,
     line_of,
 )
-from detent.control.head_motion import begin_move, forget_drive, forget_emitters, move_emitter, move_timer, put_drive
+from detent.control.head_motion import (
+    begin_move,
+    begin_stop,
+    forget_drive,
+    forget_emitters,
+    move_emitter,
+    move_timer,
+    put_drive,
+)
 from detent.control.latch import pass_on, send
 from detent.control.self_identification import identify
 from detent.control.speed_selection import HIGH_SPEED
@@ -138,6 +148,10 @@ def homing_timer(p: HeadParams, c: HeadComputer) -> None:
         fault(p, c, OBSTRUCTION)
         return
     c.homed = 1
+    if p.run_speed < LOWEST_FAST_PASS:
+        stand(p, c, IDLE)
+        finish(p, c, IMPLAUSIBLE, False)
+        return
     begin_pass(p, c, PASS_FAST_LEFT)
 
 
@@ -162,6 +176,20 @@ def begin_windows(c: HeadComputer) -> None:
     c.window_us = c.now_us + (FAST_WINDOW_US if fast else SLOW_WINDOW_US)
     c.windows = 0 if fast else -1
     c.phase_start = c.emitter
+
+
+@step
+def is_creeping(c: HeadComputer) -> bool:
+    """The slow pass has taken too long: 240 emitters come in a window at 10 in/s."""
+    return c.calibration_pass >= PASS_SLOW_LEFT and c.windows * 240 > SLOWEST_PASS * c.width
+
+
+@step
+def give_up_pass(p: HeadParams, c: HeadComputer) -> None:
+    """Stop on the way; without the fast speed there is no line, and the defaults stay."""
+    line_of(c, c.direction).speed_fast = 0
+    c.window_total = 0
+    begin_stop(p, c)
 
 
 @step
@@ -327,6 +355,8 @@ def on_timer(p: HeadParams, c: HeadComputer) -> None:
     was_accelerating = c.state == HIGH_ACCEL
     if c.calibration_pass and c.state == HIGH_STEADY:
         window_timer(c)
+        if is_creeping(c):
+            give_up_pass(p, c)
     move_timer(p, c)
     if was_accelerating and c.state == HIGH_STEADY and c.calibration_pass:
         begin_windows(c)

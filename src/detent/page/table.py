@@ -62,10 +62,10 @@ class TextTable(NamedTuple):
 
 
 def bar_cell(value: float, longest: float, *, over: bool = False) -> Cell:
-    """A number >= 0 behind a bar, `longest` being the value of the longest bar; NaN is a dash."""
+    """A number >= 0 behind a bar, `longest` being the value of the longest bar; none is longer. NaN is a dash."""
     if isnan(value):
         return Cell(text="\u2013")
-    return Cell(text=number(value, 2), bar=value / longest, over=over)
+    return Cell(text=number(value, 2), bar=value / longest if value < longest else 1.0, over=over)
 
 
 def offset_cell(offset: float, longest: float, *, over: bool = False) -> Cell:

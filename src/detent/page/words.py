@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import degrees as to_degrees
-from math import isnan, pi
+from math import isinf, isnan, pi
 
 from markupsafe import Markup
 
@@ -40,6 +40,8 @@ def number(value: float | None, digits: int = 3) -> str:
     """
     if value is None or isnan(value):
         return "\u2013"
+    if isinf(value):
+        return "\u221e" if value > 0 else "\u2212\u221e"
     if value == 0:
         return "0"
     if value == round(value) and abs(value) < 1e15:

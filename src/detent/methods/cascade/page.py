@@ -292,16 +292,17 @@ def both_sides(value: float, word: str) -> list[tuple[float, str]]:
 
 def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
     units, place = units_of(spec), units_of(spec).place.name
-    off, lag = units.small(max(run.worst_error, run.worst_overshoot)), units.small(run.worst_following)
+    # A move that failed may have stopped anywhere: its error too has to be read in the unit of the column.
+    furthest = max((abs(move.error) for move in run.moves), default=0.0)
+    off, lag = units.small(max(furthest, run.worst_overshoot)), units.small(run.worst_following)
 
     def following(move: CascadeMove) -> Cell:
         beyond = move.peak_following > spec.method.following_error
         return bar_cell(move.peak_following * lag.factor, run.worst_following * lag.factor or 1.0, over=beyond)
 
     def error(move: CascadeMove) -> Cell:
-        # A move that failed may have stopped anywhere; its bar is a full one, no longer.
-        furthest = max(run.worst_error, abs(move.error)) * off.factor or 1.0
-        return offset_cell(move.error * off.factor, furthest, over=abs(move.error) > run.tolerance)
+        longest = run.worst_error * off.factor or furthest * off.factor or 1.0
+        return offset_cell(move.error * off.factor, longest, over=abs(move.error) > run.tolerance)
 
     columns: dict[str, Callable[[CascadeMove], str | Cell]] = {
         "move": lambda move: count(move.number),

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from detent.axisfile import common_checks as common
+from detent.control.head_computer import LOWEST_FAST_PASS, SLOWEST_PASS
 from detent.files.findings import Caution, Contradiction, wrong
 from detent.files.nearest import Remedies
 from detent.files.quantities import INCH
@@ -21,8 +22,9 @@ PULLEY_TOLERANCE = 1e-3  # how far one encoder cycle may be from 1/300 in, relat
 PWM_PERIOD = 40e-6  # one PWM period [s] (2.3)
 ASSUMED_ACCELERATION = 600 * INCH  # acceleration the method's equations assume [m/s^2] (eq. 6)
 RAMP_INTERVAL_RANGE = (350e-6, 450e-6)  # usual ramp interval [s] (3.10)
-LOWEST_FAST_PASS = 84  # speed value, 14 in/s, from which a fast calibration pass lies far enough from the slow one
-STANDSTILL_SPEED = 4  # speed value at which the zero-speed detector calls the head standing (4.1: 0.67 in/s)
+EXACT_FAST_PASS = 180  # speed value, 30 in/s, from which the identification keeps the tolerance of the specification
+WINDOW_ERROR = 1.5  # speed values that both passes may miss their difference by: a whole emitter and half of one
+CREEPING = 60 / SLOWEST_PASS  # speed value below which the slow pass is given up
 
 remedy = Remedies(PrintHeadSpec)
 
@@ -188,14 +190,23 @@ def _calibration(m: HeadFigures) -> Iterator[Caution]:
             "two passes so close cannot tell slope from friction, and the power-on values stay in use",
             "raise limits.speed",
         )
+    elif top < EXACT_FAST_PASS:
+        off = WINDOW_ERROR * max(m.slope.values()) / (top - 60)
+        yield Caution(
+            "tolerance of the identification",
+            f"slope K within {off:.2g} of 256, measured by passes at {top / 6:.3g} and 10 in/s",
+            f"within 2.5, as from limits.speed of {EXACT_FAST_PASS / 6:.3g} in/s on",
+            "speeds are counted in whole emitters, and a short line between two points carries their rounding far",
+            "raise limits.speed, or count on a drive that the trim has to correct by more",
+        )
     for direction in DIRECTIONS:
         slow, fast = (m.open_loop_speed(drives[speed], direction) for speed in (60, top))
-        if slow <= STANDSTILL_SPEED:
+        if slow <= CREEPING:
             yield Caution(
                 f"slow calibration pass, {direction}",
                 f"{slow / 6:.2g} in/s at {drives[60]} counts",
-                f"above {STANDSTILL_SPEED / 6:.2g} in/s",
-                "friction holds the head, and the calibration fails",
+                f"above {CREEPING / 6:.2g} in/s",
+                "friction holds the head or lets it creep: the calibration fails, or the power-on values stay in use",
                 f"lower mechanics.friction.{direction}, or raise method.default_friction_counts",
             )
         if fast > 1.1 * top:

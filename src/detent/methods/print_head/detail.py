@@ -169,9 +169,10 @@ def _identified_figure(run: PrintRun) -> Figure | None:
     known = (
         "At power-up the axis ran at two drive values and measured the speeds (circles); the line through them gives "
         "the drive for every other speed."
-        if any(map(_measured, run.identified.values()))
-        else "The axis was not identified: these are its defaults."
     )
+    if not all(found.valid for found in run.identified.values()):
+        sides = [side for side, found in run.identified.items() if not found.valid]
+        known = f"Not identified, {' and '.join(sides)}: the axis works with its defaults."
     caption = (
         f"The drive value that holds a speed. {known} Where it meets the axis is the drive that overcomes friction. "
         "Look for: the line on the dashed truth."
@@ -187,7 +188,7 @@ def identified_chart(side: str, found: Direction) -> Chart:
 
     lines: list[tuple[str, str, tuple[int, int] | None, float, float]] = [
         ("power-on default", "muted", (2, 4), found.default_slope, found.default_friction),
-        ("identified", side, None, found.slope, found.friction),
+        ("identified" if found.valid else "in use", side, None, found.slope, found.friction),
         ("true machine", "ink", (8, 6), found.true_slope, found.true_friction),
     ]
     curves = [
@@ -223,8 +224,10 @@ def _constants_figure(run: PrintRun) -> Figure | None:
         rows.append(_constant("width between the frames", "found while homing", "mm", run.width * 1e3, None))
     if not rows:
         return None
-    heads = [("constant", False), ("identified", True), ("true", True), ("difference", True), ("unit", False)]
+    heads = [("constant", False), ("in use", True), ("true", True), ("difference", True), ("unit", False)]
     caption = "As the axis measured them, and as the simulated machine has them."
+    if not all(found.valid for found in run.identified.values()):
+        caption = "Slope and friction are defaults where the axis could not measure them; beside them the true machine."
     return Figure(title="Constants of the axis", caption=caption, table=Table(heads=heads, rows=rows))
 
 

@@ -73,9 +73,14 @@ def summary_rows(_: PrintHeadSpec, run: PrintRun) -> list[tuple[str, str]]:
             ("column error", f"worst {run.worst_error * 1e6:.1f} µm, rms {run.rms_error * 1e6:.1f} µm"),
         ]
     for side, line in run.identified.items():
-        if line.speed_fast:
+        if line.valid or run.lines:
             friction = f"friction {line.friction} counts (true {line.true_friction:.1f})"
-            rows.append((f"identified, {side}", f"slope K {line.slope} (true {line.true_slope:.1f}), {friction}"))
+            rows.append(
+                (
+                    f"{'identified' if line.valid else 'default'}, {side}",
+                    f"slope K {line.slope} (true {line.true_slope:.1f}), {friction}",
+                )
+            )
     return [*rows, ("motor", f"peak current {run.peak_current:.2f} A, energy {run.energy:.1f} J")]
 
 

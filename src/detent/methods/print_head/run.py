@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from detent.control.column_timer import COLUMNS
 from detent.control.feed_forward import steady_drive
-from detent.control.head_computer import IMPLAUSIBLE, OBSTRUCTION
+from detent.control.head_computer import IMPLAUSIBLE, LOWEST_FAST_PASS, OBSTRUCTION
 from detent.control.speed_selection import HIGH_SPEED
 from detent.errors import AxisError, describe_sb1
 from detent.files.quantities import INCH
@@ -97,6 +97,7 @@ class Direction:
     true_friction: float
     default_slope: int
     default_friction: int
+    valid: bool  # slope and friction are what the axis found; else its defaults stand in for them
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,11 +268,22 @@ class _Runner:
         if answer.command.tag >= 0 and answer.byte == 0:
             self.book_line(answer.command.tag)
         elif answer.byte == IMPLAUSIBLE:
-            self.result.warnings.append(f"{answer.command.text}: {describe_sb1(answer.byte)}")
+            self.result.warnings.append(f"{answer.command.text}: {self._unidentified(answer.byte)}")
         elif answer.byte and not self.result.failure:
             where = f" (line {self.plans[answer.command.tag].line.number})" if answer.command.tag >= 0 else ""
             self.result.failure = f"{answer.command.text}{where}: {describe_sb1(answer.byte)}{self._place(answer.byte)}"
         self.began = self.machine.time
+
+    def _unidentified(self, code: int) -> str:
+        """Why the axis works with its defaults."""
+        top = self.machine.params.controller.run_speed
+        if top >= LOWEST_FAST_PASS:
+            return describe_sb1(code)
+        return (
+            f"the axis did not measure itself and works with its defaults; limits.speed, {top / 6:.3g} in/s, leaves no "
+            f"room for two passes that can be told apart; raise it to {LOWEST_FAST_PASS / 6:.3g} in/s, or state "
+            "true defaults in method.default_slope and method.default_friction_counts"
+        )
 
     def _place(self, code: int) -> str:
         """Where an obstruction is, as far as the axis knows."""
@@ -360,6 +372,7 @@ class _Runner:
             true_friction=true.coulomb_counts[side],
             default_slope=p.slope_default,
             default_friction=p.friction_default,
+            valid=bool(line.valid),
         )
 
 

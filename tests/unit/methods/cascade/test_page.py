@@ -16,7 +16,7 @@ from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.load import load_spec
 from detent.methods.moves.job import Move, MoveJob
 from detent.page.frame import Card, Page
-from detent.page.table import Cell, Table
+from detent.page.table import Cell, Table, bar_cell, offset_cell
 from detent.page.words import GAP
 from detent.record.recorder import Recorder
 from detent.record.trace import Trace
@@ -268,3 +268,16 @@ def test_what_a_failed_run_did_not_come_to_is_left_out(linear: CascadeSpec) -> N
 
 def test_a_terminal_gets_plain_spaces(linear: CascadeSpec) -> None:
     assert not any(GAP in text for _, text in cascade_summary(linear, cascade_run()))
+
+
+def test_an_error_of_a_first_move_that_failed_is_written_in_a_unit_that_fits(linear: CascadeSpec) -> None:
+    failed = cascade_run(move(1, position=0.4, in_position=False), done=False, failure="it stood")
+    heads = [name for name, _ in table_of(cascade_page(linear, failed, None)).heads]
+    assert "error [mm]" in heads
+
+
+def test_no_bar_is_longer_than_its_column() -> None:
+    assert bar_cell(3.0, 1.0).bar == 1.0
+    assert bar_cell(0.5, 1.0).bar == 0.5
+    assert offset_cell(-1e21, 1.0).bar == 1.0
+    assert bar_cell(float("inf"), 1.0).width == "48"

@@ -32,6 +32,7 @@ def test_the_default_plant_has_nothing_to_warn_about(load_text, good_text):
         (["mechanics.friction.right.coulomb=14 N"], "slow calibration pass, right"),
         (["homing.speed=10 in/s", "homing.drive_limit_counts=60"], "homing drive, right"),
         (["limits.speed=12 in/s", "method.max_print_speed=12 in/s"], "identification"),
+        (["limits.speed=20 in/s", "method.max_print_speed=20 in/s"], "tolerance of the identification"),
         (["motor.inductance=0.1 mH"], "electrical time constant"),
         (["motor.max_current=1 A"], "current while accelerating"),
         (["motor.max_current=1 A"], "stall current while homing"),

@@ -334,3 +334,27 @@ def test_a_recording_is_closed_also_when_the_axis_failed() -> None:
     trace = recorder.trace()
     assert trace.time[-1] == pytest.approx(run.time_end)
     assert len(trace) == round(run.time_end / TICK)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("limit", [8, 12])
+def test_an_axis_too_slow_for_two_passes_makes_none_and_says_so(limit: int) -> None:
+    overrides = (f"limits.speed={limit} in/s", f"method.max_print_speed={limit} in/s")
+    run = print_job(load_spec(EXAMPLE, overrides), parse_text("a"))
+    assert run.done
+    assert run.level == "warn"
+    assert "works with its defaults; limits.speed" in run.warnings[0]
+    for found in run.identified.values():
+        assert (found.valid, found.slope, found.friction) == (False, found.default_slope, found.default_friction)
+        assert (found.speed_fast, found.speed_slow) == (0, 0)
+
+
+@pytest.mark.compiled
+def test_a_slow_pass_that_creeps_is_given_up() -> None:
+    """One second in which the head goes by an emitter or two is no stall; the pass ends, and the defaults stay."""
+    run = print_job(load_spec(EXAMPLE, ("disturbance.friction_right=85.3 %",)), parse_text("a"))
+    assert run.done
+    assert run.time_ready < 25.0
+    assert not run.identified["right"].valid
+    assert run.identified["left"].valid
+    assert run.warnings[0].startswith("CALCULATE PARAMETERS: the measured slope or friction is implausible")
