@@ -1,14 +1,14 @@
 """The Python API: an axis, loaded from its file, and the runs it makes. The words are those of the command line."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.axisfile.tables import AxisSpec
-from detent.errors import DetentError
+from detent.errors import DetentError, InputError
 from detent.files.screen import Block, OnScreen, Screen
 from detent.methods.check import CheckReport, check_spec
 from detent.methods.load import AxisFile, axis_of_tables, read_axis
@@ -28,6 +28,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
+
+
+@contextmanager
+def given_as(name: str, given: object) -> Generator[None]:
+    """Tell problems of a job, which knows only the name of its file, with the path that was given."""
+    try:
+        yield
+    except InputError as error:
+        if not isinstance(given, str | Path):
+            raise
+        told = (replace(one, file=str(given)) if one.file == name else one for one in error.problems)
+        raise InputError(told) from error
 
 
 @dataclass(frozen=True, repr=False)
@@ -191,7 +203,8 @@ class Axis(OnScreen):
         loaded = self._job(job)
         every = method.every if every is None else every
         if every == 0:
-            return Run(self, method.run(loaded, progress=progress), None)
+            with given_as(loaded.name, job):
+                return Run(self, method.run(loaded, progress=progress), None)
         names = list(method.signals if signals is None else signals)
         about: dict[str, str | float | int] = {"axis": self.name, "job": loaded.name, "seed": method.seed}
         fidelity = getattr(self.spec.axis, "fidelity", None)
@@ -200,7 +213,8 @@ class Axis(OnScreen):
         with TraceWriter(trace_file, recorder.trace(**about)) if trace_file else nullcontext() as writer:
             if writer is not None:
                 recorder.pass_on(writer.append, KEPT_ROWS)
-            result = method.run(loaded, recorder=recorder, progress=progress)
+            with given_as(loaded.name, job):
+                result = method.run(loaded, recorder=recorder, progress=progress)
         return Run(self, result, recorder.trace(**about))
 
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:

@@ -87,6 +87,7 @@ _NUMBER_THEN_UNIT = re.compile(
 _FACTOR = r"[A-Za-zµμΩ]+(?:\^-?[0-9])?"
 _PRODUCT = rf"{_FACTOR}(?: *[*/ ] *{_FACTOR})*"
 _UNIT_TEXT = re.compile(rf"(?:{_FACTOR}|\( *{_PRODUCT} *\))(?: *[*/ ] *(?:{_FACTOR}|\( *{_PRODUCT} *\)))*")
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?![,0-9])")  # and no second one, which would part thousands
 _OUNCE_OR_POUND = re.compile(r"\b(oz|lb)\b")
 
 
@@ -117,6 +118,9 @@ def parse_quantity(text: str, unit: str) -> float:
     match = _NUMBER_THEN_UNIT.fullmatch(text) if len(text) <= MAX_TEXT else None
     if match is None:
         raise QuantityError(f'"{text[:MAX_TEXT]}" is not a number with a unit', unit)
+    if _DECIMAL_COMMA.match(text):
+        remedy = f'write a decimal point: "{text.strip().replace(",", ".", 1)}"'
+        raise QuantityError(f'the decimal comma of "{text.strip()}"', unit, remedy)
     number, unit_text = match.group(1), match.group(2)
     if unit_text is None:
         remedy = f'write the unit after the number, as in "{describe_kind(unit)[1]}"'
@@ -201,10 +205,30 @@ def _conversion_factor(unit_text: str, unit: str) -> Fraction:
     return _pint_factor(unit_text, unit)
 
 
+def _meant(unit_text: str, unit: str) -> str:
+    """The usual unit of what `unit` measures that differs by signs and capitals only; empty where there is none.
+
+    >>> _meant("mms", "m/s"), _meant("mm/sec^2", "m/s^2"), _meant("kg", "m/s")
+    ('mm/s', 'mm/s^2', '')
+    """
+    known = [unit, *COMMON_UNITS.get(unit, {}), describe_kind(unit)[1].split(" ", 1)[-1]]
+    plain = {_letters(name): name for name in reversed(known)}
+    return plain.get(_letters(unit_text.replace("sec", "s")), "")
+
+
+def _letters(unit_text: str) -> str:
+    """Letters and powers of a unit, without what joins them."""
+    return re.sub(r"[^a-zµΩ%0-9]", "", unit_text.lower())
+
+
 def _pint_factor(unit_text: str, unit: str) -> Fraction:
     """Ask pint for the factor; every way it can fail becomes a `QuantityError`."""
     example = describe_kind(unit)[1]
-    unknown = QuantityError(f'the unknown unit "{unit_text}"', unit, f'use a unit as in "{example}"')
+    meant = _meant(unit_text, unit)
+    did_you_mean = f'did you mean "{meant}"?'
+    unknown = QuantityError(
+        f'the unknown unit "{unit_text}"', unit, did_you_mean if meant else f'use a unit as in "{example}"'
+    )
     spelled = re.sub(r"[·.]", "*", unit_text).replace("**", "^").replace("²", "^2")
     if not _UNIT_TEXT.fullmatch(spelled):
         raise unknown
@@ -214,7 +238,7 @@ def _pint_factor(unit_text: str, unit: str) -> Fraction:
     try:
         factor = registry.Quantity(Fraction(1), registry.parse_units(spelled)).to(unit).magnitude
     except pint.DimensionalityError:
-        remedy = f'use a unit of the same dimension as in "{example}"'
+        remedy = did_you_mean if meant else f'use a unit of the same dimension as in "{example}"'
         if "N" in unit and _OUNCE_OR_POUND.search(spelled):
             remedy = "oz and lb are masses; write the forces as ozf and lbf"
         raise QuantityError(f'the unit "{unit_text}", which measures something else', unit, remedy) from None

@@ -3,6 +3,7 @@
 import io
 import sys
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, cast
 
@@ -10,18 +11,24 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from detent import __version__
-from detent.cli.terminal import discard_output, say_compiling
+from detent.cli.terminal import be_quiet, discard_output, print_json, say_compiling
 from detent.errors import DetentError
 from detent.files.text import shown
 from detent.kernel.cache import AT_FIRST_COMPILING
 
 DONE, NOT_DONE = 0, 1
 UsageError: Any = typer.BadParameter.__base__  # typer brings a click of its own, or uses the one that is installed
+QUIET = "Print only what is wrong, and what --json asks for: `detent -q run ...`"
 LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
 
 
 class Commands(TyperGroup):
     """The verbs. Errors that detent raises on purpose become one message and an exit status, never a traceback."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Note whether the answer is for a program: its problems then are, too."""
+        ctx.meta["json"] = "--json" in args
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb."""
@@ -30,8 +37,13 @@ class Commands(TyperGroup):
             try:
                 super().invoke(ctx)
             except DetentError as error:
-                sys.stderr.write(f"{shown(str(error))}\n")
                 status = error.exit_status
+                _tell_problem(error, as_json=ctx.meta["json"])
+            except UsageError as error:
+                if not ctx.meta["json"]:
+                    raise
+                status = error.exit_code
+                _tell_problem(DetentError(error.format_message()), as_json=True)
             except typer.Exit as left:
                 status = left.exit_code
             sys.stdout.flush()
@@ -62,6 +74,15 @@ class Commands(TyperGroup):
             formatter.write_dl(rows)
 
 
+def _tell_problem(error: DetentError, *, as_json: bool) -> None:
+    """What is wrong, as sentences, or for a program as data on the standard output."""
+    if as_json:
+        problems = [asdict(problem) for problem in getattr(error, "problems", ())]
+        print_json({"error": str(error), "exit_status": error.exit_status, "problems": problems})
+    else:
+        sys.stderr.write(f"{shown(str(error))}\n")
+
+
 class ListsMethods(TyperCommand):
     """A verb whose help ends in what each installed method takes as a job, and how fast it ticks."""
 
@@ -82,7 +103,6 @@ app = typer.Typer(
     epilog="Exit status: 0 done, 1 the axis did not do it (the reason is shown), 2 wrong input. 130 Ctrl-C, "
     "143 `kill`: no file is left half-written.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # its imports take longer than the help
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -136,6 +156,11 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def common(
-    version: Annotated[bool, option("--version", "", "Print the version.", callback=_version, is_eager=True)] = False,
+    version: Annotated[
+        bool, option("--version -V", "", "Print the version.", callback=_version, is_eager=True)
+    ] = False,
+    quiet: Annotated[bool, option("--quiet -q", "", QUIET)] = False,
 ) -> None:
     """Options before the verb."""
+    del version  # its callback has told it
+    be_quiet(quiet)

@@ -29,7 +29,7 @@ def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
     figures = [(figure.name, figure.text, figure.formula) for figure in report.derived]
     print_table("What follows from them", ("figure", "value", "from"), figures)
     for caution in report.warnings:
-        say(f"warning: {caution}", "yellow")
+        say(f"warning: {caution}", "yellow", wrong=True)
     number = len(report.warnings)
     say(f"{number} warning{'s' if number > 1 else ''}" if number else "no warnings")
 

@@ -1,8 +1,10 @@
 """What there is to look at: signals as pictures, what can be recorded, files to start from."""
 
+import filecmp
 import math
 import shlex
 import shutil
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,7 +33,7 @@ def timing(
     as_json: Json = False,
 ) -> None:
     """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
-    from detent.axis import load
+    from detent.axis import given_as, load
     from detent.files.text import check_target
 
     check_target(figure)
@@ -42,7 +44,8 @@ def timing(
     axis.check_signals(names)
     loaded = axis.load_job(job) if job is not None else None
     with progress_bar(quiet=as_json) as progress:
-        found = axis.timing(begin, length, job=loaded, signals=names, progress=progress)
+        with given_as(loaded.name if loaded is not None else "", job):
+            found = axis.timing(begin, length, job=loaded, signals=names, progress=progress)
         progress(1.0, "drawing")
         # The VCD file first: it takes any number of signals, a picture does not.
         saved = found.save(vcd)
@@ -65,13 +68,20 @@ def _time(option: str, text: str) -> float:
         raise DetentError(f"{option}: came {text!r}; allowed: {error.allowed}; do: {error.remedy}") from error
 
 
+def _moment(option: str, text: str) -> float:
+    """The same of a trace, whose time is in seconds: a bare number is one of these."""
+    with suppress(ValueError):
+        return float(text)
+    return _time(option, text)
+
+
 @app.command()
 def plot(
     trace: Annotated[Path, typer.Argument(help="Trace: .h5, .csv or .parquet.", show_default=False)],
     signals: Annotated[list[str] | None, option("--signals", "NAMES", SIGNALS)] = None,
     output: Annotated[Path, option("--output -o", "FILE", "PNG, SVG or PDF.")] = Path("plot.png"),
-    start: Annotated[float | None, option("--from", "SECONDS", "First moment.")] = None,
-    stop: Annotated[float | None, option("--to", "SECONDS", "Last moment.")] = None,
+    start: Annotated[str, option("--from", "TIME", "First moment, such as '6 s'; a bare number is seconds.")] = "",
+    stop: Annotated[str, option("--to", "TIME", "Last moment, the same.")] = "",
     *,
     incomplete: Annotated[bool, option("--incomplete", "", "Take a trace of a run that broke off.")] = False,
     as_json: Json = False,
@@ -94,8 +104,9 @@ def plot(
         return
     from detent.page.plots import plot_signals
 
-    begin, end = -math.inf if start is None else start, math.inf if stop is None else stop
-    plot_signals(loaded, names, output, None if start is None and stop is None else (begin, end))
+    begin = _moment("--from", start) if start else -math.inf
+    end = _moment("--to", stop) if stop else math.inf
+    plot_signals(loaded, names, output, (begin, end) if start or stop else None)
     if as_json:
         print_json({"files": [str(output)]})
     else:
@@ -112,9 +123,10 @@ def examples_command(
     found = examples()
     if copy is not None:
         with folder_for("--copy", copy) as made:
-            existing = [path.name for path in found if (copy / path.name).exists()]
+            there = [path for path in found if (copy / path.name).exists()]
+            existing = [path.name for path in there if not _same(path, copy / path.name)]
             if existing:
-                told = f"it holds {', '.join(existing)} already; nothing was copied; choose another folder"
+                told = f"it holds another {', '.join(existing)} already; nothing was copied; choose another folder"
                 raise DetentError(f"--copy {copy}: {told}")
             for path in found:
                 shutil.copyfile(path, made / path.name)
@@ -129,6 +141,11 @@ def examples_command(
     else:
         axis, job = (shlex.quote(str(copy / name)) for name in ("print_head.toml", "letter.txt"))
         tell(f"\nCopied to {copy}. Try: detent run {axis} --job {job}")
+
+
+def _same(path: Path, other: Path) -> bool:
+    """True for files of the same bytes."""
+    return other.is_file() and filecmp.cmp(path, other, shallow=False)
 
 
 def _about(path: Path) -> str:

@@ -24,6 +24,8 @@ SIGNALS = (
     "lists them."
 )
 EVERY = "Record every n-th base tick; 0 records nothing. Tick and default of each method: below."
+TRACE = "Trace files: h5, csv, parquet, comma-separated. Default: h5, and csv up to 20 MB."
+MOST_UNASKED = 20_000_000  # bytes of a CSV trace that nobody asked for
 COMPARE = "Show the comparison with other methods in the report, where its page has one."
 
 
@@ -38,15 +40,15 @@ def run(
     overrides: Set = None,
     signals: Annotated[list[str] | None, option("--signals", "NAMES", SIGNALS)] = None,
     every: Annotated[int | None, option("--every", "", EVERY, min=0, max=10_000_000)] = None,
-    formats: Annotated[str, option("--trace", "KINDS", "Trace files: h5, csv, parquet, comma-separated.")] = "h5,csv",
+    formats: Annotated[str | None, option("--trace", "KINDS", TRACE)] = None,
     comparison: Annotated[bool, option("--compare/--no-compare", "", COMPARE)] = True,
     *,
     as_json: Json = False,
 ) -> None:
     """Do a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
-    from detent.axis import load
+    from detent.axis import given_as, load
 
-    kinds = _trace_kinds(formats) if every != 0 else []
+    kinds = _trace_kinds("h5,csv" if formats is None else formats) if every != 0 else []
     axis = load(file, overrides or [])
     source = _source(job, replay, mapping, columns or [])
     loaded = axis.load_job(source) if replay is None else axis.load_recording(source, mapping, columns or [])
@@ -57,18 +59,21 @@ def run(
     files = ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS))
     with folder_for("--output", folder, files) as made, progress_bar(quiet=as_json) as progress:
         store = made / "trace.h5" if kinds else None
-        done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
+        with given_as(loaded.name, source):
+            done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
         if comparison and replay is None and axis.method.reports_comparisons:
             done.comparisons = axis.compare(progress)
         progress(1.0, "writing the report")
         done.report(made / "report.html")
-        _convert_trace(made, kinds)
+        passed_over = _convert_trace(made, kinds, MOST_UNASKED if formats is None else None)
     written = [folder / name for name in ("report.html", *(f"trace.{kind}" for kind in kinds))]
     if as_json:
         print_json(done.to_dict() | {"files": [str(path) for path in written]})
     else:
         _print_run(done, written)
+        if passed_over:
+            say(f"  no trace.csv: it would be about {passed_over / 1e6:.0f} MB; --trace h5,csv writes it")
     if not done.done:
         raise typer.Exit(NOT_DONE)
 
@@ -100,28 +105,35 @@ def _trace_kinds(formats: str) -> list[str]:
     return list(dict.fromkeys(kinds))
 
 
-def _convert_trace(folder: Path, kinds: list[str]) -> None:
-    """The HDF5 trace is there; make the others from it and drop it if it was not asked for."""
-    from detent.record.trace_files import convert_trace
+def _convert_trace(folder: Path, kinds: list[str], most_csv: int | None) -> int:
+    """The HDF5 trace is there; make the others from it and drop it if it was not asked for.
 
-    store = folder / "trace.h5"
+    Returns the size of a CSV trace that was left out, and from the kinds, because it is above the most, 0 if none is.
+    """
+    from detent.record.trace_files import convert_trace, size_as_csv
+
+    store, left_out = folder / "trace.h5", 0
+    if most_csv is not None and "csv" in kinds and (size := size_as_csv(store)) > most_csv:
+        left_out = size
+        kinds.remove("csv")
     for kind in kinds:
         if kind != "h5":
             convert_trace(store, folder / f"trace.{kind}")
     if kinds and "h5" not in kinds:
         store.unlink()
+    return left_out
 
 
 def _print_run(done: Any, written: list[Path]) -> None:
     result = done.result
-    say(done.verdict, STYLES[done.level])
+    say(done.verdict, STYLES[done.level], wrong=done.level != "good")
     for name, text in done.summary():
         say(f"  {name:<20} {text}")
     for text in result.warnings:
-        say(f"  warning: {text}", "yellow")
+        say(f"  warning: {text}", "yellow", wrong=True)
     if number := len(done.cautions):
         told = f"{number} warning{'s' if number > 1 else ''}; `detent check` shows {'them' if number > 1 else 'it'}"
-        say(f"  {'check':<20} {told}", "yellow")
+        say(f"  {'check':<20} {told}", "yellow", wrong=True)
     notes = getattr(result.job, "notes", ())
     for note in notes[:5]:
         say(f"  note: {note}")

@@ -52,9 +52,18 @@ def _finite(data: Any) -> Any:
     return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
+_QUIET = [False]  # whether only what is wrong is told
+
+
+def be_quiet(wanted: bool) -> None:
+    """Tell only what is wrong from now on, or all again."""
+    _QUIET[0] = wanted
+
+
 def tell(line: str = "") -> None:
     """A line of text, with nothing in it that steers the terminal."""
-    print(shown(line))
+    if not _QUIET[0]:
+        print(shown(line))
 
 
 def make_console(*, stderr: bool = False) -> Any:
@@ -72,13 +81,17 @@ def make_console(*, stderr: bool = False) -> Any:
     return console
 
 
-def say(text: str, style: str | None = None) -> None:
-    """A line of any length, taken as it is."""
+def say(text: str, style: str | None = None, *, wrong: bool = False) -> None:
+    """A line of any length, taken as it is; one that tells what is `wrong` is told to the quiet too."""
+    if _QUIET[0] and not wrong:
+        return
     make_console().print(shown(text), style=style, soft_wrap=True)
 
 
 def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]], *, right: bool = False) -> None:
     """A table whose cells are taken as they are; `right` aligns all but the first column to the right."""
+    if _QUIET[0]:
+        return
     from rich.table import Table
     from rich.text import Text
 
@@ -107,7 +120,7 @@ def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = make_console(stderr=True)
-    if quiet or not console.is_terminal:
+    if quiet or _QUIET[0] or not console.is_terminal:
         yield lambda _share, _text: None
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
@@ -118,6 +131,8 @@ def progress_bar(*, quiet: bool) -> Generator[Callable[[float, str], None]]:
 
 def say_compiling(why_unkept: str) -> None:
     """Say why the first run of an axis takes longer."""
+    if _QUIET[0]:
+        return
     later = f"it cannot be kept ({why_unkept})" if why_unkept else "later runs start at once"
     sys.stderr.write(f"First run: compiling the axis, up to 15 s; {shown(later)}.\n")
     sys.stderr.flush()

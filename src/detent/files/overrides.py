@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from detent.errors import DetentError, FileProblem
 from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_fields, named_as, options_of, unit_of
 from detent.files.locate import Path
-from detent.files.problems import dotted
+from detent.files.problems import dotted, field_at
 from detent.files.text import did_you_mean
 
 
@@ -25,6 +25,12 @@ def apply_overrides(
         if not equals or not value:
             remedy = f"write it as in --set '{_example_override(tables, known.items())}'"
             problems.append(FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", remedy))
+        elif value == "none" and _may_be_none(model, path, wanted):
+            around = tables
+            for part in path[:-1]:
+                around = as_table(around.get(part))
+            around.pop(path[-1], None)
+            texts[path] = value
         elif wanted is None:
             remedy = did_you_mean(key, _keys_near(tables, known, path), "`detent check` lists the keys", 0.5)
             came, allowed = f'the unknown key "{key}"', "a key of the axis file"
@@ -33,6 +39,17 @@ def apply_overrides(
             put_value(tables, path, _override_value(wanted, value))
             texts[path] = value
     return texts, problems
+
+
+def _may_be_none(model: type[Table], path: Path, wanted: FieldInfo | None) -> bool:
+    """True for a key, or a table, that need not be there, and for which "none" is no word of its own."""
+    if wanted is None:
+        try:
+            wanted = field_at(model, path)
+        except KeyError:
+            return False
+    is_word = wanted.annotation is str or "none" in options_of(wanted)
+    return wanted.default is None and not wanted.is_required() and not is_word
 
 
 def _example_override(tables: dict[str, Any], known: Iterable[tuple[Path, FieldInfo]]) -> str:

@@ -1,6 +1,8 @@
 """From an axis file to a checked specification: `load_spec`, or `read_axis` where the origin of each value matters."""
 
 import copy
+import json
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,7 @@ from detent.files.problems import Reporter, bad_names, dotted, field_at, key_pat
 from detent.files.read import told_errors
 from detent.files.screen import OnScreen
 from detent.files.source import Source, read_source
-from detent.files.text import did_you_mean
+from detent.files.text import did_you_mean, nearest
 from detent.methods.method import Method
 from detent.methods.registry import METHODS
 from detent.units import QuantityError, parse_quantity
@@ -141,15 +143,15 @@ def _apply_catalogue(layers: _Layers, reporter: Reporter, method: Method[Any]) -
     """Put a catalogue motor's constants under the stated ones, for every motor of the file that names one."""
     if method.catalogue is None:
         return
-    known = [path for path, _ in leaf_fields(method.spec)]
+    known = dict(leaf_fields(method.spec))
     pattern = next(path for path in known if path[-2:] == ("motor", "catalogue"))
-    keys = {path[-1] for path in known if path[:-1] == pattern[:-1]}
+    keys = {path[-1]: field.is_required() for path, field in known.items() if path[:-1] == pattern[:-1]}
     for path in list(filled(layers.tables, pattern)):
         _apply_motor(layers, reporter, method.catalogue, path, keys)
 
 
-def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: set[str]) -> None:
-    """One motor: `path` is that of its key ``catalogue``, `keys` are those of its table."""
+def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: dict[str, bool]) -> None:
+    """One motor: `path` is that of its key ``catalogue``, `keys` are those of its table: whether each is needed."""
     name = _value_at(layers.tables, path)
     if not name:
         return
@@ -161,8 +163,8 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
     constants = catalogue.constants(name)
     if constants is None:
         names = list(catalogue.entries())
-        otherwise = f"choose one of these, or state the constants in [{dotted(around)}]"
-        remedy = did_you_mean(name, names, otherwise, 0.4)
+        needed = ", ".join(key for key, is_needed in keys.items() if is_needed)
+        remedy = _motor_meant(name, names, f"state its constants in [{dotted(around)}]: {needed}")
         layers.problems.append(
             reporter.problem(path, reporter.came(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
         )
@@ -173,6 +175,28 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
         if key not in motor and key in keys:
             motor[key] = value
             layers.catalogue[(*around, key)] = name
+
+
+def _motor_meant(name: str, names: Sequence[str], otherwise: str) -> str:
+    """What to do about a motor that the catalogue lacks: one of another size or winding is never the one meant."""
+    own = "".join(_words(name))
+    meant = [known for known in names if any(char.isdigit() for char in own) and own in _runs(_words(known))]
+    if meant:
+        each = " or ".join(json.dumps(known) for known in meant[:4])
+        return f"did you mean {each}? Or {otherwise}"
+    near = nearest(name, names, 0.6)
+    return f"choose one of these, or {otherwise}" + (f' (the nearest name, "{near}", is another motor)' if near else "")
+
+
+def _words(name: str) -> list[str]:
+    """Letters and digits of a name, all small, parted where something else stands between them."""
+    return re.findall(r"[a-z0-9]+", name.lower())
+
+
+def _runs(words: list[str]) -> set[str]:
+    """Words that stand one behind the other, put together."""
+    ends = range(1, len(words) + 1)
+    return {"".join(words[begin:end]) for end in ends for begin in range(end)}
 
 
 def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_whole: bool) -> AxisSpec:

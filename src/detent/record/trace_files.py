@@ -199,6 +199,9 @@ class TraceWriter:
         self.close(complete=kind is None)
 
 
+SAMPLES, SAMPLE_ROWS = 5, 100  # stretches of a trace, and rows of each, that tell how long its rows are as text
+
+
 class _Table(NamedTuple):
     """A trace in memory, or in an open HDF5 file: what it is written again from."""
 
@@ -304,6 +307,16 @@ def convert_trace(store: str | Path, path: str | Path) -> None:
         raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use {' or '.join(_WRITERS)}")
     with _open_store(Path(store)) as table:
         _WRITERS[suffix](table, Path(path))
+
+
+def size_as_csv(store: str | Path) -> int:
+    """Bytes that an HDF5 trace would take as CSV, about: some of its rows tell."""
+    with _open_store(Path(store)) as table:
+        rows = len(next(iter(table.columns.values()), ()))
+        begins = sorted({rows * part // SAMPLES for part in range(SAMPLES)})
+        taken = [values[k : k + SAMPLE_ROWS].tolist() for values in table.columns.values() for k in begins]
+        looked_at = sum(min(SAMPLE_ROWS, rows - k) for k in begins)
+        return sum(len(str(value)) + 1 for values in taken for value in values) * rows // max(looked_at, 1)
 
 
 def save_trace(trace: Trace, path: str | Path) -> None:
