@@ -27,6 +27,8 @@ from detent.record.waveforms import Waveforms, save_vcd
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from detent.methods.linear import LinearModel
+
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
 
 
@@ -73,7 +75,7 @@ class Axis(OnScreen):
         stated = [(key, self.file.texts[key], origin) for key, origin in self.file.origins.items()]
         blocks = [Block("", ("key", "value", "origin"), stated, 28, ".check().rows has every value in effect")]
         title = f"{self.name}, an axis of the method {self.method.title}\n{self.file.file}"
-        return Screen(title, blocks, ".check()  .run(job)  .replace({KEY: value})  .compare()  .timing(at, duration)")
+        return Screen(title, blocks, ".check()  .run(job)  .replace({KEY: value})  .linear()  .compare()")
 
     def replace(self, changes: Mapping[str, Any] | None = None, /, **tables: Any) -> "Axis":
         """Make the same axis with other values.
@@ -225,6 +227,31 @@ class Axis(OnScreen):
         `JerkComparison`. Cascade: one `ProfileComparison`.
         """
         return self.method.compare(self.spec, progress)
+
+    def linear(self) -> "LinearModel":
+        """Give the loops of the axis as linear systems, exact at the samples, with margins and Bode diagram.
+
+        Returns
+        -------
+        LinearModel
+            Cascade: the loop cut at the command, the velocity loop, the position loop. Filtered servo: cut at the speed
+            word. Rotary table: cut at the speed signal.
+
+        Raises
+        ------
+        DetentError
+            The axis is of a method whose law is no linear loop.
+
+        Examples
+        --------
+        >>> import detent
+        >>> model = detent.load(detent.example("cascade.toml")).linear()
+        >>> round(model.margins["velocity"].crossover, 1), round(model.margins["command"].sensitivity, 2)
+        (45.3, 2.22)
+        >>> model["position"].closed().to_scipy().dt
+        0.00025
+        """
+        return self.method.linear(self.spec)
 
     def envelopes(self) -> Mapping[str, Any]:
         """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from detent.analysis.arguments import check_constants
+from detent.analysis.linear_system import LinearSystem
 from detent.analysis.transfer_function import slowest_first
 from detent.errors import DetentError
 
@@ -92,6 +93,16 @@ class SampledLoop:
         The command is at 0.
         """
         return self._window()[:3, :3]
+
+    def open_loop(self) -> LinearSystem:
+        """The loop cut open at the speed word y, as matrices over the state (x, x', y)."""
+        after = np.zeros((3, 4))
+        after[:2, [0, 1, 3]] = self._flow(1.0)[:2, :3]  # the held word is what is put in
+        after[2] = self.coefficient * self.scale * (after[0] - np.eye(4)[0])
+        after[2, 2] += 1.0 - self.coefficient
+        out = np.array([[0.0, 0.0, -1.0]])
+        d = np.zeros((1, 1))
+        return LinearSystem(a=after[:, :3], b=after[:, 3:], c=out, d=d, dt=self.sample_period, name="speed loop")
 
     def command_input(self) -> Numbers:
         """What a command adds to the state (x, x', y) over a window, shape (3, 2).

@@ -1,6 +1,7 @@
 """What there is to look at: signals as pictures, what can be recorded, files to start from."""
 
 import filecmp
+import json
 import math
 import shlex
 import shutil
@@ -149,11 +150,13 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _about(path: Path) -> str:
-    """First comment line of an axis file or a list of moves; what kind of job the others are."""
+    """First comment line of an axis file or a list of moves, title of a notebook; what kind of job the others are."""
     from detent.files.text import lines_of
 
     if path.suffix in {".toml", ".csv"}:
         return lines_of(path.read_text(encoding="utf-8"))[0].lstrip("# ")
+    if path.suffix == ".ipynb":
+        return str(json.loads(path.read_text(encoding="utf-8"))["cells"][0]["source"][0]).strip("# \n")
     return "print job, Diablo 630 stream" if path.suffix == ".prn" else "print job, plain text"
 
 

@@ -108,7 +108,7 @@ def nested(changes: Mapping[Any, Any], before: Mapping[str, Any] | None = None) 
     {'limits': {'speed': 0.5, 'travel': 2.0}, 'axis': {'name': 'a'}}
     """
     made: dict[str, Any] = {
-        key: nested(one) if isinstance(one, Mapping) else one for key, one in (before or {}).items()
+        key: nested(as_table(one)) if isinstance(one, dict) else one for key, one in (before or {}).items()
     }
     value: Any
     for key, value in changes.items():

@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
 
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
+from detent.errors import DetentError
 from detent.files.findings import Caution, Contradiction, Derived
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
+    from detent.methods.linear import LinearModel
     from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
@@ -138,6 +140,9 @@ class Method(Protocol[SpecT]):
     takes: ClassVar[str]  # place of the class of its jobs
     reads: ClassVar[str]  # place of what reads a job file
     runs: ClassVar[str]  # place of what makes a job: ``run(spec, job, recorder=, progress=)``
+    linear_loops: ClassVar[str] = ""
+    """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
+    leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
@@ -231,6 +236,17 @@ class Method(Protocol[SpecT]):
             run=partial(self.run, spec),
             sample_job=partial(self.sample_job, spec),
         )
+
+    def linear(self, spec: SpecT) -> "LinearModel":
+        """Its linear model; refused where its loop is not a linear one."""
+        from detent.methods.linear import LinearModel
+
+        if not self.linear_loops:
+            raise DetentError(
+                f"{spec.axis.name}: came an axis of the method {self.name}, whose law is no linear loop; "
+                "look at its steps with run and compare"
+            )
+        return LinearModel(spec.axis.name, self.brought(self.linear_loops)(spec), self.leaves_out)
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""

@@ -113,9 +113,7 @@ class ComparisonOnScreen(OnScreen):
 
     __slots__ = ()
 
-    table: TextTable
-
-    def screen(self) -> Screen:
+    def screen(self: Comparison) -> Screen:
         """The table."""
         return Screen(self.table.title, [Block("", self.table.heads, self.table.rows)])
 

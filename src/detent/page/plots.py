@@ -113,7 +113,7 @@ def _kind() -> Any:
         def savefig(self, fname: Any, **options: Any) -> None:
             # matplotlib looks some settings up only when it writes.
             with mpl.rc_context(STYLE):
-                super().savefig(fname, **options)
+                base.savefig(self, fname, **options)
 
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()

@@ -17,21 +17,19 @@ import math
 from functools import cached_property
 from importlib import import_module
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.analysis.linear_system import LinearSystem, gain_limit, margins_of, usual_frequencies
 from detent.methods.cascade.schema import CascadeSpec
 from detent.plant.linear_two_mass import linear_plant
 
 Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 
-GRID = 4000  # frequencies at which an open loop is looked at, evenly spaced on a logarithmic scale
-DECADES = 6  # of frequency, below half the sample rate
 LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
-MARGIN_STEP = 1.2  # steps in which the limit of stability is approached
 
 
 def machine_of(spec: CascadeSpec) -> Any:
@@ -56,13 +54,6 @@ def machine_of(spec: CascadeSpec) -> Any:
     )
 
 
-class Margin(NamedTuple):
-    """Where an open loop crosses a gain of 1."""
-
-    crossover: float  # frequency at which the gain first falls below 1 [Hz]; 0 where it never does
-    phase: float  # smallest phase margin over all crossings [rad]
-
-
 class LinearLoop:
     """The closed loop."""
 
@@ -81,11 +72,11 @@ class LinearLoop:
         # Shares of a new velocity, and of a new velocity error of a PID, that their filters take over.
         self.velocity_share = smoothing(self.velocity_sensor.velocity_filter, self.period)
         self.derivative_share = smoothing(spec.method.derivative_filter, self.period)
-        highest = math.log10(0.5 / self.period)
-        self.frequencies = np.logspace(highest - DECADES, highest, GRID, endpoint=False)  # of the open loops [Hz]
-        self._inner, outer = self._open_loops()
+        self.frequencies = usual_frequencies(self.period)  # of the open loops [Hz]
         # Margins; a PID has no velocity loop, which then never crosses a gain of 1.
-        self.velocity_loop, self.position_loop = (_margin(self.frequencies, loop) for loop in (self._inner, outer))
+        self.velocity_loop, self.position_loop = (
+            margins_of(lambda at, k=k: self._open_loops(at)[k], self.frequencies, self.period) for k in (0, 1)
+        )
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
@@ -101,23 +92,44 @@ class LinearLoop:
         """State from sample to sample, the reference at 0, with `more` times the gain.
 
         Behind the plant it holds what encoders and amplifier remember, the newest first, then the filtered velocity,
-        the integral, and the filter of a PID's derivative. Quantities of a sample are rows over the state before it.
+        the integral, and the filter of a PID's derivative.
+        """
+        return self._sample("", more)[0][:, :-1]
+
+    @property
+    def cuts(self) -> tuple[str, ...]:
+        """Places at which the loops can be cut open."""
+        return ("command",) if self.spec.method.structure == "pid" else ("command", "velocity", "position")
+
+    def open_loop(self, cut: str) -> LinearSystem:
+        """The loop that is cut open at a place, as matrices."""
+        after, out = self._sample(cut)
+        a, b, c, d = after[:, :-1], after[:, -1:], out[None, :-1], out[None, -1:]
+        return LinearSystem(a=a, b=b, c=c, d=d, dt=self.period, name=f"{cut} loop")
+
+    def _sample(self, cut: str, more: float = 1.0) -> tuple[Numbers, Numbers]:
+        """What a sample makes of the state and of what is put in at a cut: the state after it, and what comes out.
+
+        Quantities of a sample are rows over the state before it and, last, what is put in.
         """
         read = self.velocity_sensor
         sizes = [len(self.plant.b), self.position_sensor.delay, read.delay + read.velocity_span, self.spec.drive.delay]
-        parts: list[Numbers] = np.split(np.eye(sum(sizes) + 3), np.cumsum(sizes))
+        parts: list[Numbers] = np.split(np.eye(sum(sizes) + 4), np.cumsum(sizes))
         x, positions, places, commands, rest = parts
         positions = np.vstack([x[self.position_place], positions])
         places = np.vstack([x[self.velocity_place], places])
-        velocity, integral, filtered = rest
+        velocity, integral, filtered, put_in = rest
         difference = (places[read.delay] - places[-1]) / (read.velocity_span * self.period)
         velocity = velocity + self.velocity_share * (difference - velocity)
-        command, integral, filtered = self._law(positions[-1], velocity, integral, filtered)
-        commands = np.vstack([command, commands])
+        position_meas = {"position": put_in, "velocity": 0.0 * put_in}.get(cut, positions[-1])
+        velocity_meas = put_in if cut == "velocity" else velocity
+        command, integral, filtered = self._law(position_meas, velocity_meas, integral, filtered)
+        out = -{"position": positions[-1], "velocity": velocity}.get(cut, command)
+        commands = np.vstack([put_in if cut == "command" else command, commands])
         held, driven = self.held
         plant = held @ x + np.outer(driven, more * self.gain * commands[-1])
         after: Any = np.vstack([plant, positions[:-1], places[:-1], commands[:-1], velocity, integral, filtered])
-        return after
+        return after, out
 
     def _law(
         self, position: Numbers, velocity: Numbers, integral: Numbers, filtered: Numbers
@@ -149,29 +161,15 @@ class LinearLoop:
         At most `LARGEST_MARGIN`, at least its inverse, 0 where no gain so low lets it settle. An integral in both
         loops makes a loop that settles neither with much nor with little gain.
         """
-        settles = self.spectral_radius < 1.0
-        step = MARGIN_STEP if settles else 1.0 / MARGIN_STEP
-        near = 1.0
-        while 1.0 / LARGEST_MARGIN < near < LARGEST_MARGIN:
-            far = near * step
-            if (_radius(self.transition(far)) < 1.0) != settles:
-                break
-            near = far
-        else:
-            return LARGEST_MARGIN if settles else 0.0
-        low, high = min(near, far), max(near, far)
-        while high > low * 1.0001:
-            middle = math.sqrt(low * high)
-            low, high = (middle, high) if _radius(self.transition(middle)) < 1.0 else (low, middle)
-        return low
+        return gain_limit(lambda more: _radius(self.transition(more)), LARGEST_MARGIN)
 
-    def _open_loops(self) -> tuple[Phasors, Phasors]:
+    def _open_loops(self, frequencies: Numbers) -> tuple[Phasors, Phasors]:
         """Velocity loop, and position loop with that inside it closed; of a PID no velocity loop, and all of it."""
-        m, read, z = self.spec.method, self.velocity_sensor, np.exp(2j * np.pi * self.frequencies * self.period)
+        m, read, z = self.spec.method, self.velocity_sensor, np.exp(2j * np.pi * frequencies * self.period)
         held, driven = self.held
         size, span = len(driven), float(read.velocity_span)
         through = z[:, None, None] * np.eye(size) - held
-        x = np.linalg.solve(through, np.broadcast_to(driven[:, None], (GRID, size, 1)).astype(np.complex128))[:, :, 0]
+        x = np.linalg.solve(through, np.broadcast_to(driven[:, None], (len(z), size, 1)).astype(np.complex128))[:, :, 0]
         x = x * (self.gain * z ** -float(self.spec.drive.delay))[:, None]
         position = x[:, self.position_place] * z ** -float(self.position_sensor.delay)
         velocity = x[:, self.velocity_place] * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
@@ -184,7 +182,7 @@ class LinearLoop:
 
     def velocity_level(self, frequency: float) -> float:
         """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""
-        return float(np.interp(frequency, self.frequencies, np.abs(self._inner)))
+        return float(np.abs(self._open_loops(np.array([frequency]))[0][0]))
 
 
 def smoothing(time_constant: float, period: float) -> float:
@@ -201,18 +199,7 @@ def _radius(transition: Numbers) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(transition))))
 
 
-def _margin(frequencies: Numbers, loop: Phasors) -> Margin:
-    """First crossover and smallest phase margin of an open loop."""
-    gain = np.log(np.maximum(np.abs(loop), 1e-300))
-    places = np.flatnonzero(np.signbit(gain[1:]) != np.signbit(gain[:-1]))
-    falling = places[gain[places] >= 0.0]
-    if not len(falling):
-        return Margin(0.0, math.pi)
-    share = gain[places] / (gain[places] - gain[places + 1])
-    phase = np.unwrap(np.angle(loop))
-    # An open loop is as far from -1 as its phase is from an odd multiple of 180 deg.
-    at = phase[places] + share * (phase[places + 1] - phase[places])
-    margins = np.mod(at, 2 * np.pi) - np.pi
-    first = falling[0]
-    crossover = frequencies[first] * (frequencies[first + 1] / frequencies[first]) ** share[places == first][0]
-    return Margin(float(crossover), float(margins[np.argmin(np.abs(margins))]))
+def linear_loops(spec: CascadeSpec) -> dict[str, LinearSystem]:
+    """The loops of an axis, by where they are cut."""
+    loop = LinearLoop(spec)
+    return {cut: loop.open_loop(cut) for cut in loop.cuts}

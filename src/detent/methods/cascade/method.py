@@ -36,6 +36,10 @@ class CascadeMethod(Method[CascadeSpec]):
         "plant.machine.side",
     )  # fmt: skip
     takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
+    linear_loops = "loop:linear_loops"
+    leaves_out = (
+        "Left out: limits, counts, Coulomb and Stribeck friction; both masses move, the flanks of a backlash touch.",
+    )
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"

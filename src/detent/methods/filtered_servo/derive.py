@@ -14,6 +14,7 @@ from detent.methods.filtered_servo.schema import FilteredServoSpec
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
+    from detent.analysis.linear_system import LinearSystem
     from detent.analysis.sampled_loop import Response, SampledLoop
     from detent.analysis.transfer_function import ServoTransfer
 
@@ -99,6 +100,11 @@ def damping_of(loop: "SampledLoop") -> float:
     poles = [complex(pole) for pole in loop.poles()]
     # A mode that changes its sign at each sample has no partner; one that is gone after a sample has no real part.
     return min((-pole.real / abs(pole) for pole in poles if pole.imag != 0 and math.isfinite(pole.real)), default=1.0)
+
+
+def linear_loops(spec: FilteredServoSpec) -> "dict[str, LinearSystem]":
+    """The loop of an axis, by where it is cut."""
+    return {"speed": FilteredFigures(spec).loop.open_loop()}
 
 
 def derive(spec: FilteredServoSpec) -> tuple[Derived, ...]:

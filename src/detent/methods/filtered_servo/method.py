@@ -37,6 +37,8 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     every = 10
     seed = "encoder.seed"
     signals, timing = SIGNALS, TIMING
+    linear_loops = "derive:linear_loops"
+    leaves_out = ("Left out: limits, counts, friction that does not grow with speed.",)
     compares = ("comparison:compare_feedback",)
     commands, shows = "host:FilteredHost", "page:FilteredView"
 

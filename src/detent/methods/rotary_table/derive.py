@@ -8,11 +8,15 @@ sections are those of the rotary-table specification. Angles are those of the ta
 import math
 from collections.abc import Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, count_figure, quantity_figure
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity
+
+if TYPE_CHECKING:
+    from detent.analysis.linear_system import LinearSystem
 
 TICK = 1e-4  # base tick [s] (`methods.rotary_table.system`)
 
@@ -137,6 +141,11 @@ def arc_seconds(angle: float) -> str:
 def counted(counts: int) -> str:
     """Write a number of counts."""
     return f"{counts} count{'' if counts == 1 else 's'}"
+
+
+def linear_loops(spec: RotaryTableSpec) -> "dict[str, LinearSystem]":
+    """The loop of an axis, by where it is cut."""
+    return {"position": TableFigures(spec).loop.open_loop()}
 
 
 def derive(spec: RotaryTableSpec) -> tuple[Derived, ...]:

@@ -10,7 +10,10 @@ The word is not rounded and the amplifier not at its limit. The state at a strob
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from detent.analysis.linear_system import LinearSystem
 
 LONGEST = 20.0  # time constants after which the loop has forgotten everything
 
@@ -33,16 +36,25 @@ class HeldLoop:
         run_out = self.time_constant * lost
         return run_out, self.share * (time - run_out), 1.0 - lost, self.share * lost
 
-    def eigenvalues(self) -> Any:
-        """Factors by which the modes change from strobe to strobe, shape (3,)."""
+    def open_loop(self) -> "LinearSystem":
+        """The loop cut open at the speed signal u, as matrices over the state (x, w, u of the strobe before)."""
         import numpy as np
+
+        from detent.analysis.linear_system import LinearSystem
 
         x_w, x_u, w_w, w_u = self._coefficients(self.delay)
         old = np.array([[1.0, x_w, x_u], [0.0, w_w, w_u], [0.0, 0.0, 0.0]])
         x_w, x_u, w_w, w_u = self._coefficients(self.period - self.delay)
         new = np.array([[1.0, x_w, 0.0], [0.0, w_w, 0.0], [0.0, 0.0, 0.0]])
-        signal = np.array([[x_u], [w_u], [1.0]]) @ np.array([[-self.gain, 0.0, 0.0]])
-        return np.linalg.eigvals(new @ old + signal)
+        signal, out = np.array([[x_u], [w_u], [1.0]]), np.array([[self.gain, 0.0, 0.0]])
+        d = np.zeros((1, 1))
+        return LinearSystem(a=new @ old, b=signal, c=out, d=d, dt=self.period, name="position loop")
+
+    def eigenvalues(self) -> Any:
+        """Factors by which the modes change from strobe to strobe, shape (3,)."""
+        import numpy as np
+
+        return np.linalg.eigvals(self.open_loop().closed().a)
 
     @property
     def spectral_radius(self) -> float:

@@ -30,6 +30,8 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
         "controller.positioner.s4", "lines.word", "plant.train.motor.velocity",
     )  # fmt: skip
     takes, reads, runs = "sequence_job:SequenceJob", "sequence_file:load_sequence", "run:run_sequence"
+    linear_loops = "derive:linear_loops"
+    leaves_out = ("Left out: limits, counts, friction that does not grow with speed.",)
     compares = ("comparison:compare_angle",)
     sums_up, reports = "summary:sequence_summary_rows", "page:table_page"
     says = "{job}: every step was done on {axis}.", "Not done: {failure}"

@@ -145,3 +145,19 @@ def test_a_pid_has_one_loop(load_text, good_text):
     assert loop.velocity_loop.crossover == 0
     assert loop.position_loop.crossover > 10
     assert loop.spectral_radius < 1
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_matrices_and_closed_form_give_the_same_open_loops(load_text, good_text, variant):
+    loop = LinearLoop(load_text(good_text, *variant).spec)
+    f = loop.frequencies[1000::100]
+    inner, outer = loop._open_loops(f)
+    cuts = {"velocity": inner, "position": outer} if "velocity" in loop.cuts else {"command": outer}
+    for cut, wanted in cuts.items():
+        found = loop.open_loop(cut).response(f)
+        assert np.abs(found - wanted) == pytest.approx(np.zeros(len(f)), abs=1e-6 * np.abs(wanted).max())
+        assert found[-10:] == pytest.approx(wanted[-10:], rel=1e-6)
+    # Closed at the command it is the axis: the same modes, and the same limit of its gain.
+    closed = loop.open_loop("command").closed()
+    assert closed.a == pytest.approx(loop.transition(), rel=1e-9, abs=1e-12)
+    assert loop.open_loop("command").margins().gain == pytest.approx(loop.gain_margin, rel=1e-3)
