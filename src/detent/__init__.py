@@ -13,20 +13,22 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from detent.axis import Axis, Run, Timing, load, load_trace
     from detent.errors import DetentError, InputError
-    from detent.identify.identified import identify_axis
+    from detent.identify.analysed import Analysed, analyse
+    from detent.identify.identified import Identified, identify_axis
 
 __version__ = "0.1.0"
 
 _PLACES = {
     "detent.axis": ("Axis", "Run", "Timing", "load", "load_trace"),
     "detent.errors": ("DetentError", "InputError"),
-    "detent.identify.identified": ("identify_axis",),
+    "detent.identify.analysed": ("Analysed", "analyse"),
+    "detent.identify.identified": ("Identified", "identify_axis"),
 }
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
 
 __all__ = [
-    "Axis", "DetentError", "InputError", "Run", "Timing", "__version__", "example", "examples", "identify_axis", "load",
-    "load_trace",
+    "Analysed", "Axis", "DetentError", "Identified", "InputError", "Run", "Timing", "__version__", "analyse", "example",
+    "examples", "identify_axis", "load", "load_trace",
 ]  # fmt: skip
 
 
@@ -45,7 +47,7 @@ def __dir__() -> list[str]:
 
 
 def examples() -> list[Path]:
-    """The packaged example files: axis files and jobs."""
+    """The packaged example files: axis files, jobs, and a notebook."""
     folder = Path(__file__).resolve().parent / "examples"
     return sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("__"))
 

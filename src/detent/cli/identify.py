@@ -11,7 +11,7 @@ from detent.cli.terminal import print_json, print_table, progress_bar, say, tell
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
-    from detent.identify.analyse.analyses import Analysis
+    from detent.identify.analysed import Analysed
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
 
@@ -125,6 +125,10 @@ def _print(done: "Identified", outside: list[str]) -> None:
     _print_logs(found)
     if found.estimates:
         print_table(*done.table)
+        for remark in done.remarks:
+            say(f"  {remark}", "yellow")
+        if done.remarks:
+            tell()
         _print_ladder(found)
     if found.horizons:
         _print_horizons(found)
@@ -214,45 +218,50 @@ def analyse(
     columns: Columns = None,
     effort: Effort = None,
     mass: Mass = 0.0,
+    report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
     as_json: Json = False,
 ) -> None:
     """Ask a recording single questions: friction, winding, resonances, steps, encoder; each answer has its limits.
 
-    Exit status: 0 every question asked for has an answer, 1 some have none (the output says what is missing), 2 the
-    input cannot be read.
+    Exit status: 0 every question named by --what has an answer that can be trusted, or, where none is named, any of
+    them; 1 otherwise (the output says what is missing); 2 the input cannot be read.
     """
-    from detent.identify.analyse.analyses import ANALYSES, analyse, check_names
-    from detent.logs.read_log import read_log
+    from detent.files.text import check_target
+    from detent.identify.analysed import analyse as ask
 
-    names = list(dict.fromkeys(what or ANALYSES))
-    check_names(names)
-    found: list[Analysis] = []
+    if report is not None:
+        check_target(report, (".html",), "a report")
     with progress_bar(quiet=as_json) as progress:
-        read = read_log(log, mapping, columns or [])
-        for k, name in enumerate(names):
-            progress(k / len(names), name)
-            found.append(analyse(read, name, effort or "", mass))
+        found = ask(
+            log, what or (), mapping=mapping, columns=columns or [], effort=effort or "", mass=mass, progress=progress
+        )
+        files = [] if report is None else [str(found.report(report))]
     if as_json:
-        print_json({"log": read.to_dict(), "analyses": [one.to_dict() for one in found]})
+        print_json(found.to_dict() | {"files": files})
     else:
-        _print_answers(found, [str(finding) for finding in read.findings])
-    asked = found if what else [one for one in found if one.estimates]
-    if not asked or any(one.reason for one in asked):
+        _print_answers(found)
+        for path in files:
+            say(f"written: {path}")
+    if not found.done:
         raise typer.Exit(NOT_DONE)
 
 
-def _print_answers(found: "list[Analysis]", findings: list[str]) -> None:
-    """Answers first, then what has none and why."""
-    for finding in findings:
+def _print_answers(found: "Analysed") -> None:
+    """What to do with each answer first, then the answers."""
+    from detent.identify.analysed import table_of
+
+    for finding in found.log.findings:
         say(f"  {finding}", "yellow")
-    for one in (one for one in found if one.estimates):
-        rows = [(e.name, f"{e.value:.5g}", f"{e.low:.5g} to {e.high:.5g}", e.unit) for e in one.estimates]
-        print_table(f"{one.title[0].upper()}{one.title[1:]} ({one.name})", ("", "value", "95 % interval", "unit"), rows)
+    for name, text in found.recommendations.items():
+        say(f"{name}: {text}", None if found[name].reason else "bold")
+    for remark in found.remarks:
+        say(f"  {remark}", "yellow")
+    tell()
+    for one in (one for one in found.answers if one.estimates):
+        print_table(*table_of(one))
         for note in dict.fromkeys(one.notes):
             say(f"  {note}", "dim")
         if one.reason:
             say(f"  not trusted: {one.reason}", "bold yellow")
         tell()
-    for one in (one for one in found if not one.estimates):
-        say(f"{one.name}: no answer: {one.reason}")

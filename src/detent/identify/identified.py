@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification, Method, Verdict, identify
 from detent.identify.fit.verdict import Refusal
+from detent.identify.remarks import remarks_of
 from detent.identify.write.file_numbers import Contrast, contrasts
 from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job
 from detent.logs.log import Log
@@ -22,6 +24,7 @@ from detent.page.table import TextTable
 if TYPE_CHECKING:
     from detent.record.machine import Progress
 
+MOST_REFUSALS = 5  # refusals told at a prompt
 _STAGES = {
     "ladder": (0.1, 0.4, "fitting models to parts of the log"),
     "output error": (0.4, 0.65, "fitting the simulation to the log"),
@@ -93,9 +96,14 @@ class Identified(OnScreen):
 
     def screen(self) -> Screen:
         """The verdict, what is refused and what to do about it, and the constants."""
-        refused = [(f"{one.subject}: {one.text}", one.record) for one in self.refusals]
-        blocks = [Block(*self.table), Block("Not trusted", ("why", "what to do"), refused, 8, ".refusals")]
-        return Screen(self.sentence, blocks, ".constants  .refusals  .save('axis.toml')  .report('report.html')")
+        told = [f"{one.subject}: {one.text}; do: {one.record}" for one in self.refusals[:MOST_REFUSALS]]
+        left = len(self.refusals) - len(told)
+        told += [f"{left} more: .refusals"] if left > 0 else []
+        return Screen(
+            "\n".join([self.sentence, *told, *self.remarks]),
+            [Block(*self.table)],
+            ".constants  .refusals  .save('axis.toml')  .report('report.html')",
+        )
 
     @property
     def constants(self) -> dict[str, Estimate]:
@@ -111,6 +119,11 @@ class Identified(OnScreen):
     def refusals(self) -> tuple[Refusal, ...]:
         """What is not trusted, why, and what to record instead."""
         return self.found.refusals
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know about constants that would be read wrongly, such as a delay below 0."""
+        return remarks_of(self.found)
 
     def contrasts(self) -> list[Contrast]:
         """Constants that the axis file states outside of their intervals; none without an axis file.
@@ -150,7 +163,7 @@ class Identified(OnScreen):
         from detent.identify.page.page import identify_page
         from detent.page.render import write_page
 
-        write_page(path, identify_page(self.found))
+        write_page(path, identify_page(self.found, self.remarks))
         return Path(path)
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,7 +172,11 @@ class Identified(OnScreen):
             {"name": c.name, "stated": c.stated, "low": c.found.low, "high": c.found.high, "unit": c.found.unit}
             for c in self.contrasts()
         ]
-        return self.found.to_dict() | {"axis": self.axis_name or None, "outside": outside}
+        return self.found.to_dict() | {
+            "axis": self.axis_name or None,
+            "outside": outside,
+            "remarks": list(self.remarks),
+        }
 
     def _spec(self) -> CascadeSpec | None:
         return cascade_spec(self.axis, self.axis_name) if self.axis else None

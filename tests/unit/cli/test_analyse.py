@@ -43,8 +43,9 @@ def test_a_question_without_an_answer_says_what_is_missing(steady: Path):
     assert "voltage and current" in " ".join(text.split())
 
 
-def test_without_a_question_all_are_asked(steady: Path):
-    _, text = call(steady)
+def test_without_a_question_all_are_asked_and_one_answer_will_do(steady: Path):
+    status, text = call(steady)
+    assert status == 0
     for name in ("two-speeds", "friction-map", "winding", "frequency", "steps", "sensors"):
         assert name in text
 
@@ -64,6 +65,16 @@ def test_wrong_input_is_refused(steady: Path, words: tuple[str, ...], told: str)
     done = RUN.invoke(app, ["analyse", str(steady), *words])
     assert done.exit_code != 0
     assert told in str(done.exception) + done.output
+
+
+def test_the_report_is_a_page(steady: Path, tmp_path: Path):
+    status, text = call(steady, "--what", "two-speeds", "--report", tmp_path / "a.html")
+    assert status == 0
+    assert f"written: {tmp_path / 'a.html'}" in text
+    assert "friction: use positive" in text
+    assert "Friction: use positive" in (tmp_path / "a.html").read_text(encoding="utf-8")
+    done = RUN.invoke(app, ["analyse", str(steady), "--report", str(tmp_path / "a.txt")])
+    assert "cannot be saved as '.txt'" in str(done.exception) + done.output
 
 
 def test_a_missing_file(tmp_path: Path):

@@ -1,24 +1,37 @@
 """What else a log can tell, each by its own method: asked for by name, answered with limits or with what is missing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from detent.errors import DetentError
+from detent.identify.analyse.advice import advise
 from detent.identify.analyse.friction_map import map_friction
-from detent.identify.analyse.measure_response import response_of
+from detent.identify.analyse.measure_response import FrequencyResponse, response_of
 from detent.identify.analyse.resonances import fit_resonances
 from detent.identify.analyse.sensors import estimate_resolution, find_dead_time
-from detent.identify.analyse.step_metrics import measure_steps
+from detent.identify.analyse.step_metrics import StepMetrics, measure_steps
 from detent.identify.analyse.two_speeds import fit_two_speeds
 from detent.identify.analyse.winding import fit_winding
 from detent.identify.fit.estimate import Estimate, estimate
 from detent.logs.headings import EFFORTS
 from detent.logs.log import Log
+from detent.units import format_quantity
 
-Found = tuple[tuple[Estimate, ...], str, tuple[str, ...], dict[str, Any]]
+SAME = 0.01  # difference of way and time of two moves, as parts of them, up to which they are one kind
+PROFILE = 10  # samples from which on a change of the reference is a profile and no step
+
+
+class Found(NamedTuple):
+    """What a method found: constants, why none or not to be trusted, what to know, all of it, and what it measured."""
+
+    estimates: tuple[Estimate, ...]
+    reason: str
+    notes: tuple[str, ...]
+    details: dict[str, Any]
+    shown: FrequencyResponse | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +45,8 @@ class Analysis:
     reason: str  # why there is nothing, or why it is not to be trusted; empty where neither is so
     notes: tuple[str, ...]  # what to know about it
     details: dict[str, Any]  # all of it, as plain data for JSON
+    advice: str = ""  # what to do with it, or what to record for one
+    shown: FrequencyResponse | None = None  # what was measured, for a figure
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, but for numbers that are not finite."""
@@ -42,7 +57,18 @@ def _two_speeds(log: Log, effort: str, _: float) -> Found:
     found = fit_two_speeds(log, effort)
     lines = (found.positive, found.negative)
     partly = [f"{line.direction}: {line.reason}" for line in lines if line.reason and not found.reason]
-    return found.estimates, found.reason, (*partly, *lines[0].notes, *lines[1].notes), asdict(found)
+    reason = found.reason or _impossible(found.estimates)
+    return Found(found.estimates, reason, (*partly, *lines[0].notes, *lines[1].notes), asdict(found))
+
+
+def _impossible(estimates: Sequence[Estimate]) -> str:
+    """Why friction cannot be so: of both directions together, as one alone may hold a constant force; else empty."""
+    named = {one.name: one.value for one in estimates}
+    advice = "the stretches are few, or not as steady as they look; record more steady speeds, each for longer"
+    if len(named) == 4 and named["coulomb.positive"] + named["coulomb.negative"] < 0.0:
+        return f"the friction of both directions together comes out below 0, and would drive the axis: {advice}"
+    falling = [name for name, value in named.items() if name.startswith("slope") and value < 0.0]
+    return f"the effort falls with the speed ({' and '.join(falling)} below 0): {advice}" if falling else ""
 
 
 def _friction_map(log: Log, effort: str, mass: float) -> Found:
@@ -59,20 +85,65 @@ def _friction_map(log: Log, effort: str, mass: float) -> Found:
         if dip.is_found and dip.depth is not None
     )
     details = {name: one.tolist() if isinstance(one, np.ndarray) else one for name, one in asdict(found).items()}
-    return bins, found.reason, (*dips, *found.refused), details
+    return Found(bins, found.reason, (*dips, *found.refused), details)
 
 
 def _winding(log: Log, _: str, __: float) -> Found:
     found = fit_winding(log)
-    return found.estimates, found.reason, found.notes, asdict(found)
+    return Found(found.estimates, found.reason, found.notes, asdict(found))
 
 
 def _steps(log: Log, _: str, __: float) -> Found:
     found = measure_steps(log)
-    pairs = [(number, one) for number, step in enumerate(found.steps, 1) for one in step.estimates]
-    named = tuple(replace(one, name=f"step {number}, {one.name}") for number, one in pairs)
+    kinds = _kinds(found.steps)
+    named = tuple(one for kind in kinds for one in _kind_estimates(kind, found.unit))
     notes = (note for step in found.steps for note in step.notes)
-    return named, found.reason, (*found.notes, *notes), asdict(found)
+    details = asdict(found) | {"moves": [_kind_data(kind, log.period) for kind in kinds]}
+    return Found(named, found.reason, (*found.notes, *dict.fromkeys(notes)), details)
+
+
+def _kinds(steps: Sequence[StepMetrics]) -> list[list[StepMetrics]]:
+    """Steps of the same way in the same time, in the order in which each kind is first made."""
+    kinds: list[list[StepMetrics]] = []
+    for step in steps:
+        way = step.target - step.start
+        for kind in kinds:
+            first = kind[0]
+            near = abs(way - (first.target - first.start)) <= SAME * abs(way)
+            if near and abs(step.duration - first.duration) <= SAME * step.duration:
+                kind.append(step)
+                break
+        else:
+            kinds.append([step])
+    return kinds
+
+
+def _kind_estimates(kind: Sequence[StepMetrics], unit: str) -> Iterator[Estimate]:
+    """What the moves of a kind have in common: means, with the scatter from one to the next in their limits."""
+    way, times = kind[0].target - kind[0].start, len(kind)
+    title = f"{format_quantity(way, unit, 3)} in {format_quantity(kind[0].duration, 's', 3)}"
+    title += f", {times} times" if times > 1 else ""
+    for name in dict.fromkeys(one.name for step in kind for one in step.estimates):
+        held = [one for step in kind for one in step.estimates if one.name == name]
+        if len(held) == 1:
+            yield replace(held[0], name=f"{title}: {name}")
+            continue
+        values, own = np.array([one.value for one in held]), np.array([one.error for one in held])
+        error = float(np.hypot(values.std(ddof=1), np.sqrt(np.mean(own**2))) / np.sqrt(len(held)))
+        method = f"mean of {len(held)} moves"
+        yield estimate(f"{title}: {name}", float(values.mean()), held[0].unit, error, method, len(held) - 1)
+
+
+def _kind_data(kind: Sequence[StepMetrics], period: float) -> dict[str, Any]:
+    first = kind[0]
+    overshoots = [abs(step.overshoot.value) for step in kind if step.overshoot is not None]
+    return {
+        "way": first.target - first.start,
+        "duration": first.duration,
+        "times": len(kind),
+        "is_profile": first.duration > PROFILE * period,
+        "overshoot": max(overshoots, default=0.0),
+    }
 
 
 def _frequency(log: Log, effort: str, _: float) -> Found:
@@ -84,7 +155,7 @@ def _frequency(log: Log, effort: str, _: float) -> Found:
     notes = (f"{len(lines)} lines from {lines[0]:.3g} to {lines[-1]:.3g} Hz, encoder of {' and '.join(found.outputs)}",)
     measured = {name: response for name, response in (("motor", motor), ("load", load)) if response is not None}
     details = found.to_dict() | {"coherence": {name: one.coherence.tolist() for name, one in measured.items()}}
-    return tuple(found.estimates.values()), found.reason, notes, details
+    return Found(tuple(found.estimates.values()), found.reason, notes, details, motor or load)
 
 
 def _sensors(log: Log, effort: str, _: float) -> Found:
@@ -99,10 +170,11 @@ def _sensors(log: Log, effort: str, _: float) -> Found:
         told.append(estimate("resolution", resolution.step, unit, 0.0, "step common to all positions"))
     if effort or not log.signals.keys().isdisjoint(EFFORTS):
         dead = find_dead_time(log.t, log.signals[log.effort(effort)], log.signals["position"])
-        told.append(dead.estimate)
-        notes += [dead.reason] if dead.reason else []
+        # A dead time that is not to be trusted is none: it would be put into a file all the same.
+        told += [] if dead.reason else [dead.estimate]
+        notes += [f"dead time: no answer: {dead.reason}"] if dead.reason else []
         details["dead_time"] = dead.to_dict()
-    return tuple(told), "" if told else notes[0], tuple(notes), details
+    return Found(tuple(told), "" if told else notes[0], tuple(notes), details)
 
 
 ANALYSES: dict[str, tuple[str, Callable[[Log, str, float], Found]]] = {
@@ -128,7 +200,10 @@ def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysi
     check_names([name])
     title, method = ANALYSES[name]
     try:
-        estimates, reason, notes, details = method(log, effort, mass)
+        found = method(log, effort, mass)
     except DetentError as error:
-        return Analysis(name, title, log.name, (), str(error), (), {})
-    return Analysis(name, title, log.name, estimates, reason, notes, details)
+        return Analysis(name, title, log.name, (), str(error), (), {}, f"no answer: {error}")
+    advice = advise(name, found.estimates, found.reason, found.details)
+    return Analysis(
+        name, title, log.name, found.estimates, found.reason, found.notes, found.details, advice, found.shown
+    )

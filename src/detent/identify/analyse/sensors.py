@@ -182,6 +182,10 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     if explained < EXPLAINED:
         advice = "record a run with more acceleration, or take the delay from a frequency response"
         doubt = f"the motion explains {explained:.0%} of the effort at best, less than {EXPLAINED:.0%}; {advice}"
+    elif found.high < 0.0:
+        late = f"{-1e3 * value:.3g} ms"
+        advice = "the effort is stamped later than it acts, or the position earlier; record both by one clock"
+        doubt = f"the motion comes {late} before its effort, which no drive does: {advice}"
     elif not -0.5 < shift < LONGEST - 0.5:
         advice = "check the sign and the clock of the effort"
         doubt = f"no dead time from 0 to {LONGEST} samples explains the motion; {advice}"

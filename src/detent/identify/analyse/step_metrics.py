@@ -22,6 +22,7 @@ from detent.logs.differences import fill_holes, resolution, runs_of
 from detent.logs.log import Log, Values
 
 STILL = 1e-4  # change of the reference from sample to sample, as a part of its range, up to which it rests
+CREEP = 0.01  # the same as a part of the largest such change
 PAUSE = 10  # samples of a rest of the reference, at least; a shorter one is part of the step
 SMALL = 0.05  # steps smaller than this part of the largest are passed over
 LAST = 0.25  # part of a rest of the reference, its last, in which the position is taken to rest
@@ -165,7 +166,9 @@ def find_steps(reference: Values) -> list[Move]:
     """Changes of a reference between rests."""
     if not np.ptp(reference) > 0:
         return []
-    changes = np.abs(np.diff(reference)) > STILL * float(np.ptp(reference))
+    ways = np.abs(np.diff(reference))
+    # A profile sampled quickly moves by little from sample to sample all the way.
+    changes = ways > min(STILL * float(np.ptp(reference)), CREEP * float(ways.max()))
     runs = runs_of(fill_holes(changes, PAUSE - 1)).tolist()
     before = [0, *(stop for _, stop in runs)]
     after = [*(first for first, _ in runs[1:]), len(reference)]

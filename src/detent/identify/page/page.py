@@ -33,7 +33,7 @@ Heads = list[tuple[str, bool]]  # of a table
 _COLOURS = {Severity.ERROR: "bad", Severity.WARNING: "warn", Severity.NOTE: "soft"}
 
 
-def identify_page(found: Identification) -> Page:
+def identify_page(found: Identification, remarks: Sequence[str] = ()) -> Page:
     """Put the page together; figures over time are of the log that is simulated worst."""
     held, windows = hold_out(found), windows_of(found)
     shown = max(range(len(held)), key=lambda k: held[k].rms_restarted) if held else 0
@@ -46,7 +46,10 @@ def identify_page(found: Identification) -> Page:
         title=f"{title}: {found.verdict}",
         headline=_headline(found, title, ways),
         cards=_cards(found, ways),
-        notes=[Note("error", f"{words.sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in general],
+        notes=[
+            *(Note("error", f"{words.sentence(r.subject)}: {r.text}. Do: {r.record}.") for r in general),
+            *(Note("warning", f"{words.sentence(text)}.") for text in remarks),
+        ],
         sections=[
             Section("Constants", constant_figures(found)),
             Section("What was found in the log", recording_figures(found, shown, simulated=bool(held))),

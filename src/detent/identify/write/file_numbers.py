@@ -13,10 +13,12 @@ import numpy as np
 
 from detent.axisfile.motion import unit_in
 from detent.errors import DetentError
+from detent.identify.analyse.sensors import estimate_resolution
 from detent.identify.fit.constants import hanging_position
 from detent.identify.fit.equations import Run, make_kernel
 from detent.identify.fit.estimate import Estimate
 from detent.identify.fit.identification import Identification
+from detent.logs.log import Log
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec, DirectionTable, FrictionTable
 from detent.units import format_quantity
 
@@ -290,6 +292,7 @@ class Bounds:
     effort: float = 0.0
     period: float = 0.0
     resolution: float = 0.0
+    grid: float = 0.0  # coarsest grid on which positions lie, where no counts show in their steps; 0 for none
 
     @property
     def way(self) -> float:
@@ -324,6 +327,12 @@ def see(runs: Sequence[Run]) -> Bounds:
         resolution=max(run.resolution for run in runs),
         is_rotary=runs[0].is_rotary,
     )
+
+
+def grid_of(logs: Sequence[Log]) -> float:
+    """Coarsest grid on which the positions of logs lie; 0 where there is none."""
+    steps = [estimate_resolution(log.signals["position"]).step for log in logs]
+    return max((step for step in steps if math.isfinite(step)), default=0.0)
 
 
 def outwards(value: float, *, up: bool, size: float) -> float:

@@ -20,7 +20,7 @@ from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
 from detent.identify.fit.verdict import Refusal
-from detent.identify.write.file_numbers import NATIVE, Bounds, FileNumbers, Number, outwards, plain, see
+from detent.identify.write.file_numbers import NATIVE, Bounds, FileNumbers, Number, grid_of, outwards, plain, see
 from detent.methods.cascade.schema import MOST_SAMPLES, CascadeSpec
 from detent.methods.load import axis_of
 from detent.units import format_quantity
@@ -94,7 +94,7 @@ def _whole_file(found: Identification, reading: str) -> str:
     mass, delay = numbers["mechanics.motor_mass"], numbers.get("drive.delay")
     if not mass.trusted:
         raise AxisError("no axis file: the mass is not trusted; record what the refusals name")
-    seen, run = see(found.runs), found.runs[0]
+    seen, run = replace(see(found.runs), grid=grid_of(found.logs)), found.runs[0]
     loops, motion = fit_loops(run), "rotary" if run.is_rotary else "linear"
     gains = choose_gains(mass.value, seen, round(delay.value) if delay else 0)
     file_name = plain(run.name)

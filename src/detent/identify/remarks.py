@@ -1,0 +1,60 @@
+"""What to know about constants that are right by the numbers, and would be read wrongly: each in a sentence."""
+
+from collections.abc import Iterator, Mapping
+
+from detent.errors import DetentError
+from detent.identify.analyse.two_speeds import fit_two_speeds
+from detent.identify.fit.estimate import Estimate
+from detent.identify.fit.identification import Identification
+from detent.identify.page.words import written
+from detent.logs.log import Log
+from detent.page.words import GAP
+
+
+def remarks_of(found: Identification) -> tuple[str, ...]:
+    """Remarks about the constants of an identification."""
+    named = {one.name: one for one in found.estimates}
+    told = list(early(named))
+    if len(found.runs) == 1:  # constants of several logs are those of none alone
+        told += friction_remarks(found.logs[0], found.runs[0].effort_name, named)
+    return tuple(one.replace(GAP, " ") for one in told)
+
+
+def early(constants: Mapping[str, Estimate]) -> Iterator[str]:
+    """A delay below 0, which no drive has."""
+    delay = constants.get("delay")
+    if delay is None or delay.value >= 0.0:
+        return
+    if delay.high >= 0.0:
+        yield f"delay {written(delay)}: none, within its limits"
+        return
+    yield (
+        f"delay {written(delay)}: below 0, which no drive has: effort and position are not stamped at the same moment, "
+        "the position was filtered, or the model lacks what acts like it (a compliant coupling, friction at low "
+        "speed); an axis file gets 0; do: record both by one clock, or take the delay from a frequency response "
+        "(detent analyse --what frequency)"
+    )
+
+
+def friction_remarks(log: Log, effort: str, constants: Mapping[str, Estimate]) -> Iterator[str]:
+    """Where steady speeds alone tell another friction than all of the motion does."""
+    try:
+        steady = fit_two_speeds(log, effort)
+    except DetentError:
+        return
+    for line in (steady.positive, steady.negative):
+        whole = constants.get(f"viscous.{line.direction}")
+        if line.slope is None or whole is None or whole.unit != line.slope.unit or _overlap(line.slope, whole):
+            continue
+        speeds = [abs(stretch.speed) for stretch in line.stretches]
+        unit = f"{log.units['position']}/s" if "position" in log.units else log.units.get("velocity", "")
+        yield (
+            f"viscous friction in {line.direction} direction: {written(whole)} by all of the motion (detent identify), "
+            f"{written(line.slope)} by the steady speeds from {min(speeds):.3g} to {max(speeds):.3g} {unit} alone "
+            "(detent analyse): friction is no straight line over the speed, and each fits its own range; take the "
+            "first for a simulation of all speeds, the second between these speeds"
+        )
+
+
+def _overlap(one: Estimate, other: Estimate) -> bool:
+    return one.low <= other.high and other.low <= one.high
