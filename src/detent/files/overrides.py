@@ -108,7 +108,8 @@ def nested(changes: Mapping[Any, Any], before: Mapping[str, Any] | None = None) 
     {'limits': {'speed': 0.5, 'travel': 2.0}, 'axis': {'name': 'a'}}
     """
     made: dict[str, Any] = {
-        key: nested(as_table(one)) if isinstance(one, dict) else one for key, one in (before or {}).items()
+        key: nested(cast("dict[str, Any]", one)) if isinstance(one, dict) else one
+        for key, one in (before or {}).items()
     }
     value: Any
     for key, value in changes.items():
