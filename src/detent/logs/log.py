@@ -14,6 +14,9 @@ from detent.logs.headings import EFFORTS
 
 Values = NDArray[np.float64]  # numbers of a signal, shape (n,)
 Rows = NDArray[np.int64]  # numbers of rows of a file, from 1, header lines not counted, shape (n,)
+# What no instrument shows: a cell beyond it says nothing, one below it says 0. Squares of squares of what is computed
+# from it stay numbers.
+LARGEST, SMALLEST = 1e30, 1e-30
 MOST_RANGES = 5  # stretches of rows named in a sentence; the finding itself holds all
 
 
@@ -206,9 +209,21 @@ class Draft:
 
     def convert(self) -> None:
         """Bring all numbers into SI units."""
-        self.t = self.t * self.sources["time"].factor + self.sources["time"].offset
+        self.t = self._converted("time", self.t)
         for role, values in self.values.items():
-            self.values[role] = values * self.sources[role].factor + self.sources[role].offset
+            self.values[role] = self._converted(role, values)
+
+    def _converted(self, role: str, values: Values) -> Values:
+        """Numbers of a signal in SI units; refused where its unit or its factor makes of them what nothing shows."""
+        source, unit = self.sources[role], self.units[role]
+        with np.errstate(over="ignore"):
+            found = values * source.factor + source.offset
+        most = float(np.abs(found).max(initial=0.0))
+        if not (most == 0.0 or SMALLEST <= most <= LARGEST):
+            allowed = f"{role} from {SMALLEST:g} to {LARGEST:g} {unit}".rstrip()
+            remedy = f"state another unit or factor of {role}"
+            raise InputError.of_file(self.file, f"{role} up to {most:.3g} {unit}".rstrip(), allowed, remedy)
+        return found
 
     def rescale(self, role: str, factor: float) -> None:
         """Multiply a converted signal, and remember it."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from detent.errors import InputError
 from detent.files.text import short
 from detent.logs.headings import rank, split_heading
-from detent.logs.log import Finding, Rows, Values
+from detent.logs.log import LARGEST, SMALLEST, Finding, Rows, Values
 
 MAX_CELLS = 50_000_000  # most numbers read from one file: 400 MB of them
 MAX_COLUMNS = 2000  # most columns read from one file
@@ -97,7 +97,9 @@ class RawTable:
             # Subtracting without a sign wraps round to the right difference, as long as that fits.
             values = (values.astype(np.uint64) - np.uint64(origin % 2**64)).astype(np.int64)
         floats = values.astype(np.float64)
-        floats[absent | ~np.isfinite(floats)] = np.nan
+        size = np.abs(floats)
+        floats[size < SMALLEST] = 0.0
+        floats[absent | ~(size <= LARGEST)] = np.nan
         return floats, unit
 
 

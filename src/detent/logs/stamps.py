@@ -189,8 +189,8 @@ def look_at_clock(draft: Draft) -> None:
             text = f"{tell_count(len(odd), 'step')} other than the usual {usual * 1e3:.4g} ms"
             draft.note(Kind.IRREGULAR_TIME, "time", odd + 1, text, Action.LEFT, "", Severity.NOTE)
     if len(gaps):
-        lost = np.rint(ratio[gaps]).astype(np.int64) - 1
-        text = f"about {tell_count(int(lost.sum()), 'row')} missing before these, at most {int(lost.max())} at once"
+        lost = [round(one) - 1 for one in ratio[gaps].tolist()]  # a stamp far off makes more of them than 64 bits hold
+        text = f"about {tell_count(sum(lost), 'row')} missing before these, at most {max(lost)} at once"
         draft.note(Kind.DROPPED_ROWS, "", gaps + 1, text, Action.LEFT)
 
 
