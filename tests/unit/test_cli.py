@@ -150,7 +150,7 @@ def bad_inputs() -> dict[str, tuple[Sequence[str], str]]:
         "run: unknown kind of trace": (["run", AXIS, *job, "--trace", "h5,xlsx"], "--trace: came 'xlsx'; allowed: h5,"),
         "run: output is a file": (["run", AXIS, *job, "-o", binary], "--output binary.prn: cannot be written"),
         "run: output below a file": (["run", AXIS, *job, "-o", binary + "/x"], "--output .*cannot be written"),
-        "run: a folder in place of the trace": (["run", AXIS, *job, "-o", "taken"], "--output taken: cannot be"),
+        "run: a folder in place of the trace": (["run", AXIS, *job, "-o", "taken"], "taken.trace.h5: cannot"),
         "run: negative --every": (["run", AXIS, *job, "--every", "-1"], "--every"),
         "run: huge --every": (["run", AXIS, *job, "--every", "99999999999999999999"], "--every"),
         "run: --every in words": (["run", AXIS, *job, "--every", "often"], "--every"),
