@@ -180,6 +180,11 @@ def _process() -> "subprocess.Popen[bytes]":
         why = error.strerror or str(error)
         told = f"{sys.executable}: cannot be started ({why}); recordings are read in a process of their own"
         raise DetentError(told) from error
+    if sys.platform == "linux":
+        import fcntl
+
+        with suppress(OSError):  # large answers come in fewer pieces
+            fcntl.fcntl(cast("IO[bytes]", made.stdout), fcntl.F_SETPIPE_SZ, 1 << 20)
     _RUNNING[os.getpid()] = made
     return made
 
