@@ -1,15 +1,19 @@
 """The Python API: an axis, loaded from its file, and the runs it makes. The words are those of the command line."""
 
+import json
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from detent import __version__
 from detent.axisfile.tables import AxisSpec
 from detent.errors import DetentError, InputError
 from detent.files.screen import Block, OnScreen, Screen
+from detent.files.text import shown
 from detent.methods.check import CheckReport, check_spec
 from detent.methods.load import AxisFile, axis_of_tables, read_axis
 from detent.methods.method import Job, Method, Result, Shown, Simulated
@@ -17,6 +21,7 @@ from detent.methods.registry import METHODS, bringing
 from detent.page.frame import Comparison
 from detent.page.parts import Note
 from detent.record.capture import capture
+from detent.record.evidence import ELEMENT, Kept, RunEvidence, hash_figures, now
 from detent.record.machine import Progress
 from detent.record.recorder import Recorder, choose_leaves
 from detent.record.run import Level
@@ -165,13 +170,15 @@ class Axis(OnScreen):
             )
         return getattr(self.method, word)
 
-    def run(
+    def run(  # noqa: PLR0913 - what to do, what to record of it, and whom to tell
         self,
         job: str | Path | Job,
         *,
         signals: Sequence[str] | None = None,
         every: int | None = None,
         trace_file: str | Path | None = None,
+        job_file: str | Path | None = None,
+        clock: Callable[[], datetime] = now,
         progress: Progress | None = None,
     ) -> "Run":
         """Do a job from power-on.
@@ -186,6 +193,10 @@ class Axis(OnScreen):
             Base ticks between two rows; 0 records nothing. Default: the method's.
         trace_file : path, optional
             Stream the trace to this HDF5 file as it arises: memory then stays constant however long the job is.
+        job_file : path, optional
+            The file that a job object was read from, for the evidence of the run.
+        clock : callable, optional
+            ``clock()`` gives the date of the run; the same date gives the same bytes of report and trace.
         progress : callable, optional
             ``progress(share, text)``.
 
@@ -204,10 +215,13 @@ class Axis(OnScreen):
         method = self.simulated
         loaded = self._job(job)
         every = method.every if every is None else every
+        names = list(method.signals if signals is None else signals)
+        source = job if isinstance(job, str | Path) else job_file
+        made = self._evidence(source, names, every, clock)
         if every == 0:
             with given_as(loaded.name, job):
-                return Run(self, method.run(loaded, progress=progress), None)
-        names = list(method.signals if signals is None else signals)
+                result = method.run(loaded, progress=progress)
+            return Run(self, result, None, evidence=replace(made, figures=hash_figures(result.to_dict())))
         about: dict[str, str | float | int] = {"axis": self.name, "job": loaded.name, "seed": method.seed}
         fidelity = getattr(self.spec.axis, "fidelity", None)
         about |= {"fidelity": fidelity} if fidelity else {}
@@ -217,7 +231,28 @@ class Axis(OnScreen):
                 recorder.pass_on(writer.append, KEPT_ROWS)
             with given_as(loaded.name, job):
                 result = method.run(loaded, recorder=recorder, progress=progress)
-        return Run(self, result, recorder.trace(**about))
+            made = replace(made, figures=hash_figures(result.to_dict()), trace=recorder.hashes)
+            if writer is not None:
+                writer.note(ELEMENT, json.dumps(made.to_dict()))
+        return Run(self, result, recorder.trace(**about), evidence=made)
+
+    def _evidence(
+        self, job_file: str | Path | None, signals: Sequence[str], every: int, clock: Callable[[], datetime]
+    ) -> RunEvidence:
+        """What a run is made from."""
+        job = None if job_file is None else Kept.of(str(job_file), Path(job_file).read_bytes())
+        return RunEvidence(
+            version=__version__,
+            date=clock().isoformat(timespec="seconds"),
+            axis=Kept.of(self.file.file, self.file.source.content),
+            overrides=list(self.file.overrides),
+            changes=self.file.changes,
+            effective={row.key: shown(row.value) for row in self.check().rows},
+            job=job,
+            seed=self.simulated.seed,
+            signals=list(signals),
+            every=every,
+        )
 
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:
         """Hold the method against the ways it was made to better, on this axis.
@@ -358,6 +393,8 @@ class Run(OnScreen):
         Small print for the report, beside file and seed.
     comparisons : tuple
         What `Axis.compare` found, if the report shall show it.
+    evidence : RunEvidence
+        What the run was made from, and hashes of what it gave: report, HDF5 trace and JSON carry it.
     """
 
     axis: Axis
@@ -365,6 +402,7 @@ class Run(OnScreen):
     trace: Trace | None
     settings: dict[str, str] = field(default_factory=dict[str, str])
     comparisons: tuple[Comparison, ...] = ()
+    evidence: RunEvidence | None = None
 
     @property
     def done(self) -> bool:
@@ -404,17 +442,21 @@ class Run(OnScreen):
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
         told = {"axis": self.axis.name, "file": self.axis.file.file, "verdict": self.verdict}
-        return told | self.result.to_dict() | {"check": list(self.cautions)}
+        told |= self.result.to_dict() | {"check": list(self.cautions)}
+        return told | ({"evidence": self.evidence.to_dict()} if self.evidence else {})
 
     def report(self, path: str | Path) -> Path:
         """Write the report as one self-contained HTML file."""
         from detent.page.render import write_page
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.simulated.seed)} | self.settings
+        if self.evidence:
+            settings |= {"date": self.evidence.date, "repeat it": f"detent run --again {Path(path).name}"}
         shown = Shown(trace=self.trace, comparisons=self.comparisons, settings=settings)
         page = self.axis.method.page(self.axis.spec, self.result, shown)
         checked = [Note("warning", f"Known before the run, from detent check: {text}") for text in self.cautions]
-        write_page(path, replace(page, notes=[*page.notes, *checked]))
+        carried = {ELEMENT: self.evidence.to_dict()} if self.evidence else {}
+        write_page(path, replace(page, notes=[*page.notes, *checked], embedded=carried))
         return Path(path)
 
     def save(self, path: str | Path) -> Path:

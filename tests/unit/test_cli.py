@@ -407,7 +407,7 @@ def test_a_run_as_json_has_every_figure_and_the_files(tmp_path: Path) -> None:
         "time_ready", "time_end",
         "print_time", "characters", "characters_per_second", "columns", "missed", "worst_error", "rms_error",
         "turn_arounds", "repositions", "peak_current", "energy", "width", "speeds", "identified", "lines", "notes",
-        "files",
+        "files", "evidence",
     }  # fmt: skip
     assert set(data["lines"][0]) == {
         "number", "direction", "speed_value", "turn_around", "start", "stop", "characters", "columns", "missed",

@@ -199,3 +199,39 @@ def test_a_run_says_what_check_knows_and_is_amber_by_its_own_evidence() -> None:
     data = call(*RUN, *unstable, "--every", "0", "--json").data
     assert (data["level"], len(data["check"]), data["verdict"]) == ("amber", 3, first)
     assert data["warnings"][0].startswith("the command was at its limit for ")
+
+
+@pytest.mark.parametrize("name", ["report.html", "trace.h5"])
+def test_a_run_is_repeated_from_what_it_left(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    for folder in ("one", "two"):
+        made = call(*RUN, "--set", "method.position_gain=35", "--trace", "h5", "-o", folder, "--json")
+        assert made.data["evidence"]["date"] == "1970-01-02T00:00:00+00:00"
+    again = call("run", "--again", f"one/{name}")
+    assert (again.status, again.out.partition(", ")[0]) == (0, f"one/{name}: the same bytes")
+    assert call("run", "--again", f"one/{name}", "--json").data["same"] is True
+
+
+def test_a_repetition_that_differs_says_in_what_and_is_status_1() -> None:
+    assert call(*RUN, "--every", "0", "-o", "out").status == 0
+    page = Path("out/report.html")
+    text = page.read_text(encoding="utf-8")
+    page.write_text(text.replace('"overrides":[]', '"overrides":["method.position_gain=36"]'), encoding="utf-8")
+    again = call("run", "--again", str(page))
+    assert again.status == 1
+    assert "the first difference is in method.position_gain, of the values in effect" in again.out
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("run", "--again", SLIDE), "without the evidence of a run"),
+        (("run", "--again", "no.html"), "no such file"),
+        (("run", CASCADE, "--again", "no.html"), "--again alone"),
+        (("run",), "came no axis file"),
+    ],
+)
+def test_what_cannot_be_repeated_is_refused(words: tuple[str, ...], says: str) -> None:
+    answer = call(*words)
+    assert answer.status == 2
+    assert says in answer.err

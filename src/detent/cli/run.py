@@ -3,13 +3,15 @@
 import shlex
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import LOGS, NOT_DONE, Columns, File, Job, Json, ListsMethods, Mapping, Set, app, option
+from detent import __version__
+from detent.cli.app import LOGS, NOT_DONE, Columns, Job, Json, ListsMethods, Mapping, Set, app, option
 from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
-from detent.errors import DetentError
+from detent.errors import DetentError, InputError
 
 STYLES = {"good": "bold green", "warn": "bold yellow", "bad": "bold red"}  # of a verdict
 TRACE_KINDS = ("h5", "csv", "parquet")
@@ -29,9 +31,12 @@ MOST_UNASKED = 20_000_000  # bytes of a CSV trace that nobody asked for
 COMPARE = "Show the comparison with other methods in the report, where its page has one."
 
 
+AGAIN = "Repeat the run of a report (.html) or HDF5 trace from what it carries; say whether the bytes are the same."
+
+
 @app.command(cls=ListsMethods)
 def run(
-    file: File,
+    file: Annotated[Path | None, typer.Argument(help="Axis file (TOML).", show_default=False)] = None,
     job: Job = None,
     replay: Annotated[Path | None, option("--replay", "LOG", REPLAY)] = None,
     mapping: Mapping = None,
@@ -42,12 +47,23 @@ def run(
     every: Annotated[int | None, option("--every", "", EVERY, min=0, max=10_000_000)] = None,
     formats: Annotated[str | None, option("--trace", "KINDS", TRACE)] = None,
     comparison: Annotated[bool, option("--compare/--no-compare", "", COMPARE)] = True,
+    again: Annotated[Path | None, option("--again", "FILE", AGAIN)] = None,
     *,
     as_json: Json = False,
 ) -> None:
     """Do a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
     from detent.axis import given_as, load
 
+    if again is not None:
+        if file is not None or job is not None or replay is not None or overrides or columns or mapping is not None:
+            raise DetentError(
+                "run: came --again with an axis file, a job or --set; allowed: --again alone, the evidence names them; "
+                "leave them out"
+            )
+        _repeat(again, as_json=as_json)
+        return
+    if file is None:
+        raise DetentError("run: came no axis file; allowed: an axis file, or --again FILE; name one")
     kinds = _trace_kinds("h5,csv" if formats is None else formats) if every != 0 else []
     axis = load(file, overrides or [])
     source = _source(job, replay, mapping, columns or [])
@@ -60,7 +76,7 @@ def run(
     with folder_for("--output", folder, files) as made, progress_bar(quiet=as_json) as progress:
         store = made / "trace.h5" if kinds else None
         with given_as(loaded.name, source):
-            done = axis.run(loaded, signals=wanted, every=every, trace_file=store, progress=progress)
+            done = axis.run(loaded, signals=wanted, every=every, trace_file=store, job_file=job, progress=progress)
         done.settings["command"] = shlex.join(["detent", *sys.argv[1:]])
         if comparison and replay is None and axis.method.reports_comparisons:
             done.comparisons = axis.compare(progress)
@@ -75,6 +91,42 @@ def run(
         if passed_over:
             say(f"  no trace.csv: it would be about {passed_over / 1e6:.0f} MB; --trace h5,csv writes it")
     if not done.done:
+        raise typer.Exit(NOT_DONE)
+
+
+def _repeat(path: Path, *, as_json: bool) -> None:
+    """Make a run again from its evidence, and compare."""
+    from detent.axis import load
+    from detent.record.evidence import first_difference, read_evidence
+
+    before = read_evidence(path)
+    if before.job is None:
+        raise InputError.of_file(
+            str(path), "evidence of a replay, or of a job that came from no file", "a run of a job file",
+            "make it again from its recording, or from Python",
+        )  # fmt: skip
+    with TemporaryDirectory(prefix="again-") as folder, progress_bar(quiet=as_json) as progress:
+        axis, job = Path(folder) / "axis" / Path(before.axis.name).name, Path(folder) / Path(before.job.name).name
+        axis.parent.mkdir()
+        axis.write_bytes(before.axis.content)
+        job.write_bytes(before.job.content)
+        changes = dict(before.changes)
+        repeated = load(axis, before.overrides).replace(changes) if before.axis.content else load(changes)
+        made = repeated.run(job, signals=before.signals, every=before.every, progress=progress)
+    after = made.evidence
+    differs = first_difference(before, after) if after else "the evidence"
+    same = not differs
+    version = f"detent {before.version}" + ("" if before.version == __version__ else f", this is {__version__}")
+    text = f"{path}: the same bytes, {len(before.figures)} figures and {len(before.trace)} columns"
+    if not same:
+        text = f"{path}: not the same; the first difference is in {differs}"
+    text += f"; the run of {before.date} was made by {version}"
+    if as_json:
+        told = {"before": before.to_dict(), "after": after and after.to_dict()}
+        print_json({"same": same, "difference": differs} | told)
+    else:
+        say(text, STYLES["good" if same else "bad"])
+    if not same:
         raise typer.Exit(NOT_DONE)
 
 

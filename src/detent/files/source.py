@@ -4,7 +4,7 @@ import re
 import string
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ class Source:
     problems: tuple[FileProblem, ...] = ()  # errors of syntax
     is_whole: bool = True  # False when lines were left out: then a missing key proves nothing
     is_readable: bool = True  # False when not even the tables are trustworthy
+    content: bytes = b""  # as it was read; empty for a text that came from no file
 
     def line_of(self, name: str, number: int) -> int:
         """Line in which a table of a list begins."""
@@ -43,7 +44,7 @@ def read_source(path: Path | str) -> Source:
     content = read_head(Path(path), MAX_BYTES, allowed, remedy)
     if len(content) > MAX_BYTES:
         raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", allowed, remedy)
-    return parse_source(str(path), decode_utf8(Path(path), content))
+    return replace(parse_source(str(path), decode_utf8(Path(path), content)), content=content)
 
 
 def parse_source(file: str, text: str) -> Source:

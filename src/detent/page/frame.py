@@ -65,6 +65,8 @@ class Page:
     notes: Sequence[Note] = ()
     sections: Sequence[Section] = ()
     settings: Mapping[str, str] = field(default_factory=dict[str, str])
+    embedded: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
+    """Data that the page carries along for programs, by the id of its element."""
 
     def __post_init__(self) -> None:
         twice = [name for name, times in Counter(chart["id"] for chart in self.charts).items() if times > 1]

@@ -1,5 +1,6 @@
 """Records registers while an axis advances, into memory or into a file of any length."""
 
+import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
@@ -57,6 +58,7 @@ class Recorder:
         self._raw: Any = np.dtype([(leaf.path, "<" + leaf.width.code) for leaf in picked])
         self.rows = np.zeros((ROWS, len(self.picks)), np.uint8)
         self._blocks: list[NDArray[np.void]] = []
+        self._hashes = {str(name): hashlib.sha256() for name in self.dtype.names}
         self._sink: Callable[[NDArray[np.void]], object] | None = None
         self._most = 0  # rows kept beside the sink
         self._next_row = 1
@@ -76,11 +78,18 @@ class Recorder:
         block["t"] = raw["tick"] * self.period
         for leaf in self.leaves:
             block[leaf.path] = raw[leaf.path]
+        for name, column in self._hashes.items():
+            column.update(np.ascontiguousarray(block[name]).data)
         if self._sink is not None:
             self._sink(block)
             block = block[: max(self._most - sum(map(len, self._blocks)), 0)]
         self._blocks.append(block)
         self._next_row = last + 1
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """Hash of each column, of all rows so far."""
+        return {name: column.hexdigest() for name, column in self._hashes.items()}
 
     def pass_on(self, sink: Callable[[NDArray[np.void]], object], most: int) -> None:
         """Hand rows to a sink too, and keep no more than the first so many in memory."""

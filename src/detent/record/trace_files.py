@@ -179,6 +179,10 @@ class TraceWriter:
             self._disk.check()
         self.rows, self._last_time = end, time[-1]
 
+    def note(self, name: str, text: str) -> None:
+        """Put a text beside the columns; `read_note` reads it."""
+        self._file[name] = text
+
     def close(self, *, complete: bool = True) -> None:
         """Finish the file and give it its name; a second call does nothing."""
         if self._file is None:
@@ -228,6 +232,12 @@ def _open_store(path: Path) -> Generator[_Table]:
         units, docs = ({name: str(one.attrs[key]) for name, one in columns.items()} for key in ("unit", "doc"))
         told = {name: value for name, value in file.attrs.items() if name != "format"}
         yield _Table(columns, units, docs, {name: _plain(value) for name, value in told.items()})
+
+
+def read_note(path: Path, name: str) -> str:
+    """A text that stands beside the columns of an HDF5 trace; empty where there is none."""
+    with _open_store(path), _h5py().File(path, "r") as file:
+        return file[name].asstr()[()] if name in file else ""
 
 
 def _plain(value: Any) -> Any:
