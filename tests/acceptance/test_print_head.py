@@ -1286,8 +1286,9 @@ def test_52_run_moves_end_where_they_should():
 
 
 def test_53_supply_headroom():
-    tops = {(s, d): (170 * s >> 8) + FRICTION[d] + 96 for s in range(18, 241) for d in (1, -1)}
+    tops = {(s, d): steady_drive(170, FRICTION[d], s) + 96 for s in range(18, 241) for d in (1, -1)}
     assert max(tops.values()) == 291
+    assert tops == {(s, d): math.floor(170 * s / 256) + FRICTION[d] + 96 for s, d in tops}
     for direction in DIRECTIONS:
         for s in range(60, 241, 20):
             rig = Rig().pretend_identified(emitter=2175 - direction * 1900)
