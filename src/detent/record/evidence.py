@@ -117,12 +117,8 @@ def _check_types(made: RunEvidence) -> None:
     texts += [made.version, made.date, *made.overrides, *made.signals, *made.effective.values()]
     texts += [*made.figures.values(), *made.trace.values()]
     every: Any = made.every
-    if (
-        not isinstance(made.changes, dict)
-        or not all(isinstance(text, str) for text in texts)
-        or not isinstance(every, int)
-        or every < 0
-    ):
+    plain = isinstance(made.changes, dict) and all(isinstance(text, str) for text in texts)
+    if not plain or not isinstance(every, int) or every < 0:
         raise TypeError("not what a run leaves")
 
 

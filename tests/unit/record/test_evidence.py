@@ -13,7 +13,8 @@ from detent.record.evidence import ELEMENT, Kept, RunEvidence, first_difference,
 @pytest.fixture
 def evidence() -> RunEvidence:
     return RunEvidence(
-        version="1", date="2026-01-01", axis=Kept.of("a.toml", b"x = 1\n"), overrides=["x=2"], effective={"x": "2"},
+        version="1", date="2026-01-01", axis=Kept.of("a.toml", b"x = 1\n"), overrides=["x=2"], changes={},
+        effective={"x": "2"},
         job=Kept.of("job.prn", b"\x1b\x00\xff"), seed=3, signals=["a"], every=1,
         figures=hash_figures({"moves": [1.5]}), trace={"t": "11", "a": "22"},
     )  # fmt: skip
