@@ -37,6 +37,8 @@ def test_run_makes_the_moves_and_leaves_report_and_trace(axis: str, job: str, si
         "out",
         "--signals",
         "plant.encoder.edge" if axis == FILTERED else "controller.wake",
+        "--trace",
+        "h5,csv",
     )
     assert answer.status == 0, answer.out
     assert ": every move arrived on " in answer.out.splitlines()[0]

@@ -248,6 +248,10 @@ def placing(folder: Path, others: Collection[str] = ()) -> Generator[Path]:
     with them. One process at a time places files into a folder. What a killed one left there is removed, or given its
     names if all of it had been made.
     """
+    for name in others:
+        if (folder / name).is_dir():
+            with write_errors(folder / name):
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     with _held(folder, folder) as alone:
         made = folder / f"{_MADE}{os.getpid()}"
         for left in [*folder.glob(f"{_MADE}*")] if alone else [made]:

@@ -28,14 +28,7 @@ HEAD = """\
 def starting_axis(method: Method[Any], file: FilePath, overrides: Sequence[str] = ()) -> str:
     """Text of an axis file of a method with every key, those of the overrides stated; refused where it would be wrong.
 
-    Parameters
-    ----------
-    method : Method
-        The control method.
-    file : path
-        Where it will be; the axis gets its name.
-    overrides : sequence of str
-        ``"dotted.key=value"``, as of `load_spec`.
+    The axis gets the name of `file`, where it will be.
     """
     turned = method.turned() if method.rotary else method
     stated: dict[str, Any] = {}

@@ -224,7 +224,9 @@ def test_every_motor_takes_its_own_constants_from_the_catalogue(load_text):
 def test_a_motor_that_is_not_in_the_catalogue_is_told_at_its_own_table(load_text):
     (problem,) = problems_of(load_text, TEXT.replace(MOTOR, "%%%%"))
     assert (problem.key, problem.line) == ("rail.north.motor.catalogue", 7)
-    assert problem.remedy == "choose one of these, or state the constants in [rail.north.motor]"
+    assert problem.remedy == (
+        "choose one of these, or state its constants in [rail.north.motor]: steps_per_turn, holding_torque"
+    )
     first, second = problems_of(load_text, TEXT.replace(MOTOR, "%%%%").replace("steps_per_turn = 48\n", ""))
     # What the south lacks has nothing to do with the north's motor.
     assert (first.key, second.key) == ("rail.north.motor.catalogue", "rail.south.motor.steps_per_turn")

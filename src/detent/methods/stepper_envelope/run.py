@@ -169,7 +169,7 @@ def run_stage(
     result.time_end = host.stage.time
     result.failure = result.failure or _verdict(spec, result)
     result.done = not result.failure
-    result.warnings = list(_doubts(spec, result))
+    result.warnings += _doubts(spec, result)
     return result
 
 
