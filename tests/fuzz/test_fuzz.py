@@ -27,20 +27,21 @@ def tell(name, found):
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_damaged_inputs(name):
+def test_damaged_inputs(name, tried):
     target = TARGETS[name]
-    tried, found = fuzz(target, range(target.cases))
+    number, found = fuzz(target, range(target.cases))
     assert not found, tell(name, found)
-    assert tried == target.cases
+    assert number == target.cases
+    tried("reader", name, "a result or a sentence", number)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_inputs_for_a_minute(name):
     first, seconds = int(os.environ.get("DETENT_FIRST_CASE", "0")), float(os.environ.get("DETENT_FUZZ_SECONDS", "60"))
-    tried, found = fuzz(TARGETS[name], count(first), seconds)
+    number, found = fuzz(TARGETS[name], count(first), seconds)
     assert not found, tell(name, found)
-    assert tried > 0
+    assert number > 0
 
 
 @pytest.mark.parametrize("kept", sorted(path.name for path in FOUND.iterdir()))

@@ -81,3 +81,19 @@ def test_a_missing_file(tmp_path: Path):
     done = RUN.invoke(app, ["analyse", str(tmp_path / "none.csv")])
     assert "none.csv" in str(done.exception) + done.output
     assert done.exit_code != 0
+
+
+def test_a_log_without_a_position_is_told_for_each_question(tmp_path: Path):
+    """It ended in a traceback."""
+    path = tmp_path / "current.csv"
+    np.savetxt(
+        path,
+        np.column_stack([np.arange(60) * 1e-2, np.sin(np.arange(60))]),
+        delimiter=",",
+        header="t [s],i [A]",
+        comments="",
+    )
+    status, text = call(path, "--column", "current=i [A]")
+    assert status == 1
+    assert text.count("no answer") == 6
+    assert "position=COLUMN" in text
