@@ -24,7 +24,8 @@ pytestmark = [pytest.mark.wide, pytest.mark.compiled]
 KILLS = 15  # of each command
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 HEAD, LETTER, ZOOM = (str(detent.example(name)) for name in ("print_head.toml", "letter.txt", "zoom.toml"))
-ENV = {**os.environ, "PYTHONPATH": str(Path(detent.__file__).parents[1])}
+# The date of a run is part of its evidence: the same for all.
+ENV = {**os.environ, "PYTHONPATH": str(Path(detent.__file__).parents[1]), "SOURCE_DATE_EPOCH": "0"}
 TRACED = ("plot", "../trace.h5", "--signals", "plant.train.velocity", "--output", "plot.svg")
 
 # The command, ended by a signal before the call of a number that changes something below the folder it is in.
