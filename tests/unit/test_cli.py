@@ -652,7 +652,8 @@ def test_no_word_of_the_command_line_steers_the_terminal(words: list[str], tried
     """What click refuses, it showed raw."""
     answer = call(*words)
     assert answer.status == 2
-    assert "a\\x1b[2J\\u202e\\x9bb" in answer.err
+    # An older click takes the code that clears the screen away itself.
+    assert re.search(r"a(\\x1b\[2J)?\\u202e\\x9bb", answer.err)
     assert not re.search(STEERING, answer.err)
     tried("text", "words of the command line that are refused", "shown, with escapes")
 
