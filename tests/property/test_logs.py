@@ -206,6 +206,12 @@ def test_signed_numbers_read_as_unsigned(folder, seed, bits, size):
     assert log.signals["command"].tolist() == true.tolist()
 
 
+def longest_run(values):
+    """Rows in which a series keeps its number for longest."""
+    changes = np.flatnonzero(np.diff(values))
+    return int(np.diff(np.r_[-1, changes, len(values) - 1]).max())
+
+
 @FEW
 @given(seed=seeds, role=st.sampled_from(["velocity", "force", "current"]), place=places, size=places)
 def test_a_stuck_sensor(folder, seed, role, place, size):
@@ -218,6 +224,8 @@ def test_a_stuck_sensor(folder, seed, role, place, size):
     way = position[first : first + length]
     missed = np.ptp(way - (values[first] * t[first : first + length] if role == "velocity" else 0.0))
     assume(min(np.ptp(way), missed) > 0.2 * np.ptp(position))
+    # A coarse sensor stays at one of its numbers by itself, by chance for longer here than there.
+    assume(role == "velocity" or length > 8 * longest_run(values))
     values[first : first + length] = values[first]
     assume(values.min() < values[first] < values.max())  # at an end it could be a limit
     log = recording.read(folder)
