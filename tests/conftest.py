@@ -15,7 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 # A compiled step costs seconds the first time it is called, which says nothing about the example that met it: no
 # deadline. In CI the examples are the same each time, so that a red run can be repeated.
@@ -34,8 +35,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.get_closest_marker("early") is None)
 
 
+@given(st.none())
+def make_the_first_example(_: None) -> None:
+    """Nothing; hypothesis makes its random generators with it."""
+
+
 def pytest_collection_finish() -> None:
     """What was imported and collected stays: looking through it for garbage, again and again, takes time only."""
+    # Hypothesis asks the collector who holds a generator it makes, and warns when that is frozen and nobody is seen.
+    make_the_first_example()
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000)
