@@ -72,5 +72,5 @@ def check_bad_file(bad, good_text, load_text, golden):
     assert str(first).startswith(expected)
     assert first.key == bad.key
     assert len(others) == bad.others, others
-    golden(bad.name, f"{first.key}: {first.came}; allowed: {first.allowed}; do: {first.remedy}")
+    golden(bad.name, f"{first.key}: {first.got}; expected: {first.allowed}; try: {first.remedy}")
     return first

@@ -70,8 +70,8 @@ def plan_job(
     for move in job.moves:
         if move.sample_period is not None:
             raise DetentError(
-                f"move {move.number}: came a sample period of {move.sample_period:g} s; allowed: none, the loops of "
-                "this axis have a fixed one; do: leave it out"
+                f"move {move.number}: got a sample period of {move.sample_period:g} s; expected: none, the loops of "
+                "this axis have a fixed one; try: leave it out"
             )
         target = place + (move.by or 0.0) if move.target is None else move.target
         own = limits if move.speed is None else MotionLimits(move.speed, limits.acceleration, limits.jerk)

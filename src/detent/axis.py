@@ -126,7 +126,7 @@ class Axis(OnScreen):
         if not isinstance(loaded, wanted):
             names = " or ".join(kind.__name__ for kind in (wanted if isinstance(wanted, tuple) else (wanted,)))
             raise DetentError(
-                f"{self.name}: came a {type(loaded).__name__}; allowed: a {names}, or a file as load_job "
+                f"{self.name}: got a {type(loaded).__name__}; expected: a {names}, or a file as load_job "
                 "reads it; give the axis a job of its own kind"
             )
         return loaded
@@ -165,7 +165,7 @@ class Axis(OnScreen):
         able = bringing(word)
         if self.method.name not in able:
             raise DetentError(
-                f"{self.name}: came an axis of the method {self.method.name}; allowed: {' or '.join(able)}, {why}; "
+                f"{self.name}: got an axis of the method {self.method.name}; expected: {' or '.join(able)}, {why}; "
                 "name an axis file of it"
             )
         return getattr(self.method, word)
@@ -515,7 +515,7 @@ def load(source: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) 
     Raises
     ------
     InputError
-        Everything that is wrong with it, each with its line, what came, what is allowed and what to do.
+        Everything that is wrong with it, each with its line, what it got, what it expected and what to try.
 
     Examples
     --------

@@ -22,7 +22,7 @@ class DetentError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class FileProblem:
-    """One thing wrong in one input: where, what came, what is allowed, what to do.
+    """One thing wrong in one input: where, what it got, what it expected, what to try.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class FileProblem:
         Counted from 1; 0 when the problem has no place in the text (a missing file, an override).
     key : str
         Dotted key such as ``mechanics.travel``; empty for a problem of the text as a whole.
-    came : str
+    got : str
         What was found, as written.
     allowed : str
         What would be accepted.
@@ -44,20 +44,21 @@ class FileProblem:
     line: int
     column: int
     key: str
-    came: str
+    got: str
     allowed: str
     remedy: str
 
     @classmethod
-    def of_key(cls, key: str, came: str, allowed: str, remedy: str) -> "FileProblem":
-        """Problem of a key; whoever reads the file adds the place, and the value as written where `came` is empty."""
-        return cls("", 0, 0, key, came, allowed, remedy)
+    def of_key(cls, key: str, got: str, allowed: str, remedy: str) -> "FileProblem":
+        """Problem of a key; whoever reads the file adds the place, and the value as written where `got` is empty."""
+        return cls("", 0, 0, key, got, allowed, remedy)
 
     def __str__(self) -> str:
         """Give the problem as one line that editors and terminals can jump from."""
         place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
         what = f"{place} {self.key}".rstrip()
-        return f"{what}: came {self.came}; allowed: {self.allowed}; do: {self.remedy}"
+        got = self.got if self.got == "no such file" else f"got {self.got}"
+        return f"{what}: {got}; expected: {self.allowed}; try: {self.remedy}"
 
 
 class InputError(DetentError):
@@ -72,9 +73,9 @@ class InputError(DetentError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     @classmethod
-    def of_file(cls, file: str, came: str, allowed: str, remedy: str) -> "InputError":
+    def of_file(cls, file: str, got: str, allowed: str, remedy: str) -> "InputError":
         """Error about a file as a whole: it is absent, empty or of another kind."""
-        return cls([FileProblem(file, 0, 0, "", came, allowed, remedy)])
+        return cls([FileProblem(file, 0, 0, "", got, allowed, remedy)])
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[tuple[FileProblem, ...]]]:
         """Pickle by the problems, so that the error crosses a process boundary whole."""

@@ -99,7 +99,7 @@ class QuantityError(ValueError):
         self.reason = reason
         self.allowed = f'{kind} such as "{example}"'
         self.remedy = remedy or f'write {kind} as "{example}"'
-        super().__init__(f"{reason}; allowed: {self.allowed}; do: {self.remedy}")
+        super().__init__(f"{reason}; expected: {self.allowed}; try: {self.remedy}")
 
 
 def describe_kind(unit: str) -> tuple[str, str]:

@@ -312,7 +312,7 @@ def test_10_one_comparison_and_at_most_one_increment_a_step():
         r = SimpleNamespace(index=CountingIndex(index), relation=0, state=0, cause=0)
         CountingIndex.compared = CountingIndex.added = 0
         plain(follow)(r, goal, goal)
-        # Equal and less of Python are one three-way comparison; only a falling index is held against the table too.
+        # Equal and less of Python are one three-way comparison; only a falling index is compared with the table too.
         assert CountingIndex.compared <= 2 + (index > goal)
         assert CountingIndex.added == (index != goal)
         assert abs(r.index - index) == (index != goal)

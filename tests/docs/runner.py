@@ -69,16 +69,16 @@ def words_of(text: str) -> list[str] | None:
 FIRST_RUN = "First run: compiling the axis"
 
 
-def matches(shown: str, came: str) -> bool:
+def matches(shown: str, got: str) -> bool:
     """Compare output with what a page shows: `...` stands for any text, spaces at line ends do not count."""
 
     def tidy(text: str) -> str:
         return "\n".join(line.rstrip() for line in text.strip().splitlines())
 
     # Whether a command compiles first depends on what ran before the page.
-    came = "\n".join(line for line in came.splitlines() if not line.startswith(FIRST_RUN))
+    got = "\n".join(line for line in got.splitlines() if not line.startswith(FIRST_RUN))
     parts = [re.escape(part) for part in tidy(shown).split("...")]
-    return re.fullmatch(".*".join(parts), tidy(came), flags=re.DOTALL) is not None
+    return re.fullmatch(".*".join(parts), tidy(got), flags=re.DOTALL) is not None
 
 
 class PageRunner:
@@ -118,12 +118,12 @@ class PageRunner:
         commands = commands_of(block)
         for command, following in zip(commands, [*commands[1:], None], strict=True):
             words = words_of(command.text)
-            came = self.shell(command.text) if words is None else self.detent(words)
+            got = self.shell(command.text) if words is None else self.detent(words)
             if self.status and not (following and following.text == "echo $?"):
-                message = f"{block.where}: `{command.text}` ended with status {self.status}:\n{came}"
+                message = f"{block.where}: `{command.text}` ended with status {self.status}:\n{got}"
                 raise DocumentationError(message)
-            if not matches(command.shown, came):
-                message = f"{block.where}: `{command.text}` shows\n{command.shown}\nbut it prints\n{came}"
+            if not matches(command.shown, got):
+                message = f"{block.where}: `{command.text}` shows\n{command.shown}\nbut it prints\n{got}"
                 raise DocumentationError(message)
 
     def shell(self, text: str) -> str:

@@ -85,11 +85,11 @@ def test_an_exception_of_a_python_block_names_its_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("shown", "came", "same"),
+    ("shown", "got", "same"),
     [("a...z", "a\nb\nz", True), ("a", "a  \n", True), ("a.c", "abc", False), ("...", "", True), ("a", "a\nb", False)],
 )
-def test_comparison_of_output(shown, came, same):
-    assert matches(shown, came) is same
+def test_comparison_of_output(shown, got, same):
+    assert matches(shown, got) is same
 
 
 @pytest.mark.parametrize(

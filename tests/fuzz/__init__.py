@@ -1,1 +1,1 @@
-"""Every reader of what comes from outside, held against damaged inputs: a result or detent's own error, in time."""
+"""Every reader of what comes from outside, compared with damaged inputs: a result or detent's own error, in time."""

@@ -148,7 +148,7 @@ def test_random_edits_give_problems_with_places_or_a_specification(name, edits):
         assert problem.file == "axis.toml"
         assert 1 <= problem.line <= len(text.splitlines())
         assert problem.column >= 1
-        assert problem.came
+        assert problem.got
         assert problem.allowed
         assert problem.remedy
 

@@ -53,16 +53,16 @@ def test_a_list_strikes_at_its_ticks_and_at_no_other(events):
     p, r = InterferenceParams(), Interference()
     fill_list(p, events)
     start_interference(p, r, 1)
-    came = Counter(events)
+    got = Counter(events)
     for tick in range(TICKS + 1):
         remove, lose_sample = r.remove, r.lose_sample
         if tick >= r.next_tick:
             interfere(p, r, tick)
-        assert r.plus == came[tick, INSERT_PLUS]
-        assert r.minus == came[tick, INSERT_MINUS]
-        assert r.remove - remove == came[tick, REMOVE]
-        assert r.lose_sample - lose_sample == came[tick, LOSE_SAMPLE]
-        assert r.corrupt == (1 if came[tick, CORRUPT] else 0)
+        assert r.plus == got[tick, INSERT_PLUS]
+        assert r.minus == got[tick, INSERT_MINUS]
+        assert r.remove - remove == got[tick, REMOVE]
+        assert r.lose_sample - lose_sample == got[tick, LOSE_SAMPLE]
+        assert r.corrupt == (1 if got[tick, CORRUPT] else 0)
     assert r.inserted == sum(kind in (INSERT_PLUS, INSERT_MINUS) for _, kind in events)
     assert r.next_entry == len(events)
 
@@ -114,7 +114,7 @@ def test_the_counters_hold_what_came_on_the_lines_and_what_was_put_in_less_what_
     start_interference(p.plant.interference, plant.interference, 1)
     n, s = plant.interference, c.sequencer
     s.distance = 1000
-    came, put_in, taken, words = 0, 0, 0, 0
+    got, put_in, taken, words = 0, 0, 0, 0
     to_take, to_lose = 0, 0
     for tick, pulse in enumerate(pulses):
         sense(p.plant, plant, plant.train.position, lines, tick)
@@ -123,7 +123,7 @@ def test_the_counters_hold_what_came_on_the_lines_and_what_was_put_in_less_what_
         to_lose += events.count((tick, LOSE_SAMPLE))
         c.converters.tracking.plus, c.converters.tracking.minus = pulse > 0, pulse < 0
         receive_pulses(p.controller, c, lines)
-        came, put_in = came + pulse, put_in + n.plus - n.minus
+        got, put_in = got + pulse, put_in + n.plus - n.minus
         if pulse and to_take:
             taken, to_take = taken + pulse, to_take - 1
         if tick % window == 0:
@@ -132,7 +132,7 @@ def test_the_counters_hold_what_came_on_the_lines_and_what_was_put_in_less_what_
             to_lose -= 1 if to_lose else 0
         move(p.plant, plant, plant.train, lines, tick)
         assert (n.remove, n.lose_sample) == (to_take, to_lose)
-    assert s.position == came + put_in - taken
+    assert s.position == got + put_in - taken
     assert 1000 - s.distance == sum(map(abs, pulses)) + n.inserted - n.removed
     assert s.remaining == -s.position
     assert words + c.speed.count == s.position  # a lost sample delays its pulses, it does not lose them

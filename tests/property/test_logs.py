@@ -309,7 +309,7 @@ def test_no_file_gives_a_traceback(folder, kind, data):
     try:
         log = read_log(path)
     except InputError as error:
-        assert all(problem.came and problem.allowed and problem.remedy for problem in error.problems)  # noqa: PT017
+        assert all(problem.got and problem.allowed and problem.remedy for problem in error.problems)  # noqa: PT017
     else:
         assert len(log) >= 10
 
@@ -332,7 +332,7 @@ def test_no_table_gives_a_traceback(folder, header, rows, separator, ramp):
     try:
         log = read_log(path)
     except InputError as error:
-        assert all(problem.came and problem.allowed and problem.remedy for problem in error.problems)  # noqa: PT017
+        assert all(problem.got and problem.allowed and problem.remedy for problem in error.problems)  # noqa: PT017
     else:
         assert (np.diff(log.t) > 0).all()
         assert all(np.isfinite(values).all() for values in log.signals.values())

@@ -89,7 +89,7 @@ def test_loading_any_file_gives_a_job_or_an_input_error(data, tmp_path_factory):
         problems = error.problems
     if job is None:
         assert problems
-        assert all(problem.came and problem.allowed and problem.remedy for problem in problems)
+        assert all(problem.got and problem.allowed and problem.remedy for problem in problems)
     else:
         assert job.lines
         assert_well_formed(job, len(data))

@@ -147,7 +147,7 @@ def test_any_file_gives_a_job_or_an_input_error(data, tmp_path_factory):
         problems = error.problems
     if job is None:
         assert problems
-        assert all(problem.came and problem.allowed and problem.remedy for problem in problems)
+        assert all(problem.got and problem.allowed and problem.remedy for problem in problems)
         lines = len(data.decode("utf-8", errors="replace").splitlines()) + 1
         assert all(0 <= problem.line <= lines for problem in problems)
         assert all(0 <= problem.column <= len(data) + 1 for problem in problems)

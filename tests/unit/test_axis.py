@@ -157,15 +157,15 @@ def test_an_axis_needs_no_file() -> None:
     ("changes", "says"),
     [
         ({"method.position_gian": 3.0}, r'^replace method\.position_gian: .* did you mean "position_gain"\?'),
-        ({"limits.speed": "3 V"}, r"^replace limits\.speed: came 3 V; allowed: a velocity"),
-        ({"limits.speed": -1.0}, r"^replace limits\.speed: came -1\.0 m/s; allowed: a velocity above 0"),
-        ({"limits.speed": float("nan")}, r"^replace limits\.speed: came nan m/s"),
-        ({"limits.speed": True}, r"^replace limits\.speed: came true"),
-        ({"limits.speed": {"top": 1.0}}, r"^replace limits\.speed: came a table"),
-        ({"limits": 3}, r"^replace limits: came 3; allowed: the table"),
+        ({"limits.speed": "3 V"}, r"^replace limits\.speed: got 3 V; expected: a velocity"),
+        ({"limits.speed": -1.0}, r"^replace limits\.speed: got -1\.0 m/s; expected: a velocity above 0"),
+        ({"limits.speed": float("nan")}, r"^replace limits\.speed: got nan m/s"),
+        ({"limits.speed": True}, r"^replace limits\.speed: got true"),
+        ({"limits.speed": {"top": 1.0}}, r"^replace limits\.speed: got a table"),
+        ({"limits": 3}, r"^replace limits: got 3; expected: the table"),
         ({"axis.method": "cascde"}, r'^replace axis\.method: .* did you mean "cascade"\?'),
-        ({"limits.travel": None}, r"limits\.travel: came nothing"),
-        ({"limits": 3, "limits.speed": 1.0}, r"^limits\.speed: came a value in limits, which is one itself"),
+        ({"limits.travel": None}, r"limits\.travel: got nothing"),
+        ({"limits": 3, "limits.speed": 1.0}, r"^limits\.speed: got a value in limits, which is one itself"),
     ],
 )
 def test_values_that_will_not_do_are_refused_as_those_of_a_file(changes: dict[str, Any], says: str) -> None:
@@ -351,7 +351,7 @@ def test_three_drives_are_compared_on_the_drifted_machine() -> None:
 
 def test_a_job_of_another_kind_is_refused() -> None:
     moves = load_moves(detent.example("moves.csv"))
-    with pytest.raises(DetentError, match=r"print head: came a MoveJob; allowed: a PrintJob"):
+    with pytest.raises(DetentError, match=r"print head: got a MoveJob; expected: a PrintJob"):
         detent.load(AXIS).run(moves)
-    with pytest.raises(DetentError, match=r"phase servo: came a PrintJob; allowed: a MoveJob"):
+    with pytest.raises(DetentError, match=r"phase servo: got a PrintJob; expected: a MoveJob"):
         detent.load(detent.example("phase_servo.toml")).timing(1e-3, 1e-6, job=load_job(LETTER))

@@ -160,15 +160,15 @@ def test_python_says_the_same() -> None:
 
 BAD = {
     "neither": (["run", CASCADE], "neither --job nor --replay"),
-    "both": (["run", CASCADE, "--job", SLIDE, "--replay", "log.csv"], "--job and --replay; allowed: one of them"),
+    "both": (["run", CASCADE, "--job", SLIDE, "--replay", "log.csv"], "--job and --replay; expected: one of them"),
     "columns of no recording": ([*RUN, "--column", "force=f"], "--map or --column without --replay"),
-    "another method": (["run", str(detent.example("filtered_servo.toml")), "--replay", "log.csv"], "allowed: cascade"),
+    "another method": (["run", str(detent.example("filtered_servo.toml")), "--replay", "log.csv"], "expected: cascade"),
     "no log": (["run", CASCADE, "--replay", "none.csv"], "none.csv"),
-    "angles on a slide": (["run", CASCADE, "--replay", "turn.csv"], "came reference in rad; allowed: m, as the axis"),
-    "lengths on a table": (["run", TURNTABLE, "--job", SLIDE], "allowed: an angle such as"),
-    "beyond the end": (["run", CASCADE, "--job", "far.csv"], r"far\.csv:2:1 target: came 700 mm; allowed: a position"),
+    "angles on a slide": (["run", CASCADE, "--replay", "turn.csv"], "got reference in rad; expected: m, as the axis"),
+    "lengths on a table": (["run", TURNTABLE, "--job", SLIDE], "expected: an angle such as"),
+    "beyond the end": (["run", CASCADE, "--job", "far.csv"], r"far\.csv:2:1 target: got 700 mm; expected: a position"),
     "a bad column": (["run", CASCADE, "--replay", "log.csv", "--column", "robot=x"], "robot"),
-    "nothing that drives": (["run", CASCADE, "--replay", "bare.csv"], "came neither a reference nor a force"),
+    "nothing that drives": (["run", CASCADE, "--replay", "bare.csv"], "got neither a reference nor a force"),
 }
 
 
@@ -228,7 +228,7 @@ def test_a_repetition_that_differs_says_in_what_and_is_status_1() -> None:
         (("run", "--again", SLIDE), "without the evidence of a run"),
         (("run", "--again", "no.html"), "no such file"),
         (("run", CASCADE, "--again", "no.html"), "--again alone"),
-        (("run",), "came no axis file"),
+        (("run",), "got no axis file"),
     ],
 )
 def test_what_cannot_be_repeated_is_refused(words: tuple[str, ...], says: str) -> None:

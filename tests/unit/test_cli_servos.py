@@ -124,12 +124,12 @@ def test_registers_are_listed_by_method_or_file(name: str) -> None:
 
 BAD = {
     "a text for a slide": (["run", FILTERED, "--job", "line.txt"], "line.txt"),
-    "a move beyond the end": (["run", PHASE, "--job", "far.csv"], r"far\.csv:2:1 target: came 500 mm; allowed: .* 355"),
+    "a move beyond the end": (["run", PHASE, "--job", "far.csv"], r"far\.csv:2:1 target: got 500 mm; expected: .* 355"),
     "off the grid": (["run", PHASE, "--job", "off.csv"], "move to a positioning point"),
     "too fast for the tracker": (["check", PHASE, "--set", "limits.speed=0.5 m/s"], "limits.speed"),
     "a threshold that breaks the protection": (["check", PHASE, "--set", "method.threshold=15"], "threshold"),
     "a coefficient of no filter": (["check", FILTERED, "--set", "method.coefficient=1.5"], "method.coefficient"),
-    "timing: no time": (["timing", PHASE, "--at", "5"], "--at: came '5'"),
+    "timing: no time": (["timing", PHASE, "--at", "5"], "--at: got '5'"),
     "timing: too late": (["timing", PHASE, "--at", "9 s"], "the run ends before"),
     "timing: too long": (["timing", PHASE, "--at", "1 ms", "--for", "1 s"], "up to 50 ms"),
     "timing: no picture": (["timing", PHASE, "--at", "1 ms", "--figure", "a.txt"], "cannot be saved as '.txt'"),

@@ -90,7 +90,7 @@ def test_envelope_writes_table_header_and_figure_of_each_motor() -> None:
 
 
 BAD = {
-    "no such motor": (["envelope", ZOOM, "--motor", "c"], "--motor: came 'c'; allowed: group_a, group_b"),
+    "no such motor": (["envelope", ZOOM, "--motor", "c"], "--motor: got 'c'; expected: group_a, group_b"),
     "a folder that is a file": (["envelope", ZOOM, "-o", "file/x"], "cannot be written"),
     "a zone below the start frequency": (
         ["check", ZOOM, "--set", "stepper.group_b.zone.fine.speed=1 mm/s"],

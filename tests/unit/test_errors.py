@@ -11,12 +11,12 @@ PROBLEM = FileProblem("axis.toml", 7, 1, "mechanics.travel", "12 V", 'a length s
 
 def test_a_problem_is_one_line_that_an_editor_can_jump_from():
     assert str(PROBLEM) == (
-        'axis.toml:7:1 mechanics.travel: came 12 V; allowed: a length such as "1 m"; do: write a length'
+        'axis.toml:7:1 mechanics.travel: got 12 V; expected: a length such as "1 m"; try: write a length'
     )
 
 
 def test_a_problem_without_a_place_or_a_key_names_only_the_file():
-    assert str(FileProblem("job.txt", 0, 0, "", "nothing", "a job", "name one")).startswith("job.txt: came nothing;")
+    assert str(FileProblem("job.txt", 0, 0, "", "nothing", "a job", "name one")).startswith("job.txt: got nothing;")
 
 
 def test_an_override_has_no_line():
@@ -35,7 +35,7 @@ def test_problems_are_told_in_the_order_of_the_file_and_overrides_last():
 
 def test_an_error_about_a_whole_file():
     error = InputError.of_file("job.txt", "no such file", "a job", "name one")
-    assert str(error) == "job.txt: came no such file; allowed: a job; do: name one"
+    assert str(error) == "job.txt: no such file; expected: a job; try: name one"
 
 
 @pytest.mark.parametrize(("kind", "status"), [(DetentError, 2), (InputError, 2), (AxisError, 1)])

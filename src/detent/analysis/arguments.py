@@ -36,5 +36,5 @@ def check_constants(place: str = "", **values: float) -> None:
     for name, value in values.items():
         allowed, unit, meaning = CONSTANTS[name]
         if not ALLOWED[allowed](value):
-            came = f"{value:g} {unit}".rstrip()
-            raise DetentError(f"{place}{name}: came {came}; allowed: {allowed}; do: state {meaning}")
+            got = f"{value:g} {unit}".rstrip()
+            raise DetentError(f"{place}{name}: got {got}; expected: {allowed}; try: state {meaning}")

@@ -119,7 +119,7 @@ class LinearSystem:
             control: Any = import_module("control")
         except ImportError as error:
             raise DetentError(
-                'this needs python-control, which is not installed; do: pip install "detent[control]", or '
+                'this needs python-control, which is not installed; try: pip install "detent[control]", or '
                 "take to_scipy()"
             ) from error
         return control.StateSpace(self.a, self.b, self.c, self.d, self.dt, name=self.name.replace(" ", "_"))

@@ -218,8 +218,8 @@ class SampledLoop:
         speed = np.atleast_1d(np.asarray(rates, dtype=np.float64))
         if speed.ndim != 1 or not speed.size or not np.isfinite(speed).all():
             raise DetentError(
-                f"rates: came {rates!r:.60}; allowed: one finite number per window, at least one; "
-                "do: state the speed of the command in each window"
+                f"rates: got {rates!r:.60}; expected: one finite number per window, at least one; "
+                "try: state the speed of the command in each window"
             )
         check_constants(points=points)
         part, a = self._flow(1.0 / points), self.coefficient

@@ -134,7 +134,7 @@ def unknown_method(verb: str, word: str, also: str = "") -> DetentError:
     from detent.methods.registry import METHODS
 
     remedy = did_you_mean(word.replace("-", "_").replace(" ", "_"), METHODS, "name one of these")
-    return DetentError(f"{verb}: came {word!r}; allowed: {', '.join(METHODS)}{also and f', or {also}'}; {remedy}")
+    return DetentError(f"{verb}: got {word!r}; expected: {', '.join(METHODS)}{also and f', or {also}'}; {remedy}")
 
 
 def main() -> NoReturn:

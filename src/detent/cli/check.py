@@ -87,7 +87,7 @@ def envelope(
     axis = load(file, overrides or [])
     found = axis.envelopes()
     if motor and motor not in found:
-        raise DetentError(f"--motor: came {motor!r}; allowed: {', '.join(found)}; name a motor of the file")
+        raise DetentError(f"--motor: got {motor!r}; expected: {', '.join(found)}; name a motor of the file")
     chosen = {motor: found[motor]} if motor else found
     folder = output or Path("envelope") / file.stem
     with folder_for("--output", folder) as made:

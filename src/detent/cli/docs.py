@@ -227,7 +227,7 @@ def docs_command(page: Annotated[str, typer.Argument(help=ABOUT)] = "", *, as_js
         from detent.files.text import did_you_mean
 
         remedy = did_you_mean(page, PAGES, "name one of these")
-        raise DetentError(f"docs: came {page!r}; allowed: {', '.join(PAGES)}; {remedy}")
+        raise DetentError(f"docs: got {page!r}; expected: {', '.join(PAGES)}; {remedy}")
     texts = {name: make() for name, make in PAGES.items() if page in {name, ""}}
     if as_json:
         print_json([{"page": name, "markdown": text} for name, text in texts.items()])

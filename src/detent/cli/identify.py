@@ -56,7 +56,7 @@ def identify(
 
     _check_outputs(axis, write, job, report)
     if method not in METHODS:
-        raise DetentError(f"--method: came {method!r}; allowed: {' or '.join(METHODS)}; choose one of these")
+        raise DetentError(f"--method: got {method!r}; expected: {' or '.join(METHODS)}; choose one of these")
     chosen = cast("Method", METHODS[method])
     # Options that read the logs in the same way once more.
     options = ["--map", str(mapping)] if mapping is not None else []
@@ -93,7 +93,7 @@ def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
             check_target(path, (ending,), what)
     write, job, _ = targets
     if job is not None and job in (write, axis):
-        raise DetentError(f"--job {job}: came the name of the axis file; allowed: a file of its own; choose another")
+        raise DetentError(f"--job {job}: got the name of the axis file; expected: a file of its own; choose another")
 
 
 def _write(

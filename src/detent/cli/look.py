@@ -66,7 +66,7 @@ def _time(option: str, text: str) -> float:
     try:
         return parse_quantity(text, "s")
     except QuantityError as error:
-        raise DetentError(f"{option}: came {text!r}; allowed: {error.allowed}; do: {error.remedy}") from error
+        raise DetentError(f"{option}: got {text!r}; expected: {error.allowed}; try: {error.remedy}") from error
 
 
 def _moment(option: str, text: str) -> float:

@@ -57,13 +57,13 @@ def run(
     if again is not None:
         if file is not None or job is not None or replay is not None or overrides or columns or mapping is not None:
             raise DetentError(
-                "run: came --again with an axis file, a job or --set; allowed: --again alone, the evidence names them; "
+                "run: got --again with an axis file, a job or --set; expected: --again alone, the evidence names them; "
                 "leave them out"
             )
         _repeat(again, as_json=as_json)
         return
     if file is None:
-        raise DetentError("run: came no axis file; allowed: an axis file, or --again FILE; name one")
+        raise DetentError("run: got no axis file; expected: an axis file, or --again FILE; name one")
     kinds = _trace_kinds("h5,csv" if formats is None else formats) if every != 0 else []
     axis = load(file, overrides or [])
     source = _source(job, replay, mapping, columns or [])
@@ -133,15 +133,15 @@ def _repeat(path: Path, *, as_json: bool) -> None:
 def _source(job: Path | None, replay: Path | None, mapping: Path | None, columns: list[str]) -> Path:
     """The file that says what the axis does: a job or a recording."""
     if job is not None and replay is not None:
-        raise DetentError("run: came --job and --replay; allowed: one of them; leave one out")
+        raise DetentError("run: got --job and --replay; expected: one of them; leave one out")
     if replay is None and (mapping is not None or columns):
         raise DetentError(
-            "run: came --map or --column without --replay; allowed: beside --replay, whose columns they name; leave "
+            "run: got --map or --column without --replay; expected: beside --replay, whose columns they name; leave "
             "them out, or name a recording"
         )
     found = job or replay
     if found is None:
-        raise DetentError("run: came neither --job nor --replay; allowed: one of them; name a job: --job moves.csv")
+        raise DetentError("run: got neither --job nor --replay; expected: one of them; name a job: --job moves.csv")
     return found
 
 
@@ -149,7 +149,7 @@ def _trace_kinds(formats: str) -> list[str]:
     kinds = split_names([formats])
     for kind in kinds:
         if kind not in TRACE_KINDS:
-            raise DetentError(f"--trace: came {kind!r}; allowed: h5, csv, parquet, comma-separated; choose of these")
+            raise DetentError(f"--trace: got {kind!r}; expected: h5, csv, parquet, comma-separated; choose of these")
     if "parquet" in kinds:
         from detent.record.trace_files import need_parquet
 

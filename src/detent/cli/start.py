@@ -61,7 +61,7 @@ def keys(
         from detent.files.text import did_you_mean
 
         remedy = did_you_mean(search, known, "search for a shorter word, or list all without --search")
-        raise DetentError(f"--search: came {search!r}, which no key has; {remedy}")
+        raise DetentError(f"--search: got {search!r}, which no key has; {remedy}")
     if as_json:
         print_json([{"method": name} | asdict(row) for name, rows in found.items() for row in rows])
         return

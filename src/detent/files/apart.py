@@ -56,7 +56,7 @@ def limits_of(size: int) -> Limits:
         factor = math.nan
     if not 0.0 < factor <= 1e6:
         raise DetentError(
-            f"{RAISE}: came {stated!r}; allowed: a number from above 0 to 1e6; do: set it to 4, or unset it"
+            f"{RAISE}: got {stated!r}; expected: a number from above 0 to 1e6; try: set it to 4, or unset it"
         )
     seconds, memory = SECONDS + size / BYTES_PER_SECOND, MEMORY + MEMORY_PER_BYTE * size
     return Limits(seconds * factor, int(memory * factor), factor)
@@ -81,12 +81,12 @@ def read_apart(
     if isinstance(told, DetentError):
         raise told
     if isinstance(told, str):
-        came = f"a file whose reading took more than {limits.seconds:.3g} s" if late else told
-        if came == _MEMORY:
-            came = f"a file whose reading wanted more than {limits.memory / 1e9:.3g} GB"
+        got = f"a file whose reading took more than {limits.seconds:.3g} s" if late else told
+        if got == _MEMORY:
+            got = f"a file whose reading wanted more than {limits.memory / 1e9:.3g} GB"
         within = f"{allowed}, read in {limits.seconds:.3g} s and {limits.memory / 1e9:.3g} GB"
         remedy = f"save it again, or as CSV; if it is whole, set {RAISE}={4 * limits.factor:g} in the environment"
-        raise InputError.of_file(str(path), came, within, f"{remedy}: both limits times {4 * limits.factor:g}")
+        raise InputError.of_file(str(path), got, within, f"{remedy}: both limits times {4 * limits.factor:g}")
     return told[0]
 
 

@@ -62,4 +62,4 @@ class Caution:
 
     def __str__(self) -> str:
         """Give the warning as one line."""
-        return f"{self.name}: {self.value}; should be {self.limit}; {self.consequence}; do: {self.remedy}"
+        return f"{self.name}: {self.value}; should be {self.limit}; {self.consequence}; try: {self.remedy}"

@@ -33,8 +33,8 @@ def apply_overrides(
             texts[path] = value
         elif wanted is None:
             remedy = did_you_mean(key, _keys_near(tables, known, path), "`detent check` lists the keys", 0.5)
-            came, allowed = f'the unknown key "{key}"', "a key of the axis file"
-            problems.append(FileProblem("--set", 0, 0, key, came, allowed, remedy))
+            got, allowed = f'the unknown key "{key}"', "a key of the axis file"
+            problems.append(FileProblem("--set", 0, 0, key, got, allowed, remedy))
         else:
             put_value(tables, path, _override_value(wanted, value))
             texts[path] = value
@@ -119,7 +119,7 @@ def nested(changes: Mapping[Any, Any], before: Mapping[str, Any] | None = None) 
             below = table.setdefault(part, {})
             if not isinstance(below, dict):
                 raise DetentError(
-                    f"{key}: came a value in {part}, which is one itself; allowed: a value or a table; leave one out"
+                    f"{key}: got a value in {part}, which is one itself; expected: a value or a table; leave one out"
                 )
             table = cast("dict[str, Any]", below)
         held = table.get(last)

@@ -50,18 +50,18 @@ class Reporter:
         self._root = root
         self._changed = changed or {}  # of overrides by a program, what they are called
 
-    def problem(self, path: Path, came: str, allowed: str, remedy: str) -> FileProblem:
+    def problem(self, path: Path, got: str, allowed: str, remedy: str) -> FileProblem:
         """Problem of a key, at its place."""
         if path in self._overrides:
             named = self._changed.get(path, "--set")
-            return FileProblem(named, 0, 0, dotted(path), came, allowed, remedy)
+            return FileProblem(named, 0, 0, dotted(path), got, allowed, remedy)
         place = find_place(self._places, path)
-        return FileProblem(self._file, place.line, place.column, dotted(path), came, allowed, remedy)
+        return FileProblem(self._file, place.line, place.column, dotted(path), got, allowed, remedy)
 
     def placed(self, path: Path, fault: FileProblem) -> FileProblem:
-        """A problem of a table that knows neither its file nor its place; without `came`, the value as written."""
+        """A problem of a table that knows neither its file nor its place; without `got`, the value as written."""
         path = (*path, *fault.key.split(".")) if fault.key else path
-        return self.problem(path, fault.came or self.came(path), fault.allowed, fault.remedy)
+        return self.problem(path, fault.got or self.got(path), fault.allowed, fault.remedy)
 
     def is_stated(self, path: Path) -> bool:
         """True when the file or an override gives this key."""
@@ -71,7 +71,7 @@ class Reporter:
         """True when the file or an override gives a key inside this one."""
         return any(len(path) < len(key) and key[: len(path)] == path for key in (*self._overrides, *self._places))
 
-    def came(self, path: Path, value: object = None) -> str:
+    def got(self, path: Path, value: object = None) -> str:
         """Value of a key as it was written."""
         text = self._overrides.get(path) or (self._places[path].text if path in self._places else _written(value))
         return _shortened(text)
@@ -133,11 +133,11 @@ class Reporter:
         remedy = f"rename it, as in [{dotted((*path[:-1], example_of(field)))}]"
         return self.problem(path, f'the name "{path[-1]}"', extra_of(field, "allowed"), remedy)
 
-    def _wrong_number(self, path: Path, field: FieldInfo, came: int) -> FileProblem:
+    def _wrong_number(self, path: Path, field: FieldInfo, got: int) -> FileProblem:
         least, most = bounds_of_length(field)
         table = dotted((*path, example_of(field)))
-        remedy = f"add [{table}] ({field.description})" if came < least else "remove some"
-        return self.problem(path, f"{came} tables", f"{least} to {most} tables such as [{table}]", remedy)
+        remedy = f"add [{table}] ({field.description})" if got < least else "remove some"
+        return self.problem(path, f"{got} tables", f"{least} to {most} tables such as [{table}]", remedy)
 
     def _missing(self, path: Path, field: FieldInfo) -> FileProblem:
         table = table_of(field)
@@ -156,23 +156,23 @@ class Reporter:
     def _not_a_table(self, path: Path, value: object) -> FileProblem:
         field = field_at(self._root, path)
         if is_rows(field):
-            came, header = "a single table" if isinstance(value, dict) else self.came(path, value), self._header(path)
+            got, header = "a single table" if isinstance(value, dict) else self.got(path, value), self._header(path)
             remedy = f"write {header}, with two brackets, before the keys of each"
-            return self.problem(path, came, f"tables {header}", remedy)
+            return self.problem(path, got, f"tables {header}", remedy)
         keys = ", ".join(known_keys(self._root, path))
         if is_named(field):
             table = dotted((*path, example_of(field)))
-            came = "a list" if isinstance(value, list) else self.came(path, value)
+            got = "a list" if isinstance(value, list) else self.got(path, value)
             remedy = f"write [{table}] with single brackets on a line of its own and its keys below it"
-            return self.problem(path, came, f"tables with names, such as [{table}]", remedy)
+            return self.problem(path, got, f"tables with names, such as [{table}]", remedy)
         if isinstance(value, list):
             remedy = f"write [{dotted(path)}] once, with single brackets{self._axis(': one file describes one axis')}"
             return self.problem(path, "a list", f"one table [{dotted(path)}]", remedy)
         remedy = f"write [{dotted(path)}] on a line of its own and its keys below it"
-        return self.problem(path, self.came(path, value), f"the table [{dotted(path)}] with {keys}", remedy)
+        return self.problem(path, self.got(path, value), f"the table [{dotted(path)}] with {keys}", remedy)
 
     def _bad_value(self, path: Path, field: FieldInfo, error: dict[str, Any]) -> FileProblem:
-        came = self.came(path, error["input"])
+        got = self.got(path, error["input"])
         allowed = describe_allowed(field)
         remedy = f"give {path[-1]} a value in this range ({field.description})"
         if error["type"] in {"quantity", "refused"}:
@@ -182,25 +182,25 @@ class Reporter:
             remedy = f'write "{nearest(str(error["input"]), options_of(field), 0.0) or options_of(field)[0]}"'
         elif error["type"].endswith("_type"):
             remedy = _type_remedy(path[-1], field, error["input"])
-        return self.problem(path, came, allowed, remedy)
+        return self.problem(path, got, allowed, remedy)
 
     def _bad_list(self, path: Path, field: FieldInfo, errors: Sequence[dict[str, Any]]) -> FileProblem:
         kinds = {error["type"] for error in errors}
         example = f"{path[-1]} = {list_example(field)}"
         remedy = f"give every number of {path[-1]} a value in this range ({field.description})"
         if kinds & {"too_long", "too_short"}:
-            came = f"{len(errors[0]['input'])} numbers"
+            got = f"{len(errors[0]['input'])} numbers"
             remedy = f"give {path[-1]} so many numbers ({field.description})"
         elif "list_type" in kinds:
-            came = self.came(path, errors[0]["input"])
+            got = self.got(path, errors[0]["input"])
             remedy = f"write {'quantities' if unit_of(field) else 'whole numbers'} in brackets, as in {example}"
         else:
-            came = ", ".join(_wrong_elements(errors))
+            got = ", ".join(_wrong_elements(errors))
         if kinds & {"int_type", "int_parsing_size"}:
             remedy = f"write every element as a whole number, as in {example}"
         elif "quantity" in kinds:
             remedy = f"write every element as text with a unit, as in {example}"
-        return self.problem(path, came, describe_allowed(field), remedy)
+        return self.problem(path, got, describe_allowed(field), remedy)
 
 
 def key_path(location: Sequence[str | int]) -> Path:

@@ -38,8 +38,8 @@ class Row(Table, frozen=True):
             yield FileProblem.of_key(found[1], " and ".join(found), allowed, "remove one of the two")
         elif cls.one_of and not found and is_whole:
             key = cls.one_of[0]
-            came = f"neither {' nor '.join(cls.one_of)}"
-            yield FileProblem.of_key(key, came, allowed, f"add {key} = {example_value(cls, key)}")
+            got = f"neither {' nor '.join(cls.one_of)}"
+            yield FileProblem.of_key(key, got, allowed, f"add {key} = {example_value(cls, key)}")
 
 
 def example_value(model: type[Table], key: str) -> str:
@@ -110,9 +110,9 @@ def check_values(model: type[Row], where: str, values: Mapping[str, object]) -> 
         reporter = Reporter("", {}, {}, model)
         told = [problem for _, problem, _ in told_errors(error, reporter, model)]
         units = {key: f" {unit_of(field)}".rstrip() for key, field in keys_of(model).items()}
-        problems = [replace(one, came=f"{one.key} {one.came}{units.get(one.key, '')}") for one in told] + problems
+        problems = [replace(one, got=f"{one.key} {one.got}{units.get(one.key, '')}") for one in told] + problems
     for problem in problems[:1]:
-        raise DetentError(f"{where}: came {problem.came}; allowed: {problem.allowed}; do: {problem.remedy}")
+        raise DetentError(f"{where}: got {problem.got}; expected: {problem.allowed}; try: {problem.remedy}")
 
 
 def _plain(value: object) -> object:

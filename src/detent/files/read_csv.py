@@ -118,9 +118,9 @@ class CsvRows(Generic[AnyRow]):
         try:
             parse_quantity(f"1 {unit or ''}", si_unit)
         except QuantityError as error:
-            came = f"{error.reason}, in {cell}" if unit else f'"{cell}" without a unit'
+            got = f"{error.reason}, in {cell}" if unit else f'"{cell}" without a unit'
             allowed = f"the unit of {describe_kind(si_unit)[0]} in brackets"
-            return self.refuse_heading(index, came, allowed, f"write {self.heading_of(key)}")
+            return self.refuse_heading(index, got, allowed, f"write {self.heading_of(key)}")
         return Column(key, unit or "")
 
     def heading_of(self, key: str) -> str:
@@ -128,10 +128,10 @@ class CsvRows(Generic[AnyRow]):
         unit = unit_of(self.fields[key])
         return f"{key} [{describe_kind(unit)[1].rpartition(' ')[2]}]" if unit else key
 
-    def refuse_heading(self, index: int, came: str, allowed: str, remedy: str) -> Column:
+    def refuse_heading(self, index: int, got: str, allowed: str, remedy: str) -> Column:
         """Note what is wrong with a heading; the column is not read."""
         place = _place_of(self.header.text, index, self.separator)
-        self._note(self.header.number, place, came, allowed, remedy)
+        self._note(self.header.number, place, got, allowed, remedy)
         return Column()
 
     def refuse_header(self, allowed: str, remedy: str) -> None:
@@ -152,9 +152,9 @@ class CsvRows(Generic[AnyRow]):
                 remedy = "remove the cells beyond, or name their columns in the header"
                 if self.separator == ",":
                     remedy += "; separate cells by semicolons where numbers have decimal commas"
-                came, allowed = f"{len(line.cells)} cells", f"{len(self.columns)} as in the header"
+                got, allowed = f"{len(line.cells)} cells", f"{len(self.columns)} as in the header"
                 place = _place_of(text, len(self.columns), self.separator)
-                self._note(number, place, came, allowed, remedy)
+                self._note(number, place, got, allowed, remedy)
             elif any(line.cells):
                 yield line
 
@@ -221,8 +221,8 @@ class CsvRows(Generic[AnyRow]):
             return ()
         return tuple(cell.strip() for cell in cells)
 
-    def _note(self, line: int, column: int, came: str, allowed: str, remedy: str) -> None:
-        self.problems.append(FileProblem(self._file, line, column, "", came, allowed, remedy))
+    def _note(self, line: int, column: int, got: str, allowed: str, remedy: str) -> None:
+        self.problems.append(FileProblem(self._file, line, column, "", got, allowed, remedy))
 
 
 def split_heading(cell: str) -> tuple[str, str | None]:

@@ -78,11 +78,11 @@ def reading(file: Path, allowed: str, remedy: str) -> Generator[None]:
     except FileNotFoundError:
         raise InputError.of_file(str(file), "no such file", allowed, remedy) from None
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        came = f"a damaged packed file ({error})"
-        raise InputError.of_file(str(file), came, allowed, "unpack it with gunzip, or record again") from None
+        got = f"a damaged packed file ({error})"
+        raise InputError.of_file(str(file), got, allowed, "unpack it with gunzip, or record again") from None
     except OSError as error:
-        came = f"a file that cannot be read ({(error.strerror or str(error)).lower()})"
-        raise InputError.of_file(str(file), came, allowed, remedy) from None
+        got = f"a file that cannot be read ({(error.strerror or str(error)).lower()})"
+        raise InputError.of_file(str(file), got, allowed, remedy) from None
     except ValueError:
         raise InputError.of_file(repr(str(file)), "a name no file can have", allowed, remedy) from None
 
@@ -109,9 +109,9 @@ def read_data(file: Path, kinds: Collection[str], allowed: str) -> bytes:
     limit = MAX_BYTES[file.suffix.lower()] if file.suffix.lower() in kinds else 0
     data = read_head(file, limit, allowed, _CHECK_JOB)
     if not limit:
-        came = f'a name that ends in "{file.suffix}"' if file.suffix else "a name without an ending"
+        got = f'a name that ends in "{file.suffix}"' if file.suffix else "a name without an ending"
         remedy = "name a file of one of these kinds, or give it the ending of its kind"
-        raise InputError.of_file(str(file), came, allowed, remedy)
+        raise InputError.of_file(str(file), got, allowed, remedy)
     if len(data) > limit:
         remedy = "divide the job among several files, or use repeat"
         remedy += "; a CSV file may be longer" if file.suffix.lower() == ".toml" and ".csv" in kinds else ""
@@ -130,8 +130,8 @@ def decode_utf8(file: Path, data: bytes) -> str:
         line_start = data.rfind(b"\n", 0, error.start) + 1
         line = data.count(b"\n", 0, error.start) + 1
         column = len(data[line_start : error.start].decode("utf-8", errors="replace")) + 1
-        came = f"the byte 0x{data[error.start]:02X}"
-        problem = FileProblem(str(file), line, column, "", came, "UTF-8 text", "save the file as UTF-8")
+        got = f"the byte 0x{data[error.start]:02X}"
+        problem = FileProblem(str(file), line, column, "", got, "UTF-8 text", "save the file as UTF-8")
         raise InputError([problem]) from None
 
 

@@ -96,7 +96,7 @@ class Identified(OnScreen):
 
     def screen(self) -> Screen:
         """The verdict, what is refused and what to do about it, and the constants."""
-        told = [f"{one.subject}: {one.text}; do: {one.record}" for one in self.refusals[:MOST_REFUSALS]]
+        told = [f"{one.subject}: {one.text}; try: {one.record}" for one in self.refusals[:MOST_REFUSALS]]
         left = len(self.refusals) - len(told)
         told += [f"{left} more: .refusals"] if left > 0 else []
         return Screen(
@@ -208,7 +208,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     method : str
         "regression", or "output error", which fits the simulation to the recordings too.
     axis : path, optional
-        Cascade axis file that the constants are held against, and put into by `Identified.save`.
+        Cascade axis file that the constants are compared with, and put into by `Identified.save`.
     progress : callable, optional
         ``progress(share, text)``.
     reading : str
@@ -237,7 +237,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
             text = file.read()
         cascade_spec(text, str(axis))
     if not paths:
-        raise DetentError("identify: came no log; allowed: one or more; name the recordings of the axis")
+        raise DetentError("identify: got no log; expected: one or more; name the recordings of the axis")
     read: list[Log] = []
     for number, path in enumerate(paths):
         tell(0.1 * number / len(paths), f"reading {Path(path).name}")  # the first tenth of the work

@@ -31,7 +31,7 @@ def early(constants: Mapping[str, Estimate]) -> Iterator[str]:
     yield (
         f"delay {written(delay)}: below 0, which no drive has: effort and position are not stamped at the same moment, "
         "the position was filtered, or the model lacks what acts like it (a compliant coupling, friction at low "
-        "speed); an axis file gets 0; do: record both by one clock, or take the delay from a frequency response "
+        "speed); an axis file gets 0; try: record both by one clock, or take the delay from a frequency response "
         "(detent analyse --what frequency)"
     )
 

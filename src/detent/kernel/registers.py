@@ -106,7 +106,7 @@ def _storage(name: str, hint: Any, length: int) -> tuple[Any, Width | None]:
     widths = [part for part in get_args(hint)[1:] if isinstance(part, Width)]
     if len(widths) != 1:
         raise TypeError(
-            f"register {name!r}: came {hint!r}; allowed: a width such as i8 or f8, or a Registers class; declare one"
+            f"register {name!r}: got {hint!r}; expected: a width such as i8 or f8, or a Registers class; declare one"
         )
     ctype = widths[0].ctype
     return ctype * length if length else ctype, widths[0]
@@ -168,7 +168,7 @@ class Registers(ctypes.Structure, metaclass=_RegistersMeta):
         size = ctypes.sizeof(self)
         if len(state) != size:
             raise ValueError(
-                f"snapshot of {type(self).__name__}: came {len(state)} bytes; allowed: {size}; "
+                f"snapshot of {type(self).__name__}: got {len(state)} bytes; expected: {size}; "
                 "take the snapshot with this version of the declaration"
             )
         ctypes.memmove(ctypes.addressof(self), state, size)

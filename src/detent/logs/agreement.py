@@ -1,4 +1,4 @@
-"""Signals that say the same motion, held against one another: wrong signs and units wrong by a factor.
+"""Signals that say the same motion, compared with one another: wrong signs and units wrong by a factor.
 
 The position is the anchor. The velocity must be its derivative, the acceleration that of the velocity; the reference
 and a second encoder must go where it goes. A sign is turned and a known factor taken out, as both are certain once the

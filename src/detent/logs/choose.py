@@ -35,8 +35,8 @@ def choose_columns(table: RawTable, mapping: ColumnMapping) -> Chosen:
         elif role not in silent:
             names = [split_heading(name)[0] for name in table.columns]
             remedy = did_you_mean(choice.column, names, "name one of these, or its number from 1")
-            came = f'the column "{short(choice.column)}"'
-            problems.append(FileProblem(table.file, 0, 0, role, came, held, remedy))
+            got = f'the column "{short(choice.column)}"'
+            problems.append(FileProblem(table.file, 0, 0, role, got, held, remedy))
     if problems:
         raise InputError(problems)
     if mapping.file.period is not None and "time" not in chosen:

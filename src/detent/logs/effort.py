@@ -1,4 +1,4 @@
-"""Signals held against the motion: an effort that works against it or lost its sign, and shifts in time.
+"""Signals compared with the motion: an effort that works against it or lost its sign, and shifts in time.
 
 A drive moves an axis by ``F = m a + c v + d sign(v) + k x + g`` with ``m, c, d >= 0``: it accelerates mass and feeds
 friction. For a voltage or a duty cycle the back-EMF adds to ``c``. ``k x`` stands for springs and, near one position,

@@ -81,7 +81,7 @@ class Finding:
         """Give the finding as one line."""
         where = ", ".join(part for part in (tell_rows(self.rows), self.signal) if part)
         line = f"{self.severity}: {where}: {self.text}; {self.action}"
-        return f"{line}; do: {self.advice}" if self.advice else line
+        return f"{line}; try: {self.advice}" if self.advice else line
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

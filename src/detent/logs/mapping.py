@@ -222,5 +222,5 @@ def _read_option(option: str) -> ColumnMapping:
     try:
         return _to_mapping(Source("option", tables, {}))
     except InputError as error:
-        told = (replace(one, line=0, column=0, came=f'"{short(value)}"') for one in error.problems)
+        told = (replace(one, line=0, column=0, got=f'"{short(value)}"') for one in error.problems)
         raise InputError(told) from None

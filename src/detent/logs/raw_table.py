@@ -146,8 +146,8 @@ def whole(path: Path, kind: str, allowed: str, remedy: str = "save it again, or 
     except (InputError, MemoryError):
         raise
     except Exception as error:  # noqa: BLE001 - parsers raise whatever the damage makes them stumble over
-        came = f"a file that is no {kind} file ({short(str(error) or type(error).__name__)})"
-        raise InputError.of_file(str(path), came, allowed, remedy) from None
+        got = f"a file that is no {kind} file ({short(str(error) or type(error).__name__)})"
+        raise InputError.of_file(str(path), got, allowed, remedy) from None
 
 
 def no_table(file: str, name: str, held: Iterable[str], nothing: str = "") -> InputError:

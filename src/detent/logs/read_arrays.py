@@ -57,8 +57,8 @@ def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
                 size = sum(entry.file_size for entry in archive.infolist())
             if size > 8 * raw_table.MAX_CELLS:
                 most = f"up to {8 * raw_table.MAX_CELLS // 1_000_000} MB unpacked"
-                came = f"{size // 1_000_000} MB unpacked"
-                raise InputError.of_file(str(path), came, most, "cut the recording into pieces")
+                got = f"{size // 1_000_000} MB unpacked"
+                raise InputError.of_file(str(path), got, most, "cut the recording into pieces")
             with np.load(path, allow_pickle=False) as arrays:
                 for name in arrays.files:
                     items += _fields(name, _load_member(arrays, name), 0)
@@ -76,8 +76,8 @@ def read_parquet(path: Path, options: FileOptions) -> raw_table.RawTable:
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError:
         remedy = 'pip install "detent[parquet]", or save the recording as CSV or HDF5'
-        came = "a file that needs pyarrow, which is not installed"
-        raise InputError.of_file(str(path), came, ALLOWED_PARQUET, remedy) from None
+        got = "a file that needs pyarrow, which is not installed"
+        raise InputError.of_file(str(path), got, ALLOWED_PARQUET, remedy) from None
     with raw_table.whole(path, "Parquet", ALLOWED_PARQUET), parquet.ParquetFile(path) as file:
         raw_table.check_size(str(path), file.metadata.num_rows, len(file.schema_arrow))
         notes = _broke_off(path, trace_attributes(file.schema_arrow.metadata), options)
@@ -183,10 +183,10 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item],
     # A cell may be a text or a table of any width: what counts is its memory, in numbers of eight bytes.
     cells = sum(int(dataset.size) * max(1, dataset.dtype.itemsize // 8) for dataset in taken if _is_vector(dataset))
     if cells > raw_table.MAX_CELLS or len(taken) > raw_table.MAX_COLUMNS:
-        came = f"{len(taken)} datasets of {cells} numbers"
+        got = f"{len(taken)} datasets of {cells} numbers"
         remedy = "state one group as table=, or cut the recording into pieces"
         raise InputError.of_file(
-            path, came, f"up to {raw_table.MAX_COLUMNS} datasets, {raw_table.MAX_CELLS} numbers", remedy
+            path, got, f"up to {raw_table.MAX_COLUMNS} datasets, {raw_table.MAX_CELLS} numbers", remedy
         )
     attributes = [raw_table.Item(str(name), value) for name, value in file.attrs.items()]
     return [*_in_order(file, chosen, taken), *map(_item, singles), *attributes], notes

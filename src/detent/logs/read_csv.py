@@ -63,15 +63,15 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
         check_size(table.file, len(numbers), len(layout.names))
         _read_rows(table, layout, lines, numbers)
     except csv.Error as error:
-        came = f"cells that cannot be told apart ({error})"
-        raise InputError.of_file(table.file, came, ALLOWED, "remove the quotation marks, or state separator=") from None
+        got = f"cells that cannot be told apart ({error})"
+        raise InputError.of_file(table.file, got, ALLOWED, "remove the quotation marks, or state separator=") from None
     if len(table.broken) > _MOST_BROKEN * len(numbers) and len(table.broken) > 2:
         worst = table.broken[0]
         line = numbers[worst.row - 1]
-        came = f"{short(lines[line].strip())} ({worst.reason}; {len(table.broken)} of {len(numbers)} rows are broken)"
+        got = f"{short(lines[line].strip())} ({worst.reason}; {len(table.broken)} of {len(numbers)} rows are broken)"
         allowed = f"rows of {len(layout.names)} cells as the header has"
         remedy = "state separator=, decimal= or header= (its line)"
-        raise InputError([FileProblem(table.file, line + 1, 1, "", came, allowed, remedy)])
+        raise InputError([FileProblem(table.file, line + 1, 1, "", got, allowed, remedy)])
     return table
 
 
@@ -222,10 +222,10 @@ def guess_layout(table: RawTable, lines: Sequence[str], options: FileOptions) ->
     width = _width(rows)
     place = _first_data(rows, width)
     if place is None:
-        came = short(lines[sample[0]].strip()) if sample else "no lines below the header"
+        got = short(lines[sample[0]].strip()) if sample else "no lines below the header"
         allowed = "a table: a header such as t [s],position [mm], then lines of numbers"
         remedy = "state separator=, decimal= or header= (its line), or name another file"
-        raise InputError.of_file(table.file, came, allowed, remedy)
+        raise InputError.of_file(table.file, got, allowed, remedy)
     # Lines may end in separators behind which nothing ever stands.
     while width > 1 and not any(cells[width - 1 : width] != [""] for cells in rows[place:] if len(cells) >= width):
         width -= 1

@@ -38,12 +38,12 @@ def read_json(path: Path, options: FileOptions) -> RawTable:
         if error.msg == "Extra data" and error.lineno > 1:
             return _read_lines(file, text)  # one record per line, under another name
         remedy = f"correct the line ({error.msg[:1].lower()}{error.msg[1:]}), or record again"
-        came = short(lines_of(text)[error.lineno - 1].strip()) or "the end of the file"
-        problem = FileProblem(file, error.lineno, error.colno, "", came, ALLOWED, remedy)
+        got = short(lines_of(text)[error.lineno - 1].strip()) or "the end of the file"
+        problem = FileProblem(file, error.lineno, error.colno, "", got, ALLOWED, remedy)
         raise InputError([problem]) from None
     except (RecursionError, ValueError) as error:
-        came = "brackets nested too deeply" if isinstance(error, RecursionError) else "a number of thousands of digits"
-        raise InputError.of_file(file, came, ALLOWED, "name another file") from None
+        got = "brackets nested too deeply" if isinstance(error, RecursionError) else "a number of thousands of digits"
+        raise InputError.of_file(file, got, ALLOWED, "name another file") from None
     if isinstance(found, list):
         return _from_records(file, cast("list[Any]", found), {})
     return _from_object(file, found, options.table)
@@ -120,8 +120,8 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
     table.broken.sort()
     if len(table.broken) > max(2, _MOST_BROKEN * len(records)) or not columns or not keep.any():
         some = f"{len(table.broken)} of {len(records)} records that are none"
-        came = some if table.broken else "no records of numbers"
-        raise InputError.of_file(file, came, ALLOWED, "name another file, or another list of it with table=NAME")
+        got = some if table.broken else "no records of numbers"
+        raise InputError.of_file(file, got, ALLOWED, "name another file, or another list of it with table=NAME")
     table.rows = rows[keep]
     for name, values in columns.items():
         table.add(Item(name, values[keep], split_heading(name)[1]))

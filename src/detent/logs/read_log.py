@@ -67,9 +67,9 @@ def read_table(path: str | Path, options: FileOptions | None = None, *, apart: b
     kind = kind_of(path)
     is_packed = path.suffix.lower() == ".gz"
     if kind not in READERS or (is_packed and kind not in _TEXTS):
-        came = f'a name that ends in "{path.suffix}"' if path.suffix else "a name without an ending"
+        got = f'a name that ends in "{path.suffix}"' if path.suffix else "a name without an ending"
         remedy = "give the file the ending of its kind, or save it as one of these"
-        raise InputError.of_file(str(path), came, f"{', '.join(READERS)}; text also with .gz", remedy)
+        raise InputError.of_file(str(path), got, f"{', '.join(READERS)}; text also with .gz", remedy)
     reader, options = READERS[kind], options or FileOptions()
     return read_apart(reader, path, ALLOWED, options) if apart and reader is not read_csv else reader(path, options)
 

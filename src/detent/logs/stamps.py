@@ -50,9 +50,9 @@ def mend_clock(draft: Draft) -> None:
 def _check_length(draft: Draft) -> None:
     if len(draft) < FEWEST:
         found = "; ".join(map(str, draft.findings))
-        came = f"{tell_count(len(draft), 'usable row')}{f' ({found})' if found else ''}"
+        got = f"{tell_count(len(draft), 'usable row')}{f' ({found})' if found else ''}"
         remedy = "name another file, or say which column is the time"
-        raise InputError.of_file(draft.file, came, f"at least {FEWEST} rows with a rising time", remedy)
+        raise InputError.of_file(draft.file, got, f"at least {FEWEST} rows with a rising time", remedy)
 
 
 def _remove_twins(draft: Draft) -> None:

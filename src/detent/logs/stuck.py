@@ -1,4 +1,4 @@
-"""Numbers that stay the same: stuck sensors, held against signals of the same motion, and drives at their limit."""
+"""Numbers that stay the same: stuck sensors, compared with signals of the same motion, and drives at their limit."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -69,7 +69,7 @@ class Twin(NamedTuple):
 
 
 def find_twins(draft: Draft, role: str) -> Iterator[Twin]:
-    """Find the signals that a position or a velocity can be held against."""
+    """Find the signals that a position or a velocity can be compared with."""
     values, t = draft.values[role], draft.t
     base = draft.units[role].partition("/")[0]
     found: list[tuple[str, Values, Values, float]] = []
@@ -125,7 +125,7 @@ def _free(values: Values) -> NDArray[np.bool_]:
 def find_stuck(draft: Draft) -> None:
     """Find signals that never change, and stretches in which one stays the same though the axis moves.
 
-    Within a recording a run of equal numbers alone proves nothing, since an axis may rest. A position is held against
+    Within a recording a run of equal numbers alone proves nothing, since an axis may rest. A position is compared with
     the integral of the velocity, the other encoder or the reference, a velocity against the position. Of a noisy signal
     without such a twin, a run must be longer than chance allows while the axis moves.
     """

@@ -44,7 +44,7 @@ class LinearModel(OnScreen):
         if cut not in self.loops:
             known = ", ".join(self.loops)
             remedy = did_you_mean(cut, self.loops, "name one of these")
-            raise DetentError(f"{self.name}: came the cut {cut!r}; allowed: {known}; do: {remedy}")
+            raise DetentError(f"{self.name}: got the cut {cut!r}; expected: {known}; try: {remedy}")
         return self.loops[cut]
 
     @cached_property

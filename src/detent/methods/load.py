@@ -120,7 +120,7 @@ def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]
     remedy = did_you_mean(str(name).replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
     reporter = Reporter(source.file, source.places, overridden, Table, {METHOD_KEY: stated})
-    problem = reporter.problem(METHOD_KEY, reporter.came(METHOD_KEY, name), _all_methods(), remedy)
+    problem = reporter.problem(METHOD_KEY, reporter.got(METHOD_KEY, name), _all_methods(), remedy)
     raise InputError([*source.problems, problem])
 
 
@@ -166,7 +166,7 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
         needed = ", ".join(key for key, is_needed in keys.items() if is_needed)
         remedy = _motor_meant(name, names, f"state its constants in [{dotted(around)}]: {needed}")
         layers.problems.append(
-            reporter.problem(path, reporter.came(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
+            reporter.problem(path, reporter.got(path), f"a motor of the catalogue: {', '.join(names)}", remedy)
         )
         layers.doubtful.add(around)
         return
@@ -257,9 +257,9 @@ def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: R
         stated = [path for path in paths if path in layers.overrides] or list(filter(reporter.is_stated, paths))
         blamed = stated[0] if stated else paths[0]
         unstated = "a table of this name" if reporter.is_table(blamed) else "the default"
-        came = reporter.came(blamed) if stated else unstated
+        got = reporter.got(blamed) if stated else unstated
         allowed = _allowed_at(blamed, contradiction, reporter)
-        yield reporter.problem(blamed, came, allowed, contradiction.remedy)
+        yield reporter.problem(blamed, got, allowed, contradiction.remedy)
 
 
 def _allowed_at(blamed: Path, contradiction: Contradiction, reporter: Reporter) -> str:
@@ -267,7 +267,7 @@ def _allowed_at(blamed: Path, contradiction: Contradiction, reporter: Reporter) 
     ruled = contradiction.paths[0]
     if blamed == ruled:
         return contradiction.allowed
-    value = reporter.came(ruled) if reporter.is_stated(ruled) else "its default"
+    value = reporter.got(ruled) if reporter.is_stated(ruled) else "its default"
     return f"{contradiction.keys[0]} ({value}) {contradiction.allowed}"
 
 

@@ -243,7 +243,7 @@ class Method(Protocol[SpecT]):
 
         if not self.linear_loops:
             raise DetentError(
-                f"{spec.axis.name}: came an axis of the method {self.name}, whose law is no linear loop; "
+                f"{spec.axis.name}: got an axis of the method {self.name}, whose law is no linear loop; "
                 "look at its steps with run and compare"
             )
         return LinearModel(spec.axis.name, self.brought(self.linear_loops)(spec), self.leaves_out)

@@ -75,7 +75,7 @@ class Page:
                 f"page: charts share an id: {', '.join(twice)}; give each chart of a page a name of its own"
             )
         if sum(figure.paper is not None for figure in self.figures) > 1:
-            raise ValueError("page: came two printed pages, allowed: one; leave one out")
+            raise ValueError("page: got two printed pages, expected: one; leave one out")
 
     @property
     def figures(self) -> list[Figure]:
@@ -94,7 +94,7 @@ class Page:
 
 
 class Comparison(Protocol):
-    """A method held against its alternatives."""
+    """A method compared with its alternatives."""
 
     @property
     def table(self) -> TextTable:

@@ -40,7 +40,7 @@ class Table:
     def __post_init__(self) -> None:
         for place, row in enumerate(self.rows, 1):
             if len(row) != len(self.heads):
-                raise ValueError(f"table: row {place} has {len(row)} cells, allowed: {len(self.heads)}, one per head")
+                raise ValueError(f"table: row {place} has {len(row)} cells, expected: {len(self.heads)}, one per head")
 
     def cells(self, row: Sequence[str | Cell]) -> list[tuple[Cell, bool]]:
         """Cells of a row, each with whether its column holds numbers."""

@@ -75,7 +75,7 @@ def plot_timing(
     count = len(waveforms.signals)
     if not 1 <= count <= MAX_SIGNALS:
         raise DetentError(
-            f"{path or 'plot'}: came {count or 'no'} signals; allowed: 1 to {MAX_SIGNALS}, so that the diagram can be "
+            f"{path or 'plot'}: got {count or 'no'} signals; expected: 1 to {MAX_SIGNALS}, so that the diagram can be "
             "read; name those that matter, or look at all of them in a VCD file"
         )
     # The unit that gives the axis of time numbers from 2 to 2000.

@@ -91,7 +91,7 @@ def capture(  # noqa: PLR0913 - what runs, and what is shown of it
     if at < 0 or duration <= 0 or ticks > MOST_TICKS:
         longest = format_quantity(MOST_TICKS * tick, "s")
         raise DetentError(
-            f"timing: came {at:g} s for {duration:g} s; allowed: a moment from 0 s and up to {longest} "
+            f"timing: got {at:g} s for {duration:g} s; expected: a moment from 0 s and up to {longest} "
             "from there; choose a shorter stretch, or record a trace with `detent run --every`"
         )
     shown = choose_leaves(registers, signals)

@@ -26,7 +26,7 @@ def choose_leaves(registers: type[Registers], names: Iterable[str]) -> list[Leaf
         found = [leaf for leaf in single if fnmatchcase(leaf.path, pattern)]
         if not found and name in leaves:
             raise DetentError(
-                f"signal {name!r}: came an array of {leaves[name].length} values; allowed: a register of one value; "
+                f"signal {name!r}: got an array of {leaves[name].length} values; expected: a register of one value; "
                 "leave it out"
             )
         if not found:
@@ -50,7 +50,7 @@ class Recorder:
 
     def __init__(self, registers: type[Registers], names: Sequence[str], *, every: int, period: float) -> None:
         if every < 1:
-            raise DetentError(f"recording: came every {every} ticks; allowed: 1 or more; choose how often to record")
+            raise DetentError(f"recording: got every {every} ticks; expected: 1 or more; choose how often to record")
         picked = choose_leaves(registers, ["tick", *names])
         self.leaves, self.picks = picked[1:], byte_places(picked)
         self.every, self.period = every, period

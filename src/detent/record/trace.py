@@ -19,7 +19,7 @@ from detent.files.text import nearest
 Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats or booleans
 Attribute = str | float | int  # what is known about a trace as a whole: the axis, the job, the seed
 TIME = "t"
-# Of a trace that a run left which broke off: what came, and what is allowed.
+# Of a trace that a run left which broke off: what it got, and what it expected.
 BROKEN_OFF = ("a trace of a run that broke off", "a trace of a run that came to its end")
 
 
@@ -183,8 +183,8 @@ def _extra(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError as error:
         raise DetentError(
-            f'this needs {name}, which is not installed; do: pip install "detent[{name}]", or take the columns as they '
-            'are: trace["NAME"]'
+            f'this needs {name}, which is not installed; try: pip install "detent[{name}]", or take the columns as '
+            'they are: trace["NAME"]'
         ) from error
 
 
@@ -208,7 +208,7 @@ def check_columns(columns: Mapping[str, Column]) -> None:
             )
         if values.dtype.kind not in "biuf":
             raise DetentError(
-                f"trace: column {name!r} holds {values.dtype}; allowed: integers, floats, booleans; convert it"
+                f"trace: column {name!r} holds {values.dtype}; expected: integers, floats, booleans; convert it"
             )
     time = columns[TIME]
     backwards = np.flatnonzero(~(np.diff(time) >= 0)) if time.size > 1 else np.empty(0, dtype=np.intp)

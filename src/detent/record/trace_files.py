@@ -221,8 +221,8 @@ def _open_store(path: Path) -> Generator[_Table]:
     try:
         file: Any = _h5py().File(path, "r")
     except OSError as error:
-        came = " ".join(str(error).split())
-        raise InputError.of_file(str(path), came, "a trace in HDF5", "give a .h5 file that detent wrote") from error
+        got = " ".join(str(error).split())
+        raise InputError.of_file(str(path), got, "a trace in HDF5", "give a .h5 file that detent wrote") from error
     with file:
         if GROUP not in file or "columns" not in file[GROUP].attrs:
             raise InputError.of_file(
@@ -299,7 +299,7 @@ def _write_table_csv(table: _Table, path: Path) -> None:
     """
     if broke_off(table.attributes):
         raise DetentError(
-            f"{path}: came {BROKEN_OFF[0]}, which CSV cannot say; allowed: {BROKEN_OFF[1]}; save it as .h5 or "
+            f"{path}: got {BROKEN_OFF[0]}, which CSV cannot say; expected: {BROKEN_OFF[1]}; save it as .h5 or "
             '.parquet, or take the mark off it: attributes["complete"] = 1'
         )
     units = table.units
@@ -377,9 +377,9 @@ def _load(path: Path) -> Trace:
     except Exception as error:
         if isinstance(error, DetentError) and not str(error).startswith("trace:"):
             raise
-        came = " ".join(str(error).split()) or type(error).__name__
+        got = " ".join(str(error).split()) or type(error).__name__
         remedy = "save it again with detent, or give another file"
-        raise InputError.of_file(str(path), came, "a trace", remedy) from error
+        raise InputError.of_file(str(path), got, "a trace", remedy) from error
 
 
 def _load_parquet(path: Path) -> Trace:
@@ -443,5 +443,5 @@ def need_parquet() -> tuple[Any, Any]:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError as error:
         raise DetentError(
-            'Parquet needs pyarrow, which is not installed; do: pip install "detent[parquet]", or save as .h5 or .csv'
+            'Parquet needs pyarrow, which is not installed; try: pip install "detent[parquet]", or save as .h5 or .csv'
         ) from error

@@ -51,11 +51,13 @@ class Phase:
     def __post_init__(self) -> None:
         if not 0 <= self.changes_at < 1:
             raise DetentError(
-                f"phase: changes_at is {self.changes_at!r}; allowed: 0 <= fraction < 1; give one of these"
+                f"phase: changes_at is {self.changes_at!r}; expected: 0 <= fraction < 1; give one of these"
             )
         first, last = self.pulse or (0.0, 1.0)
         if not 0 <= first < last <= 1:
-            raise DetentError(f"phase: pulse is {self.pulse!r}; allowed: 0 <= from < to <= 1; give fractions of a tick")
+            raise DetentError(
+                f"phase: pulse is {self.pulse!r}; expected: 0 <= from < to <= 1; give fractions of a tick"
+            )
         if self.pulse and self.changes_at:
             raise DetentError(f"phase: changes_at {self.changes_at!r} and pulse {self.pulse!r} are given; give one")
 
@@ -124,7 +126,7 @@ class Waveforms(OnScreen):
         if found is not None:
             return found
         held = ", ".join(signal.name for signal in self.signals) or "none"
-        raise DetentError(f"waveforms: no signal {name!r}; allowed: {held}; name one of these")
+        raise DetentError(f"waveforms: no signal {name!r}; expected: {held}; name one of these")
 
     def window(self, begin: int, end: int) -> "Waveforms":
         """Cut out a stretch of time [ps] since power-on; what lies outside of these waveforms is left out.
@@ -136,7 +138,7 @@ class Waveforms(OnScreen):
         if first >= last:
             held = f"{self.begin} ps to {self.end} ps"
             raise DetentError(
-                f"waveforms: nothing from {begin} ps to {end} ps; allowed: within {held}; choose it there"
+                f"waveforms: nothing from {begin} ps to {end} ps; expected: within {held}; choose it there"
             )
         return Waveforms(first, last, tuple(_cut(signal, first, last) for signal in self.signals), self.title)
 
@@ -194,7 +196,7 @@ def _checked_period(period: float) -> float:
     """Period of a tick [ps]; whole where the period is meant to be, so that its multiples are exact for ever."""
     period_ps = period * PICOSECONDS
     if not (math.isfinite(period_ps) and period_ps >= 1):
-        raise DetentError(f"waveforms: the period of a tick is {period!r} s; allowed: 1e-12 s or more; give it in s")
+        raise DetentError(f"waveforms: the period of a tick is {period!r} s; expected: 1e-12 s or more; give it in s")
     whole = round(period_ps)
     # 250e-9 s is not a double, and a product with 1e12 rounds once more: two roundings, 2.3e-16 at most.
     return float(whole) if math.isclose(period_ps, whole, rel_tol=1e-15) else period_ps
@@ -231,8 +233,8 @@ def _pulses(ticks: Times, column: Values, period_ps: float, phase: Phase) -> tup
     first, last = phase.pulse or (0.0, 1.0)
     up, down = _picoseconds(ticks, first, period_ps), _picoseconds(ticks, last, period_ps)
     if np.any(up >= down):
-        came = f"a pulse from {first!r} to {last!r} of a tick of {period_ps:g} ps is shorter than 1 ps"
-        raise DetentError(f"waveforms: {came}; allowed: 1 ps or more; give a wider pulse")
+        got = f"a pulse from {first!r} to {last!r} of a tick of {period_ps:g} ps is shorter than 1 ps"
+        raise DetentError(f"waveforms: {got}; expected: 1 ps or more; give a wider pulse")
     times = np.concatenate((_picoseconds(ticks[:1], 0.0, period_ps), np.column_stack((up, down)).ravel()))
     values = np.concatenate((np.zeros(1, column.dtype), np.column_stack((column, np.zeros_like(column))).ravel()))
     # The last fall may lie on the end of the window, outside of it.
@@ -267,7 +269,7 @@ def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
     """
     path = Path(path)
     if not waveforms.signals:
-        raise DetentError(f"{path}: there are no signals; allowed: one or more; name registers to record")
+        raise DetentError(f"{path}: there are no signals; expected: one or more; name registers to record")
     with writing(path) as part, part.open("w", encoding="ascii", newline="\n") as stream:
         _write(waveforms, stream)
 

@@ -112,18 +112,18 @@ def test_a_coefficient_of_1_is_no_filter():
     ],
 )
 def test_a_coefficient_out_of_range_is_refused(function, coefficient):
-    with pytest.raises(DetentError, match=r"^coefficient: came .*; allowed: above 0, up to 1; do: state A = TS/Tf"):
+    with pytest.raises(DetentError, match=r"^coefficient: got .*; expected: above 0, up to 1; try: state A = TS/Tf"):
         function(coefficient)
 
 
 @pytest.mark.parametrize("function", [filter_step, impulse_weights])
 def test_no_samples_are_refused(function):
-    with pytest.raises(DetentError, match=r"^samples: came 0; allowed: 1 or more; do: state how many"):
+    with pytest.raises(DetentError, match=r"^samples: got 0; expected: 1 or more; try: state how many"):
         function(0.25, 0)
 
 
 @pytest.mark.parametrize("function", [equivalent_time_constant, cutoff_hz])
 @pytest.mark.parametrize("period", [0.0, -1.0, inf, float("nan")])
 def test_a_sample_period_out_of_range_is_refused(function, period):
-    with pytest.raises(DetentError, match=r"^sample_period: came .* s; allowed: above 0 and finite; do: state"):
+    with pytest.raises(DetentError, match=r"^sample_period: got .* s; expected: above 0 and finite; try: state"):
         function(0.25, period)

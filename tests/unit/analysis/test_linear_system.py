@@ -92,6 +92,6 @@ def test_scipy_and_control_take_it(monkeypatch: pytest.MonkeyPatch) -> None:
     assert loop.to_scipy().dt == loop.to_control().dt == DT
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(
-        DetentError, match=r'needs python-control, which is not installed; do: pip install "detent\[con'
+        DetentError, match=r'needs python-control, which is not installed; try: pip install "detent\[con'
     ):
         loop.to_control()

@@ -217,13 +217,13 @@ def test_overshoot_after_a_stop_from_1000_counts_per_second(loop, low, high):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"gain": -1.0}, r"^SampledLoop.gain: came -1 1/s\^2; allowed: above 0 and finite; do: state K = K3\*K4"),
-        ({"gain": inf}, r"^SampledLoop.gain: came inf 1/s\^2"),
-        ({"sample_period": 0.0}, r"^SampledLoop.sample_period: came 0 s; allowed: above 0 and finite; do: state the"),
-        ({"scale": float("nan")}, r"^SampledLoop.scale: came nan; allowed: above 0 and finite; do: state the scale B"),
-        ({"coefficient": 2.0}, r"^SampledLoop.coefficient: came 2; allowed: above 0, up to 1; do: state A = TS/Tf"),
-        ({"tau_m": 0.0}, r"^SampledLoop.tau_m: came 0 s; allowed: above 0 or inf; do: state the mechanical"),
-        ({"position_gain": 0.0}, r"^SampledLoop.position_gain: came 0; allowed: above 0 and finite; do: state K1"),
+        ({"gain": -1.0}, r"^SampledLoop.gain: got -1 1/s\^2; expected: above 0 and finite; try: state K = K3\*K4"),
+        ({"gain": inf}, r"^SampledLoop.gain: got inf 1/s\^2"),
+        ({"sample_period": 0.0}, r"^SampledLoop.sample_period: got 0 s; expected: above 0 and finite; try: state the"),
+        ({"scale": float("nan")}, r"^SampledLoop.scale: got nan; expected: above 0 and finite; try: state the scale B"),
+        ({"coefficient": 2.0}, r"^SampledLoop.coefficient: got 2; expected: above 0, up to 1; try: state A = TS/Tf"),
+        ({"tau_m": 0.0}, r"^SampledLoop.tau_m: got 0 s; expected: above 0 or inf; try: state the mechanical"),
+        ({"position_gain": 0.0}, r"^SampledLoop.position_gain: got 0; expected: above 0 and finite; try: state K1"),
     ],
 )
 def test_constants_that_describe_no_loop_are_refused(wrong, message):
@@ -234,13 +234,13 @@ def test_constants_that_describe_no_loop_are_refused(wrong, message):
 @pytest.mark.parametrize("rates", [[], [[1.0, 2.0]], [1.0, inf], [float("nan")]])
 def test_commands_without_windows_or_numbers_are_refused(rates):
     with pytest.raises(
-        DetentError, match=r"^rates: came .*; allowed: one finite number per window, at least one; do: "
+        DetentError, match=r"^rates: got .*; expected: one finite number per window, at least one; try: "
     ):
         CONVENTIONAL.respond(rates)
 
 
 def test_a_response_without_instants_is_refused():
-    with pytest.raises(DetentError, match=r"^points: came 0; allowed: 1 or more; do: state how many instants"):
+    with pytest.raises(DetentError, match=r"^points: got 0; expected: 1 or more; try: state how many instants"):
         CONVENTIONAL.respond([1.0], points=0)
 
 

@@ -76,12 +76,12 @@ def test_the_sampled_loop_tends_to_these_poles(gain, filter_time):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"gain": 0.0}, r"^ServoTransfer.gain: came 0 1/s\^2; allowed: above 0 and finite; do: state K = "),
-        ({"speed_gain": -0.02}, r"^ServoTransfer.speed_gain: came -0.02 s; allowed: above 0 and finite; do: state K2"),
-        ({"filter_time": -1e-3}, r"^ServoTransfer.filter_time: came -0.001 s; allowed: 0 or above, finite; do: state"),
-        ({"filter_time": inf}, r"^ServoTransfer.filter_time: came inf s"),
-        ({"filter_time": float("nan")}, r"^ServoTransfer.filter_time: came nan s"),
-        ({"position_gain": float("nan")}, r"^ServoTransfer.position_gain: came nan; allowed: above 0 and finite"),
+        ({"gain": 0.0}, r"^ServoTransfer.gain: got 0 1/s\^2; expected: above 0 and finite; try: state K = "),
+        ({"speed_gain": -0.02}, r"^ServoTransfer.speed_gain: got -0.02 s; expected: above 0 and finite; try: state K2"),
+        ({"filter_time": -1e-3}, r"^ServoTransfer.filter_time: got -0.001 s; expected: 0 or above, finite; try: state"),
+        ({"filter_time": inf}, r"^ServoTransfer.filter_time: got inf s"),
+        ({"filter_time": float("nan")}, r"^ServoTransfer.filter_time: got nan s"),
+        ({"position_gain": float("nan")}, r"^ServoTransfer.position_gain: got nan; expected: above 0 and finite"),
     ],
 )
 def test_constants_that_describe_no_servo_are_refused(wrong, message):
@@ -92,9 +92,9 @@ def test_constants_that_describe_no_servo_are_refused(wrong, message):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"sample_period": 0.0}, r"^sample_period: came 0 s; allowed: above 0 and finite"),
-        ({"scale": inf}, r"^scale: came inf; allowed: above 0 and finite"),
-        ({"coefficient": 1.5}, r"^coefficient: came 1.5; allowed: above 0, up to 1; do: state A"),
+        ({"sample_period": 0.0}, r"^sample_period: got 0 s; expected: above 0 and finite"),
+        ({"scale": inf}, r"^scale: got inf; expected: above 0 and finite"),
+        ({"coefficient": 1.5}, r"^coefficient: got 1.5; expected: above 0, up to 1; try: state A"),
     ],
 )
 def test_windows_that_describe_no_servo_are_refused(wrong, message):

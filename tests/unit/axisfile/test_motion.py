@@ -142,7 +142,7 @@ def test_a_quantity_of_the_other_motion_is_refused_where_it_stands(load_text):
     text = example_text("turntable").replace('speed = "180 deg/s"', 'speed = "0.5 m/s"')
     (problem,) = problems(load_text, text)
     assert str(problem).startswith("axis.toml:9:1 limits.speed")
-    assert problem.came == '"0.5 m/s"'
+    assert problem.got == '"0.5 m/s"'
     assert problem.allowed.startswith("an angular velocity above 0 deg/s")
     assert problem.remedy == 'use a unit of the same dimension as in "60 deg/s", or set axis.motion = "linear"'
 
@@ -169,4 +169,4 @@ def test_an_unknown_motion_is_refused(load_text):
 
 def test_other_methods_know_no_motion(load_text):
     (problem,) = problems(load_text, example_text("print_head"), "axis.motion=rotary")
-    assert problem.came == 'the unknown key "axis.motion"'
+    assert problem.got == 'the unknown key "axis.motion"'

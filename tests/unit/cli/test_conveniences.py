@@ -84,7 +84,7 @@ def test_json_gives_the_problems_of_a_file_as_data():
     told = json.loads(out)
     assert (status, err, told["exit_status"]) == (2, "", 2)
     assert [problem["key"] for problem in told["problems"]] == ["limits.travel", "limits.speed"]
-    assert set(told["problems"][0]) == {"file", "line", "column", "key", "came", "allowed", "remedy"}
+    assert set(told["problems"][0]) == {"file", "line", "column", "key", "got", "allowed", "remedy"}
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_examples_copied_twice_are_no_trouble():
 
 
 @pytest.mark.parametrize(
-    ("came", "says"),
+    ("got", "says"),
     [
         ("limits.travel=0,5 m", 'write a decimal point: "0.5 m"'),
         ("limits.speed=500 mms", 'did you mean "mm/s"?'),
@@ -185,8 +185,8 @@ def test_examples_copied_twice_are_no_trouble():
         ("motor.catalogue=maxon RE40", 'did you mean "maxon RE 40 148867" or "maxon RE 40 148877"?'),
     ],
 )
-def test_the_answer_fits_what_was_meant(came, says):
-    status, _, err = call("check", CASCADE, "--set", came)
+def test_the_answer_fits_what_was_meant(got, says):
+    status, _, err = call("check", CASCADE, "--set", got)
     assert (status, says in err) == (2, True), err
 
 

@@ -168,7 +168,7 @@ def test_a_log_that_is_none_is_status_2(name: str, content: bytes | None, words:
     answer = call("identify", wrong(name, content))
     assert answer.status == 2
     assert words in answer.err
-    assert "allowed" in answer.err
+    assert "expected" in answer.err
     assert "Traceback" not in answer.err + answer.out
 
 
@@ -184,7 +184,7 @@ def test_a_log_that_is_none_is_status_2(name: str, content: bytes | None, words:
         (("--effort", "rubbish"), "rubbish"),
         (("--method", "guess"), "regression or output-error"),
         (("--axis", "absent.toml"), "no such file"),
-        (("--axis", STAGE), "allowed: cascade"),
+        (("--axis", STAGE), "expected: cascade"),
         (("--axis", "log.csv"), "log.csv:1"),
         (("--write", "axis.txt"), "use one of .toml"),
         (("--report", "report.toml"), "use one of .html"),
@@ -209,7 +209,7 @@ def test_a_file_that_cannot_be_written_is_status_2_beside_what_was_found() -> No
 def test_an_axis_of_another_motion_is_status_2() -> None:
     answer = call("identify", write_log(Path("log.csv")), "--axis", str(detent.example("turntable.toml")))
     assert answer.status == 2
-    assert "came a position in m; allowed: rad" in answer.err
+    assert "got a position in m; expected: rad" in answer.err
 
 
 def test_no_limits_for_a_job_leave_the_findings_and_status_2() -> None:
@@ -218,4 +218,4 @@ def test_no_limits_for_a_job_leave_the_findings_and_status_2() -> None:
     answer = call("identify", write_log(Path("log.csv"), rests), "--job", "job.toml")
     assert answer.status == 2
     assert answer.out.startswith("Refused:")
-    assert "not written: log.csv: came a log without motion" in answer.out
+    assert "not written: log.csv: got a log without motion" in answer.out

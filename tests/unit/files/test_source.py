@@ -16,32 +16,32 @@ def refusal(path):
 
 def test_no_such_file(tmp_path):
     problem = refusal(tmp_path / "none.toml")
-    assert problem.came == "no such file"
+    assert problem.got == "no such file"
     assert problem.file.endswith("none.toml")
 
 
 def test_a_folder(tmp_path):
-    assert "cannot be read" in refusal(tmp_path).came
+    assert "cannot be read" in refusal(tmp_path).got
 
 
 def test_an_impossible_name():
-    assert "no file can have" in refusal("a\x00b").came
+    assert "no file can have" in refusal("a\x00b").got
 
 
 def test_an_empty_file(tmp_path):
     (tmp_path / "a.toml").write_text(" \n\n")
-    assert refusal(tmp_path / "a.toml").came == "an empty file"
+    assert refusal(tmp_path / "a.toml").got == "an empty file"
 
 
 def test_a_huge_file(tmp_path):
     (tmp_path / "a.toml").write_bytes(b"#" * (MAX_BYTES + 1))
-    assert refusal(tmp_path / "a.toml").came == "more than 1000 kB"
+    assert refusal(tmp_path / "a.toml").got == "more than 1000 kB"
 
 
 def test_another_encoding_names_the_byte_and_its_line(tmp_path):
     (tmp_path / "a.toml").write_bytes(b'[axis]\nname = "K\xe4fer"\n')
     problem = refusal(tmp_path / "a.toml")
-    assert (problem.line, problem.came) == (2, "the byte 0xE4")
+    assert (problem.line, problem.got) == (2, "the byte 0xE4")
     assert "UTF-8" in problem.remedy
 
 

@@ -100,7 +100,7 @@ def test_fields_know_their_declaration():
 
 
 def test_a_register_without_a_width_is_refused_with_its_name():
-    with pytest.raises(TypeError, match="register 'speed': came <class 'float'>; allowed: a width"):
+    with pytest.raises(TypeError, match="register 'speed': got <class 'float'>; expected: a width"):
         type("Wrong", (Registers,), {"__annotations__": {"speed": float}, "speed": register("no width")})
 
 
@@ -135,7 +135,7 @@ def test_snapshot_and_restore():
 
 
 def test_restoring_another_size_is_refused():
-    with pytest.raises(ValueError, match="snapshot of Inner: came 3 bytes; allowed: 16"):
+    with pytest.raises(ValueError, match="snapshot of Inner: got 3 bytes; expected: 16"):
         Inner().restore(b"abc")
 
 

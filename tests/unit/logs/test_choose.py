@@ -86,7 +86,7 @@ def test_same_name_in_two_units():
 
 def test_missing_columns_are_refused():
     problem = problem_of(chosen, table_of("t", "motor position"), "position=motor positon")
-    assert (problem.key, problem.came, problem.remedy) == (
+    assert (problem.key, problem.got, problem.remedy) == (
         "position", 'the column "motor positon"', 'did you mean "motor position"?'
     )  # fmt: skip
     assert problem_of(chosen, table_of("a", "x")).allowed == "a column for the time"
@@ -173,7 +173,7 @@ def test_factors_that_are_constants(tmp_path):
     assert draft.values["force"][0] == 3.5
     table.constants = {"other": 1.0, "k": "text"}
     problem = problem_of(make_draft, table, choose_columns(table, mapping), mapping)
-    assert problem.came == 'the factor "k"'
+    assert problem.got == 'the factor "k"'
     assert "other" in problem.allowed
 
 

@@ -26,7 +26,7 @@ def refusal(path):
         read_log(path)
     (problem,) = caught.value.problems
     assert problem.file == str(path)
-    assert all((problem.came, problem.allowed, problem.remedy))
+    assert all((problem.got, problem.allowed, problem.remedy))
     return problem
 
 
@@ -91,7 +91,7 @@ def test_hdf5_of_few_bytes_that_would_fill_the_memory(tmp_path):
         for name in "abc":
             file.create_dataset(name, (30_000_000,), wide, chunks=(1000,), compression="gzip")
     assert path.stat().st_size < 20_000
-    assert "3 datasets of" in refusal(path).came  # 30 GB
+    assert "3 datasets of" in refusal(path).got  # 30 GB
 
 
 def test_hdf5_with_texts_that_would_fill_the_memory(tmp_path):
@@ -110,7 +110,7 @@ def test_hdf5_whose_groups_go_in_circles(tmp_path):
         for depth in range(12):
             group = group.create_group(f"g{depth}")
             group["up"], group["soft"], group["out"] = file, h5py.SoftLink("/g0"), h5py.ExternalLink("log.h5", "/")
-    assert refusal(path).came == "no columns of numbers"
+    assert refusal(path).got == "no columns of numbers"
 
 
 @pytest.mark.parametrize("shape", ["one long text", "nested texts", "texts of records"])
@@ -191,7 +191,7 @@ def test_text_that_unpacks_without_end(tmp_path, monkeypatch):
     monkeypatch.setattr("detent.logs.read_csv.MAX_BYTES", 1_000_000)
     with gzip.open(tmp_path / "log.csv.gz", "wb") as stream:
         stream.write(b"1,2\n" * 1_000_000)
-    assert refusal(tmp_path / "log.csv.gz").came == "more than 1 MB"
+    assert refusal(tmp_path / "log.csv.gz").got == "more than 1 MB"
 
 
 def test_foreign_files_are_read_apart_and_text_tables_are_not(whole, monkeypatch):

@@ -37,7 +37,7 @@ LOG = Log(
 
 
 def test_findings_as_text():
-    assert str(FOUND) == "error: rows 2-3, 9, velocity: stays the same; left; do: leave it out"
+    assert str(FOUND) == "error: rows 2-3, 9, velocity: stays the same; left; try: leave it out"
     assert str(LOG.findings[1]) == "warning: row 2: 2 cells; removed"
 
 

@@ -38,7 +38,7 @@ def write(tmp_path, monkeypatch):
 def problems_of(call, *arguments):
     with pytest.raises(InputError) as caught:
         call(*arguments)
-    assert all(problem.came and problem.allowed and problem.remedy for problem in caught.value.problems)
+    assert all(problem.got and problem.allowed and problem.remedy for problem in caught.value.problems)
     return caught.value.problems
 
 
@@ -87,7 +87,7 @@ def test_options_override_the_mapping(write):
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "key", "came"),
+    ("text", "line", "key", "got"),
     [
         ('[columns]\nposition = "qm [V]"', 2, "columns.position.unit", "V"),
         ('[columns]\npositon = "qm"', 2, "columns.positon", 'the unknown key "positon"'),
@@ -115,10 +115,10 @@ def test_options_override_the_mapping(write):
         ("[columns]\nposition = qm", 2, "position", "`position = qm`"),
     ],
 )
-def test_slips_in_mapping_files(write, text, line, key, came):
+def test_slips_in_mapping_files(write, text, line, key, got):
     (problem,) = problems_of(load_mapping, write(text))
     assert (problem.file, problem.line, problem.key) == ("map.toml", line, key)
-    assert came in problem.came or problem.came in came
+    assert got in problem.got or problem.got in got
 
 
 def test_all_slips_are_told_at_once(write):
@@ -128,15 +128,15 @@ def test_all_slips_are_told_at_once(write):
 
 
 def test_files_that_are_no_mapping(write, tmp_path):
-    assert problems_of(load_mapping, "gone.toml")[0].came == "no such file"
-    assert problems_of(load_mapping, write(""))[0].came == "an empty file"
+    assert problems_of(load_mapping, "gone.toml")[0].got == "no such file"
+    assert problems_of(load_mapping, write(""))[0].got == "an empty file"
     assert problems_of(load_mapping, write("[[[ no toml"))[0].line == 1
     (tmp_path / "map.toml").write_bytes(b"\xff\xfe\x00")
-    assert problems_of(load_mapping, "map.toml")[0].came == "the byte 0xFF"
+    assert problems_of(load_mapping, "map.toml")[0].got == "the byte 0xFF"
 
 
 @pytest.mark.parametrize(
-    ("option", "came", "remedy"),
+    ("option", "got", "remedy"),
     [
         ("position", '"position"', "write SIGNAL=COLUMN [UNIT]"),
         ("positon=qm", 'the unknown key "positon"', 'did you mean "position"?'),
@@ -148,9 +148,9 @@ def test_files_that_are_no_mapping(write, tmp_path):
         ("period=fast", '"fast"', "write a time as"),
     ],
 )
-def test_slips_in_options(option, came, remedy):
+def test_slips_in_options(option, got, remedy):
     (problem,) = problems_of(parse_options, [option])
-    assert (problem.file, problem.key, problem.came) == ("option", option, came)
+    assert (problem.file, problem.key, problem.got) == ("option", option, got)
     assert problem.remedy.startswith(remedy)
 
 

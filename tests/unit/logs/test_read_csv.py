@@ -31,7 +31,7 @@ def refusal(path, options=FileOptions()):  # noqa: B008 - frozen
         read_csv(path, options)
     (problem,) = caught.value.problems
     assert problem.file == str(path)
-    assert problem.came
+    assert problem.got
     assert problem.allowed
     assert problem.remedy
     return problem
@@ -110,7 +110,7 @@ def test_stated_layout_is_not_guessed(write):
 
 def test_header_beyond_the_file(write):
     problem = refusal(write("t,x\n1,2\n"), FileOptions(header=9))
-    assert problem.came == "no lines below the header"
+    assert problem.got == "no lines below the header"
 
 
 def test_a_comma_that_is_no_decimal_sign_is_refused_as_a_cell(write):
@@ -178,7 +178,7 @@ def test_blocks_join(write, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("data", "came"),
+    ("data", "got"),
     [
         (b"", "an empty file"),
         (b"  \n\n", "an empty file"),
@@ -187,43 +187,43 @@ def test_blocks_join(write, monkeypatch):
         (b"t,x\n", "t,x"),
     ],
 )
-def test_no_tables(write, data, came):
-    assert refusal(write(data)).came == came
+def test_no_tables(write, data, got):
+    assert refusal(write(data)).got == got
 
 
 def test_a_table_that_is_mostly_broken(write):
     problem = refusal(write("t,x\n1,2\n" + "1,2,3,4,5\n3,4\n" * 5))
     assert problem.line == 3
-    assert problem.came.startswith("1,2,3,4,5 (")
-    assert "5 of 11 rows are broken" in problem.came
+    assert problem.got.startswith("1,2,3,4,5 (")
+    assert "5 of 11 rows are broken" in problem.got
 
 
 def test_too_large(write, monkeypatch):
     path = write("t,x\n" + "1,2\n" * 100)
     monkeypatch.setattr("detent.logs.read_csv.MAX_BYTES", 300)
-    assert refusal(path).came == "more than 0 MB"
+    assert refusal(path).got == "more than 0 MB"
     monkeypatch.setattr("detent.logs.read_csv.MAX_BYTES", 3000)
     monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 150)
-    assert refusal(path).came == "2 columns of 100 rows"
+    assert refusal(path).got == "2 columns of 100 rows"
     packed = write(gzip.compress(b"t,x\n" + b"1,2\n" * 5000), "bomb.csv.gz")
-    assert refusal(packed).came == "more than 0 MB"
+    assert refusal(packed).got == "more than 0 MB"
 
 
 def test_damaged_packing(write):
     whole = gzip.compress(b"t,x\n" + b"1,2\n" * 5000)
-    assert refusal(write(whole[:-9], "cut.csv.gz")).came.startswith("a damaged packed file")
-    assert refusal(write(b"t,x\n1,2\n", "plain.csv.gz")).came.startswith("a damaged packed file")
+    assert refusal(write(whole[:-9], "cut.csv.gz")).got.startswith("a damaged packed file")
+    assert refusal(write(b"t,x\n1,2\n", "plain.csv.gz")).got.startswith("a damaged packed file")
 
 
 def test_no_file(tmp_path):
-    assert refusal(tmp_path / "gone.csv").came == "no such file"
+    assert refusal(tmp_path / "gone.csv").got == "no such file"
     (tmp_path / "folder.csv").mkdir()
-    assert refusal(tmp_path / "folder.csv").came == "a folder"
+    assert refusal(tmp_path / "folder.csv").got == "a folder"
 
 
 def test_cell_too_long(write):
     problem = refusal(write('t,x\n1,2\n2,"' + "3" * 200_000 + '"\n'))
-    assert "field larger than field limit" in problem.came
+    assert "field larger than field limit" in problem.got
 
 
 @pytest.mark.parametrize(

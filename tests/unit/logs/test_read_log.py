@@ -123,9 +123,9 @@ def test_a_file_without_a_clock(write):
 def test_nothing_usable(write):
     assert "at least 10 rows" in refused(write(table(ROWS[:5])))[0].allowed
     zeros = table([(10 * k, 0.0) for k in range(50)], "t [ms],i [A]")
-    assert "no usable signal: current 0 A in each of 50 rows" in refused(write(zeros))[0].came
+    assert "no usable signal: current 0 A in each of 50 rows" in refused(write(zeros))[0].got
     wide = table([(10 * k, 900 * k) for k in range(50)], "t [ms],pwm(8bits)")
-    assert "no usable signal: command the heading says 8 bits" in refused(write(wide))[0].came
+    assert "no usable signal: command the heading says 8 bits" in refused(write(wide))[0].got
 
 
 def test_bad_options_come_before_the_file():

@@ -32,7 +32,7 @@ def refusal(path, **options):
         read_table(path, FileOptions(**options))
     (problem,) = caught.value.problems
     assert problem.file == str(path)
-    assert all((problem.came, problem.allowed, problem.remedy))
+    assert all((problem.got, problem.allowed, problem.remedy))
     return problem
 
 
@@ -64,7 +64,7 @@ def test_damaged_files_are_refused(tmp_path, kind, data):
 
 @pytest.mark.parametrize("kind", sorted(READERS))
 def test_absent_files_are_refused(tmp_path, kind):
-    assert refusal(tmp_path / f"run{kind}").came == "no such file"
+    assert refusal(tmp_path / f"run{kind}").got == "no such file"
 
 
 # -- JSON ---------------------------------------------------------------------------------------------------
@@ -147,7 +147,7 @@ def test_json_lists_without_names(dump):
 
 
 @pytest.mark.parametrize(
-    ("value", "came"),
+    ("value", "got"),
     [
         ("[1, 2", "[1, 2"),
         ("[" * 100_000, "brackets nested too deeply"),
@@ -159,8 +159,8 @@ def test_json_lists_without_names(dump):
         ('[{"t": 1}, 2, 3, 4]', "3 of 4 records that are none"),
     ],
 )
-def test_json_that_holds_no_recording(dump, value, came):
-    assert refusal(dump(value)).came == came
+def test_json_that_holds_no_recording(dump, value, got):
+    assert refusal(dump(value)).got == got
 
 
 def test_json_list_that_is_not_there(dump):
@@ -211,7 +211,7 @@ def test_matlab_that_would_fill_the_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.mat"
     scipy.io.savemat(path, {"t": np.arange(1000.0)})
     monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 999)
-    assert refusal(path).came == "1000 numbers"
+    assert refusal(path).got == "1000 numbers"
 
 
 # -- NumPy --------------------------------------------------------------------------------------------------
@@ -248,14 +248,14 @@ def test_npz_that_would_fill_the_memory(tmp_path, monkeypatch):
     path = tmp_path / "run.npz"
     np.savez_compressed(path, t=np.zeros(100_000))
     monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 50_000)
-    assert refusal(path).came == "0 MB unpacked"
+    assert refusal(path).got == "0 MB unpacked"
 
 
 def test_npz_with_a_damaged_member(tmp_path):
     path = tmp_path / "run.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("t.npy", b"\x93NUMPY\x01\x00 nothing of the kind")
-    assert refusal(path).came.startswith("a file that is no NPZ file")
+    assert refusal(path).got.startswith("a file that is no NPZ file")
 
 
 def test_unsigned_64_bits_stay_exact(tmp_path):
@@ -325,7 +325,7 @@ def test_hdf5_that_would_fill_the_memory(tmp_path):
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
         file.create_dataset("t", shape=(10**12,), dtype="f8", chunks=(1000,))
-    assert refusal(path).came == "1 datasets of 1000000000000 numbers"
+    assert refusal(path).got == "1 datasets of 1000000000000 numbers"
 
 
 # -- Parquet ------------------------------------------------------------------------------------------------
@@ -356,7 +356,7 @@ def test_parquet_too_large(tmp_path, monkeypatch):
     path = tmp_path / "run.parquet"
     files.write_table(arrow.table({"t": np.zeros(1000)}), path)
     monkeypatch.setattr("detent.logs.raw_table.MAX_CELLS", 500)
-    assert refusal(path).came == "1 columns of 1000 rows"
+    assert refusal(path).got == "1 columns of 1000 rows"
 
 
 def test_parquet_without_pyarrow(tmp_path, monkeypatch):

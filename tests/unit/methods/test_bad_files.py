@@ -1,4 +1,4 @@
-"""Every way to get an axis file wrong: place, key, what came, what is allowed, what to do.
+"""Every way to get an axis file wrong: place, key, what it got, what it expected, what to try.
 
 Line numbers are those of the packaged example without its head comment: [axis] stands in line 1, [limits] in 6.
 """

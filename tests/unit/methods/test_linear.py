@@ -50,14 +50,12 @@ def test_a_loop_beyond_its_gain_says_that_it_does_not_settle() -> None:
 
 
 def test_a_method_without_a_linear_loop_says_so() -> None:
-    with pytest.raises(
-        DetentError, match="phase servo: came an axis of the method phase_servo, whose law is no linear"
-    ):
+    with pytest.raises(DetentError, match="phase servo: got an axis of the method phase_servo, whose law is no linear"):
         model_of("phase_servo.toml")
 
 
 def test_a_cut_that_is_not_there_is_said_with_those_that_are() -> None:
-    with pytest.raises(DetentError, match=r"cut 'velocty'; allowed: command, velocity, position; do: did you mean"):
+    with pytest.raises(DetentError, match=r"cut 'velocty'; expected: command, velocity, position; try: did you mean"):
         model_of("cascade.toml").to_scipy("velocty")
     assert model_of("cascade.toml").to_scipy("velocity").dt == 0.25e-3
 

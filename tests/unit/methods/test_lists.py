@@ -106,7 +106,7 @@ TICKS, GAINS = "ticks = [20000, 20096]", "gains = {}"
 
 
 @pytest.mark.parametrize(
-    ("key", "written", "came", "remedy"),
+    ("key", "written", "got", "remedy"),
     [
         ("ticks", "20000", "20000", "in brackets, as in ticks = [3, 9]"),
         ("ticks", '"20000"', '"20000"', "in brackets"),
@@ -125,21 +125,21 @@ TICKS, GAINS = "ticks = [20000, 20096]", "gains = {}"
         ("more", "1", "1", "in brackets, as in more = [20000, 20096]"),
     ],
 )
-def test_a_bad_list_is_one_problem_at_its_key(load_text, key, written, came, remedy):
+def test_a_bad_list_is_one_problem_at_its_key(load_text, key, written, got, remedy):
     line = f"{key} = {written}"
     text = TEXT.replace(TICKS, line) if key == "ticks" else f"{TEXT}{line}\n"
     with pytest.raises(InputError) as caught:
         load_text(text)
     (problem,) = caught.value.problems
     assert str(problem).startswith(f"axis.toml:{5 if key == 'ticks' else 6}:1 fault.{key}: ")
-    assert came in problem.came
-    assert len(problem.came) < 250
+    assert got in problem.got
+    assert len(problem.got) < 250
     assert problem.allowed == describe_allowed(field(key))
     assert remedy in problem.remedy
 
 
 @pytest.mark.parametrize(
-    ("override", "came"),
+    ("override", "got"),
     [
         ("fault.ticks=5", "5"),
         ("fault.ticks=[1, x]", "[1, x]"),
@@ -150,12 +150,12 @@ def test_a_bad_list_is_one_problem_at_its_key(load_text, key, written, came, rem
         ("fault.ticks=[1]\nnext = 2", "[1]"),
     ],
 )
-def test_a_bad_list_of_an_override_is_told_there(load_text, override, came):
+def test_a_bad_list_of_an_override_is_told_there(load_text, override, got):
     with pytest.raises(InputError) as caught:
         load_text(TEXT, override)
     (problem,) = caught.value.problems
     assert (problem.file, problem.key) == ("--set", "fault.ticks")
-    assert came in problem.came
+    assert got in problem.got
 
 
 def test_a_missing_list_is_asked_for_with_its_example(load_text):

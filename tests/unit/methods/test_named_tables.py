@@ -307,7 +307,7 @@ def test_an_override_that_is_none_is_told_with_a_key_of_this_file(load_text):
 
 def test_a_name_that_will_not_do_in_an_override(load_text):
     (problem,) = problems_of(load_text, TEXT, "rail.north.stop.12.at=1 m")
-    assert (problem.key, problem.came, problem.allowed) == ("rail.north.stop.12", 'the name "12"', "a digit")
+    assert (problem.key, problem.got, problem.allowed) == ("rail.north.stop.12", 'the name "12"', "a digit")
 
 
 # ---------------------------------------------------------------------------------------------------------- problems
@@ -336,11 +336,11 @@ BAD = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "line", "key", "came", "allowed", "remedy"), BAD)
-def test_a_problem_of_a_named_table_is_told_at_its_place(load_text, old, new, line, key, came, allowed, remedy):
+@pytest.mark.parametrize(("old", "new", "line", "key", "got", "allowed", "remedy"), BAD)
+def test_a_problem_of_a_named_table_is_told_at_its_place(load_text, old, new, line, key, got, allowed, remedy):
     first, *_ = problems_of(load_text, TEXT.replace(old, new, 1))
     assert (first.key, first.line) == (key, line or first.line)
-    assert came in first.came
+    assert got in first.got
     assert allowed in first.allowed
     assert remedy in first.remedy
 
@@ -349,7 +349,7 @@ TOO_MANY = "".join(f"[rail.south.stop.{number}]\n" for number in range(4))
 
 
 @pytest.mark.parametrize(
-    ("text", "key", "came", "allowed", "remedy"),
+    ("text", "key", "got", "allowed", "remedy"),
     [
         ("", "rail", "0 tables", "1 to 2 tables such as [rail.north]", "add [rail.north] (a rail by its name)"),
         ("[rail]\n", "rail", "0 tables", "1 to 2 tables", "add [rail.north]"),
@@ -371,13 +371,13 @@ TOO_MANY = "".join(f"[rail.south.stop.{number}]\n" for number in range(4))
         ),
     ],
 )
-def test_the_tables_as_a_whole(load_text, text, key, came, allowed, remedy):
+def test_the_tables_as_a_whole(load_text, text, key, got, allowed, remedy):
     head = "" if text.startswith("[axis]") else "".join(TEXT.partition('method = "yard"\n')[:2])
     # A key before any table belongs to the top of the file.
     whole = text + head if text.startswith("rail =") else head + text
     first, *_ = problems_of(load_text, whole)
     assert first.key == key
-    assert came in first.came
+    assert got in first.got
     assert allowed in first.allowed
     assert remedy in first.remedy
 
@@ -406,12 +406,12 @@ LISTS = [
 ]
 
 
-@pytest.mark.parametrize(("line", "came", "remedy"), LISTS)
-def test_a_bad_list_of_quantities_is_one_problem(load_text, line, came, remedy):
+@pytest.mark.parametrize(("line", "got", "remedy"), LISTS)
+def test_a_bad_list_of_quantities_is_one_problem(load_text, line, got, remedy):
     (problem,) = problems_of(load_text, TEXT.replace(CURVE, line))
     key = f"rail.south.motor.{line.partition(' ')[0]}"
     assert (problem.key, problem.line) == (key, 17)
-    assert came in problem.came
+    assert got in problem.got
     assert remedy in problem.remedy
     assert problem.allowed == describe_allowed(field_at(YardSpec, tuple(key.split("."))))
 
@@ -433,4 +433,4 @@ def test_an_override_may_be_a_list_of_quantities(load_text):
     spec = load_text(TEXT, 'rail.north.motor.curve=["1 kHz", "60 rpm"]'.replace("60 rpm", "2e3 Hz")).spec
     assert spec.rail["north"].motor.curve == [1000.0, 2000.0]
     (problem,) = problems_of(load_text, TEXT, "rail.north.motor.curve=1 kHz")
-    assert (problem.file, problem.came) == ("--set", "1 kHz")
+    assert (problem.file, problem.got) == ("--set", "1 kHz")

@@ -146,7 +146,7 @@ def test_an_override_of_the_method_lists_all_methods(load_text, good_text):
 
 def test_a_catalogue_is_only_asked_where_the_method_has_one(load_text):
     problem = problem_of(load_text, "motor", f'{SLED_TEXT}[motor]\ncatalogue = "no such motor"\n')
-    assert problem.came == "the unknown table [motor]"
+    assert problem.got == "the unknown table [motor]"
 
 
 def test_the_registry_loads_no_compiled_blocks():

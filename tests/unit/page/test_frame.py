@@ -46,7 +46,7 @@ def test_events_are_listed_in_the_unit_of_their_charts() -> None:
 
 
 def test_a_row_has_a_cell_for_each_head() -> None:
-    with pytest.raises(ValueError, match="row 2 has 1 cells, allowed: 2"):
+    with pytest.raises(ValueError, match="row 2 has 1 cells, expected: 2"):
         Table(heads=[("a", False), ("b", True)], rows=[["1", "2"], ["1"]])
 
 

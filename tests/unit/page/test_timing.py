@@ -200,10 +200,10 @@ def test_the_height_grows_with_the_signals(tmp_path):
 
 
 def test_none_and_too_many_signals_are_refused(shown, tmp_path):
-    with pytest.raises(DetentError, match="came no signals; allowed: 1 to 40"):
+    with pytest.raises(DetentError, match="got no signals; expected: 1 to 40"):
         plot_timing(replace(shown, signals=()), tmp_path / "a.png")
     many = tuple(words(f"s{k}", [0]) for k in range(41))
-    with pytest.raises(DetentError, match=r"came 41 signals; allowed: 1 to 40.*VCD"):
+    with pytest.raises(DetentError, match=r"got 41 signals; expected: 1 to 40.*VCD"):
         plot_timing(replace(shown, signals=many), tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
 

@@ -98,7 +98,7 @@ def test_a_move_may_have_its_own_speed():
 
 
 def test_a_sample_period_of_a_move_is_refused():
-    with pytest.raises(DetentError, match=r"move 1: came a sample period of 0\.002 s"):
+    with pytest.raises(DetentError, match=r"move 1: got a sample period of 0\.002 s"):
         plan_job(joblist(Move(1, 2, target=0.1, sample_period=2e-3)), 0.0, LIMITS, T)
 
 

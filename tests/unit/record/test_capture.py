@@ -133,8 +133,8 @@ def test_watching_changes_nothing(name, delay):
 @pytest.mark.parametrize(
     ("at", "duration", "text"),
     [
-        (-1.0, 1e-6, "allowed: a moment from 0 s"),
-        (0.0, 0.0, "allowed: a moment from 0 s"),
+        (-1.0, 1e-6, "expected: a moment from 0 s"),
+        (0.0, 0.0, "expected: a moment from 0 s"),
         (0.0, 1.0, "up to 50 ms"),
         (10.0, 1e-6, "the run ends before 10 s"),
     ],

@@ -47,7 +47,7 @@ def test_names_and_patterns_choose_registers_once_and_in_order(names: list[str],
         ("motor.curent", "signal 'motor.curent': no such register of Bench; did you mean 'motor.current'?"),
         ("Speed", "did you mean 'speed'?"),
         ("gripper.*", "'all' records every one"),
-        ("table", "signal 'table': came an array of 4 values; allowed: a register of one value"),
+        ("table", "signal 'table': got an array of 4 values; expected: a register of one value"),
         ("", "no such register"),
     ],
 )
@@ -59,7 +59,7 @@ def test_what_is_no_register_is_named_with_the_nearest(name: str, says: str) -> 
 
 @pytest.mark.parametrize("every", [0, -3])
 def test_a_recorder_needs_a_distance_of_rows(every: int) -> None:
-    with pytest.raises(DetentError, match=f"came every {every} ticks; allowed: 1 or more"):
+    with pytest.raises(DetentError, match=f"got every {every} ticks; expected: 1 or more"):
         Recorder(Bench, ["speed"], every=every, period=1e-3)
 
 

@@ -80,7 +80,7 @@ def test_match_refuses_a_pattern_that_fits_nothing() -> None:
         ({"a": np.zeros(2), "t": np.zeros(2)}, "the first column must be 't' .* got 'a'"),
         ({"t": np.zeros(2), "a": np.zeros(3)}, r"column 'a' has shape \(3,\), 't' has \(2,\)"),
         ({"t": np.zeros((2, 2))}, r"column 't' has shape \(2, 2\)"),
-        ({"t": np.zeros(1), "a": np.array(["x"])}, "column 'a' holds <U1; allowed: integers, floats, booleans"),
+        ({"t": np.zeros(1), "a": np.array(["x"])}, "column 'a' holds <U1; expected: integers, floats, booleans"),
         ({"t": np.zeros(1), "a": np.array([1j])}, "column 'a' holds complex128"),
         ({"t": np.array([0.0, 2.0, 1.0])}, r"after row 2 \(2.0 s, then 1.0 s\)"),
         ({"t": np.array([0.0, np.nan])}, "is not a number after row 1"),
@@ -124,5 +124,7 @@ def test_xarray_gets_variables_with_units() -> None:
 @pytest.mark.parametrize("name", ["pandas", "xarray"])
 def test_what_is_not_installed_is_said_with_what_installs_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(DetentError, match=rf'needs {name}, which is not installed; do: pip install "detent\[{name}\]"'):
+    with pytest.raises(
+        DetentError, match=rf'needs {name}, which is not installed; try: pip install "detent\[{name}\]"'
+    ):
         getattr(make_trace(), f"to_{name}")()

@@ -134,7 +134,7 @@ def test_an_empty_trace_survives(tmp_path: Path, suffix: str) -> None:
     ("name", "content", "says"),
     [
         ("absent.h5", None, "no such file"),
-        ("run.txt", b"", r"suffix '.txt'; allowed: .h5, .hdf5, .csv, .parquet"),
+        ("run.txt", b"", r"suffix '.txt'; expected: .h5, .hdf5, .csv, .parquet"),
         ("run.h5", b"not HDF5", "file signature not found|Unable to"),
         ("run.parquet", b"not Parquet at all", "[Pp]arquet"),
         ("empty.csv", b"", "the first column must be 't' .*got 'nothing'"),
@@ -158,7 +158,7 @@ def test_a_file_that_is_no_trace_is_an_input_error(tmp_path: Path, name: str, co
 def test_another_hdf5_file_is_an_input_error(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["pictures"] = [1, 2]
-    with pytest.raises(InputError, match="came HDF5 with pictures; allowed: a group /trace"):
+    with pytest.raises(InputError, match="got HDF5 with pictures; expected: a group /trace"):
         load_trace(tmp_path / "other.h5")
 
 
@@ -231,7 +231,7 @@ def test_a_run_that_breaks_off_leaves_what_it_recorded(tmp_path: Path) -> None:
 def test_csv_cannot_say_that_a_run_broke_off(tmp_path: Path) -> None:
     trace = Trace(columns=make_trace().columns, attributes={"complete": 0})
     save_trace(trace, tmp_path / "run.h5")
-    told = r"run\.csv: came a trace of a run that broke off, which CSV cannot say; .*; save it as \.h5 or \.parquet"
+    told = r"run\.csv: got a trace of a run that broke off, which CSV cannot say; .*; save it as \.h5 or \.parquet"
     with pytest.raises(DetentError, match=told):
         save_trace(trace, tmp_path / "run.csv")
     with pytest.raises(DetentError, match=told):
@@ -313,7 +313,7 @@ def test_a_trace_is_converted_to_csv_and_parquet_only(tmp_path: Path, name: str)
 def test_a_store_that_is_none_is_an_input_error(tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "store.h5").write_bytes(content)
-    with pytest.raises(InputError, match=r"store\.h5: came .*; allowed: a trace in HDF5; do: give a \.h5 file"):
+    with pytest.raises(InputError, match=r"store\.h5: got .*; expected: a trace in HDF5; try: give a \.h5 file"):
         convert_trace(tmp_path / "store.h5", tmp_path / "run.csv")
     assert not (tmp_path / "run.csv").exists()
 
@@ -323,9 +323,9 @@ def test_a_store_of_something_else_is_an_input_error(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["pictures"] = [1, 2]
         file.create_group("trace")
-    with pytest.raises(InputError, match="came HDF5 with pictures, trace; allowed: a group /trace"):
+    with pytest.raises(InputError, match="got HDF5 with pictures, trace; expected: a group /trace"):
         convert_trace(tmp_path / "other.h5", tmp_path / "run.csv")
-    with pytest.raises(InputError, match="allowed: a group /trace"):
+    with pytest.raises(InputError, match="expected: a group /trace"):
         load_trace(tmp_path / "other.h5")
 
 

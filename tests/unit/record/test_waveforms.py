@@ -196,7 +196,7 @@ def test_two_phase_clocks_lie_in_the_same_ticks_as_the_rows():
 
 # -- the whole --------------------------------------------------------------------------------------------------------
 def test_an_unknown_signal_is_answered_with_those_there_are():
-    with pytest.raises(DetentError, match=r"no signal 'c'; allowed: a, b"):
+    with pytest.raises(DetentError, match=r"no signal 'c'; expected: a, b"):
         Waveforms(0, 5, (flag("a", [0], [0]), flag("b", [0], [0])))["c"]
 
 
@@ -229,5 +229,5 @@ def test_a_window_begins_with_the_value_that_holds(begin, end, expected):
 
 @pytest.mark.parametrize(("begin", "end"), [(100, 120), (-20, 0), (50, 50), (60, 40)])
 def test_a_window_with_nothing_in_it_is_refused(begin, end):
-    with pytest.raises(DetentError, match="allowed: within 0 ps to 100 ps"):
+    with pytest.raises(DetentError, match="expected: within 0 ps to 100 ps"):
         SHOWN.window(begin, end)

@@ -192,7 +192,7 @@ def check_names(names: Sequence[str]) -> None:
     """Refuse a name that no analysis has."""
     for name in names:
         if name not in ANALYSES:
-            raise DetentError(f"analysis: came {name}; allowed: {', '.join(ANALYSES)}; name one of these")
+            raise DetentError(f"analysis: got {name}; expected: {', '.join(ANALYSES)}; name one of these")
 
 
 def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysis:

@@ -63,9 +63,9 @@ class FrictionMap:
 def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) -> FrictionMap:
     """Average the friction of a recording per bin of speed and direction; without `mass`, of steady stretches only."""
     if not mass >= 0 or not np.isfinite(mass):
-        raise DetentError(f"friction map: came a mass of {mass:g}; allowed: 0 or above; 0 takes steady stretches only")
+        raise DetentError(f"friction map: got a mass of {mass:g}; expected: 0 or above; 0 takes steady stretches only")
     if bins < 1:
-        raise DetentError(f"friction map: came {bins} bins; allowed: at least 1; ten are usual")
+        raise DetentError(f"friction map: got {bins} bins; expected: at least 1; ten are usual")
     role = log.effort(effort)
     _, speed_unit, _ = find_velocity(log)
     moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)

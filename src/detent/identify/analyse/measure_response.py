@@ -221,7 +221,7 @@ def _excited_lines(excitation: Complex, size: int) -> NDArray[np.intp]:
             chosen = np.flatnonzero(clear & (strength >= falling[widest + _FEWEST_LINES - 1]))
     if not len(chosen):
         raise DetentError(
-            "identify: came an excitation without a line that comes back in each period; allowed: a multisine or a "
+            "identify: got an excitation without a line that comes back in each period; expected: a multisine or a "
             "chirp that repeats; record one"
         )
     return chosen
@@ -267,13 +267,13 @@ def measure_response(t: Values, excitation: Values, answer: Values) -> Frequency
     """Measure a response in the longest part without a gap, by periods of the excitation or else by windows."""
     if not len(t) == len(excitation) == len(answer) or len(t) < FEWEST_ROWS:
         raise DetentError(
-            f"identify: came {len(t)} times, {len(excitation)} values of the input, {len(answer)} of the output; "
-            f"allowed: as many of each, {FEWEST_ROWS} or more; record longer"
+            f"identify: got {len(t)} times, {len(excitation)} values of the input, {len(answer)} of the output; "
+            f"expected: as many of each, {FEWEST_ROWS} or more; record longer"
         )
     part = max(stretches(t), key=lambda part: part.stop - part.start)
     if part.stop - part.start < FEWEST_ROWS:
         raise DetentError(
-            f"identify: came {part.stop - part.start} samples between two gaps; allowed: {FEWEST_ROWS} or more; record "
+            f"identify: got {part.stop - part.start} samples between two gaps; expected: {FEWEST_ROWS} or more; record "
             "without missing rows"
         )
     t, excitation, answer = t[part], excitation[part], answer[part]
@@ -299,9 +299,9 @@ def average_windows(t: Values, excitation: Values, answer: Values, step_hz: floa
     rows = len(excitation) // WINDOWS if step_hz is None else round(1.0 / (step_hz * mean))
     if not FEWEST_ROWS // WINDOWS <= rows <= len(excitation) // 2 or not np.ptp(excitation) > 0:
         raise DetentError(
-            f"identify: came {len(excitation)} samples for windows of {rows}, with an excitation over "
-            f"{np.ptp(excitation):g}; allowed: two windows or more of {FEWEST_ROWS // WINDOWS} samples or more, and an "
-            "excitation that changes; record longer, with a chirp or a multisine"
+            f"identify: got {len(excitation)} samples for windows of {rows}, with an excitation over "
+            f"{np.ptp(excitation):g}; expected: two windows or more of {FEWEST_ROWS // WINDOWS} samples or more, and "
+            "an excitation that changes; record longer, with a chirp or a multisine"
         )
     how = {"fs": 1.0 / mean, "window": "hann", "nperseg": rows, "noverlap": int(OVERLAP * rows), "detrend": "linear"}
     frequency, power = scipy("signal").welch(excitation, **how)

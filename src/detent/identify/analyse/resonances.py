@@ -74,7 +74,7 @@ def fit_resonances(
     """
     responses = [response for response in (motor, load) if response is not None]
     if not responses:
-        raise DetentError("identify: came no frequency response; allowed: that of the motor, of the load, or of both")
+        raise DetentError("identify: got no frequency response; expected: that of the motor, of the load, or of both")
     outputs = tuple(name for name, response in (("motor", motor), ("load", load)) if response is not None)
     lines = response_fit.take_lines(responses)
     low = 2 * np.pi * lines.frequency[0]

@@ -216,8 +216,8 @@ def fit_model(model: ResponseModel, lines: Lines, starts: Sequence[Values], hold
     count = model.count + 2
     if int(lines.used.sum()) < LINES_PER_PARAMETER * count:
         raise DetentError(
-            f"identify: came {int(lines.used.sum())} lines with a standard deviation below {MOST_DEVIATION:.0%}; "
-            f"allowed: {LINES_PER_PARAMETER * count} or more for {count} parameters; record a multisine with more "
+            f"identify: got {int(lines.used.sum())} lines with a standard deviation below {MOST_DEVIATION:.0%}; "
+            f"expected: {LINES_PER_PARAMETER * count} or more for {count} parameters; record a multisine with more "
             "lines, more periods, or a larger amplitude"
         )
     coarse = np.where(lines.used, 1.0 / np.maximum(lines.deviation, _COARSE), 0.0)

@@ -164,7 +164,7 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     least = BLOCKS * _FEWEST_ROWS * LONGEST
     if not len(t) == len(effort) == len(position) or len(t) < least:
         raise DetentError(
-            f"identify: came {len(t)} times, {len(effort)} efforts, {len(position)} positions; allowed: as many of "
+            f"identify: got {len(t)} times, {len(effort)} efforts, {len(position)} positions; expected: as many of "
             f"each, {least} or more for a dead time of up to {LONGEST} samples; record longer"
         )
     step = float(t[-1] - t[0]) / (len(t) - 1)

@@ -133,7 +133,7 @@ def measure_steps(log: Log) -> StepResponse:
     unit = log.units["position"]
     if unit != log.units["reference"]:
         raise DetentError(
-            f"{log.name}: came a position in {unit} and a reference in {log.units['reference']}; allowed: one unit; "
+            f"{log.name}: got a position in {unit} and a reference in {log.units['reference']}; expected: one unit; "
             "state both, as in reference=COLUMN [0.5 um]"
         )
     moves = find_steps(log.signals["reference"])

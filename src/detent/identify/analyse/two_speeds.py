@@ -57,7 +57,7 @@ def find_velocity(log: Log) -> tuple[Values, str, float]:
         return log.signals["velocity"], log.units["velocity"], 0.0
     log.need("position")
     if len(log) < 3:
-        raise DetentError(f"{log.name}: came {len(log)} samples; allowed: at least 3; record longer")
+        raise DetentError(f"{log.name}: got {len(log)} samples; expected: at least 3; record longer")
     position = log.signals["position"]
     return np.gradient(position, log.t), f"{log.units['position']}/s", grain(position)
 

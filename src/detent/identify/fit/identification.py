@@ -163,13 +163,13 @@ def _check_alike(runs: Sequence[Run]) -> None:
     """Refuse logs of which one axis cannot have made all."""
     first = runs[0]
     for run in runs[1:]:
-        for what, came, wanted in (
+        for what, got, wanted in (
             ("positions", run.position_unit, first.position_unit),
             ("effort", f"{run.effort_name} [{run.effort_unit}]", f"{first.effort_name} [{first.effort_unit}]"),
         ):
-            if came != wanted:
+            if got != wanted:
                 allowed, remedy = f"{wanted}, as in {first.name}", "state the columns and units of both"
-                raise InputError.of_file(run.name, f"{what} in {came}", allowed, remedy)
+                raise InputError.of_file(run.name, f"{what} in {got}", allowed, remedy)
 
 
 def _refine(runs: Sequence[Run], constants: Constants, what: str, report: Report) -> Constants:

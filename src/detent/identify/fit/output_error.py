@@ -72,7 +72,7 @@ def fit_output_error(
     stretches = cut_stretches(runs, duration)
     if len(stretches) < 4 or sum(s.samples for s in stretches) < 20 * len(names):
         raise DetentError(
-            f"identify: came {len(stretches)} stretches of {duration:g} s; allowed: 4 or more; "
+            f"identify: got {len(stretches)} stretches of {duration:g} s; expected: 4 or more; "
             "record longer, or shorten the stretches"
         )
     search = _Search(names, start, stretches)

@@ -60,7 +60,7 @@ class Refusal:
     def __str__(self) -> str:
         """Give the refusal as one line."""
         what = ", ".join(self.constants) if self.constants else "all constants"
-        return f"refused: {what}: {self.subject}: {self.text}; do: {self.record}"
+        return f"refused: {what}: {self.subject}: {self.text}; try: {self.record}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

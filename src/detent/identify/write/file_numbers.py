@@ -69,7 +69,7 @@ def scale_of(spec: CascadeSpec, run: Run) -> Scale:
     motion = "rotary" if run.is_rotary else "linear"
     if spec.axis.motion != motion:
         raise DetentError(
-            f"{run.name}: came a position in {run.position_unit}; allowed: {spec.unit('m')}, as {spec.axis.name} is a "
+            f"{run.name}: got a position in {run.position_unit}; expected: {spec.unit('m')}, as {spec.axis.name} is a "
             f"{spec.axis.motion} axis; state the unit of the column, or name another axis file"
         )
     by_voltage = Scale(spec.effort_per_command, spec.back_emf_drag)
@@ -84,7 +84,7 @@ def scale_of(spec: CascadeSpec, run: Run) -> Scale:
         return scales[run.effort_unit]
     role = "torque" if motion == "rotary" else "force"
     raise DetentError(
-        f"{run.name}: came a {run.effort_name} in {run.effort_unit}; allowed for {spec.axis.name}: "
+        f"{run.name}: got a {run.effort_name} in {run.effort_unit}; expected for {spec.axis.name}: "
         f"{', '.join(scales)}; give what it does in these, such as --column '{role}=COLUMN [35 {NATIVE[motion]}]' with "
         f"the {role} per {run.effort_unit}"
     )
@@ -212,7 +212,7 @@ class FileNumbers:
         if total <= rest and "mass" in self._trusted:
             unit = self._unit("kg")
             raise DetentError(
-                f"{base.axis.name}: came {format_quantity(total, unit)} for all that moves; allowed: more than "
+                f"{base.axis.name}: got {format_quantity(total, unit)} for all that moves; expected: more than "
                 f"{format_quantity(rest, unit)}, which the axis file states without {key}; correct the axis file"
             )
         text = f"with the other {format_quantity(rest, self._unit('kg'))} of this file; " if rest else ""
@@ -304,9 +304,9 @@ def see(runs: Sequence[Run]) -> Bounds:
     """Extremes of runs."""
     units = {run.position_unit for run in runs}
     if len(units) > 1 or not units <= {"m", "rad"}:
-        came = " and ".join(sorted(units))
+        got = " and ".join(sorted(units))
         raise DetentError(
-            f"{runs[0].name}: came positions in {came}; allowed: m or rad, the same in all logs; state the unit of the "
+            f"{runs[0].name}: got positions in {got}; expected: m or rad, the same in all logs; state the unit of the "
             "column, such as --column 'position=COLUMN [0.3125 um]' for counts"
         )
     # Largest speed and acceleration of each run, by a window that noise does not pass.

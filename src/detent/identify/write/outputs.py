@@ -220,8 +220,8 @@ def _add(lines: list[str], places: dict[Path, Place], path: Path, number: Number
         lines.insert(max([header.line, *keys]), said)
         return
     if keys:
-        came, allowed = f"{name} without a table of its own", f"[{name}], which {path[-1]} can be added to"
-        raise InputError.of_file(file, came, allowed, "write its keys below such a line")
+        got, allowed = f"{name} without a table of its own", f"[{name}], which {path[-1]} can be added to"
+        raise InputError.of_file(file, got, allowed, "write its keys below such a line")
     while lines and not lines[-1].strip():
         lines.pop()
     lines += ["", f"[{name}]", said, ""]
@@ -239,7 +239,7 @@ def bounds_of(found: Identification, spec: CascadeSpec | None) -> Bounds:
     seen = see(found.runs)
     if not (seen.way > 20.0 * seen.resolution and seen.speed > 0.0):
         raise DetentError(
-            f"{found.runs[0].name}: came a log without motion; allowed: one that shows how far and how fast the axis "
+            f"{found.runs[0].name}: got a log without motion; expected: one that shows how far and how fast the axis "
             "may go; name the axis file whose limits the moves shall keep: --axis FILE"
         )
     return replace(seen, acceleration=max(seen.acceleration, seen.speed / 2.0))

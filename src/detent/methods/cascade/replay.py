@@ -61,15 +61,15 @@ class ReplayJob(OnScreen):
         present += [x for x in (self.reference, self.velocity, self.load_position) if x is not None]
         if len(self.t) < 3 or any(x.shape != self.t.shape for x in present):
             shapes = ", ".join(str(x.shape) for x in present)
-            raise DetentError(f"{self.name}: came signals of shapes {shapes}; allowed: all (n,) with n 3 or more")
+            raise DetentError(f"{self.name}: got signals of shapes {shapes}; expected: all (n,) with n 3 or more")
         if not (np.diff(self.t) > 0).all() or not all(np.isfinite(x).all() for x in present):
             raise DetentError(
-                f"{self.name}: came a time that does not rise, or values that are not finite; allowed: a rising time, "
+                f"{self.name}: got a time that does not rise, or values that are not finite; expected: a rising time, "
                 "finite values; read the log with detent.identify first"
             )
         if self.reference is None and not self.efforts:
             raise DetentError(
-                f"{self.name}: came neither a reference nor a force, current, voltage or command; allowed: one of them "
+                f"{self.name}: got neither a reference nor a force, current, voltage or command; expected: one of them "
                 "beside the position; name its column: --column 'reference=COLUMN [mm]'"
             )
 
@@ -82,9 +82,9 @@ class ReplayJob(OnScreen):
 def make_replay_job(spec: CascadeSpec, log: Log) -> ReplayJob:
     """The recording of an axis, as its job."""
     if "position" not in log.signals:
-        came = ", ".join(log.signals) or "no signal"
+        got = ", ".join(log.signals) or "no signal"
         raise DetentError(
-            f"{log.name}: came {came}; allowed: a log with a position; name its column: --column 'position=COLUMN [mm]'"
+            f"{log.name}: got {got}; expected: a log with a position; name its column: --column 'position=COLUMN [mm]'"
         )
     way = spec.unit("m")
     example = "deg" if way == "rad" else "mm"
@@ -92,7 +92,7 @@ def make_replay_job(spec: CascadeSpec, log: Log) -> ReplayJob:
         kind = unit.partition("/")[0]
         if role in log.signals and kind in {"m", "rad", "count"} and kind != way:
             raise DetentError(
-                f"{log.name}: came {role} in {unit}; allowed: {way}, as the axis is a {spec.axis.motion} one; state "
+                f"{log.name}: got {role} in {unit}; expected: {way}, as the axis is a {spec.axis.motion} one; state "
                 f"the unit of its column, a number before it for counts: --column '{role}=COLUMN [{example}]'"
             )
     guessed = [f"guessed: {'; '.join(log.guesses)}"] if log.guesses else []
@@ -265,7 +265,7 @@ def _open_loop(spec: CascadeSpec, job: ReplayJob) -> tuple[str, Numbers]:
             return name, job.efforts[name] / gain
     allowed = " or ".join(gains)
     raise DetentError(
-        f"{job.name}: came {', '.join(job.efforts)} and no reference; allowed: a reference, or {allowed}, for an axis "
+        f"{job.name}: got {', '.join(job.efforts)} and no reference; expected: a reference, or {allowed}, for an axis "
         f'with drive.input = "{spec.drive.input}"; name the column, or change drive.input'
     )
 
@@ -318,23 +318,23 @@ def _motion(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Number
     if job.load_position is not None:
         load = simulated("controller.load_sensor.position")
         found.append(Compared("position of the load", way, job.load_position, load))
-    measured, came = (smooth_velocity(job.t, values) for values in (job.position, place))
-    accelerations = np.gradient(measured, job.t), np.gradient(came, job.t)
+    measured, got = (smooth_velocity(job.t, values) for values in (job.position, place))
+    accelerations = np.gradient(measured, job.t), np.gradient(got, job.t)
     if job.velocity is not None and not on_load:
-        measured, came = job.velocity, simulated("controller.motor_sensor.velocity")
-    found.append(Compared("velocity", spec.unit("m/s"), measured, came))
+        measured, got = job.velocity, simulated("controller.motor_sensor.velocity")
+    found.append(Compared("velocity", spec.unit("m/s"), measured, got))
     return [*found, Compared("acceleration", spec.unit("m/s^2"), *accelerations)]
 
 
 def _efforts(spec: CascadeSpec, job: ReplayJob, simulated: Callable[[str], Numbers]) -> list[Compared]:
     """Every recorded effort that this axis has too."""
     units = {"force": "N", "torque": "N*m", "current": "A", "voltage": "V", "command": "V"}
-    came = {name: gain * simulated("plant.source.command") for name, gain in per_command(spec).items()}
+    got = {name: gain * simulated("plant.source.command") for name, gain in per_command(spec).items()}
     if spec.drive.input == "voltage":
         current = simulated("plant.machine.current")
         force = "torque" if spec.axis.motion == "rotary" else "force"
-        came |= {"current": current, force: spec.force_constant * current}
-    return [Compared(name, units[name], values, came[name]) for name, values in job.efforts.items() if name in came]
+        got |= {"current": current, force: spec.force_constant * current}
+    return [Compared(name, units[name], values, got[name]) for name, values in job.efforts.items() if name in got]
 
 
 def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:

@@ -266,7 +266,7 @@ def check_cascade_job(spec: CascadeSpec, job: MoveJob) -> list[float]:
 
 
 def _refused(spec: CascadeSpec, move: Move, place: float) -> Iterator[tuple[str, str, str, str]]:
-    """Key, what came, what is allowed and what to do, of each word of a move that the axis cannot do."""
+    """Key, what it got, what it expected and what to try, of each word of a move that the axis cannot do."""
     speed = spec.unit("m/s")
     low, high, slack = spec.limits.lowest, spec.highest, 1e-9 * spec.limits.travel
     if not low - slack <= place <= high + slack:

@@ -366,7 +366,7 @@ class CascadeSpec(AxisSpec, frozen=True):
         if isinstance(spec, cls):
             return spec
         raise DetentError(
-            f"{file}: came an axis of the method {spec.axis.method}; allowed: cascade, whose constants are those of an "
+            f"{file}: got an axis of the method {spec.axis.method}; expected: cascade, whose constants are those of an "
             "identification; name an axis file of it, or leave it out"
         )
 

@@ -135,10 +135,10 @@ def expand_moves(
     return tuple(moves)
 
 
-def too_many_moves(file: str, came: str) -> InputError:
+def too_many_moves(file: str, got: str) -> InputError:
     """Refuse a job for its length."""
     remedy = "lower the repeats, or divide the job among several files"
-    return InputError.of_file(file, came, f"up to {MOST_MOVES} moves", remedy)
+    return InputError.of_file(file, got, f"up to {MOST_MOVES} moves", remedy)
 
 
 def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, hammer_time: float = 0.0) -> MoveJob:
@@ -155,9 +155,9 @@ def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, ha
     """
     struck = _struck(text, name)
     if not struck:
-        came = "a text that prints nothing" if text else "an empty file"
+        got = "a text that prints nothing" if text else "an empty file"
         allowed, remedy = "a text with at least one character to print", "put some text into it, or name another file"
-        raise InputError.of_file(name, came, allowed, remedy)
+        raise InputError.of_file(name, got, allowed, remedy)
     moves = (
         Move(number, row, target=left_margin + column * pitch, dwell=hammer_time, label=label)
         for number, (row, column, label) in enumerate(struck, start=1)
@@ -192,9 +192,9 @@ def _struck(text: str, file: str) -> list[tuple[int, int, str]]:
                 raise too_many_moves(file, f"more than {MOST_MOVES} characters to print")
         elif len(problems) < MOST_PROBLEMS:
             code = f"0x{ord(char):02X}" if ord(char) < 0x100 else f"U+{ord(char):04X}"
-            came = f"the character {code}, which prints nothing alone"
+            got = f"the character {code}, which prints nothing alone"
             remedy = "remove it; save a document of a word processor as plain text first"
-            problems.append(FileProblem(file, row, place, "", came, _WHAT_TEXT_HOLDS, remedy))
+            problems.append(FileProblem(file, row, place, "", got, _WHAT_TEXT_HOLDS, remedy))
     if problems:
         raise InputError(problems)
     return struck
@@ -219,8 +219,8 @@ def load_moves(
         return _parse_moves(file, decode_utf8(file, data), RotaryMoveRow if rotary else MoveRow)
     if pitch is None:
         remedy = "name a list of moves; a text is for an axis that has a character pitch"
-        came, allowed = "a text; this axis prints no text", "a list of moves (.csv or .toml)"
-        raise InputError.of_file(str(file), came, allowed, remedy)
+        got, allowed = "a text; this axis prints no text", "a list of moves (.csv or .toml)"
+        raise InputError.of_file(str(file), got, allowed, remedy)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -127,7 +127,7 @@ def moves_page(
         cards=_cards(view, figures),
         notes=_notes(figures),
         sections=[
-            Section("What came out", [figure for figure in result if figure]),
+            Section("Results", [figure for figure in result if figure]),
             Section("How the axis did it", _move_figures(view, figures, trace)),
             comparison_section(comparisons),
             Section("Move by move", [_every_move(run)] if run.moves else []),

@@ -22,7 +22,7 @@ FAULTS = {"inserted": "inserted", "removed": "removed", "lost samples": "lost", 
 
 SOONEST = 1e-6  # an axis that says so by less than this before it is within the tolerance says so in time [s]
 
-Wrong = Iterator[tuple[str, str, str, str]]  # problems of a move: key, what came, what is allowed and what to do
+Wrong = Iterator[tuple[str, str, str, str]]  # problems of a move: key, what it got, what it expected and what to try
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +120,8 @@ def check_job(host: Host, job: MoveJob) -> list[Destination]:
         to = host.place(move, position)
         wrong = list(host.problems(to, position))
         if not 0.0 <= position <= travel:
-            came = format_quantity(position, "m", 6)
-            wrong.insert(0, (move.place_key, came, allowed, "keep the move between the two ends"))
+            got = format_quantity(position, "m", 6)
+            wrong.insert(0, (move.place_key, got, allowed, "keep the move between the two ends"))
         told = (FileProblem(job.name, move.row, 1 if move.row else 0, *what) for what in wrong)
         problems += [problem for problem in told if len(problems) < MOST_PROBLEMS]
         position = to.position

@@ -152,8 +152,8 @@ def compare_noise(spec: PhaseServoSpec, *, pitches: int = PITCHES, progress: Pro
     counts = spec.detector.counts
     most = MOST_STEPS // counts
     if not 1 <= pitches <= most:
-        came = f"came a move of {pitches} pitches; allowed: 1 to {most}; choose another"
-        raise DetentError(f"comparison of noise: {came}")
+        got = f"got a move of {pitches} pitches; expected: 1 to {most}; choose another"
+        raise DetentError(f"comparison of noise: {got}")
     servos = [spec.changed(method={"final": final}) for final in ("absolute", "incremental")]
     margin = counts // 2 - spec.method.threshold
     pulses = pulse_counts(margin)

@@ -191,9 +191,9 @@ def compare_drives(
     chosen = tuple(v for v in speeds if v <= spec.limits.speed * (1 + 1e-9))
     low = [v for v in chosen if speed_value(v) < HIGH_SPEED]
     if low or not chosen:
-        came = ", ".join(f"{v / INCH:.4g} in/s" for v in low or speeds)
+        got = ", ".join(f"{v / INCH:.4g} in/s" for v in low or speeds)
         raise DetentError(
-            f"comparison of drives: came {came}; allowed: 10 in/s to {spec.limits.speed / INCH:.4g} in/s "
+            f"comparison of drives: got {got}; expected: 10 in/s to {spec.limits.speed / INCH:.4g} in/s "
             "(limits.speed); choose speeds of the high-speed class, or raise limits.speed"
         )
     ways = {

@@ -151,7 +151,7 @@ def _misfit(line: PrintLine, geometry: Geometry, job_name: str) -> FileProblem:
         line=0,
         column=0,
         key=f"printed line {line.number}",
-        came=f"ink from {line.first_column / 120:.2f} in to {line.last_column / 120:.2f} in",
+        got=f"ink from {line.first_column / 120:.2f} in to {line.last_column / 120:.2f} in",
         allowed=f"ink between {first:.2f} in and {last:.2f} in from column 0, with room to stop before both frames",
         remedy="shorten the line, or change limits.travel or print.left_margin of the axis",
     )

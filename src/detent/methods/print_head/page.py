@@ -50,7 +50,7 @@ def print_page(
         cards=_cards(run),
         notes=_notes(run),
         sections=[
-            Section("What came out", _result(run)),
+            Section("Results", _result(run)),
             Section("Where the head was", [path] if path else []),
             Section("How the axis did it", how_figures(run, trace)),
             comparison_section(comparisons),

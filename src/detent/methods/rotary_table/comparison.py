@@ -146,8 +146,8 @@ def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) ->
     if speed < math.tau / LONGEST_TURN:
         least = format_quantity(math.tau / LONGEST_TURN, "rad/s")
         raise DetentError(
-            f"compare: came a table that goes round at {format_quantity(speed, 'rad/s')}; allowed: {least} or more, a "
-            "turn in an hour; do: raise limits.speed, or limits.acceleration where it stops the table too slowly"
+            f"compare: got a table that goes round at {format_quantity(speed, 'rad/s')}; expected: {least} or more, a "
+            "turn in an hour; try: raise limits.speed, or limits.acceleration where it stops the table too slowly"
         )
     speeds = sorted({min(wanted, spec.limits.speed) for wanted in FEED_SPEEDS})
     lag = speed / spec.method.position_gain / (1 - spec.drive.droop)

@@ -15,17 +15,17 @@ from detent.units import format_quantity as text
 TURN_COUNTER = put("method.form", '"turn counter"')
 
 
-def form_caution(key: str, came: str, sound: str, consequence: str) -> Caution:
+def form_caution(key: str, got: str, sound: str, consequence: str) -> Caution:
     """Look at a form that is known to fail, where another value of its key is sound."""
-    return Caution(key, came, sound, consequence, put(key, sound))
+    return Caution(key, got, sound, consequence, put(key, sound))
 
 
 def _angle(m: TableFigures) -> Iterator[Caution]:
     """The angle goes on beyond a turn."""
     if m.spec.method.form == "raw":
         ends = "the deviation jumps by a turn and the table runs away (test 11); a jog ends after two turns at most"
-        came = '"raw", the conventional angle of one turn'
-        yield form_caution("method.form", came, '"turn counter"', f"at the boundary {ends}")
+        got = '"raw", the conventional angle of one turn'
+        yield form_caution("method.form", got, '"turn counter"', f"at the boundary {ends}")
     if m.spec.method.form == "flag" and m.spec.detector.fine.noise > 0:
         yield Caution(
             "noise at the boundary",
@@ -84,12 +84,12 @@ def _remaining(m: TableFigures) -> Iterator[Caution]:
         )
         yield form_caution("method.signed_remaining", "false: the remaining angle is |M - R|", "true", driven)
     if not spec.method.position_control:
-        came, half_word = (
+        got, half_word = (
             "false: the speed signal is the commanded speed alone",
             text(0.5 * spec.speed_per_word, "rad/s"),
         )
         wrong = f"speeds are wrong by the droop, {text(spec.drive.droop, '%')}, and by up to half a word, {half_word}"
-        yield form_caution("method.position_control", came, "true", f"{wrong}, and no place is kept (test 19)")
+        yield form_caution("method.position_control", got, "true", f"{wrong}, and no place is kept (test 19)")
 
 
 def _near_boundary(m: TableFigures) -> Iterator[Caution]:

@@ -94,8 +94,8 @@ def find_faults(job: SequenceJob) -> list[Fault]:
     faults = [*_label_faults(job.steps), *_signal_faults(job)]
     if job.count > MOST_STEPS:
         last = max((k for k, step in enumerate(job.steps) if isinstance(step, Repeat)), default=len(job.steps) - 1)
-        came, allowed = f"{job.count} steps, repeats counted", f"up to {MOST_STEPS} steps"
-        faults.append((last, FileProblem.of_key("times", came, allowed, "lower the repeats")))
+        got, allowed = f"{job.count} steps, repeats counted", f"up to {MOST_STEPS} steps"
+        faults.append((last, FileProblem.of_key("times", got, allowed, "lower the repeats")))
     return faults or list(_time_faults(job))
 
 
@@ -107,8 +107,8 @@ def _label_faults(steps: Sequence[Step]) -> Iterator[Fault]:
             if step.label not in labels:
                 known = ", ".join(f'"{name}"' for name in labels) or "none of them has one"
                 remedy = f'write label = "{step.label}" in the first step of the loop, or correct the name'
-                came, allowed = f'the label "{step.label}", which no step before has', "the label of an earlier step"
-                yield (index, FileProblem.of_key("repeat", came, f"{allowed}: {known}", remedy))
+                got, allowed = f'the label "{step.label}", which no step before has', "the label of an earlier step"
+                yield (index, FileProblem.of_key("repeat", got, f"{allowed}: {known}", remedy))
         elif step.label in labels:
             allowed, remedy = "each label once", "give one of the steps another label"
             yield (index, FileProblem.of_key("label", f'the label "{step.label}" again', allowed, remedy))
@@ -117,9 +117,9 @@ def _label_faults(steps: Sequence[Step]) -> Iterator[Fault]:
     loops = find_loops(steps)
     for end, begin in loops.items():
         if any(other < begin <= last < end for last, other in loops.items()):
-            came = "a loop that begins inside an earlier loop and ends outside it"
+            got = "a loop that begins inside an earlier loop and ends outside it"
             remedy = "begin it where the earlier loop begins, or before that, or after the earlier loop"
-            yield (end, FileProblem.of_key("repeat", came, "loops inside one another or apart", remedy))
+            yield (end, FileProblem.of_key("repeat", got, "loops inside one another or apart", remedy))
 
 
 def _signal_faults(job: SequenceJob) -> Iterator[Fault]:
@@ -132,8 +132,8 @@ def _signal_faults(job: SequenceJob) -> Iterator[Fault]:
                 remedy = "give the output another name"
                 yield (index, FileProblem.of_key(key, f'the input "{signal}"', "a name that no input has", remedy))
         elif signal is not None and not job.inputs.get(signal):
-            came, remedy = f'the unknown input "{signal}"', f'add [[input]] with name = "{signal}", or correct the name'
-            yield (index, FileProblem.of_key(key, came, f"an input of this job: {known}", remedy))
+            got, remedy = f'the unknown input "{signal}"', f'add [[input]] with name = "{signal}", or correct the name'
+            yield (index, FileProblem.of_key(key, got, f"an input of this job: {known}", remedy))
 
 
 def _signal_of(step: Step) -> tuple[str | None, str]:
@@ -150,14 +150,14 @@ def _time_faults(job: SequenceJob) -> Iterator[Fault]:
         if later is None:
             signal, key = _signal_of(step)
             last = job.inputs[signal or ""][-1][1]
-            came = f'"{signal}", which is off for good from {last:g} s on; the step begins at {time:g} s or later'
+            got = f'"{signal}", which is off for good from {last:g} s on; the step begins at {time:g} s or later'
             remedy = f'let "{signal}" be on later, or repeat less'
-            yield (index, FileProblem.of_key(key, came, "a signal that comes on after the step begins", remedy))
+            yield (index, FileProblem.of_key(key, got, "a signal that comes on after the step begins", remedy))
             return
         time = later
         if time > LONGEST_JOB:
-            came, allowed = f"a sequence of more than {LONGEST_JOB:g} s", f"up to {LONGEST_JOB:g} s"
-            yield (index, FileProblem.of_key("", came, allowed, "shorten the waits, or repeat less"))
+            got, allowed = f"a sequence of more than {LONGEST_JOB:g} s", f"up to {LONGEST_JOB:g} s"
+            yield (index, FileProblem.of_key("", got, allowed, "shorten the waits, or repeat less"))
             return
 
 

@@ -120,9 +120,9 @@ def _lacking(action: str, stated: Mapping[str, Any]) -> Iterator[FileProblem]:
         yield FileProblem.of_key("repeat", "repeat without times", allowed, "add times = 2")
     held = [key for key in ("while", "for") if key in stated]
     if action == "jog" and len(held) != 1:
-        came = "jog with while and for" if held else "jog without an end"
+        got = "jog with while and for" if held else "jog without an end"
         remedy = "remove one of the two" if held else 'add for = "2 s", or while with the name of an input'
-        yield FileProblem.of_key("jog", came, "exactly one of while (a signal) and for (a time)", remedy)
+        yield FileProblem.of_key("jog", got, "exactly one of while (a signal) and for (a time)", remedy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

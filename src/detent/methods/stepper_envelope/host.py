@@ -230,9 +230,9 @@ class StageHost:
         for name in move.motors:
             motor = self.stage.motors[name]
             goal = move.place_of(name, self.goal[name])
-            for key, came, allowed, remedy in move_faults(motor.table, name, move, motor.place, goal):
+            for key, got, allowed, remedy in move_faults(motor.table, name, move, motor.place, goal):
                 where = f"motor {name} at {text(motor.place, 'm')}" + (f", {key}" if key != name else "")
-                raise AxisError(f"{where}: came {came}; allowed: {allowed}; do: {remedy}")
+                raise AxisError(f"{where}: got {got}; expected: {allowed}; try: {remedy}")
             turn = None if move.turn is None else motor.table.step_inside(move.turn)
             leg, self.goal[name] = Leg(motor.position, motor.table.step_inside(goal), turn), goal
             if leg.steps:
@@ -320,7 +320,7 @@ def check_stage_job(spec: StepperEnvelopeSpec, job: StageJob) -> None:
 
 
 def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[tuple[int, str, str, str, str]]:
-    """Line and key of what the axis cannot do, what came, what is allowed, and what to do."""
+    """Line and key of what the axis cannot do, what it got, what it expected and what to try."""
     goal = {name: table.mechanics.start_position for name, table in spec.stepper.items()}
     for move in job.moves:
         unknown = next((name for name in move.motors if name not in spec.stepper), None)
@@ -330,9 +330,9 @@ def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[tuple[in
         if isinstance(move, StageJog):
             table = spec.stepper[move.motor]
             if not 1.0 <= table.hz(abs(move.speed)) <= table.max_hz * (1 + 1e-9):
-                came, slowest, top = (text(v, "m/s") for v in (move.speed, table.step, table.limits.speed))
+                got, slowest, top = (text(v, "m/s") for v in (move.speed, table.step, table.limits.speed))
                 remedy = f"write {top}, or correct limits.speed"
-                yield move.row, "speed", came, f"{slowest} to {top}, either way", remedy
+                yield move.row, "speed", got, f"{slowest} to {top}, either way", remedy
             goal[move.motor] = math.nan  # where a manual run ends is not known before it is made
             continue
         for name in move.motors:
@@ -348,7 +348,7 @@ def move_faults(
 ) -> Iterator[tuple[str, str, str, str]]:
     """What a motor at `start` cannot do of a move to `goal` [m], either NaN where it is not known.
 
-    Key, what came, what is allowed, and what to do: places outside its travel, and places that are not on its way.
+    Key, what it got, what it expected and what to try: places outside its travel, and places that are not on its way.
     """
     change = () if move.change is None else (move.change.at, move.change.to)
     outside = [told for place in (goal, move.turn, *change) if place is not None if (told := _outside(table, place))]
@@ -360,17 +360,17 @@ def move_faults(
     if move.turn is not None:
         turn = table.step_inside(move.turn)
         if (turn - here) * (there - turn) >= 0:
-            came, allowed = f"{text(move.turn, 'm', 6)} on the way {way}", "a place from which the motor comes back"
-            yield "turn", came, allowed, "set turn beyond both, or remove it"
+            got, allowed = f"{text(move.turn, 'm', 6)} on the way {way}", "a place from which the motor comes back"
+            yield "turn", got, allowed, "set turn beyond both, or remove it"
     if move.change is not None:
         at = table.step_inside(move.change.at)
         if at == here or (at - here) * (there - at) < 0:
-            came = f"{text(move.change.at, 'm', 6)}, which the motor does not pass {way}"
-            yield "changed_at", came, "a place on the way, its end included", "set it there, or correct the target"
+            got = f"{text(move.change.at, 'm', 6)}, which the motor does not pass {way}"
+            yield "changed_at", got, "a place on the way, its end included", "set it there, or correct the target"
 
 
 def _outside(table: StepperTable, place: float) -> tuple[str, str, str] | None:
-    """What is wrong with a place: what came, what is allowed, and what to do."""
+    """What is wrong with a place: what it got, what it expected and what to try."""
     lower, upper = table.mechanics.lower_end, table.upper_end
     # The end of a travel that is no whole number of steps lies a part of a step beyond the last one.
     end = max(table.steps * table.step, table.limits.travel) + table.step / 2

@@ -60,7 +60,7 @@ def stage_page(
         cards=_cards(figures),
         notes=_notes(figures),
         sections=[
-            Section("What came out", [figure for figure in result if figure]),
+            Section("Results", [figure for figure in result if figure]),
             Section("Speed under the envelope", _runs_figures(figures, made)),
             detail_section(figures, trace, made),
             comparison_section(comparisons),

@@ -115,8 +115,8 @@ class StageRow(Row, frozen=True):
             allowed = "one of them: the motor would pass the place twice"
             yield FileProblem.of_key(changed[0], f"turn and {changed[0]}", allowed, "divide the move into two")
         for key in [key for key in ("turn", *changed) if key in stated][:1] if len(ways) > 1 else ():
-            came, allowed = f"{key} in a move of {len(ways)} motors", f"{key} in a move of exactly one motor"
-            yield FileProblem.of_key(key, came, allowed, "give the motor a [[move]] of its own")
+            got, allowed = f"{key} in a move of {len(ways)} motors", f"{key} in a move of exactly one motor"
+            yield FileProblem.of_key(key, got, allowed, "give the motor a [[move]] of its own")
 
     @classmethod
     def _lacking(cls, stated: Mapping[str, Any], needed: Sequence[str], what: str) -> Iterator[FileProblem]:
@@ -396,10 +396,10 @@ class PlaceRows(CsvRows[StageRow]):
             return
         nominal = [index for index in found if _PREFERRED in cells[index].lower()]
         if len(nominal) != 1:
-            came = f"{len(found)} columns for {motor}: {', '.join(short(cells[index]) for index in found)}"
+            got = f"{len(found)} columns for {motor}: {', '.join(short(cells[index]) for index in found)}"
             allowed = f'one column for each motor, or one with the word "{_PREFERRED}" among several'
             unit = self.columns[found[0]].unit
             remedy = f"name the column of the places to go to {motor}_{unit}_{_PREFERRED}"
-            self.refuse_heading(found[1], came, allowed, remedy)
+            self.refuse_heading(found[1], got, allowed, remedy)
         for index in set(found).difference(nominal):
             self.columns[index] = Column()

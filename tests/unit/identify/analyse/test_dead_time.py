@@ -77,7 +77,7 @@ def test_an_effort_after_its_motion_is_doubted():
 def test_recordings_too_short_are_refused():
     t, effort, position = record()
     with pytest.raises(
-        DetentError, match="came 1000 times, 1000 efforts, 1000 positions; allowed: as many of each, 1280"
+        DetentError, match="got 1000 times, 1000 efforts, 1000 positions; expected: as many of each, 1280"
     ):
         find_dead_time(t[:1000], effort[:1000], position[:1000])
     with pytest.raises(DetentError, match="15999 efforts"):

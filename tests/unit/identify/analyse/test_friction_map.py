@@ -118,11 +118,11 @@ def test_what_cannot_be_mapped_has_a_reason():
 
 def test_wrong_input_is_an_error():
     log = record(np.random.default_rng(1), seconds=1.0)
-    with pytest.raises(DetentError, match="came a mass of -1"):
+    with pytest.raises(DetentError, match="got a mass of -1"):
         map_friction(log, mass=-1.0)
-    with pytest.raises(DetentError, match="came 0 bins"):
+    with pytest.raises(DetentError, match="got 0 bins"):
         map_friction(log, bins=0)
-    with pytest.raises(DetentError, match="allowed: voltage that drives the axis"):
+    with pytest.raises(DetentError, match="expected: voltage that drives the axis"):
         map_friction(log, "voltage")
 
 

@@ -150,9 +150,9 @@ def test_an_excitation_that_does_not_come_back_is_refused():
 
 def test_too_short_recordings_are_refused():
     t, u, y = record()
-    with pytest.raises(DetentError, match="came 50 times, 50 values of the input, 50 of the output"):
+    with pytest.raises(DetentError, match="got 50 times, 50 values of the input, 50 of the output"):
         measure_response(t[:50], u[:50], y[:50])
-    with pytest.raises(DetentError, match="came 5000 times, 4999 values"):
+    with pytest.raises(DetentError, match="got 5000 times, 4999 values"):
         measure_response(t, u[1:], y)
     with pytest.raises(DetentError, match="an excitation that changes"):
         measure_response(t, np.ones(len(t)), y)
@@ -191,11 +191,11 @@ def test_of_a_log_the_most_direct_effort_is_taken():
 
 def test_a_log_without_the_signals_is_refused():
     _, u, y = record()
-    with pytest.raises(DetentError, match=r"a.csv: came signals position; allowed: something that drives the axis"):
+    with pytest.raises(DetentError, match=r"a.csv: got signals position; expected: something that drives the axis"):
         response_of(a_log(position=y))
-    with pytest.raises(DetentError, match="allowed: a recording with position_load"):
+    with pytest.raises(DetentError, match="expected: a recording with position_load"):
         response_of(a_log(position=y, force=u), position="position_load")
-    with pytest.raises(DetentError, match="allowed: current that drives the axis"):
+    with pytest.raises(DetentError, match="expected: current that drives the axis"):
         response_of(a_log(position=y, force=u), "current")
 
 

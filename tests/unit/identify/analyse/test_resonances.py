@@ -241,9 +241,9 @@ def test_a_vague_resonance_is_not_trusted():
 
 def test_too_few_lines_are_refused():
     one = rigid_response(lines=8)
-    with pytest.raises(DetentError, match="came 8 lines with a standard deviation below 30%; allowed: 14 or more"):
+    with pytest.raises(DetentError, match="got 8 lines with a standard deviation below 30%; expected: 14 or more"):
         fit_resonances(one)
-    with pytest.raises(DetentError, match="came no frequency response"):
+    with pytest.raises(DetentError, match="got no frequency response"):
         fit_resonances()
 
 

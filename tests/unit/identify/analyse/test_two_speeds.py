@@ -109,7 +109,7 @@ def test_wrong_input_is_an_error():
     t = np.arange(0.0, 1.0, DT)
     with pytest.raises(DetentError, match="something that drives the axis, one of force"):
         fit_two_speeds(make_log(t, position=t))
-    with pytest.raises(DetentError, match="allowed: current that drives the axis"):
+    with pytest.raises(DetentError, match="expected: current that drives the axis"):
         fit_two_speeds(make_log(t, position=t, force=t), "current")
     with pytest.raises(DetentError, match="a recording with position"):
         fit_two_speeds(make_log(t, force=t))

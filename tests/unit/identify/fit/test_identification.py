@@ -256,7 +256,7 @@ def test_the_verdict_follows_from_the_refusals():
 
 def test_a_log_that_cannot_be_identified_is_an_error_with_what_to_do():
     t = np.arange(1000) * 1e-3
-    with pytest.raises(InputError, match=r"a recording with position; do: name the column") as error:
+    with pytest.raises(InputError, match=r"a recording with position; try: name the column") as error:
         identify([make_log(t, {"force": np.sin(t)})])
     assert error.value.exit_status == 2
     with pytest.raises(InputError, match="something that drives the axis"):

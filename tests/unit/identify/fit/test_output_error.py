@@ -64,5 +64,5 @@ def test_stretches_leave_out_what_means_nothing():
 
 
 def test_too_few_stretches_are_refused():
-    with pytest.raises(DetentError, match="allowed: 4 or more"):
+    with pytest.raises(DetentError, match="expected: 4 or more"):
         fit_output_error([driven(3.0)], constants(TRUE))

@@ -161,12 +161,12 @@ def test_what_cannot_be_identified_is_said_with_what_to_do():
     text = refused({"force": FORCE})
     assert "signals force" in text
     assert "a recording with position" in text
-    assert "do: name the column: position=COLUMN [UNIT]" in text
+    assert "try: name the column: position=COLUMN [UNIT]" in text
     text = refused({"position": POSITION, "reference": POSITION})
     assert "force, torque, current, voltage, command" in text
-    assert "do: name its column: force=COLUMN [UNIT]" in text
+    assert "try: name its column: force=COLUMN [UNIT]" in text
     text = refused({"position": POSITION, "force": FORCE}, "voltage")
-    assert "allowed: voltage that drives the axis" in text
-    assert "do: name its column: voltage=COLUMN [UNIT]" in text
+    assert "expected: voltage that drives the axis" in text
+    assert "try: name its column: voltage=COLUMN [UNIT]" in text
     text = refused({"position": POSITION[:19], "force": FORCE[:19]}, t=T[:19])
-    assert "came 19 samples; allowed: 20 or more; do: record a longer run" in text
+    assert "got 19 samples; expected: 20 or more; try: record a longer run" in text

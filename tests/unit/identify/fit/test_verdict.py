@@ -61,7 +61,7 @@ def test_signals_that_contradict_each_other_are_refused(kind, subject, advice):
     (found,) = look(finding(kind))
     assert (found.subject, found.record, found.constants) == (subject, advice, ())
     assert found.text == "made.csv: force points the other way"
-    assert str(found) == f"refused: all constants: {subject}: made.csv: force points the other way; do: {advice}"
+    assert str(found) == f"refused: all constants: {subject}: made.csv: force points the other way; try: {advice}"
     (own,) = look(finding(kind, advice="do something else"))
     assert own.record == "do something else"
     assert look(finding(kind, severity=Severity.NOTE)) == []
@@ -305,4 +305,4 @@ def test_a_refusal_as_data():
         "record": "what to do",
         "constants": ("mass", "delay"),
     }
-    assert str(refusal) == "refused: mass, delay: too short: why; do: what to do"
+    assert str(refusal) == "refused: mass, delay: too short: why; try: what to do"

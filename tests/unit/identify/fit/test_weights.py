@@ -61,7 +61,7 @@ def test_whole_samples_of_delay_are_a_shift(kernel):
 
 @pytest.mark.parametrize("late", [0.0, 0.4, 1.7])
 def test_a_held_mean_is_the_integral_over_what_stands(kernel, late):
-    """Held against an integral in steps of a hundredth of a sample."""
+    """Compared with an integral in steps of a hundredth of a sample."""
     signal = np.random.default_rng(2).standard_normal(300)
     fine = (np.arange(-1300, 1300) + 0.5) / 100
     window = np.where(np.abs(fine) < 12, (1 - (fine / 12) ** 2) ** 4, 0.0)

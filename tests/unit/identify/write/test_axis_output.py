@@ -150,7 +150,7 @@ def test_a_number_that_is_not_trusted_stands_in_a_comment(folder: Path, found: I
     partly = replace(found, refusals=(Refusal("not told by the data", "wide", "record more", ("viscous.positive",)),))
     text = axis_toml(partly)
     assert "# not trusted: viscous = " in text
-    assert "do: record more" in text
+    assert "try: record more" in text
     spec = loaded(folder, text).spec
     assert isinstance(spec, CascadeSpec)
     assert spec.mechanics.friction.positive.viscous == 0.0
@@ -226,7 +226,7 @@ def test_a_table_in_one_line_is_refused(found: Identification) -> None:
 
 def test_a_lighter_axis_than_the_file_can_be_is_refused(found: Identification) -> None:
     base = HEAD + LIMITS + '\n[mechanics]\nload_mass = "3 kg"\nmotor_mass = "9 kg"\n' + LOOPS
-    with pytest.raises(DetentError, match=r"came 3.999 kg for all that moves; allowed: more than 9 kg"):
+    with pytest.raises(DetentError, match=r"got 3.999 kg for all that moves; expected: more than 9 kg"):
         axis_toml(found, base)
 
 
@@ -295,12 +295,12 @@ def test_an_angle_makes_a_rotary_axis(folder: Path) -> None:
     assert spec.mass == pytest.approx(4.0, rel=1e-2)
     run = axis.run(axis.load_recording(log), every=0)
     assert {one.name: one.relative for one in run.result.compared}["torque"] < 0.03
-    with pytest.raises(DetentError, match="came a position in rad; allowed: m, as slide is a linear axis"):
+    with pytest.raises(DetentError, match="got a position in rad; expected: m, as slide is a linear axis"):
         axis_toml(found, AXIS)
 
 
 @pytest.mark.parametrize(
-    ("unit", "words"), [("A", "came a force in A; allowed for slide: N, 1, V"), ("N*m", r"came a force in N\*m")]
+    ("unit", "words"), [("A", "got a force in A; expected for slide: N, 1, V"), ("N*m", r"got a force in N\*m")]
 )
 def test_an_effort_that_the_axis_does_not_have_is_refused(found: Identification, unit: str, words: str) -> None:
     runs = tuple(replace(run, effort_unit=unit) for run in found.runs)
@@ -310,7 +310,7 @@ def test_an_effort_that_the_axis_does_not_have_is_refused(found: Identification,
 
 def test_counts_make_no_axis(found: Identification) -> None:
     runs = tuple(replace(run, position_unit="count") for run in found.runs)
-    with pytest.raises(DetentError, match="came positions in count; allowed: m or rad"):
+    with pytest.raises(DetentError, match="got positions in count; expected: m or rad"):
         axis_toml(replace(found, runs=runs))
 
 

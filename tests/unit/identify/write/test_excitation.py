@@ -109,7 +109,7 @@ def test_moves_go_both_ways_at_several_speeds(folder: Path, found: Identificatio
 def test_the_job_says_what_each_part_is_for(found: Identification) -> None:
     text = excitation_job(found)
     for refused in found.refusals:
-        assert f"do: {refused.record}" in text
+        assert f"try: {refused.record}" in text
     assert re.search(r"^# Several steady speeds, both ways", text, flags=re.MULTILINE)
     assert re.search(r"^# Short ramps", text, flags=re.MULTILINE)
 
@@ -141,12 +141,12 @@ def test_moves_of_an_angle_are_angles(folder: Path) -> None:
 def test_a_log_at_rest_tells_no_limits(found: Identification, spec: CascadeSpec) -> None:
     run = found.runs[0]
     rests = replace(found, runs=(replace(run, position=np.zeros_like(run.position)),))
-    with pytest.raises(DetentError, match=r"came a log without motion; .*--axis FILE"):
+    with pytest.raises(DetentError, match=r"got a log without motion; .*--axis FILE"):
         excitation_job(rests)
     assert "limits of slide" in excitation_job(rests, spec)
 
 
 def test_counts_tell_no_limits(found: Identification) -> None:
     counts = replace(found, runs=tuple(replace(run, position_unit="count") for run in found.runs))
-    with pytest.raises(DetentError, match="came positions in count"):
+    with pytest.raises(DetentError, match="got positions in count"):
         excitation_job(counts)

@@ -180,7 +180,7 @@ def test_a_voltage_axis_cannot_be_driven_by_a_current():
     t = np.arange(100) * 1e-3
     job = ReplayJob(name="log", t=t, position=0 * t, efforts={"current": 0 * t})
     with pytest.raises(
-        DetentError, match=r"log: came current and no reference; allowed: a reference, or voltage or com"
+        DetentError, match=r"log: got current and no reference; expected: a reference, or voltage or com"
     ):
         run_cascade_replay(spec, job)
 
@@ -188,7 +188,7 @@ def test_a_voltage_axis_cannot_be_driven_by_a_current():
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"reference": None, "efforts": {}}, "came neither a reference nor"),
+        ({"reference": None, "efforts": {}}, "got neither a reference nor"),
         ({"t": np.zeros(3)}, "signals of shapes"),
         ({"velocity": np.zeros(2)}, "signals of shapes"),
         ({"position": None}, "not finite"),
@@ -214,11 +214,11 @@ def test_a_log_becomes_a_job_if_it_fits_the_axis():
     good = {"position": "m", "reference": "m", "force": "N", "temperature": "K"}
     job = make_replay_job(spec, log_of(**good))
     assert (list(job.efforts), job.notes, job.velocity) == (["force"], ("guessed: position; the rest",), None)
-    with pytest.raises(DetentError, match="came reference; allowed: a log with a position"):
+    with pytest.raises(DetentError, match="got reference; expected: a log with a position"):
         make_replay_job(spec, log_of(reference="m"))
-    with pytest.raises(DetentError, match=r"came velocity in rad/s; allowed: m, as the axis is a linear one"):
+    with pytest.raises(DetentError, match=r"got velocity in rad/s; expected: m, as the axis is a linear one"):
         make_replay_job(spec, log_of(**good, velocity="rad/s"))
-    with pytest.raises(DetentError, match=r"came position in count; .*--column 'position=COLUMN \[mm\]'"):
+    with pytest.raises(DetentError, match=r"got position in count; .*--column 'position=COLUMN \[mm\]'"):
         make_replay_job(spec, log_of(position="count", reference="m"))
 
 

@@ -200,11 +200,11 @@ def test_moves_that_the_axis_cannot_make_are_refused_with_their_lines():
     wrong = job({"target": 0.6}, {"by": 0.2, "speed": 0.7}, {"target": 0.1, "sample_period": 1e-3})
     with pytest.raises(InputError) as caught:
         run_cascade_moves(linear(), wrong)
-    told = [(problem.line, problem.key, problem.came) for problem in caught.value.problems]
+    told = [(problem.line, problem.key, problem.got) for problem in caught.value.problems]
     assert told == [
         (1, "target", "600 mm"), (2, "by", "800 mm"), (2, "speed", "700 mm/s"), (3, "sample_period", "1 ms"),
     ]  # fmt: skip
-    with pytest.raises(InputError, match=r"came 400 deg; allowed: a position .* -360 deg to 360 deg"):
+    with pytest.raises(InputError, match=r"got 400 deg; expected: a position .* -360 deg to 360 deg"):
         check_cascade_job(rotary(), job({"target": math.radians(400)}))
 
 

@@ -194,5 +194,5 @@ def test_progress_names_each_case():
 
 @pytest.mark.parametrize("rate", [0.0, -1037.0, math.nan, math.inf])
 def test_a_rate_that_is_none_is_refused(rate):
-    with pytest.raises(DetentError, match=r"compare_feedback: rate: came .* pulses/s; allowed: above 0 and finite"):
+    with pytest.raises(DetentError, match=r"compare_feedback: rate: got .* pulses/s; expected: above 0 and finite"):
         compare_feedback(make_spec(), rate=rate)

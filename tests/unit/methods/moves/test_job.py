@@ -36,7 +36,7 @@ def test_a_move_says_where_or_how_far_and_leaves_the_rest_to_the_axis():
 
 
 @pytest.mark.parametrize(
-    ("values", "came", "allowed"),
+    ("values", "got", "allowed"),
     [
         ({}, "neither target nor by", "exactly one"),
         ({"target": 0.1, "by": 0.2}, "target and by", "exactly one"),
@@ -49,10 +49,10 @@ def test_a_move_says_where_or_how_far_and_leaves_the_rest_to_the_axis():
         ({"by": 0.1, "sample_period": -1e-3}, "sample_period -0.001 s", "a time above 0 s"),
     ],
 )
-def test_no_move_is_what_no_axis_can_do(values, came, allowed):
-    with pytest.raises(DetentError, match="move 7: came ") as caught:
+def test_no_move_is_what_no_axis_can_do(values, got, allowed):
+    with pytest.raises(DetentError, match="move 7: got ") as caught:
         Move(number=7, row=1, **values)
-    assert f"came {came}; allowed: {allowed}" in str(caught.value)
+    assert f"got {got}; expected: {allowed}" in str(caught.value)
 
 
 # -- repeats ------------------------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ def test_a_job_has_a_limit_and_may_reach_it():
     with pytest.raises(InputError) as caught:
         expand_moves("job.toml", [(step, MOST_MOVES), (step, 1)])
     (problem,) = caught.value.problems
-    assert (problem.file, problem.came) == ("job.toml", f"{MOST_MOVES + 1} moves, repeats counted")
+    assert (problem.file, problem.got) == ("job.toml", f"{MOST_MOVES + 1} moves, repeats counted")
     assert problem.allowed == f"up to {MOST_MOVES} moves"
 
 
@@ -117,17 +117,17 @@ def test_an_accent_is_struck_with_its_letter():
 @pytest.mark.parametrize("before", ["", " ", "a ", "a\n", "a\t"])
 def test_an_accent_without_a_letter_is_refused(before):
     (problem,) = refusal(f"{before}\N{COMBINING ACUTE ACCENT}b")
-    assert "U+0301" in problem.came
+    assert "U+0301" in problem.got
 
 
 def test_a_text_of_cp_m_ends_in_sub():
     assert strikes("ab\n\x1a\x1a\x1a") == strikes("ab\n")
-    assert [problem.came for problem in refusal("a\x1ab")] == ["the character 0x1A, which prints nothing alone"]
+    assert [problem.got for problem in refusal("a\x1ab")] == ["the character 0x1A, which prints nothing alone"]
 
 
 def test_every_character_that_cannot_be_printed_is_named_with_its_place():
     problems = refusal("a\x1bb\r\n\tc\x07\n\N{ZERO WIDTH SPACE}d\x85")
-    places = [(problem.line, problem.column, problem.came.split()[2].rstrip(",")) for problem in problems]
+    places = [(problem.line, problem.column, problem.got.split()[2].rstrip(",")) for problem in problems]
     assert places == [(1, 2, "0x1B"), (2, 3, "0x07"), (3, 1, "U+200B"), (3, 3, "0x85")]
     assert all("printable characters" in problem.allowed for problem in problems)
 
@@ -136,13 +136,13 @@ def test_rubbish_is_not_reported_for_ever():
     assert len(refusal("\x01" * 1000)) == MOST_PROBLEMS
 
 
-@pytest.mark.parametrize(("text", "came"), [("", "an empty file"), (" \n\t\f\r\n", "a text that prints nothing")])
-def test_a_text_that_prints_nothing_is_refused(text, came):
+@pytest.mark.parametrize(("text", "got"), [("", "an empty file"), (" \n\t\f\r\n", "a text that prints nothing")])
+def test_a_text_that_prints_nothing_is_refused(text, got):
     (problem,) = refusal(text)
-    assert (problem.line, problem.came) == (0, came)
+    assert (problem.line, problem.got) == (0, got)
 
 
 def test_a_text_may_be_as_long_as_a_job_and_no_longer():
     assert text_job("x" * MOST_MOVES, name="job.txt", pitch=PITCH).count == MOST_MOVES
     (problem,) = refusal("x" * (MOST_MOVES + 1))
-    assert problem.came == f"more than {MOST_MOVES} characters to print"
+    assert problem.got == f"more than {MOST_MOVES} characters to print"

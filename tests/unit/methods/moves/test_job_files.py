@@ -32,13 +32,13 @@ def values(job):
 def refusal(path, **options):
     with pytest.raises(InputError) as caught:
         load_moves(path, **options)
-    assert all(problem.came and problem.allowed and problem.remedy for problem in caught.value.problems)
+    assert all(problem.got and problem.allowed and problem.remedy for problem in caught.value.problems)
     assert all(problem.file == str(path) for problem in caught.value.problems)
     return caught.value.problems
 
 
 def told(problems):
-    return [(problem.line, problem.column, problem.key, problem.came) for problem in problems]
+    return [(problem.line, problem.column, problem.key, problem.got) for problem in problems]
 
 
 # -- CSV ----------------------------------------------------------------------------------------------------
@@ -75,7 +75,7 @@ def test_csv_as_programs_write_it(write, text):
 
 
 @pytest.mark.parametrize(
-    ("header", "place", "came", "remedy"),
+    ("header", "place", "got", "remedy"),
     [
         ("target [mm],dwel [ms]", 13, 'the unknown column "dwel [ms]"', 'did you mean "dwell"?'),
         ("target [mm], Dwell [ms]", 14, 'the unknown column "Dwell [ms]"', 'did you mean "dwell"?'),
@@ -101,14 +101,14 @@ def test_csv_as_programs_write_it(write, text):
         ('"target [mm]', 1, '"target [mm]', "remove the quotation marks (unexpected end of data)"),
     ],
 )
-def test_csv_header_that_says_nothing_or_the_wrong_thing(write, header, place, came, remedy):
+def test_csv_header_that_says_nothing_or_the_wrong_thing(write, header, place, got, remedy):
     (problem,) = refusal(write("job.csv", f"# a job\n{header}\n1\n"))
-    assert told([problem]) == [(2, place, "", came)]
+    assert told([problem]) == [(2, place, "", got)]
     assert problem.remedy == remedy
 
 
 @pytest.mark.parametrize(
-    ("line", "place", "key", "came", "allowed"),
+    ("line", "place", "key", "got", "allowed"),
     [
         ("x", 1, "target", '"x"', "a plain number"),
         ("1 mm", 1, "target", '"1 mm"', "a plain number"),
@@ -132,10 +132,10 @@ def test_csv_header_that_says_nothing_or_the_wrong_thing(write, header, place, c
         ("\x01\x02", 1, "target", '"\ufffd\ufffd"', "a plain number"),
     ],
 )
-def test_csv_line_that_is_no_move(write, line, place, key, came, allowed):
+def test_csv_line_that_is_no_move(write, line, place, key, got, allowed):
     header = "target [mm],dwell [ms],repeat,speed [mm/s],sample_period [s],by [mm]"
     (problem,) = refusal(write("job.csv", f"{header}\n1\n{line}\n2\n"))
-    assert told([problem]) == [(3, place, key, came)]
+    assert told([problem]) == [(3, place, key, got)]
     assert problem.allowed.startswith(allowed)
 
 
@@ -171,9 +171,9 @@ def test_csv_without_moves(write, text):
 
 def test_csv_has_as_many_moves_as_a_job(write):
     (problem,) = refusal(write("job.csv", "by [mm]\n" + "1\n" * (MOST_MOVES + 2)))
-    assert problem.came == f"more than {MOST_MOVES} moves"
+    assert problem.got == f"more than {MOST_MOVES} moves"
     (problem,) = refusal(write("job.csv", f"by [mm],repeat\n1,{MOST_MOVES}\n1,2\n"))
-    assert problem.came == f"{MOST_MOVES + 2} moves, repeats counted"
+    assert problem.got == f"{MOST_MOVES + 2} moves, repeats counted"
 
 
 # -- TOML ---------------------------------------------------------------------------------------------------
@@ -216,7 +216,7 @@ def test_toml_with_the_list_in_one_value(write):
 
 
 @pytest.mark.parametrize(
-    ("line", "came", "allowed", "remedy"),
+    ("line", "got", "allowed", "remedy"),
     [
         ("target = 12", "12", 'a length such as "12 mm"', "write it as text with a unit"),
         ("target = true", "true", 'a length such as "12 mm"', "write it as text with a unit"),
@@ -227,16 +227,16 @@ def test_toml_with_the_list_in_one_value(write):
         ("target.x = 1", "a table", "a length", "write it as text with a unit"),
     ],
 )
-def test_toml_place_or_way_that_is_none(write, line, came, allowed, remedy):
+def test_toml_place_or_way_that_is_none(write, line, got, allowed, remedy):
     (problem,) = refusal(write("job.toml", f'[[move]]\nby = "1 mm"\n\n[[move]]\n  {line}\n'))
     key = line.partition(" ")[0].partition(".")[0]
-    assert told([problem]) == [(5, 3, f"move.{key}", came)]
+    assert told([problem]) == [(5, 3, f"move.{key}", got)]
     assert problem.allowed.startswith(allowed)
     assert problem.remedy.startswith(remedy)
 
 
 @pytest.mark.parametrize(
-    ("line", "came", "allowed"),
+    ("line", "got", "allowed"),
     [
         ('dwell = "-1 ms"', '"-1 ms"', "a time from 0 s"),
         ('speed = "0 in/s"', '"0 in/s"', "a velocity above 0 m/s"),
@@ -251,15 +251,15 @@ def test_toml_place_or_way_that_is_none(write, line, came, allowed, remedy):
         ('"a b" = 1', 'the unknown key "a b"', "in [[move]]: target, by, dwell"),
     ],
 )
-def test_toml_key_that_will_not_do(write, line, came, allowed):
+def test_toml_key_that_will_not_do(write, line, got, allowed):
     (problem,) = refusal(write("job.toml", f'[[move]]\nby = "1 mm"\n[[move]]\ntarget = "1 mm"\n{line}\n'))
     key = line.partition(" =")[0]
-    assert told([problem]) == [(5, 1, f"move.{key}", came)]
+    assert told([problem]) == [(5, 1, f"move.{key}", got)]
     assert problem.allowed.startswith(allowed)
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "key", "came", "remedy"),
+    ("text", "place", "key", "got", "remedy"),
     [
         ('[[move]]\nby = "1 m"\n[[move]]\n', (3, 1), "move.target", "neither target nor by", 'add target = "12 mm"'),
         ('[[move]]\nby = "1 m"\ntarget = "1 m"', (2, 1), "move.by", "target and by", "remove one"),
@@ -281,9 +281,9 @@ def test_toml_key_that_will_not_do(write, line, came, allowed):
         ("[limits]\ntravel = 1", (1, 1), "limits", "the unknown table [limits]", "remove it"),
     ],
 )
-def test_toml_that_is_no_list_of_moves(write, text, place, key, came, remedy):
+def test_toml_that_is_no_list_of_moves(write, text, place, key, got, remedy):
     (problem,) = refusal(write("job.toml", text))
-    assert told([problem]) == [(*place, key, came)]
+    assert told([problem]) == [(*place, key, got)]
     assert problem.remedy.startswith(remedy)
 
 
@@ -299,7 +299,7 @@ def test_toml_problems_come_all_at_once_those_of_syntax_too(write):
 
 def test_toml_that_is_none(write):
     (problem,) = refusal(write("job.toml", "target [mm],dwell [ms]\n1,2\n"))
-    assert (problem.line, problem.came) == (1, "`target [mm],dwell [ms]`")
+    assert (problem.line, problem.got) == (1, "`target [mm],dwell [ms]`")
 
 
 def test_toml_of_another_kind_is_not_reported_for_ever(write):
@@ -309,7 +309,7 @@ def test_toml_of_another_kind_is_not_reported_for_ever(write):
 def test_toml_without_moves_and_with_too_many(write):
     assert told(refusal(write("job.toml", "repeat = 2\n"))) == [(0, 0, "", "no moves")]
     (problem,) = refusal(write("job.toml", f'repeat = {MOST_MOVES}\n[[move]]\nby = "1 mm"\nrepeat = {MOST_MOVES}\n'))
-    assert problem.came == f"{MOST_MOVES**2} moves, repeats counted"
+    assert problem.got == f"{MOST_MOVES**2} moves, repeats counted"
 
 
 def test_toml_that_looks_like_moves_inside_a_text_is_none(write):
@@ -330,7 +330,7 @@ def test_text_is_printed_by_an_axis_that_has_a_pitch(write):
 
 def test_text_is_refused_by_an_axis_without_a_pitch(write):
     (problem,) = refusal(write("job.txt", "abc"))
-    assert "this axis prints no text" in problem.came
+    assert "this axis prints no text" in problem.got
     assert problem.allowed == "a list of moves (.csv or .toml)"
 
 
@@ -341,7 +341,7 @@ def test_text_names_the_file_as_the_user_did(write, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "came"),
+    ("name", "content", "got"),
     [
         ("job.prn", "abc", 'a name that ends in ".prn"'),
         ("job", "abc", "a name without an ending"),
@@ -353,18 +353,18 @@ def test_text_names_the_file_as_the_user_did(write, tmp_path):
         ("job.toml", b"#" * (MAX_BYTES[".toml"] + 1), "more than 1000 kB"),
     ],
 )
-def test_file_of_another_kind(write, name, content, came):
-    assert told(refusal(write(name, content))) == [(0, 0, "", came)]
+def test_file_of_another_kind(write, name, content, got):
+    assert told(refusal(write(name, content))) == [(0, 0, "", got)]
 
 
 def test_file_that_is_not_there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.csv").mkdir()
     assert told(refusal("absent.csv")) == [(0, 0, "", "no such file")]
-    assert "directory" in refusal("folder.csv")[0].came
+    assert "directory" in refusal("folder.csv")[0].got
     with pytest.raises(InputError) as caught:
         load_moves("a\0b.csv")
-    assert caught.value.problems[0].came == "a name no file can have"
+    assert caught.value.problems[0].got == "a name no file can have"
 
 
 @pytest.mark.parametrize("name", ["job.csv", "job.toml"])

@@ -47,7 +47,7 @@ def test_a_page_shows_the_job_the_rests_a_move_and_every_move() -> None:
     page = page_of(six_moves(), trace_of(six_moves()))
     assert (page.headline.level, page.headline.verdict) == ("good", "Done")
     assert [section.title for section in page.sections if section.shown] == [
-        "What came out", "How the axis did it", "Move by move",
+        "Results", "How the axis did it", "Move by move",
     ]  # fmt: skip
     assert ids_of(page) == ["job", "rest", "move-speed", "approach-place", "approach-words"]
     assert all(figure.caption for figure in page.figures)

@@ -114,5 +114,5 @@ def test_an_axis_that_cannot_move_is_compared_as_it_is():
 
 @pytest.mark.parametrize("pitches", [0, -1, 1024])
 def test_a_move_that_cannot_be_commanded_is_refused(pitches):
-    with pytest.raises(DetentError, match=rf"came a move of {pitches} pitches; allowed: 1 to 1023; choose another"):
+    with pytest.raises(DetentError, match=rf"got a move of {pitches} pitches; expected: 1 to 1023; choose another"):
         compare_noise(make_spec(), pitches=pitches)

@@ -76,7 +76,7 @@ def test_speeds_above_the_limit_are_left_out():
 
 @pytest.mark.parametrize("speeds", [(9 * INCH,), (1.2,), ()])
 def test_speeds_that_cannot_be_compared_are_refused(speeds):
-    with pytest.raises(DetentError, match=r"comparison of drives: came .*; allowed: 10 in/s to 40 in/s"):
+    with pytest.raises(DetentError, match=r"comparison of drives: got .*; expected: 10 in/s to 40 in/s"):
         compare_drives(make_spec(), speeds)
 
 

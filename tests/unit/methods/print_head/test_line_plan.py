@@ -168,7 +168,7 @@ def test_lines_that_fit_nowhere_are_all_named_with_what_would_fit():
     with pytest.raises(InputError) as caught:
         plan_lines(job.lines, CARRIAGE, job_name="wide.txt")
     first, second = caught.value.problems
-    assert (first.file, first.key, first.came) == ("wide.txt", "printed line 1", "ink from 0.00 in to 20.00 in")
+    assert (first.file, first.key, first.got) == ("wide.txt", "printed line 1", "ink from 0.00 in to 20.00 in")
     assert second.key == "printed line 3"
     assert "between 0.00 in and 12.95 in" in first.allowed
     assert "print.left_margin" in first.remedy

@@ -138,21 +138,21 @@ def test_text_that_is_not_utf_8_is_latin_1(tmp_path):
 
 
 def test_refuses_a_missing_file(tmp_path):
-    assert refusal(tmp_path / "absent.txt").came == "no such file"
+    assert refusal(tmp_path / "absent.txt").got == "no such file"
 
 
 def test_refuses_a_folder(tmp_path):
-    assert "directory" in refusal(tmp_path).came
+    assert "directory" in refusal(tmp_path).got
 
 
 def test_refuses_a_name_that_no_file_can_have():
-    assert refusal("a\0b").came == "a name no file can have"
+    assert refusal("a\0b").got == "a name no file can have"
 
 
-@pytest.mark.parametrize(("data", "came"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes that print nothing")])
-def test_refuses_a_job_without_ink(tmp_path, data, came):
+@pytest.mark.parametrize(("data", "got"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes that print nothing")])
+def test_refuses_a_job_without_ink(tmp_path, data, got):
     (tmp_path / "job").write_bytes(data)
-    assert refusal(tmp_path / "job").came == came
+    assert refusal(tmp_path / "job").got == got
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_refuses_a_job_without_ink(tmp_path, data, came):
 )
 def test_refuses_what_is_no_job_and_says_where_it_shows(tmp_path, data):
     (tmp_path / "job").write_bytes(data)
-    assert f"of {len(data)} bytes that mean nothing to a printer, the first at byte" in refusal(tmp_path / "job").came
+    assert f"of {len(data)} bytes that mean nothing to a printer, the first at byte" in refusal(tmp_path / "job").got
 
 
 # -- streams: our own, and a real one -----------------------------------------------------------------------

@@ -142,7 +142,7 @@ def test_a_word_at_the_right_edge_is_printed_slower_than_the_same_in_the_middle(
 
 
 def test_a_line_that_fits_at_no_speed_is_refused_before_anything_moves_on_paper() -> None:
-    with pytest.raises(InputError, match=r"printed line 2: came ink from 0\.00 in to 13\.20 in; allowed: ink"):
+    with pytest.raises(InputError, match=r"printed line 2: got ink from 0\.00 in to 13\.20 in; expected: ink"):
         play("fits\n" + "x" * 132)
 
 

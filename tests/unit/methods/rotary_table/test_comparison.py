@@ -241,7 +241,7 @@ def test_a_table_that_stops_slowly_crosses_slowly():
 @pytest.mark.compiled
 def test_a_table_that_hardly_moves_is_not_compared():
     spec = table("limits.speed=0.05 deg/s", "position.1.speed=0.05 deg/s")
-    with pytest.raises(DetentError, match=r"came a table that goes round at 0\.05 deg/s; allowed: 0\.1 deg/s or more"):
+    with pytest.raises(DetentError, match=r"got a table that goes round at 0\.05 deg/s; expected: 0\.1 deg/s or more"):
         compare_angle(spec)
 
 

@@ -144,14 +144,14 @@ def test_a_sequence_that_the_axis_can_do_is_not_refused():
 
 def test_a_position_without_an_entry_is_told_with_those_that_exist():
     (problem,) = refusal([Go(4, row=3), Go(7, row=5)])
-    assert (problem.line, problem.key, problem.came) == (5, "step.go", "position number 7")
+    assert (problem.line, problem.key, problem.got) == (5, "step.go", "position number 7")
     assert problem.allowed == "the position numbers of the axis: 0 to 4"
     assert problem.remedy == "name one of these, or add [position.7] to the axis file"
 
 
 def test_a_jog_above_the_limit_is_told_the_speed_that_will_do():
     (problem,) = refusal([Jog(1, math.radians(61), duration=1.0, row=2)])
-    assert (problem.key, problem.came) == ("step.speed", "61 deg/s")
+    assert (problem.key, problem.got) == ("step.speed", "61 deg/s")
     assert problem.allowed == "up to limits.speed, 60 deg/s"
     assert problem.remedy == 'write speed = "60 deg/s", or raise limits.speed'
     check_sequence(table(), SequenceJob("job", (Jog(1, table().limits.speed, duration=1.0),)))
@@ -160,14 +160,14 @@ def test_a_jog_above_the_limit_is_told_the_speed_that_will_do():
 def test_a_jog_below_a_step_of_the_dial_is_told_the_speed_that_will_do():
     slow = table("method.fraction_bits=0")
     (problem,) = refusal([Jog(1, math.radians(0.1), duration=1.0)], "method.fraction_bits=0")
-    assert (problem.line, problem.key, problem.came) == (0, "step[1].speed", "0.1 deg/s")
+    assert (problem.line, problem.key, problem.got) == (0, "step[1].speed", "0.1 deg/s")
     assert 'write speed = "0.4883 deg/s"' in problem.remedy  # a count per interrupt of 2 ms
     assert dial_of(slow, math.radians(0.4883)) == 1
 
 
 def test_a_jog_that_the_task_could_miss_is_told():
     (problem,) = refusal([Go(1, row=1), Jog(1, duration=0.015, row=9)])
-    assert (problem.line, problem.key, problem.came) == (9, "step.for", "15 ms")
+    assert (problem.line, problem.key, problem.got) == (9, "step.for", "15 ms")
     assert 'write for = "20 ms"' in problem.remedy
     (problem,) = refusal([Jog(1, duration=0.5)], "method.task_period=1 s")
     assert 'write for = "1 s"' in problem.remedy
@@ -184,7 +184,7 @@ def test_everything_is_told_at_once_what_is_wrong_with_any_axis_too():
 
 def test_a_job_made_without_steps():
     (problem,) = refusal([])
-    assert problem.came == "no steps"
+    assert problem.got == "no steps"
 
 
 @pytest.mark.parametrize(

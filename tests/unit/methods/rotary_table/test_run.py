@@ -94,13 +94,13 @@ def test_the_table_is_clamped_for_half_a_second_at_each_station(story):
 
 
 def test_inputs_come_when_the_job_says(story):
-    came = [(round(time - story.time_ready, 9), name, on) for time, name, on in story.inputs]
+    got = [(round(time - story.time_ready, 9), name, on) for time, name, on in story.inputs]
     stretches = [
         (time, name, on)
         for name, ((begin, end),) in story.job.inputs.items()
         for time, on in ((begin, True), (end, False))
     ]
-    assert came == stretches  # in order in the file too
+    assert got == stretches  # in order in the file too
 
 
 def test_the_jog_lasts_as_long_as_its_signal_and_goes_over_the_end_of_the_turn(story):

@@ -69,12 +69,12 @@ def refusal(text):
         read(text)
     problems = caught.value.problems
     assert all(problem.file == "job.toml" for problem in problems)
-    assert all(problem.came and problem.allowed and problem.remedy for problem in problems)
+    assert all(problem.got and problem.allowed and problem.remedy for problem in problems)
     return problems
 
 
 def told(problems):
-    return [(problem.line, problem.column, problem.key, problem.came) for problem in problems]
+    return [(problem.line, problem.column, problem.key, problem.got) for problem in problems]
 
 
 def test_each_step_is_read_with_its_line():
@@ -115,7 +115,7 @@ def test_stretches_of_a_signal_are_joined_in_order():
 
 
 @pytest.mark.parametrize(
-    ("line", "came", "allowed", "remedy"),
+    ("line", "got", "allowed", "remedy"),
     [
         ("go = 128", "128", "a position number from 0 to 127", "give go a value"),
         ("go = -1", "-1", "a position number from 0 to 127", "give go a value"),
@@ -132,15 +132,15 @@ def test_stretches_of_a_signal_are_joined_in_order():
         ("colour = 3", 'the unknown key "colour"', "in [[step]]: go, jog", "remove it"),
     ],
 )
-def test_a_value_that_will_not_do(line, came, allowed, remedy):
+def test_a_value_that_will_not_do(line, got, allowed, remedy):
     (problem,) = refusal(f"[[step]]\ngo = 1\n\n[[step]]\n  {line}\n")
-    assert told([problem]) == [(5, 3, f"step.{line.partition(' ')[0]}", came)]
+    assert told([problem]) == [(5, 3, f"step.{line.partition(' ')[0]}", got)]
     assert problem.allowed.startswith(allowed)
     assert problem.remedy.startswith(remedy)
 
 
 @pytest.mark.parametrize(
-    ("lines", "key", "came", "allowed"),
+    ("lines", "key", "got", "allowed"),
     [
         ('jog = "*"\nfor = "1 s"', "jog", '"*"', '"+" (to larger angles) or "-"'),
         ('jog = 1\nfor = "1 s"', "jog", "1", '"+" (to larger angles) or "-"'),
@@ -166,16 +166,16 @@ def test_a_value_that_will_not_do(line, came, allowed, remedy):
         ('label = "x"', "", "a step that does nothing", "exactly one of go, jog, wait"),
     ],
 )  # fmt: skip
-def test_a_step_that_will_not_do(lines, key, came, allowed):
+def test_a_step_that_will_not_do(lines, key, got, allowed):
     begin = '[[input]]\nname = "a"\nfrom = "0 s"\nto = "9 s"\n[[step]]\ngo = 1\nlabel = "a"\n'
     (problem,) = refusal(f"{begin}[[step]]\n{lines}\n")
     rows = [number for number, line in enumerate(lines.splitlines(), 9) if key and line.startswith(f"{key} =")]
-    assert told([problem]) == [(rows[0] if rows else 8, 1, f"step.{key}" if key else "step", came)]
+    assert told([problem]) == [(rows[0] if rows else 8, 1, f"step.{key}" if key else "step", got)]
     assert problem.allowed.startswith(allowed)
 
 
 @pytest.mark.parametrize(
-    ("lines", "place", "came", "allowed"),
+    ("lines", "place", "got", "allowed"),
     [
         ('name = "a"\nfrom = "2 s"\nto = "1 s"', (3, "input.to"), '"1 s"', "a time after from, 2 s"),
         ('name = "a"\nfrom = "2 s"\nto = "2 s"', (3, "input.to"), '"2 s"', "a time after from, 2 s"),
@@ -185,14 +185,14 @@ def test_a_step_that_will_not_do(lines, key, came, allowed):
         ('name = "a"\nfrom = "1 s"\nto = "2 s"\non = true', (4, "input.on"), 'the unknown key "on"', "in [[input]]:"),
     ],
 )
-def test_an_input_that_will_not_do(lines, place, came, allowed):
+def test_an_input_that_will_not_do(lines, place, got, allowed):
     (problem,) = refusal(f"[[step]]\ngo = 1\n[[input]]\n{lines}\n")
-    assert told([problem]) == [(3 + place[0], 1, place[1], came)]
+    assert told([problem]) == [(3 + place[0], 1, place[1], got)]
     assert problem.allowed.startswith(allowed)
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "key", "came", "remedy"),
+    ("text", "line", "key", "got", "remedy"),
     [
         ("[step]\ngo = 1", 1, "step", "a single table", "write [[step]], with two brackets"),
         ("step = 3", 1, "step", "3", "write [[step]], with two brackets"),
@@ -203,14 +203,14 @@ def test_an_input_that_will_not_do(lines, place, came, allowed):
         ("[axis]\nname = 1", 1, "axis", "the unknown table [axis]", "remove it"),
     ],
 )
-def test_a_file_of_something_else(text, line, key, came, remedy):
+def test_a_file_of_something_else(text, line, key, got, remedy):
     (problem,) = refusal(text)
-    assert told([problem]) == [(line, 1, key, came)]
+    assert told([problem]) == [(line, 1, key, got)]
     assert problem.remedy.startswith(remedy)
 
 
 @pytest.mark.parametrize(
-    ("lines", "place", "key", "came"),
+    ("lines", "place", "key", "got"),
     [
         ('[[step]]\nwait_for = "b"\n', (5, 1), "wait_for", 'the unknown input "b"'),
         ('[[step]]\njog = "+"\n while = "b"\n', (6, 2), "while", 'the unknown input "b"'),
@@ -231,11 +231,11 @@ def test_a_file_of_something_else(text, line, key, came, remedy):
         ),
     ],
 )
-def test_steps_that_do_not_go_together_are_told_with_their_place(lines, place, key, came):
+def test_steps_that_do_not_go_together_are_told_with_their_place(lines, place, key, got):
     # the input stands behind the steps, so that places are counted through both lists
     text = f'# a job\n\n\n{lines}[[input]]\nname = "a"\nfrom = "1 s"\nto = "2 s"\n'
     (problem,) = refusal(text)
-    assert told([problem]) == [(*place, f"step.{key}", came)]
+    assert told([problem]) == [(*place, f"step.{key}", got)]
 
 
 def test_problems_come_all_at_once_those_of_syntax_too():
@@ -269,11 +269,11 @@ def test_a_file_is_named_as_the_user_named_it(tmp_path, monkeypatch):
     (tmp_path / "job.toml").write_text("﻿[[step]]\ngo = 1\n", encoding="utf-8")
     assert load_sequence("job.toml").steps == (Go(1, row=1),)
     (tmp_path / "job.csv").write_text("go\n1\n")
-    for name, came in (("absent.toml", "no such file"), ("job.csv", 'a name that ends in ".csv"')):
+    for name, got in (("absent.toml", "no such file"), ("job.csv", 'a name that ends in ".csv"')):
         with pytest.raises(InputError) as caught:
             load_sequence(name)
         (problem,) = caught.value.problems
-        assert (problem.file, problem.came, problem.allowed) == (name, came, "a sequence of steps (.toml)")
+        assert (problem.file, problem.got, problem.allowed) == (name, got, "a sequence of steps (.toml)")
 
 
 def test_the_example_uses_everything():
@@ -295,7 +295,7 @@ def only(steps, inputs=None):
     ((index, fault),) = find_faults(SequenceJob("job", tuple(steps), inputs or {}))
     assert fault.allowed
     assert fault.remedy
-    return SimpleNamespace(index=index, key=fault.key, came=fault.came, allowed=fault.allowed)
+    return SimpleNamespace(index=index, key=fault.key, got=fault.got, allowed=fault.allowed)
 
 
 @pytest.mark.parametrize(
@@ -319,12 +319,12 @@ def test_steps_that_go_together(steps):
 
 def test_a_label_given_twice():
     fault = only([Go(1, label="a"), Go(2), Go(3, label="a")])
-    assert (fault.index, fault.key, fault.came) == (2, "label", 'the label "a" again')
+    assert (fault.index, fault.key, fault.got) == (2, "label", 'the label "a" again')
 
 
 def test_a_loop_to_nowhere():
     fault = only([Go(1), Repeat("a", 2)])
-    assert (fault.index, fault.key, fault.came) == (1, "repeat", 'the label "a", which no step before has')
+    assert (fault.index, fault.key, fault.got) == (1, "repeat", 'the label "a", which no step before has')
     assert "none of them has one" in fault.allowed
     later = only([Go(1, label="b"), Repeat("a", 2), Go(2, label="a")])
     assert (later.index, later.allowed) == (1, 'the label of an earlier step: "b"')
@@ -333,19 +333,19 @@ def test_a_loop_to_nowhere():
 def test_loops_that_cross():
     fault = only([Go(1, label="a"), Go(2, label="b"), Repeat("a", 2), Go(3), Repeat("b", 2)])
     assert (fault.index, fault.key) == (4, "repeat")
-    assert "begins inside an earlier loop and ends outside it" in fault.came
+    assert "begins inside an earlier loop and ends outside it" in fault.got
 
 
 def test_more_steps_than_a_job_may_have():
     assert find_faults(SequenceJob("job", (Wait(0.0, label="a"), Repeat("a", MOST_STEPS)), {})) == []
     fault = only([Wait(0.0, label="a"), Wait(0.0), Repeat("a", 2), Repeat("a", MOST_STEPS)])
-    assert (fault.index, fault.key, fault.came) == (3, "times", f"{4 * MOST_STEPS} steps, repeats counted")
+    assert (fault.index, fault.key, fault.got) == (3, "times", f"{4 * MOST_STEPS} steps, repeats counted")
 
 
 @pytest.mark.parametrize(("step", "key"), [(Jog(1, signal="fed"), "while"), (Wait(signal="fed"), "wait_for")])
 def test_an_input_that_the_job_does_not_have(step, key):
     fault = only([Go(1), step], FEED)
-    assert (fault.index, fault.key, fault.came) == (1, key, 'the unknown input "fed"')
+    assert (fault.index, fault.key, fault.got) == (1, key, 'the unknown input "fed"')
     assert fault.allowed == 'an input of this job: "feed"'
     assert "the job has none" in only([step]).allowed
 
@@ -353,7 +353,7 @@ def test_an_input_that_the_job_does_not_have(step, key):
 @pytest.mark.parametrize(("on", "key"), [(True, "set"), (False, "clear")])
 def test_an_output_that_comes_from_outside(on, key):
     fault = only([Output("feed", on=on)], FEED)
-    assert (fault.index, fault.key, fault.came) == (0, key, 'the input "feed"')
+    assert (fault.index, fault.key, fault.got) == (0, key, 'the input "feed"')
 
 
 @pytest.mark.parametrize(
@@ -370,7 +370,7 @@ def test_an_output_that_comes_from_outside(on, key):
 def test_a_signal_that_cannot_come_any_more(steps, index, key, begins):
     fault = only(steps, FEED)
     assert (fault.index, fault.key) == (index, key)
-    assert fault.came == f'"feed", which is off for good from 6 s on; the step begins at {begins:g} s or later'
+    assert fault.got == f'"feed", which is off for good from 6 s on; the step begins at {begins:g} s or later'
 
 
 def test_a_signal_may_be_on_already_when_a_step_begins():
@@ -381,7 +381,7 @@ def test_a_signal_may_be_on_already_when_a_step_begins():
 def test_a_job_of_many_days():
     assert find_faults(SequenceJob("job", (Wait(LONGEST_TIME, label="a"), Repeat("a", 10)), {})) == []
     fault = only([Wait(LONGEST_TIME, label="a"), Go(1), Repeat("a", 11)])
-    assert (fault.index, fault.came) == (0, f"a sequence of more than {LONGEST_JOB:g} s")
+    assert (fault.index, fault.got) == (0, f"a sequence of more than {LONGEST_JOB:g} s")
 
 
 def test_times_are_looked_at_only_where_the_rest_is_right():

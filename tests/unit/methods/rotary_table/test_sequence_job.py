@@ -21,7 +21,7 @@ from detent.methods.rotary_table.sequence_job import (
 
 
 @pytest.mark.parametrize(
-    ("make", "came"),
+    ("make", "got"),
     [
         (lambda: Go(-1), "go -1"),
         (lambda: Go(128), "go 128"),
@@ -46,14 +46,14 @@ from detent.methods.rotary_table.sequence_job import (
         (lambda: Repeat("", 2), "a step that does nothing"),
     ],
 )
-def test_a_step_that_means_nothing_is_refused(make, came):
-    with pytest.raises(DetentError, match=r"^step: came .+; allowed: .+; do: .+") as caught:
+def test_a_step_that_means_nothing_is_refused(make, got):
+    with pytest.raises(DetentError, match=r"^step: got .+; expected: .+; try: .+") as caught:
         make()
-    assert f"came {came};" in str(caught.value)
+    assert f"got {got};" in str(caught.value)
 
 
 def test_a_refusal_names_the_line():
-    with pytest.raises(DetentError, match=r"^step of line 12: came go 300"):
+    with pytest.raises(DetentError, match=r"^step of line 12: got go 300"):
         Go(300, row=12)
 
 

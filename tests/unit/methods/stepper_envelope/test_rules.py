@@ -66,7 +66,7 @@ def test_a_name_that_is_a_column_of_another_is_refused(good_text, load_text, one
     with pytest.raises(InputError) as caught:
         load_text(renamed(good_text, one, other))
     (problem,) = caught.value.problems
-    assert (problem.key, problem.came) == (f"stepper.{name}", "a table of this name")
+    assert (problem.key, problem.got) == (f"stepper.{name}", "a table of this name")
     assert f'there "{name}" is {meaning}' in problem.allowed
     assert meaning.partition(" in ")[0] in problem.remedy or "dwell" in problem.allowed
 

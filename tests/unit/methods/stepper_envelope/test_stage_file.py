@@ -32,13 +32,13 @@ def write(tmp_path, monkeypatch):
 def refusal(path, motors=XY):
     with pytest.raises(InputError) as caught:
         load_stage_job(path, motors)
-    assert all(problem.came and problem.allowed and problem.remedy for problem in caught.value.problems)
+    assert all(problem.got and problem.allowed and problem.remedy for problem in caught.value.problems)
     assert all(problem.file == str(path) for problem in caught.value.problems)
     return caught.value.problems
 
 
 def told(problems):
-    return [(problem.line, problem.column, problem.key, problem.came) for problem in problems]
+    return [(problem.line, problem.column, problem.key, problem.got) for problem in problems]
 
 
 def places(job):
@@ -97,7 +97,7 @@ def test_csv_takes_the_nominal_of_several_columns_and_tells_which(write):
 
 
 @pytest.mark.parametrize(
-    ("header", "place", "came", "remedy"),
+    ("header", "place", "got", "remedy"),
     [
         ("x", 1, '"x" without a unit', "write x [mm]"),
         ("x [],y [mm]", 1, '"x []" without a unit', "write x [mm]"),
@@ -123,9 +123,9 @@ def test_csv_takes_the_nominal_of_several_columns_and_tells_which(write):
         ('"x [mm]', 1, '"x [mm]', "remove the quotation marks (unexpected end of data)"),
     ],
 )
-def test_csv_header_that_says_nothing_or_the_wrong_thing(write, header, place, came, remedy):
+def test_csv_header_that_says_nothing_or_the_wrong_thing(write, header, place, got, remedy):
     (problem,) = refusal(write("job.csv", f"# a job\n{header}\n1\n"))
-    assert told([problem]) == [(2, place, "", came)]
+    assert told([problem]) == [(2, place, "", got)]
     assert problem.remedy.startswith(remedy)
 
 
@@ -136,7 +136,7 @@ def test_csv_column_of_something_else_is_passed_over(write, name):
 
 
 @pytest.mark.parametrize(
-    ("line", "place", "key", "came", "allowed"),
+    ("line", "place", "key", "got", "allowed"),
     [
         ("1,here", 3, "x", '"here"', "a plain number"),
         ("1,nan", 3, "x", '"nan"', "a plain number"),
@@ -154,10 +154,10 @@ def test_csv_column_of_something_else_is_passed_over(write, name):
         ('1,"1', 1, "", '1,"1', "cells separated by commas or semicolons"),
     ],
 )
-def test_csv_line_that_is_no_place(write, line, place, key, came, allowed):
+def test_csv_line_that_is_no_place(write, line, place, key, got, allowed):
     header = "tile,x [mm],y [mm],dwell [ms],repeat"
     (problem,) = refusal(write("job.csv", f"{header}\n1,1,1\n{line}\n2,2,2\n"))
-    assert told([problem]) == [(3, place, key, came)]
+    assert told([problem]) == [(3, place, key, got)]
     assert problem.allowed.startswith(allowed)
 
 
@@ -172,7 +172,7 @@ def test_csv_without_places_and_with_too_many(write):
     assert (told([problem]), problem.remedy) == ([(0, 0, "", "no moves")], "add a move with a place for x or y")
     assert told(refusal(write("job.csv", "# nothing\n"))) == [(0, 0, "", "no moves")]
     (problem,) = refusal(write("job.csv", "x [mm]\n" + "1\n" * (MOST_MOVES + 2)))
-    assert problem.came == f"more than {MOST_MOVES} moves"
+    assert problem.got == f"more than {MOST_MOVES} moves"
 
 
 # -- TOML ---------------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ def test_toml_as_programs_write_it(write):
 
 
 @pytest.mark.parametrize(
-    ("line", "key", "came", "allowed", "remedy"),
+    ("line", "key", "got", "allowed", "remedy"),
     [
         ("y = 12", "y", "12", 'a length such as "12 mm"', "write it as text with a unit"),
         ('y = "12"', "y", '"12"', "a length", "write the unit after the number"),
@@ -260,16 +260,16 @@ def test_toml_as_programs_write_it(write):
         ("turn = 3", "turn", "3", "a length", "write it as text with a unit"),
     ],
 )
-def test_toml_key_that_will_not_do(write, line, key, came, allowed, remedy):
+def test_toml_key_that_will_not_do(write, line, key, got, allowed, remedy):
     (problem,) = refusal(write("job.toml", f'[[move]]\ny = "1 mm"\n\n[[move]]\nx = "1 mm"\n  {line}\n'))
     inside = line.index("{") + 1 if "." in key and "{" in line else 0
-    assert told([problem]) == [(6, 3 + inside, f"move.{key}", came)]
+    assert told([problem]) == [(6, 3 + inside, f"move.{key}", got)]
     assert problem.allowed.startswith(allowed)
     assert problem.remedy.startswith(remedy)
 
 
 @pytest.mark.parametrize(
-    ("line", "key", "came", "remedy"),
+    ("line", "key", "got", "remedy"),
     [
         ("", "duration", "no duration", 'add duration = "5 ms"'),
         (
@@ -289,15 +289,15 @@ def test_toml_key_that_will_not_do(write, line, key, came, allowed, remedy):
         ('duration = "1 s"\ntarget = "1 mm"', "target", 'the unknown key "target"', "remove it"),
     ],
 )
-def test_toml_manual_run_that_will_not_do(write, line, key, came, remedy):
+def test_toml_manual_run_that_will_not_do(write, line, key, got, remedy):
     (problem,) = refusal(write("job.toml", f'[[move]]\njog = "x"\nspeed = "1 mm/s"\n{line}\n'))
     row = 3 + len(line.splitlines()) if line else 1
-    assert told([problem]) == [(row, 1, f"move.{key}", came)]
+    assert told([problem]) == [(row, 1, f"move.{key}", got)]
     assert problem.remedy == remedy
 
 
 @pytest.mark.parametrize(
-    ("line", "place", "key", "came", "allowed"),
+    ("line", "place", "key", "got", "allowed"),
     [
         ('jog = "z"\nspeed = "1 mm/s"', (2, 1), "move.jog", '"z"', "a motor: x, y"),
         ('jog = 1\nspeed = "1 mm/s"', (2, 1), "move.jog", "1", "text in quotes"),
@@ -306,14 +306,14 @@ def test_toml_manual_run_that_will_not_do(write, line, key, came, remedy):
         ('jog = "x"', (1, 1), "move.speed", "no speed", "speed and duration of a jog"),
     ],
 )
-def test_toml_manual_run_of_nothing(write, line, place, key, came, allowed):
+def test_toml_manual_run_of_nothing(write, line, place, key, got, allowed):
     (problem,) = refusal(write("job.toml", f'[[move]]\n{line}\nduration = "1 s"\n'))
-    assert told([problem]) == [(*place, key, came)]
+    assert told([problem]) == [(*place, key, got)]
     assert problem.allowed.startswith(allowed)
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "key", "came", "allowed"),
+    ("text", "place", "key", "got", "allowed"),
     [
         ("", (1, 1), "move.x", "no motor", "a place or a way for at least one of x, y"),
         ("by = {}", (1, 1), "move.x", "no motor", "a place or a way for at least one of x, y"),
@@ -349,14 +349,14 @@ def test_toml_manual_run_of_nothing(write, line, place, key, came, allowed):
         ),
     ],
 )
-def test_toml_move_that_says_too_little_or_too_much(write, text, place, key, came, allowed):
+def test_toml_move_that_says_too_little_or_too_much(write, text, place, key, got, allowed):
     (problem,) = refusal(write("job.toml", f"[[move]]\n{text}\n"))
-    assert told([problem]) == [(*place, key, came)]
+    assert told([problem]) == [(*place, key, got)]
     assert problem.allowed.startswith(allowed)
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "key", "came", "remedy"),
+    ("text", "place", "key", "got", "remedy"),
     [
         ('repeat = 0\n[[move]]\nx = "1 m"', (1, 1), "repeat", "0", "give repeat a value"),
         ('x = "1 mm"\n[[move]]\nx = "1 m"', (1, 1), "x", 'the unknown key "x"', "move it to [[move]]"),
@@ -365,9 +365,9 @@ def test_toml_move_that_says_too_little_or_too_much(write, text, place, key, cam
         ("repeat = 2", (0, 0), "", "no moves", "add a move with a place for x or y"),
     ],
 )
-def test_toml_that_is_no_list_of_moves(write, text, place, key, came, remedy):
+def test_toml_that_is_no_list_of_moves(write, text, place, key, got, remedy):
     (problem,) = refusal(write("job.toml", text))
-    assert told([problem]) == [(*place, key, came)]
+    assert told([problem]) == [(*place, key, got)]
     assert problem.remedy.startswith(remedy)
 
 
@@ -385,14 +385,14 @@ def test_toml_problems_come_all_at_once_those_of_syntax_too(write):
 
 def test_toml_with_too_many_moves(write):
     (problem,) = refusal(write("job.toml", f'repeat = {MOST_MOVES}\n[[move]]\nx = "1 mm"\nrepeat = 2\n'))
-    assert problem.came == f"{2 * MOST_MOVES} moves, repeats counted"
+    assert problem.got == f"{2 * MOST_MOVES} moves, repeats counted"
 
 
 # -- files --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "came"),
+    ("name", "content", "got"),
     [
         ("job.txt", "abc", 'a name that ends in ".txt"'),
         ("job", "abc", "a name without an ending"),
@@ -401,8 +401,8 @@ def test_toml_with_too_many_moves(write):
         ("job.toml", b"#" * (MAX_BYTES[".toml"] + 1), "more than 1000 kB"),
     ],
 )
-def test_file_of_another_kind(write, name, content, came):
-    assert told(refusal(write(name, content))) == [(0, 0, "", came)]
+def test_file_of_another_kind(write, name, content, got):
+    assert told(refusal(write(name, content))) == [(0, 0, "", got)]
 
 
 def test_file_in_another_encoding_or_not_there(write):

@@ -31,7 +31,7 @@ def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
 
 
 @pytest.mark.parametrize(
-    ("values", "came", "allowed"),
+    ("values", "got", "allowed"),
     [
         ({}, "no motor", "a place or a way for at least one"),
         ({"targets": {"x": 0.1, "y": 0.1}, "by": {"y": 0.1}}, "motor y and by.motor y", "motor y (a place) or"),
@@ -55,15 +55,15 @@ def test_a_move_of_one_motor_may_turn_or_have_its_stop_changed():
         ({"by": {"x": 0.1}, "turn": 0.2, "change": Change(0, 0)}, "turn and changed_at", "one of them"),
     ],
 )
-def test_no_move_is_what_no_stage_can_do(values, came, allowed):
-    with pytest.raises(DetentError, match="move 7: came ") as caught:
+def test_no_move_is_what_no_stage_can_do(values, got, allowed):
+    with pytest.raises(DetentError, match="move 7: got ") as caught:
         StageMove(number=7, row=1, **values)
-    assert f"came {came}" in str(caught.value)
-    assert f"; allowed: {allowed}" in str(caught.value)
+    assert f"got {got}" in str(caught.value)
+    assert f"; expected: {allowed}" in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("values", "came"),
+    ("values", "got"),
     [
         ({"speed": 0.0}, "speed 0.0 m/s"),
         ({"speed": math.nan}, "speed nan m/s"),
@@ -73,12 +73,12 @@ def test_no_move_is_what_no_stage_can_do(values, came, allowed):
         ({"dwell": -1.0}, "dwell -1.0 s"),
     ],
 )
-def test_no_manual_run_is_what_no_operator_can_do(values, came):
+def test_no_manual_run_is_what_no_operator_can_do(values, got):
     jog = {"motor": "x", "speed": -0.005, "duration": 0.5}
     assert StageJog(3, 1, **jog).motors == ("x",)
-    with pytest.raises(DetentError, match="move 3: came ") as caught:
+    with pytest.raises(DetentError, match="move 3: got ") as caught:
         StageJog(3, 1, **(jog | values))
-    assert f"came {came}; allowed: " in str(caught.value)
+    assert f"got {got}; expected: " in str(caught.value)
 
 
 def test_repeats_of_moves_and_manual_runs_are_written_out():
