@@ -240,7 +240,7 @@ class Axis(OnScreen):
         self, job_file: str | Path | None, signals: Sequence[str], every: int, clock: Callable[[], datetime]
     ) -> RunEvidence:
         """What a run is made from."""
-        job = None if job_file is None else Kept.of(str(job_file), Path(job_file).read_bytes())
+        job = None if job_file is None else Kept.of_file(Path(job_file))
         return RunEvidence(
             version=__version__,
             date=clock().isoformat(timespec="seconds"),

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from detent.errors import FileProblem, InputError
+from detent.errors import FileProblem
 from detent.files.locate import Index, Place, locate_keys
-from detent.files.text import decode_utf8, lines_of, read_head
+from detent.files.text import decode_utf8, lines_of, read_head, refuse_longer
 
 MAX_BYTES = 1_000_000  # largest axis file read; a real one has a few thousand bytes
 MAX_SYNTAX_PROBLEMS = 20  # syntax errors reported at most: a file of another kind would have one in each line
@@ -42,8 +42,7 @@ def read_source(path: Path | str) -> Source:
     """Read and parse an axis file."""
     allowed, remedy = "an axis file (TOML)", "name an axis file; `detent examples` copies one to start from"
     content = read_head(Path(path), MAX_BYTES, allowed, remedy)
-    if len(content) > MAX_BYTES:
-        raise InputError.of_file(str(path), f"more than {MAX_BYTES // 1000} kB", allowed, remedy)
+    refuse_longer(Path(path), content, MAX_BYTES, remedy)
     return replace(parse_source(str(path), decode_utf8(Path(path), content)), content=content)
 
 

@@ -96,6 +96,12 @@ def read_head(file: Path, limit: int, allowed: str, remedy: str) -> bytes:
     return data
 
 
+def refuse_longer(file: Path, data: bytes, limit: int, remedy: str) -> None:
+    """Raise for a file of which more was read than its kind allows."""
+    if len(data) > limit:
+        raise InputError.of_file(str(file), f"more than {limit // 1000} kB", f"up to {limit // 1000} kB", remedy)
+
+
 # ---- jobs
 
 
@@ -112,10 +118,9 @@ def read_data(file: Path, kinds: Collection[str], allowed: str) -> bytes:
         got = f'a name that ends in "{file.suffix}"' if file.suffix else "a name without an ending"
         remedy = "name a file of one of these kinds, or give it the ending of its kind"
         raise InputError.of_file(str(file), got, allowed, remedy)
-    if len(data) > limit:
-        remedy = "divide the job among several files, or use repeat"
-        remedy += "; a CSV file may be longer" if file.suffix.lower() == ".toml" and ".csv" in kinds else ""
-        raise InputError.of_file(str(file), f"more than {limit // 1000} kB", f"up to {limit // 1000} kB", remedy)
+    remedy = "divide the job among several files, or use repeat"
+    remedy += "; a CSV file may be longer" if file.suffix.lower() == ".toml" and ".csv" in kinds else ""
+    refuse_longer(file, data, limit, remedy)
     if b"\0" in data:
         remedy = "save the file as UTF-8 text, or name another"
         raise InputError.of_file(str(file), "NUL bytes, as in a binary file or UTF-16", allowed, remedy)

@@ -232,9 +232,8 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     tell = progress or untold
     text = ""
     if axis is not None:
-        read_axis(axis)  # tells everything that is wrong with it
-        with Path(axis).open(encoding="utf-8-sig", newline="") as file:
-            text = file.read()
+        content = read_axis(axis).source.content  # tells everything that is wrong with it
+        text = content.decode("utf-8-sig")
         cascade_spec(text, str(axis))
     if not paths:
         raise DetentError("identify: got no log; expected: one or more; name the recordings of the axis")

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from detent.errors import InputError
-from detent.files.text import shown
+from detent.files.text import read_head, refuse_longer, shown
 
 FORMAT = 1
 ELEMENT = "run-evidence"  # id of the JSON in a report
 LARGEST = 20_000_000  # bytes of a job that are carried along; a longer one is told by its hash
+LONGEST_REPORT = 200_000_000  # bytes that are read of one; it has a few million, and the job
 _IN_REPORT = re.compile(rf'<script type="application/json" id="{ELEMENT}">(.*?)</script>', re.DOTALL)
 
 
@@ -47,8 +48,6 @@ class Kept:
     @classmethod
     def of(cls, name: str, content: bytes) -> "Kept":
         """A file that was read."""
-        if len(content) > LARGEST:
-            return cls(shown(name), digest(content))
         try:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
@@ -56,6 +55,16 @@ class Kept:
         if shown(text) == text and "\r" not in text:
             return cls(shown(name), digest(content), text=text)
         return cls(shown(name), digest(content), base64=base64.b64encode(content).decode())
+
+    @classmethod
+    def of_file(cls, path: Path) -> "Kept":
+        """A file; a recording may be longer than the memory."""
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+            if len(content) <= LARGEST:
+                return cls.of(str(path), content)
+            stream.seek(0)
+            return cls(shown(str(path)), hashlib.file_digest(stream, "sha256").hexdigest())
 
     @property
     def content(self) -> bytes:
@@ -132,7 +141,9 @@ def read_evidence(path: Path) -> RunEvidence:
 
         text = read_note(path, ELEMENT)
     else:
-        found = _IN_REPORT.search(path.read_bytes().decode("utf-8", "replace"))
+        content = read_head(path, LONGEST_REPORT, allowed, remedy)
+        refuse_longer(path, content, LONGEST_REPORT, remedy)
+        found = _IN_REPORT.search(content.decode("utf-8", "replace"))
         text = found[1] if found else ""
     if not text:
         raise InputError.of_file(str(path), "a file without the evidence of a run", allowed, remedy)

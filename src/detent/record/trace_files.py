@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from detent.errors import DetentError, InputError
 from detent.files.apart import read_apart
-from detent.files.text import write_errors, writing
+from detent.files.text import check_file, write_errors, writing
 from detent.record.trace import BROKEN_OFF, TIME, Attribute, Column, Trace, broke_off, check_columns
 
 CHUNK_ROWS = 16384  # rows of one HDF5 chunk: 128 KiB of float64, inside h5py's chunk cache of 1 MiB per column
 CSV_ROWS = 8192  # rows of text made at once: bounds the memory of a CSV file of any length
+MAX_CSV = 2_000_000_000  # longest CSV file read [byte]
 PARQUET_ROWS = 1 << 20  # rows of one Parquet row group
 STORES = (".h5", ".hdf5")  # endings of the store's own files
 GROUP = "trace"
@@ -400,6 +401,7 @@ def trace_attributes(metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
 
 
 def _load_csv(path: Path) -> Trace:
+    check_file(path, MAX_CSV, "a trace")
     with path.open(encoding="utf-8-sig", newline="") as stream:
         rows = csv.reader(stream)
         empty: list[str] = []

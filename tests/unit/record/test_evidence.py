@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from detent.errors import InputError
+from detent.record import evidence as evidence_module
 from detent.record.evidence import ELEMENT, Kept, RunEvidence, first_difference, hash_figures, now, read_evidence
 
 
@@ -26,6 +27,23 @@ def test_every_byte_of_a_file_comes_back(content: bytes) -> None:
         Kept(**json.loads(json.dumps({k: getattr(Kept.of("f", content), k) for k in Kept.__slots__}))).content
         == content
     )
+
+
+def test_a_file_that_is_not_carried_along_is_told_by_its_hash(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes(b"0123456789" * 3)
+    whole = Kept.of_file(tmp_path / "log.csv")
+    assert whole.content == b"0123456789" * 3
+    monkeypatch.setattr(evidence_module, "LARGEST", 29)
+    told = Kept.of_file(tmp_path / "log.csv")
+    assert (told.sha256, told.text, told.base64) == (whole.sha256, "", "")
+
+
+def test_of_a_report_no_more_is_read_than_one_has(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    page.write_bytes(b"<p>" * 1000)
+    monkeypatch.setattr(evidence_module, "LONGEST_REPORT", 2000)
+    with pytest.raises(InputError, match="more than 2 kB"):
+        read_evidence(page)
 
 
 def test_a_text_that_was_changed_is_refused(evidence: RunEvidence) -> None:

@@ -137,7 +137,7 @@ def test_an_empty_trace_survives(tmp_path: Path, suffix: str) -> None:
         ("run.txt", b"", r"suffix '.txt'; expected: .h5, .hdf5, .csv, .parquet"),
         ("run.h5", b"not HDF5", "file signature not found|Unable to"),
         ("run.parquet", b"not Parquet at all", "[Pp]arquet"),
-        ("empty.csv", b"", "the first column must be 't' .*got 'nothing'"),
+        ("empty.csv", b"", "an empty file"),
         ("order.csv", b"x,t [s]\n1,2\n", "the first column must be 't' .*got 'x'"),
         ("twice.csv", b"t [s],x,x [A]\n1,2,3\n", "two columns 'x'"),
         ("ragged.csv", b"t [s],x\n1,2\n3\n", "columns"),
@@ -153,6 +153,14 @@ def test_a_file_that_is_no_trace_is_an_input_error(tmp_path: Path, name: str, co
     with pytest.raises(InputError, match=says) as caught:
         load_trace(tmp_path / name)
     assert str(caught.value).startswith(str(tmp_path / name))
+
+
+def test_a_csv_file_longer_than_any_trace_is_an_input_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.csv").write_text("t [s],x\n" + "0,1\n" * 100)
+    assert load_trace(tmp_path / "a.csv").columns["x"].tolist() == [1] * 100
+    monkeypatch.setattr("detent.record.trace_files.MAX_CSV", 300)
+    with pytest.raises(InputError, match=r"a\.csv.*more than"):
+        load_trace(tmp_path / "a.csv")
 
 
 def test_another_hdf5_file_is_an_input_error(tmp_path: Path) -> None:

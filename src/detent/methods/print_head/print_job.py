@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from detent.errors import InputError
-from detent.files.text import reading
+from detent.files.text import MAX_BYTES, reading, refuse_longer
 from detent.methods.print_head.diablo630 import parse_diablo
 from detent.methods.print_head.printed_page import LINE, WHEEL_PITCH, PrintedCharacter, PrintJob, Reading
 
@@ -28,8 +28,10 @@ _WHAT_A_JOB_IS = "a text file, or a stream for the Diablo 630 printer"
 def load_job(path: str | PathLike[str]) -> PrintJob:
     """Read a print job."""
     file = Path(path)
-    with reading(file, _WHAT_A_JOB_IS, "check the name after --job"):
-        data = file.read_bytes()
+    limit = MAX_BYTES[".txt"]  # whatever the name ends in
+    with reading(file, _WHAT_A_JOB_IS, "check the name after --job"), file.open("rb") as stream:
+        data = stream.read(limit + 1)
+    refuse_longer(file, data, limit, "divide the job among several files")
     if _CONTROL_BYTE.search(data.rstrip(b"\x1a")):
         job = parse_diablo(data, file.name)
         _refuse_rubbish(job, data, str(path))

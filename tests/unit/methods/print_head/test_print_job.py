@@ -3,12 +3,14 @@
 from dataclasses import astuple
 from importlib.resources import files
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from tests.places import DATA
 from tools.make_brochure import brochure
 
 from detent.errors import InputError
+from detent.files.text import MAX_BYTES
 from detent.methods.print_head.print_job import load_job, parse_text
 
 EXAMPLES = files("detent") / "examples"
@@ -147,6 +149,18 @@ def test_refuses_a_folder(tmp_path):
 
 def test_refuses_a_name_that_no_file_can_have():
     assert refusal("a\0b").got == "a name no file can have"
+
+
+@pytest.mark.parametrize("name", ["job.txt", "job.prn", "job"])
+def test_refuses_a_job_longer_than_any(tmp_path, name):
+    (tmp_path / name).write_bytes(b"a" * (MAX_BYTES[".txt"] + 1))
+    problem = refusal(tmp_path / name)
+    assert (problem.got, problem.allowed) == ("more than 8000 kB", "up to 8000 kB")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no file without an end here")
+def test_refuses_a_file_that_never_ends():
+    assert refusal("/dev/zero").got == "more than 8000 kB"
 
 
 @pytest.mark.parametrize(("data", "got"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes that print nothing")])
