@@ -5,7 +5,7 @@ import json
 import math
 import shlex
 import shutil
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,7 +35,8 @@ def timing(
 ) -> None:
     """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
     from detent.axis import given_as, load
-    from detent.files.text import check_target
+    from detent.files.text import check_target, together
+    from detent.page.timing import MAX_SIGNALS
 
     check_target(figure)
     axis = load(file, overrides or [])
@@ -48,9 +49,10 @@ def timing(
         with given_as(loaded.name if loaded is not None else "", job):
             found = axis.timing(begin, length, job=loaded, signals=names, progress=progress)
         progress(1.0, "drawing")
-        # The VCD file first: it takes any number of signals, a picture does not.
-        saved = found.save(vcd)
-        found.plot(figure)
+        # A picture that refuses so many signals takes none away from the VCD file.
+        with together() if len(found.waveforms.signals) <= MAX_SIGNALS else nullcontext():
+            saved = found.save(vcd)
+            found.plot(figure)
         files = [figure, saved]
     if as_json:
         print_json({"signals": [s.name for s in found.waveforms.signals], "files": [str(path) for path in files]})

@@ -6,10 +6,13 @@ import os
 import re
 import shutil
 import zlib
-from collections.abc import Collection, Generator, Iterable
+from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
+from typing import NamedTuple
 
 from detent.errors import DetentError, DiskError, FileProblem, InputError
 
@@ -185,7 +188,7 @@ def _check_size(path: Path, size: int, limit: int, allowed: str) -> None:
 
 _PART = ".part"  # ending of a file that is not whole yet
 _MADE, _WHOLE = ".detent-", ".whole"  # folder in which files are made that belong together; once all of them are there
-_UNFINISHED: dict[Path, None] = {}  # what is being made now
+_UNFINISHED: dict[Path, Path | None] = {}  # what is being made now; its name, once all is whole that belongs together
 _WRITTEN: dict[Path, None] = {}  # what has been, in that order
 
 
@@ -221,7 +224,7 @@ def end_of_links(path: Path) -> Path:
 def writing(path: Path) -> Generator[Path]:
     """Give the place to write a file to: at the end it gets its name, after a failure nothing is left of it.
 
-    A link is written through, and stays one.
+    A link is written through, and stays one. Inside of `together` it gets its name when that ends.
     """
     with write_errors(path):
         end = end_of_links(path)
@@ -229,20 +232,77 @@ def writing(path: Path) -> Generator[Path]:
             kind = errno.EISDIR if end.is_dir() else errno.EINVAL
             raise OSError(kind, os.strerror(kind) if end.is_dir() else "it is no file but a device")
     part = end.with_name(f"{end.name}{_PART}")
-    with write_errors(path), _held(part, path):
+    with ExitStack() as alone, write_errors(path):
+        group = _GROUP.get()
+        held = group.held if group else alone
+        held.enter_context(_held(part, path))
         _UNFINISHED[part] = None
+        held.callback(_drop, part)
+        yield part
+        with part.open("rb+") as whole:
+            os.fsync(whole.fileno())
+        file = _Whole(part, end, path)
+        if group:
+            group.files.append(file)
+        else:
+            _name([file])
+
+
+class _Whole(NamedTuple):
+    """A file that is all there, but for its name."""
+
+    part: Path
+    end: Path
+    path: Path  # as it was given
+
+
+@dataclass
+class _Group:
+    """Files that get their names at one time."""
+
+    held: ExitStack
+    files: list[_Whole] = field(default_factory=list[_Whole])
+
+
+_GROUP: ContextVar[_Group | None] = ContextVar("_GROUP", default=None)
+
+
+@contextmanager
+def together() -> Generator[None]:
+    """Give all files that are written inside their names at its end, wherever they are, or none of them.
+
+    Only a process that is killed in the instant of naming leaves fewer: as of `placing`, earlier files go before the
+    first comes, so that none stands beside one of another time.
+    """
+    with ExitStack() as held:
+        group = _Group(held)
+        token = _GROUP.set(group)
         try:
-            yield part
-            with part.open("rb+") as whole:
-                os.fsync(whole.fileno())
-            part.replace(end)
-        except BaseException:
-            with suppress(OSError):
-                part.unlink()
-            raise
+            yield
         finally:
-            del _UNFINISHED[part]
-        _WRITTEN[path] = None
+            _GROUP.reset(token)
+        _name(group.files)
+
+
+def _name(files: Sequence[_Whole]) -> None:
+    """Give files that belong together their names."""
+    _UNFINISHED.update({file.part: file.end for file in files})
+    for file in files[1:]:
+        with write_errors(file.path):
+            file.end.unlink(missing_ok=True)
+    for file in files:
+        with write_errors(file.path):
+            file.part.replace(file.end)
+        del _UNFINISHED[file.part]
+        _WRITTEN[file.path] = None
+
+
+def _drop(part: Path) -> None:
+    """Remove a file that got no name."""
+    if part in _UNFINISHED:
+        with suppress(OSError):
+            part.unlink()
+        del _UNFINISHED[part]
 
 
 @contextmanager
@@ -326,9 +386,12 @@ def _held(place: Path, told: Path) -> Generator[bool]:
 
 def abandon() -> list[Path]:
     """Remove what is not whole, for a process that ends at once; the files that it has written."""
-    for made in list(_UNFINISHED):
+    for made, name in list(_UNFINISHED.items()):
         try:
-            if made.suffix == _PART:
+            if name:
+                made.replace(name)
+                _WRITTEN[name] = None
+            elif made.suffix == _PART:
                 made.unlink()
             else:
                 _finish(made)

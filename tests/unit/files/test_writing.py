@@ -12,7 +12,8 @@ import pytest
 
 import detent
 from detent.errors import DetentError, DiskError
-from detent.files.text import placing, write_text, writing
+from detent.files import text as files_text
+from detent.files.text import abandon, placing, together, write_text, writing
 
 
 def test_a_file_gets_its_name_at_the_end(tmp_path: Path) -> None:
@@ -183,6 +184,91 @@ def test_a_message_names_the_place_that_a_file_will_have(tmp_path: Path, monkeyp
     with pytest.raises(DiskError) as told, placing(Path("out")) as made, writing(made / "trace.h5"):
         raise OSError(28, "No space left")
     assert str(told.value).startswith("out/trace.h5: cannot be written (No space left)")
+
+
+# ---- files in any folders that belong together
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> tuple[Path, Path]:
+    (tmp_path / "pictures").mkdir()
+    files = tmp_path / "a.vcd", tmp_path / "pictures" / "a.png"
+    for file in files:
+        write_text(file, "old")
+    return files
+
+
+def texts(pair: tuple[Path, Path]) -> list[str]:
+    assert sorted(p for p in pair[0].parent.rglob("*") if p.is_file()) == sorted(pair)
+    return [file.read_text() for file in pair]
+
+
+def test_files_written_together_get_their_names_at_one_time(pair: tuple[Path, Path]) -> None:
+    with together():
+        for file in pair:
+            write_text(file, "new")
+        assert [file.read_text() for file in pair] == ["old", "old"]
+        with pytest.raises(DiskError, match="another process is writing there"):
+            write_text(pair[0], "another")
+    assert texts(pair) == ["new", "new"]
+    write_text(pair[0], "alone")
+    assert texts(pair) == ["alone", "new"]
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left"), KeyError()])
+def test_when_the_second_fails_the_first_gets_no_name_either(pair: tuple[Path, Path], error: Exception) -> None:
+    """A VCD file of this run stood beside the picture of an earlier one."""
+
+    def fail() -> None:
+        with together():
+            write_text(pair[0], "new")
+            with writing(pair[1]):
+                raise error
+
+    with pytest.raises((DiskError, KeyError)) as told:
+        fail()
+    assert texts(pair) == ["old", "old"]
+    assert isinstance(told.value, KeyError) or str(told.value).startswith(f"{pair[1]}: cannot be written (No space")
+
+
+@pytest.mark.parametrize("named", [0, 1, 2])
+def test_ended_while_they_are_named_all_get_their_names(
+    pair: tuple[Path, Path], named: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal that is heeded comes between the names of two files."""
+    monkeypatch.setattr(files_text, "_WRITTEN", {})
+    monkeypatch.setattr(files_text, "_UNFINISHED", {})
+    replace, kept = Path.replace, list[Path]()
+
+    def ended(self: Path, target: Path) -> Path:
+        left = [one for one in pair if one.with_name(f"{one.name}.part").exists()]
+        if 2 - len(left) == named:
+            monkeypatch.setattr(Path, "replace", replace)
+            kept.extend(abandon())
+            raise KeyboardInterrupt
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", ended)
+    with suppress(KeyboardInterrupt):
+        with together():
+            for file in pair:
+                write_text(file, "new")
+        kept.extend(abandon())
+    assert texts(pair) == ["new", "new"]
+    assert sorted(kept) == sorted(pair)
+
+
+def test_ended_before_all_are_whole_none_gets_its_name(
+    pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files_text, "_WRITTEN", {})
+    with suppress(KeyboardInterrupt), together():
+        write_text(pair[0], "new")
+        with writing(pair[1]) as part:
+            part.write_text("half")
+            assert abandon() == []
+            assert texts(pair) == ["old", "old"]
+            raise KeyboardInterrupt
 
 
 # ---- two at once
