@@ -8,13 +8,15 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.identify_files import write_log
 from typer.testing import CliRunner
 
 import detent
@@ -662,40 +664,114 @@ def files_in(folder: Path) -> dict[str, bytes]:
     return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
 
 
-@pytest.mark.compiled
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("run", AXIS, "--job", LETTER, "--output", "out"),
-        ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out"),
-        ("plot", "out/trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png"),
-        ("compare", AXIS, "--figure", "out/comparison.html"),
-        ("timing", AXIS, "--at", "20 ms", "--vcd", "out/timing.vcd", "--figure", "out/timing.png"),
-        ("envelope", str(detent.example("zoom.toml")), "--output", "out"),
-        ("examples", "--copy", "out"),
-    ],
-)
-def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
-    words: tuple[str, ...], tmp_path: Path, trace: Path, tried: Callable[..., None]
-) -> None:
-    """HDF5 that cannot write crashed the process at its end, and the earlier report was gone."""
-    (tmp_path / "out").mkdir()
-    for name in ("report.html", "comparison.html", "timing.vcd", "timing.png", "plot.png", "group_a.csv"):
+# ---- full disks
+
+ON_A_FULL_DISK = [
+    ("run", AXIS, "--job", LETTER, "--output", "out"),
+    ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out"),
+    ("plot", "trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png"),
+    ("compare", AXIS, "--figure", "out/comparison.html"),
+    ("timing", AXIS, "--at", "20 ms", "--vcd", "out/timing.vcd", "--figure", "out/timing.png"),
+    ("envelope", str(detent.example("zoom.toml")), "--output", "out"),
+    ("examples", "--copy", "out"),
+    ("new", "cascade", "out/new.toml"),
+    ("analyse", "log.csv", "--what", "steps", "--report", "out/found.html"),
+    ("identify", "log.csv", "--report", "out/found.html"),
+]
+
+
+@pytest.fixture
+def earlier(tmp_path: Path, trace: Path) -> None:
+    """Files of an earlier time, beside those that the commands read."""
+    (tmp_path / "out").mkdir(exist_ok=True)
+    for name in ("report", "comparison", "found"):
+        (tmp_path / "out" / f"{name}.html").write_text("earlier")
+    for name in ("timing.vcd", "timing.png", "plot.png", "group_a.csv", "trace.h5"):
         (tmp_path / "out" / name).write_text("earlier")
-    shutil.copy(trace, tmp_path / "out" / "trace.h5")
+    shutil.copy(trace, tmp_path / "trace.h5")
+    write_log(tmp_path / "log.csv")
+
+
+def check_told(words: tuple[str, ...], answer: Answer, reason: str) -> None:
+    """One sentence of the place as it was given, and status 1."""
+    lines = [line for line in answer.out.splitlines() + answer.err.splitlines() if "cannot be written" in line]
+    assert answer.status == 1
+    assert len(lines) == 1
+    assert f"cannot be written ({reason}); choose another place or make room" in lines[0]
+    assert re.match("(not written: )?(out/|--output out|--copy out)", lines[0])
+    others = [line for line in answer.err.splitlines() if line != lines[0] and not line.startswith("First run")]
+    assert others == [], words
+
+
+@contextmanager
+def files_up_to(size: int) -> Generator[None]:
+    """No file may grow beyond a size: as a full disk, but on every machine."""
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.compiled
+@pytest.mark.usefixtures("earlier")
+@pytest.mark.parametrize("words", ON_A_FULL_DISK, ids=lambda words: f"{words[0]}{len(words)}")
+def test_a_disk_that_is_full_is_one_sentence_and_leaves_what_was_there(
+    words: tuple[str, ...], tried: Callable[..., None]
+) -> None:
+    """The earlier report was gone."""
+    before = files_in(Path())
+    with files_up_to(500):
+        answer = call(*words)
+    check_told(words, answer, "File too large")
+    assert files_in(Path()) == before
+    tried("disk", f"`detent {words[0]}`", "one sentence, status 1, the earlier files")
+
+
+@pytest.mark.wide
+@pytest.mark.usefixtures("earlier")
+def test_hdf5_that_cannot_write_ends_no_process(tmp_path: Path, tried: Callable[..., None]) -> None:
+    """It crashed at its end."""
     before = files_in(tmp_path)
     limit = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500)); "
-    program = f"{limit}from detent.cli import main; main()"
     done = subprocess.run(
-        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=False, cwd=tmp_path,
+        [sys.executable, "-c", f"{limit}from detent.cli import main; main()", *ON_A_FULL_DISK[0]], check=False,
+        capture_output=True, text=True, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(Path(detent.__file__).parents[1])},
     )  # fmt: skip
-    told = [line for line in done.stderr.splitlines() if not line.startswith("First run")]
-    assert (done.returncode, len(told)) == (1, 1), done.stderr
-    assert "cannot be written (File too large); choose another place or make room" in told[0]
-    assert told[0].startswith(("out/", "--output out", "--copy out"))  # the place as it was given
+    check_told(ON_A_FULL_DISK[0], Answer(done.returncode, done.stdout, done.stderr), "File too large")
     assert files_in(tmp_path) == before
-    tried("disk", f"`detent {words[0]}`", "one sentence, status 1, the earlier files")
+    tried("disk", "`detent run`", "one sentence, status 1, the earlier files")
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Generator[Path]:
+    """A disk of 200 kB, where the user may make one."""
+    (tmp_path / "out").mkdir()
+    mount = ("mount", "-t", "tmpfs", "-o", "size=200k", "detent", str(tmp_path / "out"))
+    if not shutil.which("mount") or subprocess.run(mount, check=False, capture_output=True).returncode:
+        pytest.skip("a disk in memory cannot be mounted here")
+    yield tmp_path / "out"
+    subprocess.run(("umount", str(tmp_path / "out")), check=True)  # noqa: S607
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("words", ON_A_FULL_DISK, ids=lambda words: f"{words[0]}{len(words)}")
+def test_a_small_disk_that_is_full_is_one_sentence_too(
+    words: tuple[str, ...], small_disk: Path, request: pytest.FixtureRequest, tried: Callable[..., None]
+) -> None:
+    request.getfixturevalue("earlier")
+    with (small_disk / "filler").open("wb", buffering=0) as filler, suppress(OSError):
+        while True:
+            filler.write(bytes(1000))
+    os.truncate(small_disk / "filler", (small_disk / "filler").stat().st_size - 8192)  # two pages: a part fits
+    before = files_in(Path())
+    answer = (shell if words[0] == "run" else call)(*words)
+    check_told(words, answer, "No space left on device")
+    assert files_in(Path()) == before
+    tried("disk", f"`detent {words[0]}`, a disk of 200 kB", "one sentence, status 1, the earlier files")
 
 
 @pytest.mark.parametrize("kind", ["h5", "parquet"])
