@@ -5,6 +5,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Generator, Iterable
 from contextlib import contextmanager
 from pathlib import Path
@@ -90,6 +91,7 @@ def main(names: list[str]) -> None:
 
     from tests.fuzz.targets import TARGETS
 
+    warnings.simplefilter("error")  # as in the tests
     seconds, first, *chosen = names
     for name in chosen or TARGETS:
         tried, found = fuzz(TARGETS[name], count(int(first)), float(seconds))

@@ -105,7 +105,8 @@ def _order_rows(draft: Draft) -> None:
     near = np.abs(kept[places] - out) <= FARTHEST
     inside = (stamps[places - 1] < draft.t[out]) & (draft.t[out] < stamps[places])
     # A row that came late has left a hole; a wrong stamp falls between rows that lack nothing.
-    hole = stamps[places] - stamps[places - 1] > _HOLE * np.median(np.diff(stamps))
+    usual = np.median(np.diff(stamps)) if len(stamps) > 1 else np.inf  # of a clock that only falls one row is left
+    hole = stamps[places] - stamps[places - 1] > _HOLE * usual
     fits = near & inside & hole
     moved, lost = out[fits], out[~fits]
     if len(moved):
