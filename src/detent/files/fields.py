@@ -4,7 +4,7 @@ Everything else that knows about keys (validation, messages, the printed axis, t
 """
 
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -163,6 +163,7 @@ def keys_of(table: type[Table]) -> dict[str, FieldInfo]:
     return {file_key(name, field): field for name, field in table.model_fields.items()}
 
 
+@cache
 def unit_of(field: FieldInfo) -> str:
     """SI unit of a dimensional field; empty for pure numbers, words and switches."""
     units = [entry.symbol for entry in _annotations_of(field) if isinstance(entry, Unit)]
@@ -209,19 +210,24 @@ def example_of(field: FieldInfo) -> str:
     return str(field.examples[0]) if field.examples else ""
 
 
-def leaf_fields(table: type[Table], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
-    """Walk all values a table can hold, tables below it included, in the order of declaration.
+@cache
+def leaf_fields(table: type[Table]) -> Sequence[tuple[tuple[str, ...], FieldInfo]]:
+    """All values a table can hold, tables below it included, in the order of declaration.
 
     Where the user names the tables, `AnyName` stands in the path.
     """
+    return tuple(_leaves_below(table, ()))
+
+
+def _leaves_below(table: type[Table], prefix: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], FieldInfo]]:
     for key, field in keys_of(table).items():
         path, below = (*prefix, key), table_of(field)
         if below is None:
             yield path, field
         elif is_named(field):
-            yield from leaf_fields(below, (*path, AnyName(extra_of(field, "name"))))
+            yield from _leaves_below(below, (*path, AnyName(extra_of(field, "name"))))
         else:
-            yield from leaf_fields(below, path)
+            yield from _leaves_below(below, path)
 
 
 def held_leaves(table: Table, prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo, object]]:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, cast
 
 from pydantic.fields import FieldInfo
@@ -260,8 +261,13 @@ def bad_names(root: type[Table], tables: object, prefix: Path = ()) -> Iterator[
 
 def dotted(path: Sequence[str]) -> str:
     """Key as written in messages; parts that need quotes get them."""
-    parts = [_shortened(part) for part in path if not isinstance(part, Index)]
-    return ".".join(part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in parts)
+    return ".".join(_written_key(part) for part in path if not isinstance(part, Index))
+
+
+@lru_cache(4096)  # an axis file is read with the same few hundred keys over and over
+def _written_key(part: str) -> str:
+    part = _shortened(part)
+    return part if part.replace("_", "").replace("-", "").isalnum() else f'"{part}"'
 
 
 def _shortened(text: str) -> str:

@@ -99,6 +99,7 @@ def is_unit(text: str) -> bool:
     return text in _NO_UNIT or any(find_conversion(text, unit) is not None for unit in _COMMON_TARGETS)
 
 
+@lru_cache(4096)  # each column is compared with every unit of every role, and what does not fit costs the most
 def find_conversion(text: str, unit: str) -> Conversion | None:
     """How numbers in a unit become numbers in another; None where the text is no unit of this kind.
 
