@@ -51,7 +51,7 @@ test: venv-test ## the tests, without those that take long
 	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark $(PYTEST_ARGS)
 
 test-wide: venv-test ## thousands of numbered cases, dozens of logs, other processors' kernels
-	$(PYTEST) -m wide -n auto -p no:benchmark $(PYTEST_ARGS)
+	$(PYTEST) -m wide -n auto --dist loadgroup -p no:benchmark $(PYTEST_ARGS)
 
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)
@@ -65,7 +65,7 @@ test-lowest: venv-dev ## files, pages, commands and a run of each method, with t
 	$(BIN)/uv venv --quiet --clear --seed --python '$(PYTHON)' $(LOWEST)
 	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --only-binary :all: --editable '.[test]'
 	$(LOWEST)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark \
-	    -W default::DeprecationWarning $(OLDEST) $(PYTEST_ARGS)
+	    -m "not long and not wide and not process" -W default::DeprecationWarning $(OLDEST) $(PYTEST_ARGS)
 
 LOCK := requirements-dev.txt
 lock: venv-dev ## write the versions of all that development needs, with their checksums, to requirements-dev.txt
@@ -78,7 +78,7 @@ locked: venv-dev ## bring .venv to the versions of requirements-dev.txt, and to 
 	$(BIN)/uv pip install --quiet --python $(VENV) --no-deps --editable .
 
 tried: venv-test ## attack detent: kills, full disks, damaged files, hostile text; the figures of the page about that
-	$(PYTEST) -m "not bench" -n auto -p no:benchmark --tried docs/tried.toml $(PYTEST_ARGS)
+	$(PYTEST) -m "not bench" -n auto --dist loadgroup -p no:benchmark --tried docs/tried.toml $(PYTEST_ARGS)
 
 bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, milliseconds to start
 	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)
@@ -87,17 +87,19 @@ bench-smoke: venv-test ## run every benchmark once, without measuring
 	$(PYTEST) -m bench tests/bench --benchmark-disable $(PYTEST_ARGS)
 
 # Compiled code is invisible to coverage: the tests of the steps run as plain Python, but for those that simulate too
-# long; then all run compiled, as in `make test`. Two processes at the same time, with about as much to do.
+# long; then all run compiled, as in `make test`. Two processes at the same time, with about as much to do. Coverage
+# slows Python down: what tests/property draws a hundred times reaches few lines that the unit tests do not.
 STEPS    := $(addprefix tests/unit/,control drive kernel planning plant sensing) \
             $(wildcard $(addprefix tests/unit/methods/*/test_,controller.py plant.py system*.py))
-PLAIN    := -m "not long and not wide and not bench and not compiled"
+WHOLE    := tests/unit/methods tests/unit/identify
+SEEN     := not long and not wide and not bench and not process
 COVER    := $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
-coverage: venv-test ## which lines and branches the unit and property tests reach
-	COVERAGE_FILE=.coverage.methods $(COVER) tests/unit/methods tests/property & methods=$$!; \
-	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) $(STEPS) $(PLAIN); steps=$$?; \
-	COVERAGE_FILE=.coverage.rest $(COVER) tests/unit --ignore=tests/unit/methods; rest=$$?; \
-	wait $$methods && test $$steps = 0 && test $$rest = 0
-	$(BIN)/python -m coverage combine .coverage.methods .coverage.steps .coverage.rest
+coverage: venv-test ## which lines and branches the unit tests reach
+	COVERAGE_FILE=.coverage.whole $(COVER) -m "$(SEEN)" $(WHOLE) & whole=$$!; \
+	NUMBA_DISABLE_JIT=1 COVERAGE_FILE=.coverage.steps $(COVER) -m "$(SEEN) and not compiled" $(STEPS); steps=$$?; \
+	COVERAGE_FILE=.coverage.rest $(COVER) -m "$(SEEN)" tests/unit $(addprefix --ignore=,$(WHOLE)); rest=$$?; \
+	wait $$whole && test $$steps = 0 && test $$rest = 0
+	$(BIN)/python -m coverage combine .coverage.whole .coverage.steps .coverage.rest
 	$(BIN)/python -m coverage report
 
 lint: venv-dev ## ruff: rules and layout

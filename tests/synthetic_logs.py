@@ -39,9 +39,8 @@ class Recording:
     def rows_of(self, order=None):
         """Rows as lists of texts."""
         names = order or list(self.columns)
-        return [
-            [repr(float(value)) for value in row] for row in zip(*(self.columns[name] for name in names), strict=True)
-        ]
+        texts = ([repr(value) for value in self.columns[name].astype(np.float64).tolist()] for name in names)
+        return [list(row) for row in zip(*texts, strict=True)]
 
     def text(self, rows=None):
         """The recording as CSV, with other rows than its own where they are given."""

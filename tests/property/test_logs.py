@@ -14,7 +14,7 @@ from detent.logs.differences import runs_of, window_rows
 from detent.logs.log import Action, Kind
 from detent.logs.read_log import READERS, read_log
 
-FEW = settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+FEW = settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 seeds = st.integers(0, 2000)
 """Recordings of which none gives a false alarm; `test_no_false_alarms` looks at others."""
 
@@ -38,8 +38,12 @@ def rows_told(log, kind):
 def same_values(log, recording, indices):
     """True where the samples hold what the recording says at some indices."""
     return all(
-        log.signals[role]
-        == pytest.approx(recording.columns[role][indices] * log.columns[role].factor + log.columns[role].offset)
+        np.allclose(
+            log.signals[role],
+            recording.columns[role][indices] * log.columns[role].factor + log.columns[role].offset,
+            rtol=1e-6,
+            atol=1e-12,
+        )
         for role in log.signals
     )
 
@@ -130,7 +134,7 @@ def test_a_clock_of_microseconds_that_wraps(folder, seed, bits, start):
     wraps = np.flatnonzero(np.diff(count) < 0)
     recording.columns["time"], recording.headings["time"] = count, "t [us]"
     log = recording.read(folder)
-    assert np.diff(log.t) == pytest.approx(np.diff(true) * 1e-6)
+    assert np.allclose(np.diff(log.t), np.diff(true) * 1e-6, rtol=1e-6, atol=1e-12)
     assert rows_told(log, Kind.WRAPPED_COUNTER) == set((wraps + 2).tolist())
 
 
@@ -232,7 +236,10 @@ def test_a_stuck_sensor(folder, seed, role, place, size):
     told = rows_told(log, Kind.STUCK)
     assert {("stuck", role)} <= set(kinds(log))
     assert set(range(first + 1, first + length + 1)) <= told
-    assert len(told) <= length + 20
+    # Beside them it may have stayed at that number by itself.
+    others = np.r_[-1, np.flatnonzero(values != values[first]), len(values)]
+    after = int(np.searchsorted(others, first))
+    assert len(told) <= others[after] - others[after - 1] - 1 + 20
 
 
 @FEW
@@ -264,7 +271,7 @@ def test_wrong_signs(folder, seed, role):
     assert ("wrong sign", role) in kinds(log)
     is_turned = next(finding.action for finding in log.findings if finding.signal == role) == Action.TURNED
     assert is_turned == (role in {"velocity", "position_load"})
-    assert log.signals[role] == pytest.approx(true if is_turned else -true)
+    assert np.allclose(log.signals[role], true if is_turned else -true, rtol=1e-6, atol=1e-12)
 
 
 @FEW
@@ -279,7 +286,7 @@ def test_units_of_velocities(folder, seed, unit, place, is_reverse):
     recording.headings["position_load"] = "load position"
     log = recording.read(folder)
     assert kinds(log) == [("wrong unit", "velocity")]
-    assert log.signals["velocity"] == pytest.approx(true)
+    assert np.allclose(log.signals["velocity"], true, rtol=1e-6, atol=1e-12)
 
 
 @FEW

@@ -119,7 +119,7 @@ contents = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(data=contents, ending=st.sampled_from([".csv", ".toml", ".txt"]), pitch=st.sampled_from([None, PITCH]))
 @example(data=b"move = " + b"[" * 3000, ending=".toml", pitch=None)
 @example(data=b"[[move]]\nrepeat = " + b"9" * 5000, ending=".toml", pitch=None)

@@ -88,7 +88,7 @@ def farthest_rest(jitter: float) -> float:
 
 
 @pytest.mark.compiled
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(chain=moves(PROTECTED))
 def test_pulses_within_the_protection_never_move_the_end_of_a_move(chain):
     rig = Rig(locked=True)
@@ -103,7 +103,7 @@ def test_pulses_within_the_protection_never_move_the_end_of_a_move(chain):
 
 
 @pytest.mark.compiled
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(chain=moves(64), jitter=st.sampled_from((0, 5, 20)), seed=st.integers(0, 2**62))
 def test_whatever_comes_on_the_lines_a_move_ends_whole_pitches_from_its_target(chain, jitter, seed):
     # Noise of the comparator adds pulses of both signs, which all count down, so it takes of the protection too.

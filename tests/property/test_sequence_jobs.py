@@ -131,7 +131,7 @@ contents = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(data=contents)
 @example(data=b"step = " + b"[" * 3000)
 @example(data=b"[[step]]\ngo = " + b"9" * 5000)
@@ -247,7 +247,7 @@ FORMS = [
 
 
 @pytest.mark.compiled
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     steps=st.lists(actions, min_size=1, max_size=6),
     on=st.lists(st.tuples(st.floats(0, 9), st.floats(0.0001, 2)).map(lambda pair: (pair[0], sum(pair))), max_size=4),

@@ -191,7 +191,7 @@ def finite_values(registers):
 @pytest.mark.parametrize("name", BUILD)
 def test_specification_to_text_to_specification_is_identity(name):
     @given(overrides_of(name), disturbances(name))
-    @settings(max_examples=200)
+    @settings(max_examples=70)
     def check(overrides, disturbance):
         axis, _ = attempt(name, (*overrides, *disturbance))
         assert axis is None or axis_of(parse_source("axis.toml", dump_spec(axis.spec))).spec == axis.spec
@@ -202,7 +202,7 @@ def test_specification_to_text_to_specification_is_identity(name):
 @pytest.mark.parametrize("name", BUILD)
 def test_what_no_rule_refuses_can_be_looked_over_and_built(name):
     @given(overrides_of(name), disturbances(name))
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=70, deadline=None)
     def check(overrides, disturbance):
         axis, problems = attempt(name, (*overrides, *disturbance))
         assert all(problem.allowed and problem.remedy for problem in problems)
@@ -224,7 +224,7 @@ def test_the_value_that_a_remedy_names_satisfies_its_rule(name, monkeypatch):
     monkeypatch.setitem(METHODS.known, METHOD[name], without)
 
     @given(overrides_of(name))
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=70, deadline=None)
     def check(overrides):
         spec = load(name, overrides).spec
         for rule in method.rules:

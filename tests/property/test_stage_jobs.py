@@ -171,7 +171,7 @@ contents = st.one_of(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=150)
 @given(data=contents, ending=st.sampled_from([".csv", ".toml"]))
 @example(data=b"move = " + b"[" * 3000, ending=".toml")
 @example(data=b"[[move]]\nby = {x = " + b"9" * 5000 + b"}", ending=".toml")

@@ -71,7 +71,7 @@ def zone_lists(draw: st.DrawFn, steps: int, top: float) -> tuple[Zone, ...]:
     return tuple(Zone(begin, end, max(1.0, top * draw(st.floats(0.02, 1.1)))) for begin, end in places)
 
 
-@settings(max_examples=300, derandomize=True)
+@settings(max_examples=150, derandomize=True)
 @given(st.data())
 def test_every_table_keeps_the_limits_and_every_edit_gives_the_table_built_anew(data):
     axis = data.draw(axes())
@@ -137,7 +137,7 @@ def run_once(data: st.DataObject, axis: Axis) -> None:
     assert rig.rotor.peak_lag < PEAK_LAG
 
 
-@settings(max_examples=200, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 @pytest.mark.compiled
 def test_no_step_is_lost_and_every_stop_is_on_its_place(data):
@@ -225,7 +225,7 @@ def test_the_judge_sees_a_step_that_is_not_allowed(field, change, fault):
         judge_steps(rig, replace(course, **{field: change(getattr(course, field))}), [0, 100], tables)
 
 
-@settings(max_examples=200, derandomize=True)
+@settings(max_examples=100, derandomize=True)
 @given(st.data())
 @pytest.mark.compiled
 def test_whatever_the_operator_does_the_limits_hold(data):

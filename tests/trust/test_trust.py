@@ -13,7 +13,7 @@ from tests.trust.judge import FIRST_BAD, judge_all, judge_number, numbers_of
 from tests.trust.plants import BAD, make_case
 from tests.trust.table import CONSTANTS, coverage_table, figures_of, page, sections
 
-pytestmark = pytest.mark.early
+pytestmark = [pytest.mark.early, pytest.mark.xdist_group("trust")]  # what it judges is judged once
 
 GOOD_LOGS, BAD_LOGS = 350, 150
 

@@ -35,6 +35,7 @@ def test_the_words_of_the_package_are_those_it_promises() -> None:
         _ = detent.Gripper
 
 
+@pytest.mark.process
 def test_completion_offers_the_words_of_the_package_before_any_is_used() -> None:
     code = (
         "import detent, sys; print(dir(detent)); assert 'detent.axis' not in sys.modules; detent.load; "
@@ -51,6 +52,7 @@ def test_the_version_is_the_projects() -> None:
     assert detent.__version__ == project["project"]["version"]
 
 
+@pytest.mark.process
 def test_importing_the_package_loads_nothing_heavy() -> None:
     code = (
         "import sys, detent; detent.examples(); "

@@ -95,6 +95,7 @@ def test_help_is_there_and_complete(verb: str) -> None:
         assert "--json" in text
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("words", [["--help"], ["--version"], *([verb, "--help"] for verb in VERBS), ["examples"]])
 def test_help_and_examples_load_nothing_heavy(words: list[str]) -> None:
     heavy = {"numba", "llvmlite", "numpy", "pint", "tree_sitter", "h5py", "pyarrow", "matplotlib"}
@@ -208,6 +209,7 @@ def test_a_run_that_cannot_begin_leaves_nothing_behind(tmp_path: Path, words: li
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.process
 @pytest.mark.usefixtures("rubbish")
 @pytest.mark.parametrize(
     "words",
@@ -434,6 +436,7 @@ def test_an_obstacle_in_the_way_is_status_1_and_the_reason() -> None:
     assert "obstructed" in data.data["failure"]
 
 
+@pytest.mark.process
 def test_an_obstacle_as_a_process_of_its_own(tmp_path: Path) -> None:
     answer = shell("run", AXIS, "--job", LETTER, *OBSTACLE, "--every", "0", cwd=tmp_path)
     assert answer.status == 1
@@ -441,6 +444,7 @@ def test_an_obstacle_as_a_process_of_its_own(tmp_path: Path) -> None:
     assert "Traceback" not in answer.err
 
 
+@pytest.mark.process
 def test_the_report_says_how_to_make_it_again(tmp_path: Path) -> None:
     words = ("run", AXIS, "--job", LETTER, "-o", "out", "--set", "drive.supply=40 V")
     assert shell(*words, cwd=tmp_path).status == 0
@@ -457,6 +461,7 @@ def test_what_the_job_could_not_mean_is_noted(tmp_path: Path) -> None:
     assert len(call("run", AXIS, "--job", "odd.prn", "--every", "0", "--json").data["notes"]) == 7
 
 
+@pytest.mark.process
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such file names")
 @pytest.mark.parametrize("as_json", [False, True])
 def test_a_file_name_no_encoding_knows_is_no_trouble(tmp_path: Path, as_json: bool) -> None:
@@ -570,6 +575,7 @@ def test_registers_lists_what_can_be_recorded() -> None:
 # ---- the terminal
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("words", [["registers"], ["check", AXIS], ["registers", "--json"], ["examples"]])
 def test_a_reader_that_leaves_early_is_no_error(words: list[str]) -> None:
     source = str(Path(detent.__file__).parents[1])
@@ -584,6 +590,7 @@ def test_a_reader_that_leaves_early_is_no_error(words: list[str]) -> None:
         assert process.wait() == 0
 
 
+@pytest.mark.process
 def test_a_reader_that_leaves_early_does_not_hide_a_failure(tmp_path: Path) -> None:
     source = str(Path(detent.__file__).parents[1])
     words = ["run", AXIS, "--job", LETTER, "--every", "0", *OBSTACLE]
@@ -596,6 +603,7 @@ def test_a_reader_that_leaves_early_does_not_hide_a_failure(tmp_path: Path) -> N
         assert process.wait() == 1
 
 
+@pytest.mark.process
 @pytest.mark.long
 def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path: Path) -> None:
     words = ("run", AXIS, "--job", LETTER, "--every", "0")
@@ -607,6 +615,7 @@ def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path: P
     assert first.out == second.out
 
 
+@pytest.mark.process
 @pytest.mark.long
 def test_a_cache_that_cannot_be_made_is_said_and_the_run_is_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
@@ -618,6 +627,7 @@ def test_a_cache_that_cannot_be_made_is_said_and_the_run_is_made(tmp_path: Path)
     assert answer.out.startswith("Printed letter.txt")
 
 
+@pytest.mark.process
 def test_text_is_written_where_the_terminal_cannot_show_it(tmp_path: Path) -> None:
     answer = shell("run", AXIS, "--job", LETTER, "--every", "0", cwd=tmp_path, env={"PYTHONIOENCODING": "ascii"})
     assert answer.status == 0
@@ -790,6 +800,7 @@ def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace:
         assert "broke off" not in call(*words, *asked).err
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 @pytest.mark.parametrize("words", [("registers",), ("check", AXIS, "--json")])
 def test_a_standard_output_that_is_full_is_one_sentence(words: tuple[str, ...], tried: Callable[..., None]) -> None:

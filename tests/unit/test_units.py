@@ -170,6 +170,7 @@ def test_digits_are_a_choice():
     assert format_quantity(0.0423333333, "m", digits=6) == "42.3333 mm"
 
 
+@pytest.mark.process
 def test_pint_waits_until_an_unusual_unit_comes():
     program = (
         "import sys; from detent.units import parse_quantity; parse_quantity('3 in', 'm'); "
@@ -178,6 +179,7 @@ def test_pint_waits_until_an_unusual_unit_comes():
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
 
 
+@pytest.mark.process
 def test_units_leave_nothing_in_the_users_cache(tmp_path):
     """What pint kept there was code to be run, and a damaged file of it a traceback."""
     program = "from detent.units import parse_quantity; assert parse_quantity('1 ft', 'm') == 0.3048"

@@ -244,6 +244,7 @@ def test_a_response_without_instants_is_refused():
         CONVENTIONAL.respond([1.0], points=0)
 
 
+@pytest.mark.process
 def test_scipy_loads_only_when_a_loop_is_computed():
     code = (
         "import sys; from detent.analysis.sampled_loop import SampledLoop; before = 'scipy' in sys.modules; "

@@ -42,6 +42,7 @@ def shell(words, **more):
     return subprocess.run(program, capture_output=True, check=False, env={**os.environ, **source, **more})
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("typed", "completed"), [("detent ch", "check"), ("detent plot --fr", "--from"), ("detent ke", "keys")]
 )
@@ -51,6 +52,7 @@ def test_a_shell_completes_verbs_and_options(typed, completed):
     assert done.stdout.decode().split() == [completed]
 
 
+@pytest.mark.process
 def test_the_completion_of_a_shell_is_shown():
     # Which shell it is must not hang on the one that has started the tests.
     done = shell(["--show-completion", "bash"], _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1")

@@ -21,7 +21,7 @@ from detent.files.text import placing
 
 pytestmark = [pytest.mark.wide, pytest.mark.compiled]
 
-KILLS = 15  # of each command
+KILLS, SOON = 15, 6  # of each command; of these in `make test-wide`
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 HEAD, LETTER, ZOOM = (str(detent.example(name)) for name in ("print_head.toml", "letter.txt", "zoom.toml"))
 # The date of a run is part of its evidence: the same for all.
@@ -173,8 +173,10 @@ def _heeds(process: int, by: int) -> bool:
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks /proc which signals a process heeds")
-@pytest.mark.parametrize("number", range(KILLS))
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "number", [*range(SOON), *(pytest.param(number, marks=pytest.mark.long) for number in range(SOON, KILLS))]
+)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in COMMANDS])
 def test_ended_at_any_moment(name: str, number: int, tried: Callable[..., None]) -> None:
     chance = random.Random(f"{name} {number}")
     by, known = SIGNALS[number % len(SIGNALS)], done(name)

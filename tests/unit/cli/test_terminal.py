@@ -11,6 +11,8 @@ import pytest
 
 import detent
 
+pytestmark = pytest.mark.process
+
 SOURCE = str(Path(detent.__file__).parents[1])
 BY = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
 NOTHING = "Interrupted; no file was written or changed.\n"

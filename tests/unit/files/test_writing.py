@@ -154,6 +154,7 @@ def killed_at(number: int, folder: Path) -> bool:
     return done.returncode == 9
 
 
+@pytest.mark.process
 def test_killed_anywhere_files_that_belong_together_are_those_of_one_time(
     tmp_path: Path, tried: Callable[..., None]
 ) -> None:

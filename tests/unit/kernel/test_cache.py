@@ -16,7 +16,7 @@ from detent.kernel import cache
 
 PACKAGE = Path(detent.__file__).parent
 
-pytestmark = pytest.mark.compiled
+pytestmark = [pytest.mark.compiled, pytest.mark.process]
 
 
 class Copy:
@@ -308,17 +308,17 @@ def test_a_full_disk_costs_time_only(package, tried):
     tried("disk", "the folder of compiled steps", "the same result, later")
 
 
-def test_a_folder_that_others_may_write_is_not_used(package):
-    assert package.run(SHORT_PROGRAM) == "False"
-    kept = package.compiled
-    why = "from detent.kernel.cache import compiled_folder; print(compiled_folder())"
-    for folder in (package.cache, package.cache / "compiled", *package.folders):
+def test_a_folder_that_others_may_write_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("DETENT_CACHE_DIR", str(tmp_path / "cache"))
+    find = cache.compiled_folder.__wrapped__
+    used, why = find()
+    assert used == tmp_path / "cache" / "compiled" / cache.source_hash()
+    assert why == ""
+    for folder in (used.parents[1], used.parent, used):
         folder.chmod(0o775)
-        told = f"(None, '{folder} can be written by other users; set DETENT_CACHE_DIR to a folder of yours')"
-        assert package.run(why) == told
+        assert find() == (None, f"{folder} can be written by other users; set DETENT_CACHE_DIR to a folder of yours")
         folder.chmod(0o700)
-    assert kept
-    assert package.compiled == kept
+    assert find() == (used, "")
 
 
 def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):

@@ -167,6 +167,7 @@ def test_registers_of_another_class_are_another_type():
         through_blocks(Small(), 0)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("fidelity", ["averaged", "switch-level"])
 def test_identification_and_a_run_give_the_same_bytes_compiled_and_plain(fidelity):
     program = f"from tests.unit.kernel.test_compiled import run_hash; print(run_hash({fidelity!r}))"

@@ -168,6 +168,7 @@ def test_numpy_dtype_is_that_of_the_memory():
     assert np.dtype(np.dtype(Outer)["table"].base) == np.float64
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("registers", [Widths, Outer, PrintHeadParams, PrintHead], ids=lambda c: c.__name__)
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) on this machine")
 def test_the_c_compiler_lays_the_structure_out_the_same(registers, tmp_path):

@@ -73,6 +73,7 @@ print(rows[1, 0])
 """
 
 
+@pytest.mark.process
 @compiled_only
 def test_registers_of_a_script_stay_out_of_the_cache(tmp_path):
     """Code that names a class of a script can be read by no process that cannot import it: commands crashed."""

@@ -151,6 +151,7 @@ def test_a_specification_cannot_be_changed(axis_path):
         spec.limits.travel = 1.0
 
 
+@pytest.mark.process
 def test_a_file_of_common_units_is_read_without_pint(axis_path):
     program = (
         "import sys; from detent.methods.load import load_spec; "

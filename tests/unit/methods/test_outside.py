@@ -15,7 +15,7 @@ from tests.places import ROOT
 
 from detent.units import parse_quantity
 
-pytestmark = [pytest.mark.compiled, pytest.mark.early]
+pytestmark = [pytest.mark.compiled, pytest.mark.early, pytest.mark.process]
 
 PROJECT = ROOT / "tests" / "distribution" / "detent-bang-bang"
 FILE, JOB = str(PROJECT / "bang_bang.toml"), str(PROJECT / "moves.csv")

@@ -149,6 +149,7 @@ def test_a_catalogue_is_only_asked_where_the_method_has_one(load_text):
     assert problem.got == "the unknown table [motor]"
 
 
+@pytest.mark.process
 def test_the_registry_loads_no_compiled_blocks():
     blocks = "{'numba', 'detent.methods.cascade.system'}"
     program = f"import sys; import detent.methods.registry; assert not {blocks} & set(sys.modules)"

@@ -263,6 +263,7 @@ def test_the_writer_refuses_what_does_not_follow(tmp_path: Path) -> None:
     assert len(load_trace(tmp_path / "run.h5")) == 5
 
 
+@pytest.mark.process
 def test_importing_the_module_loads_neither_h5py_nor_pyarrow() -> None:
     import subprocess
 

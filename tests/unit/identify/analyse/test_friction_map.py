@@ -44,6 +44,7 @@ def test_a_known_law_comes_back():
     assert np.all(found.windows >= 5)
 
 
+@pytest.mark.wide
 def test_intervals_hold_the_true_value_as_often_as_they_say():
     hits = []
     for seed in range(200):

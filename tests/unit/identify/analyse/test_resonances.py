@@ -47,6 +47,7 @@ def test_intervals_hold_the_true_value(encoders, lines):
     assert {name: share for name, share in found.items() if not 0.90 <= share <= 0.99} == {}
 
 
+@pytest.mark.wide
 def test_intervals_hold_the_true_value_in_some():
     found = coverage(30, "both")
     assert len(found) == 13

@@ -67,6 +67,7 @@ def test_closed_forms_come_back():
     )
 
 
+@pytest.mark.wide
 def test_intervals_hold_the_true_value_as_often_as_they_say():
     true = true_values()
     hits = {name: [] for name in true}

@@ -45,6 +45,7 @@ def test_known_lines_come_back_within_their_intervals():
     assert all(stretch.seconds == pytest.approx(0.8, abs=0.05) for stretch in found.negative.stretches)
 
 
+@pytest.mark.wide
 def test_intervals_hold_the_true_value_as_often_as_they_say():
     hits = {name: [] for name in TRUE}
     for seed in range(200):
@@ -55,6 +56,7 @@ def test_intervals_hold_the_true_value_as_often_as_they_say():
         assert_covers(hits[name])
 
 
+@pytest.mark.wide
 def test_intervals_of_a_line_through_many_speeds_hold_as_well():
     speeds = (0.05, -0.05, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3)
     hits = [

@@ -51,6 +51,7 @@ def test_known_constants_come_back():
     assert 0.02 < found.relative_error < 0.1
 
 
+@pytest.mark.wide
 def test_intervals_hold_the_true_value_as_often_as_they_say():
     hits = {name: [] for name in TRUE}
     for seed in range(200):

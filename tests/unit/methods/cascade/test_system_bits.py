@@ -79,6 +79,7 @@ def test_it_is_determined():
         assert run_hash(variant) == run_hash(variant)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_plain_python_gives_the_same_bytes_as_compiled_code():
     program = (

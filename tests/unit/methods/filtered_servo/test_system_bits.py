@@ -192,6 +192,7 @@ def run_hash(servo: str) -> str:
     return digest.hexdigest()
 
 
+@pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_plain_python_gives_the_same_bytes_as_compiled_code():
     program = (

@@ -303,6 +303,7 @@ def test_the_machine_switches_on_as_its_file_says():
     assert machine.time == pytest.approx(2.5e-6)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_acquisition_and_a_stretch_give_the_same_bytes_compiled_and_plain():
     program = "from tests.unit.methods.phase_servo.test_system import run_hash; print(run_hash())"

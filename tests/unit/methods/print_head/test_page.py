@@ -514,6 +514,7 @@ def test_the_limit_is_half_the_finest_column() -> None:
     assert 2 * COLUMN_LIMIT == COLUMN
 
 
+@pytest.mark.process
 def test_a_page_loads_no_plotting_library() -> None:
     code = (
         "import sys, detent.methods.print_head.page, detent.page.plots; "

@@ -443,6 +443,7 @@ def test_the_same_seed_gives_the_same_run_to_the_last_bit():
     assert run_hash() == run_hash()
 
 
+@pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_a_sequence_gives_the_same_compiled_and_plain():
     program = "from tests.unit.methods.rotary_table.test_run import run_hash; print(run_hash())"

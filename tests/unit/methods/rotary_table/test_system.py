@@ -142,6 +142,7 @@ def test_static_friction_leaves_a_rest_in_hold():
     assert rig.positioner.state == (MOVE if abs(rig.positioner.oar - rig.angle.aar) > 2 else HOLD)
 
 
+@pytest.mark.process
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="compares with compiled code; NUMBA_DISABLE_JIT is set")
 def test_a_stretch_gives_the_same_bytes_compiled_and_plain():
     program = "from tests.unit.methods.rotary_table.test_system import run_hash; print(run_hash())"

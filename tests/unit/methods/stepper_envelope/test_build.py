@@ -314,6 +314,7 @@ def test_as_many_zones_as_may_be_have_room_for_their_limits():
     assert build_stepper(spec, "group_a", tables).controller.rule.limit[14] == 1000
 
 
+@pytest.mark.process
 def test_tables_are_made_without_compiled_blocks():
     program = (
         "import sys; from importlib.resources import files; from detent.methods.check import check_spec;"

@@ -45,7 +45,10 @@ from detent.methods.stepper_envelope.envelope_files import EnvelopeTables, write
 from detent.planning.step_envelope import INDEX_BITS, SENTINEL, StepEnvelope, Zone, ZoneMap
 from detent.planning.step_ramp import StepRamp
 
-pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc) here to compile the header with")
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(COMPILER is None, reason="no C compiler (cc) here to compile the header with"),
+]
 
 STRICT = ("-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wundef", "-Wcast-qual")
 CLOCK_HZ = 1_000_000
@@ -431,7 +434,7 @@ def act(draw: st.DataObject, motor: Twins) -> None:
         motor.place(draw.draw(st.integers(-1, tables.steps + 1)))
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(st.data())
 def test_whatever_the_host_does_the_bits_are_the_same(data):
     tables = data.draw(random_tables())

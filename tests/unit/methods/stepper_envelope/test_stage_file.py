@@ -167,12 +167,14 @@ def test_csv_problems_come_all_at_once(write):
     assert len(refusal(write("job.csv", "x [mm],repeat\n" + "a,b\n" * 1000))) == MOST_PROBLEMS
 
 
-def test_csv_without_places_and_with_too_many(write):
+def test_csv_without_places_and_with_too_many(write, monkeypatch):
     (problem,) = refusal(write("job.csv", "x [mm]\n\n,\n"))
     assert (told([problem]), problem.remedy) == ([(0, 0, "", "no moves")], "add a move with a place for x or y")
     assert told(refusal(write("job.csv", "# nothing\n"))) == [(0, 0, "", "no moves")]
-    (problem,) = refusal(write("job.csv", "x [mm]\n" + "1\n" * (MOST_MOVES + 2)))
-    assert problem.got == f"more than {MOST_MOVES} moves"
+    monkeypatch.setattr("detent.methods.stepper_envelope.stage_job.MOST_MOVES", 1000)
+    monkeypatch.setattr("detent.methods.moves.job.MOST_MOVES", 1000)
+    (problem,) = refusal(write("job.csv", "x [mm]\n" + "1\n" * 1002))
+    assert problem.got == "more than 1000 moves"
 
 
 # -- TOML ---------------------------------------------------------------------------------------------------
