@@ -103,6 +103,21 @@ def test_hdf5_with_texts_that_would_fill_the_memory(tmp_path):
     assert len(read_log(path)) == 400
 
 
+def test_hdf5_whose_list_of_names_never_ends(tmp_path, monkeypatch, tried):
+    """Of 2 kB: in the tree of a group's names the node to the right of the only one is that node."""
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w", libver="earliest") as file:
+        file["t [s]"], file["x [m]"] = T, T
+    whole = bytearray(path.read_bytes())
+    tree = whole.index(b"TREE")
+    assert struct.unpack_from("<Q", whole, tree + 16) == (2**64 - 1,)  # no neighbour to the right
+    struct.pack_into("<Q", whole, tree + 16, tree)
+    path.write_bytes(whole)
+    monkeypatch.setattr(apart, "SECONDS", 1.0)
+    assert refusal(path).got == "a file whose reading took more than 1 s"
+    tried("reader", "an HDF5 file whose list of names leads back to its begin", "ended by the limit, with a sentence")
+
+
 def test_hdf5_whose_groups_go_in_circles(tmp_path):
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:
