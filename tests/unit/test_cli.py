@@ -753,7 +753,7 @@ def test_hdf5_that_cannot_write_ends_no_process(tmp_path: Path, tried: Callable[
     )  # fmt: skip
     check_told(ON_A_FULL_DISK[0], Answer(done.returncode, done.stdout, done.stderr), "File too large")
     assert files_in(tmp_path) == before
-    tried("disk", "`detent run`", "one sentence, status 1, the earlier files")
+    tried("disk", "`detent run` as a process of its own", "one sentence, status 1, the earlier files")
 
 
 @pytest.fixture
