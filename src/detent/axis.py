@@ -218,19 +218,23 @@ class Axis(OnScreen):
         names = list(method.signals if signals is None else signals)
         source = job if isinstance(job, str | Path) else job_file
         made = self._evidence(source, names, every, clock)
-        if every == 0:
-            with given_as(loaded.name, job):
-                result = method.run(loaded, progress=progress)
+        with given_as(loaded.name, job):
+            if every:
+                return self._recorded(loaded, made, trace_file, progress)
+            result = method.run(loaded, progress=progress)
             return Run(self, result, None, evidence=replace(made, figures=hash_figures(result.to_dict())))
-        about: dict[str, str | float | int] = {"axis": self.name, "job": loaded.name, "seed": method.seed}
+
+    def _recorded(self, job: Job, made: RunEvidence, trace_file: str | Path | None, progress: Progress | None) -> "Run":
+        """Do a job and record what the evidence says."""
+        method = self.simulated
+        about: dict[str, str | float | int] = {"axis": self.name, "job": job.name, "seed": method.seed}
         fidelity = getattr(self.spec.axis, "fidelity", None)
         about |= {"fidelity": fidelity} if fidelity else {}
-        recorder = Recorder(method.registers, names, every=every, period=method.tick)
+        recorder = Recorder(method.registers, made.signals, every=made.every, period=method.tick)
         with TraceWriter(trace_file, recorder.trace(**about)) if trace_file else nullcontext() as writer:
             if writer is not None:
                 recorder.pass_on(writer.append, KEPT_ROWS)
-            with given_as(loaded.name, job):
-                result = method.run(loaded, recorder=recorder, progress=progress)
+            result = method.run(job, recorder=recorder, progress=progress)
             made = replace(made, figures=hash_figures(result.to_dict()), trace=recorder.hashes)
             if writer is not None:
                 writer.note(ELEMENT, json.dumps(made.to_dict()))

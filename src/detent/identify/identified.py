@@ -182,6 +182,15 @@ class Identified(OnScreen):
         return cascade_spec(self.axis, self.axis_name) if self.axis else None
 
 
+def _text_of(axis: str | Path) -> str:
+    """Text of an axis file; raises where anything is wrong with it, or where it is of another method."""
+    from detent.methods.load import read_axis
+
+    text = read_axis(axis).source.content.decode("utf-8-sig")
+    cascade_spec(text, str(axis))
+    return text
+
+
 def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     logs: str | Path | Sequence[str | Path],
     *,
@@ -226,15 +235,9 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     DetentError
         The axis file is of another method.
     """
-    from detent.methods.load import read_axis
-
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
     tell = progress or untold
-    text = ""
-    if axis is not None:
-        content = read_axis(axis).source.content  # tells everything that is wrong with it
-        text = content.decode("utf-8-sig")
-        cascade_spec(text, str(axis))
+    text = "" if axis is None else _text_of(axis)
     if not paths:
         raise DetentError("identify: got no log; expected: one or more; name the recordings of the axis")
     read: list[Log] = []
