@@ -13,7 +13,7 @@ from tests.trust.judge import FIRST_BAD, judge_all, judge_number, numbers_of
 from tests.trust.plants import BAD, make_case
 from tests.trust.table import CONSTANTS, coverage_table, figures_of, page, sections
 
-pytestmark = [pytest.mark.early, pytest.mark.xdist_group("trust")]  # what it judges is judged once
+pytestmark = pytest.mark.xdist_group("trust")  # in `make test-wide` one process judges the logs, once
 
 GOOD_LOGS, BAD_LOGS = 350, 150
 
@@ -40,6 +40,7 @@ def reduced():
     return figures_of(judge_all(numbers_of(40, 3 * len(BAD)), workers=1))
 
 
+@pytest.mark.early
 @pytest.mark.wide
 def test_limits_hold_in_a_few_logs(reduced):
     """At 0.95, 35 intervals leave chance 29 to 35 hits: so few logs find gross errors only."""
