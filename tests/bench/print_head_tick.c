@@ -16,7 +16,7 @@
 
 enum { PERIOD_US = 40, STALL_US = 50000, TRIM_US = 16000, RUNAWAY_US = 62, REVERSAL_US = 800, TURN_AROUND_US = 133000 };
 enum { EDGES = 64, FIRES = 4 };
-enum { COLUMNS = 2048, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
+enum { COLUMNS = 2048, HALF_EMITTER = 128, STATUS_QUEUE = 32, COMMAND_QUEUE = 4 };
 enum { FLOOR = 30, HIGH_SPEED = 60, STALL_MARGIN = 20, RUN_UP_RESERVE = 12 };
 enum {
     POWER_ON, HOME_LEFT, HOME_RIGHT, IDLE, LOW_START, LOW_STEADY, LOW_STOP,
@@ -124,7 +124,7 @@ static inline void schedule(const ColumnTimerParams *p, ColumnTimer *c, const Li
 {
     while (c->active && c->fire_us == NEVER) {
         int64_t place = p->column_zero + (int64_t)c->column * p->column_pitch;
-        int64_t ahead = (place - emitter * 256) * direction - c->lead;
+        int64_t ahead = (place - (emitter * 256 - HALF_EMITTER)) * direction - c->lead;
         if (ahead >= 256)
             break;
         if (ahead < 0 || interval <= 0) {
@@ -735,7 +735,7 @@ static inline void observe(const PrintHeadPlantParams *p, Paper *paper, const Pr
     const PaperParams *q = &p->paper;
     for (unsigned k = 0; k < lines->fired; k++) {
         int64_t column = lines->place[k] & (COLUMNS - 1);
-        double at = start + (x - start) * (lines->fired_us[k] * (1.0 / PERIOD_US)) - p->encoder.origin;
+        double at = start + (x - start) * (lines->fired_us[k] * (1.0 / PERIOD_US));
         double wanted = (double)(q->column_zero + column * q->column_pitch) * q->metres_per_unit;
         paper->offset = at + velocity * q->flight_time - wanted;
         paper->landed[lines->place[k]] = (int32_t)(int64_t)(paper->offset * 1e9);

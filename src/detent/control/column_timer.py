@@ -1,8 +1,9 @@
 """Print timing: fires the columns of a line from the emitter signal.
 
-Between two emitters the position is extrapolated with the last emitter interval. A wire needs its flight time to reach
-the paper, so it is fired early by commanded speed x flight time; what is left when the true speed differs is the column
-error. Positions in 1/256 emitter, times in microseconds.
+Position zero is the left frame, which homing leaves in the middle of emitter 0: the edge at which emitter n begins lies
+half an emitter left of n. Between two edges the position is extrapolated with the last interval. A wire needs its
+flight time to reach the paper, so it is fired early by commanded speed x flight time; what is left when the true speed
+differs is the column error. Positions in 1/256 emitter from the left frame, times in microseconds.
 """
 
 from detent.kernel.registers import Registers, i4, i4_array, i8, register, u1, u1_array
@@ -10,6 +11,9 @@ from detent.kernel.step import hot_step, step
 
 COLUMNS = 2048
 """Columns of the line buffer: 17 in at 120 per inch."""
+
+HALF_EMITTER = 128
+"""How far left of its count an emitter begins [1/256 emitter]."""
 
 NEVER = 1 << 62
 
@@ -91,7 +95,8 @@ def schedule(
     A column found behind the head (its time passed while the interval was still unknown) is counted as missed.
     """
     while r.active and r.fire_us == NEVER:
-        ahead = (p.column_zero + r.column * p.column_pitch - emitter * 256) * direction - r.lead
+        edge = emitter * 256 - HALF_EMITTER
+        ahead = (p.column_zero + r.column * p.column_pitch - edge) * direction - r.lead
         if ahead >= 256:
             break
         if ahead < 0 or interval <= 0:

@@ -6,6 +6,7 @@ from tests.print_head_rig import EMITTER, Rig
 
 from detent.control.column_timer import (
     COLUMNS,
+    HALF_EMITTER,
     NEVER,
     ColumnTimer,
     ColumnTimerParams,
@@ -17,6 +18,7 @@ from detent.control.column_timer import (
     skip_white,
     start_line,
 )
+from detent.methods.print_head.controller import PERIOD_US
 
 PITCH = 640  # 1/120 in = 2.5 emitters
 
@@ -24,7 +26,7 @@ PITCH = 640  # 1/120 in = 2.5 emitters
 @pytest.fixture
 def p():
     return ColumnTimerParams(
-        column_zero=100 * 256,
+        column_zero=100 * 256 - HALF_EMITTER,  # on an edge, as then every even column is
         column_pitch=PITCH,
         lead_per_speed=1147,
     )
@@ -93,7 +95,7 @@ def test_lead_is_speed_times_flight_time(p):
 @pytest.mark.parametrize(("direction", "column", "emitter"), [(1, 4, 109), (-1, 4, 111)])
 def test_a_column_is_fired_between_the_emitters(p, direction, column, emitter):
     r = started(inked(column), *((0, 20) if direction > 0 else (20, 0)), direction)
-    # Column 4 lies at emitter 110; the head passes its neighbour with 200 us per emitter.
+    # Column 4 lies where emitter 110 begins; the head passes its neighbour with 200 us per emitter.
     r.lead = 64
     schedule(p, r, inked(column), emitter, direction, 1000, 200)
     assert r.fire_us == 1000 + 200 * (256 - 64) // 256
@@ -181,3 +183,27 @@ def test_every_inked_column_of_a_line_is_fired_once_and_in_order(s):
         np.testing.assert_allclose(landed[order] * 1e-9, speed_error * 350e-6, rtol=0, atol=rounding)
         assert np.abs(speed_error).max() < 0.1 * s / 6 * 0.0254
         assert rig.r.plant.paper.offset * 1e9 == pytest.approx(landed[order[-1]], abs=1)
+
+
+@pytest.mark.parametrize("order", [1, -1], ids=["right", "left"])
+@pytest.mark.parametrize("s", [60, 240])
+def test_columns_land_at_the_left_margin_and_every_120th_of_an_inch_from_there(s, order):
+    """Taken from the carriage itself, whose zero is the left frame, where it is when the wires leave."""
+    rig = Rig().pretend_identified(emitter=1500)
+    rig.set_speed(s)
+    columns = [500, 501, 540, 543, 600]
+    places = [450 + 2.5 * column for column in columns[::order]]
+    for column in columns:
+        rig.head.buffer.ink[COLUMNS * (1 - rig.head.columns.bank) + column] = 1
+    rig.send_print(places[0] - order * 5, round(places[-1] + order * 5))
+    lines, plant, margin, off = rig.r.lines, rig.r.plant, rig.spec.printing.left_margin, []
+    while len(off) < len(columns):
+        before, now, v = plant.sampled, plant.train.position, plant.train.velocity
+        rig.run(1)
+        for k in range(lines.fired):
+            assert lines.fired_us[k] < PERIOD_US
+            landed = before + (now - before) * lines.fired_us[k] / PERIOD_US + v * 350e-6
+            off.append(landed - margin - (lines.place[k] % COLUMNS) * 0.0254 / 120)
+    assert np.abs(off).max() < 0.1 * s / 6 * 0.0254 * 350e-6 + EMITTER / 50
+    # No constant of the order of an emitter is left in either direction.
+    assert abs(np.mean(off)) < EMITTER / 10

@@ -107,10 +107,10 @@ def land(p: PaperParams, r: Paper, place: int, x: float, v: float) -> None:
 
 @hot_step
 def observe(p: PrintHeadPlantParams, r: PrintHeadPlant, train: DriveTrain, lines: PrintHeadLines) -> None:
-    """Columns fired in the last period, with the carriage where it truly was, counted from edge 0 of the encoder."""
+    """Columns fired in the last period, with the carriage where it truly was, from the left frame."""
     for k in range(lines.fired):
         share = lines.fired_us[k] * (1.0 / PERIOD_US)
-        x = r.sampled + (train.position - r.sampled) * share - p.encoder.origin
+        x = r.sampled + (train.position - r.sampled) * share
         land(p.paper, r.paper, lines.place[k], x, train.velocity)
     r.sampled = train.position
 

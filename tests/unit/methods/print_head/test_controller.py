@@ -55,8 +55,8 @@ def test_a_column_is_fired_before_the_edge_that_comes_with_it(rig, due, at_the_e
     columns.fire_us = rig.head.now_us + due
     rig.head.direction, rig.head.emitter_seen, rig.head.last_step = 1, 1, 1
     rig.head.last_emitter_us = rig.head.now_us - 200
-    # Column 6 lies half an emitter behind the emitter that is to come.
-    rig.p.controller.columns.column_zero = 1001 * 256 + 128 - 6 * 640
+    # Column 6 lies half an emitter behind the edge that is to come.
+    rig.p.controller.columns.column_zero = 1001 * 256 - 6 * 640
     lines = period(rig, (3, 3), (13, 2), (23, 0), (33, 1))
     assert (lines.fired, lines.fired_us[0], lines.place[0]) == (1, due, 5)
     assert columns.column == 6

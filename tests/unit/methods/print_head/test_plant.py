@@ -71,4 +71,4 @@ def test_a_column_is_struck_where_the_carriage_was_when_it_was_fired(rig):
     lines.fired, lines.fired_us[0], lines.place[0] = 1, PERIOD_US // 4, 7
     carried(rig, 4 * EDGE)
     wanted = (p.column_zero + 7 * p.column_pitch) * p.metres_per_unit
-    assert rig.r.plant.paper.offset == pytest.approx(1000.125 * EMITTER + EMITTER / 2 + EDGE - wanted, abs=1e-12)
+    assert rig.r.plant.paper.offset == pytest.approx(1000.125 * EMITTER + EDGE - wanted, abs=1e-12)
