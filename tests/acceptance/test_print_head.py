@@ -836,65 +836,103 @@ def test_35_trim_is_one_count_per_16_ms_by_the_interval():
     assert np.mean(out == drive) > 0.9
 
 
-LIMIT_CYCLE = (0, 1, 2, 1, 0, -1, -2, -1)
-"""Drive of a trim cycle of 4 counts width, per 16 ms, relative to the drive that holds the speed."""
+FIRST_SWING, TRIM_CYCLE = (0, 1, 2, 1, 0, -1, -2, -1), (0, 1, 0, -1)
+"""Drive per 16 ms, around the count that holds the speed best: a cycle as wide as the specification allows, 4 counts,
+and the narrowest one by one count each 16 ms that comes back to where it began."""
 
 
-def cycle_swing(s: int, offset: float) -> float:
-    """Largest relative speed deviation of LIMIT_CYCLE at speed value s, with the whole counts `offset` above the exact.
+@cache
+def cycle_swing(s: int, cycle: tuple[int, ...]) -> float:
+    """Largest relative speed deviation of a drive cycle at speed value s.
 
     The speed follows one count by 256/170 speed values, with time constants of 1 ms (electrical) and 40.16 ms
     (mechanical), in steps of 0.1 ms.
     """
+    exact = 170 * s / 256
+    offset = round(exact) - exact
     current = speed = peak = 0.0
-    for n in range(160 * 8 * 10):
-        drive = LIMIT_CYCLE[n // 160 % 8] + offset
+    for n in range(160 * len(cycle) * 10):
+        drive = cycle[n // 160 % len(cycle)] + offset
         current += (drive - speed - current) * 0.1 / 1.0
         speed += current * 0.1 / 40.16
-        peak = max(peak, abs(speed)) if n >= 160 * 8 * 9 else 0.0
+        peak = max(peak, abs(speed)) if n >= 160 * len(cycle) * 9 else 0.0
     return peak * 256 / 170 / s
 
 
-ON_AN_EDGE = {1: 0.02, -1: 0.98}
-"""Where a head stands that is just past an emitter in its direction: the start that whole emitters are counted from."""
+@dataclass(frozen=True)
+class HeldSpeed:
+    """What a low-speed move did from 0.15 s of its steady phase on, and from 0.55 s on, with the first swing over."""
+
+    error: float  # largest, of the speed
+    width: int  # of the drive [count]
+    late_error: float
+    late_width: int
 
 
-def low_speed_phase(s, direction, fraction):
-    """Time since the steady phase began, relative speed error, drive."""
+def held_speed(s: int, direction: int, fraction: float) -> HeldSpeed:
+    """Move at a low speed from a fraction of the way between two emitters."""
     move = Move(s, direction, min(3900, 75 * s), fraction=fraction)
     begin, end = move.first(LOW_STEADY), move.stop()
     t = np.arange(end - begin) * TICK
     assert t[-1] > 0.9
-    return t, move.speed[begin:end] / (s / 6) - 1, move["controller.head.drive"][begin:end]
+    error, drive = np.abs(move.speed[begin:end] / (s / 6) - 1), move["controller.head.drive"][begin:end]
+    soon, late = t > 0.15, t > 0.55
+    return HeldSpeed(error[soon].max(), int(np.ptp(drive[soon])), error[late].max(), int(np.ptp(drive[late])))
 
 
-@pytest.mark.parametrize("direction", DIRECTIONS, ids=("right", "left"))
-@pytest.mark.parametrize("s", [18, 24, 30, 42, 54])
+def check_held(s: int, direction: int, fraction: float) -> HeldSpeed:
+    """Hold one start up to what is calculated for every start."""
+    held = held_speed(s, direction, fraction)
+    assert held.width <= 4
+    assert held.error <= max(0.03, cycle_swing(s, FIRST_SWING)) + 0.0005
+    # Once the first swing is over the specification's 3 % hold at every speed from every start: only the trim's own
+    # cycle is left, calculated 2.3 % at 3 in/s and less above it.
+    assert held.late_width == 2
+    assert held.late_error == pytest.approx(cycle_swing(s, TRIM_CYCLE), abs=0.0005)
+    assert held.late_error <= 0.03
+    return held
+
+
+LOW_SPEEDS = pytest.mark.parametrize("s", [18, 24, 30, 42, 54])
+BOTH_DIRECTIONS = pytest.mark.parametrize("direction", DIRECTIONS, ids=("right", "left"))
+
+
+@BOTH_DIRECTIONS
+@LOW_SPEEDS
 def test_36_low_speed_is_held(s, direction):
-    """Steady speed within 3 %, trim cycle at most 4 counts wide, from a start on an emitter as in the reference."""
-    t, error, drive = low_speed_phase(s, direction, ON_AN_EDGE[direction])
-    assert np.ptp(drive[t > 0.15]) <= 4
-    assert np.abs(error[t > 0.15]).max() <= 0.03
-    # A drive of whole counts cannot hold the speed exactly.
-    assert np.abs(error[t > 0.15]).max() >= 0.2 * 256 / 170 / s
+    """Steady speed within 3 %, trim cycle at most 4 counts wide: from a start on an emitter, as in the reference.
 
-
-@pytest.mark.parametrize("direction", DIRECTIONS, ids=("right", "left"))
-@pytest.mark.parametrize("s", [18, 24, 30, 42, 54])
-def test_36_from_between_two_emitters_the_trim_cycle_bounds_the_swing(s, direction):
-    """A head that rests between two emitters has a shorter open-loop start: it begins slower, rule 3.7 takes longer.
-
-    Until the first swing is over the cycle may then be as wide as the specification allows, 4 counts, and such a cycle
-    swings the speed by `cycle_swing` whatever the axis does: 5.2 % at 4 in/s. After it the 3 % hold.
+    The head stands just past an emitter in its direction, so that the N emitters of the open-loop start are whole ones.
     """
-    t, error, drive = low_speed_phase(s, direction, 0.5)
-    swing = max(
-        cycle_swing(s, offset - 170 * s / 256) for offset in (math.floor(170 * s / 256), math.ceil(170 * s / 256))
-    )
-    assert np.ptp(drive[t > 0.15]) <= 4
-    assert np.abs(error[t > 0.15]).max() <= max(0.03, swing + 0.0005)
-    assert np.abs(error[t > 0.55]).max() <= 0.03
-    assert np.ptp(drive[t > 0.55]) <= 3
+    held = check_held(s, direction, 0.02 if direction > 0 else 0.98)
+    assert held.error <= 0.03
+
+
+@BOTH_DIRECTIONS
+@LOW_SPEEDS
+def test_36_from_between_two_emitters_the_first_swing_is_wider(s, direction):
+    """A head that rests between two emitters has an open-loop start up to an emitter shorter, and begins slower.
+
+    The specification's 3 % after 0.15 s do NOT hold for every such start: rule 3.7 winds the drive up meanwhile, and
+    the first swing back is as wide as a cycle of 4 counts makes it, 6.9 % at 3 in/s, 5.2 % at 4 and 4.3 % at 5 in/s. It
+    is over after 0.55 s.
+    """
+    for fraction in (0.1, 0.22, 0.36, 0.5, 0.64, 0.78, 0.9):
+        check_held(s, direction, fraction)
+
+
+@pytest.mark.wide
+@BOTH_DIRECTIONS
+@LOW_SPEEDS
+def test_36_no_start_within_an_emitter_swings_wider_than_is_calculated(s, direction):
+    held = [check_held(s, direction, fraction) for fraction in np.arange(0.005, 1.0, 0.01)]
+    worst = max(one.error for one in held)
+    # What is calculated does happen where the first swing has its 4 counts; elsewhere it is narrower.
+    wide = max(one.width for one in held) == 4
+    assert not wide or worst >= 0.95 * cycle_swing(s, FIRST_SWING)
+    assert wide == (s in (24, 30))
+    assert (worst > 0.03) == (s <= 30)
+    assert min(one.error for one in held) <= 0.03
 
 
 def test_37_overspeed_test_limits_a_push():
@@ -921,31 +959,80 @@ def test_37_overspeed_test_limits_a_push():
     assert 6.8 <= peaks["false"] < 8.0
 
 
-def low_speed_stops(s):
-    return [(direction, Move(s, direction, 700)) for direction in (1, -1)]
+def reversed_stop(direction: int, speed: float, drive: int) -> float:
+    """Way of a stop by reversal [emitters], from a speed [in/s] and the drive that ran, from the rules alone.
+
+    Drive and speed in counts of back-EMF; electrical lag 1 ms, mechanical time constant 40.16 ms, steps of 10 us. What
+    current there is flows back into the supply first, against all 300 counts.
+    """
+    v = speed * 6 * 170 / 256
+    current, way = drive - v, 0.0
+    while v > 0:
+        current += ((-300 if current > 0 else -drive) - v - current) * 0.01 / 1.0
+        v += (current - FRICTION[direction]) * 0.01 / 40.16
+        way += v * 256 / 170 * 50 * 1e-5
+    return way
+
+
+def low_speed_stop(s: int, direction: int, length: int, fraction: float = 0.5) -> float:
+    """Hold a stop up to the rules; its way [emitters]."""
+    move = Move(s, direction, length, fraction=fraction)
+    begin = move.stop()
+    command, drive = move["controller.head.drive_cmd"], int(move["controller.head.drive"][begin - 1])
+    assert set(command[begin:-1]) == {-direction * drive}
+    assert command[begin - 1] in (-command[begin], -command[begin] // 2)
+    assert not np.any(move["lines.transition"])
+    distance = move.stop_distance()
+    assert distance == pytest.approx(reversed_stop(direction, float(move.speed[begin - 1]), drive), abs=0.2)
+    # Drive off with the detection of zero speed, at the reversal or within the 5 ms without an emitter.
+    assert command[-1] == 0
+    assert (len(command) - move.standstill()) * TICK < 5e-3
+    peak = move.way[move.standstill()]
+    move.rig.run(2500)
+    assert move.rig.r.plant.train.velocity == 0
+    back = peak - move.rig.r.plant.train.position * direction / EMITTER
+    assert 0 <= back <= 1.0
+    return distance
 
 
 def test_38_low_speed_stop_reverses_the_running_drive():
     for s in range(18, 60):
-        for direction, move in low_speed_stops(s):
-            begin = move.stop()
-            command = move["controller.head.drive_cmd"]
-            assert set(command[begin:-1]) == {-direction * move["controller.head.drive"][begin - 1]}
-            assert command[begin - 1] in (-command[begin], -command[begin] // 2)
-            assert not np.any(move["lines.transition"])
-            distance = move.stop_distance()
-            assert abs(distance - s * s / 144) <= 5.5
-            if s == 54:
-                # Whole emitters in the specification: 17 right, 19 left.
-                assert round(distance) == {1: 17, -1: 19}[direction]
-            # Drive off with the detection of zero speed, at the reversal or within the 5 ms without an emitter.
-            assert command[-1] == 0
-            assert (len(command) - move.standstill()) * TICK < 5e-3
-            peak = move.way[move.standstill()]
-            move.rig.run(2500)
-            assert move.rig.r.plant.train.velocity == 0
-            back = peak - move.rig.r.plant.train.position * direction / EMITTER
-            assert 0 <= back <= 1.0
+        for direction in DIRECTIONS:
+            assert abs(low_speed_stop(s, direction, 400 + 10 * s) - s * s / 144) <= 5.5
+
+
+@pytest.mark.wide
+def test_38_low_speed_stops_of_moves_of_several_lengths():
+    """The 5.5 emitters hold to 0.03: a move right of 550 at s = 59 ends in the first swing, and stops 5.53 short."""
+    misses = [
+        abs(low_speed_stop(s, direction, length) - s * s / 144)
+        for s in range(18, 60)
+        for direction in DIRECTIONS
+        for length in (300, 420, 550, 900, 1500)
+    ]
+    assert sum(miss > 5.5 for miss in misses) == 1
+    assert max(misses) <= 5.55
+
+
+def test_38_stop_from_nine_inches_per_second():
+    """17 right and 19 left, says the specification in whole emitters: so it is on average, and each stop within 0.8.
+
+    The drive is a count or so off when the stop begins, and in a short move the first swing of the trim is not over
+    (test 36): 3.5 % of speed. The way therefore depends on the length of the move, and on the place within an emitter
+    from which it began: 16.2 to 17.6 emitters right, 18.3 to 19.7 left.
+    """
+    for direction, nominal in ((1, 17), (-1, 19)):
+        ways = [
+            low_speed_stop(54, direction, length, fraction)
+            for length in (300, 323, 484, 560, 700, 800, 1100, 1400)
+            for fraction in (0.02, 0.5, 0.98)
+        ]
+        drive = round(170 * 54 / 256) + FRICTION[direction]
+        shortest, longest = (reversed_stop(direction, 9 * (1 + k * 0.035), drive - k) for k in (-1, 1))
+        assert shortest <= min(ways) < max(ways) <= longest + 0.2
+        assert np.mean(ways) == pytest.approx(nominal, abs=0.3)
+        assert 1.0 < max(ways) - min(ways) < 1.6
+        assert nominal - 0.8 <= min(ways) < max(ways) <= nominal + 0.8
 
 
 def test_39_low_speed_forgets_the_trimmed_drive():
@@ -1152,62 +1239,90 @@ def answered(turn: TurnAround) -> tuple[int, list[int]]:
     return turn.rig.head.turn_arounds, [code for code in turn.rig.responses if code != 0xFF][-2:]
 
 
-def test_48_turn_around():
-    turn = TurnAround(1, 240, OPEN_LOOP)
-    rows, begin = turn.rows, turn.begin
-    command = rows["controller.head.drive_cmd"].astype(int)
+@pytest.mark.parametrize("s", [240, 180, 120])
+@BOTH_DIRECTIONS
+def test_48_events_of_a_turn_around(direction, s):
+    """Event table 4.4, which the specification gives for 40 in/s to the right, at every speed and both ways round.
+
+    Times and ways in proportion to speed and its square, drives by friction of the two directions; the ramp takes 418.2
+    us per count. Untrimmed, as the table is.
+    """
+    turn = TurnAround(direction, s, OPEN_LOOP)
+    rows, begin, share = turn.rows, turn.begin, s / 240
+    command = rows["controller.head.drive_cmd"].astype(int) * direction
+    steady, friction, other = {d: (170 * s >> 8) + FRICTION[d] for d in DIRECTIONS}, FRICTION[direction], -direction
     change = begin + int(np.flatnonzero(command[begin:] == 0)[0])
-    # Event table 4.4.
-    assert (command[begin - 1], command[begin]) == (195, 99)
-    assert turn.ms(change) == pytest.approx(41.4, abs=1)
-    assert -turn.speed[change] == pytest.approx(15.3, abs=0.3)
-    assert turn.ms(turn.zero) == pytest.approx(66.8, abs=1.5)
-    assert command[turn.zero] == pytest.approx(-60, abs=4)
-    assert rows["controller.head.emitter"][turn.zero] - rows["controller.head.emitter"][begin] == pytest.approx(
-        403, abs=8
-    )
+    assert (command[begin - 1], command[begin]) == (steady[direction], steady[direction] - 96)
+    assert turn.ms(change) == pytest.approx((steady[direction] - 96) * 0.4182, abs=1)
+    # No drive, but the current of the brake: back-EMF of 96 counts less friction, seen half a lag of 1 ms late.
+    assert -turn.speed[change] == pytest.approx((96 - friction) * 256 / 170 / 6 + 0.3, abs=0.3)
+    assert turn.ms(turn.zero) == pytest.approx(66.8 * share, abs=1.5)
+    assert command[turn.zero] == pytest.approx(friction - 96, abs=4)
+    way = abs(int(rows["controller.head.emitter"][turn.zero]) - int(rows["controller.head.emitter"][begin]))
+    assert way == pytest.approx(403 * share**2, abs=8)
     # The jump follows when the encoder has seen the reversal, up to 2.5 ms or six counts later.
     assert command[turn.turn - 1] - command[turn.turn] in (64, 65)
     assert turn.ms(turn.turn) - turn.ms(turn.zero) <= 2.5
-    assert (command[turn.end - 1], command[turn.end]) == (-283, -187)
-    assert turn.ms(turn.end) == pytest.approx(133.3, abs=1.5)
-    assert turn.speed[turn.end] == pytest.approx(39.7, abs=0.3)
-    assert not np.any(rows["lines.transition"][change : turn.end])
-    assert not np.any(rows["lines.right_left"][change : turn.end])
+    assert (command[turn.end - 1], command[turn.end]) == (-steady[other] - 96, -steady[other])
+    assert turn.ms(turn.end) == pytest.approx(133.3 * share, abs=1.5)
+    # The ramp ends on time, the speed lags behind it: 39.7 of 40 in the table, 19.5 of 20 in/s in test 41.
+    assert turn.speed[turn.end] == pytest.approx(s / 6 - 0.4, abs=0.3)
+    after = slice(change, turn.end)
+    assert not np.any(rows["lines.transition"][after])
+    assert np.all(rows["lines.right_left"][after] == (direction < 0))
     assert answered(turn) == (1, [OK, OK])
-    # Both speeds, both directions, with the trim as in normal work.
+
+
+def test_48_turn_around_takes_133_ms_at_40_inches_per_second():
+    """To 39/40 of the speed the other way, with the trim as in normal work; both ways round within 2 ms."""
     for s, time, tolerance in ((240, 133, 6), (120, 67, 6 * 67 / 133)):
-        both = [TurnAround(direction, s) for direction in (1, -1)]
+        both = [TurnAround(direction, s) for direction in DIRECTIONS]
         times = [one.ms(one.reached) for one in both]
         assert times == pytest.approx([time, time], abs=tolerance)
         assert abs(times[0] - times[1]) <= 2
-        assert [answered(one)[0] for one in both] == [1, 1]
+        assert [answered(one) for one in both] == [(1, [OK, OK])] * 2
 
 
-def test_49_turn_around_needs_same_speed_opposite_direction_and_a_queued_command():
-    cases = {
-        "different speed": (240, 3000, 2600),
-        "same direction": (120, 1400, 2600),
-        "low speed": (48, 1000, 400),
-        "nothing queued": (240, 3000, None),
-    }
-    for name, (s, first, second) in cases.items():
-        rig = Rig().pretend_identified(emitter=400)
-        rig.set_speed(s)
-        rig.controlled_run_to(first, wait=False)
-        if second is not None:
-            rig.controlled_run_to(second, wait=False)
-        rows = rig.record(4, SIGNALS)
-        assert rig.read_status() == OK, name
-        assert rig.head.turn_arounds == 0, name
-        if second is None:
-            assert rows["controller.head.drive_cmd"][-1] == 0
-            assert rig.head.state == IDLE
-            continue
-        # The next command starts afresh: from friction + IR of its direction, not from the jumped braking value.
-        direction = rig.head.direction
-        assert rows["controller.head.drive_cmd"][-1] == direction * (FRICTION[direction] + 96), name
-        assert rig.head.moves == 2, name
+# Preselected speed value, and the ways from the start of a first and of a queued second command [emitter].
+TURNS = {
+    "turns around": (120, (1000, 0)),
+    "different speed": (240, (2600, 2200)),  # 400 are too short for 240
+    "same direction": (120, (1000, 2000)),
+    "low speed": (48, (1000, 0)),
+    "nothing queued": (120, (1000,)),
+}
+
+
+@BOTH_DIRECTIONS
+@pytest.mark.parametrize("case", TURNS)
+def test_49_turn_around_needs_same_speed_opposite_direction_high_speed_and_a_queued_command(case, direction):
+    """The first case has all four; each of the others lacks one, stops, and begins the next command afresh."""
+    s, ways = TURNS[case]
+    rig = Rig().pretend_identified(emitter=2175 - direction * 1300)
+    rig.set_speed(s)
+    for way in ways:
+        rig.controlled_run_to(2175 - direction * (1300 - way), wait=False)
+    rows = rig.record(4, SIGNALS)
+    assert rig.read_status() == OK  # SB1 of the first command, at its zero speed
+    last = {name: int(rows[f"controller.head.{name}"][-1]) for name in ("drive_cmd", "state")}
+    second = rig.head.direction
+    assert rig.head.turn_arounds == (case == "turns around")
+    if case == "turns around":
+        # Straight on from the braking value, by the friction of both directions.
+        before = int(rows["controller.head.drive_cmd"][-2])
+        assert before - last["drive_cmd"] in (direction * 64, direction * 65)
+    elif case == "nothing queued":
+        assert last == {"drive_cmd": 0, "state": IDLE}
+        assert rig.next_status(0.2) is None
+        return
+    else:
+        # The drive went off, and within the same tick the next command starts: friction + IR, and its own time.
+        assert last["drive_cmd"] == second * (FRICTION[second] + 96)
+        assert rig.head.moves == 2
+        assert rig.head.next_ramp_us - rig.head.now_us == rig.head.ramp_us or case == "low speed"
+    assert second == (direction if case == "same direction" else -direction)
+    assert rig.next_status() == OK
+    assert rig.head.state == IDLE
 
 
 def test_50_turn_around_without_the_friction_jump_takes_longer():
@@ -1285,25 +1400,47 @@ def test_52_run_moves_end_where_they_should():
     assert found[1001, 1] < found[1000, 1], "halving makes the longer run the faster one"
 
 
-def test_53_supply_headroom():
-    tops = {(s, d): steady_drive(170, FRICTION[d], s) + 96 for s in range(18, 241) for d in (1, -1)}
-    assert max(tops.values()) == 291
-    assert tops == {(s, d): math.floor(170 * s / 256) + FRICTION[d] + 96 for s, d in tops}
+def test_53_supply_headroom_at_every_speed_and_in_both_directions():
+    """Steady drive and the top of the ramp of the axis itself, just after it has begun a run at each of its speeds."""
+    tops = {}
     for direction in DIRECTIONS:
-        for s in range(60, 241, 20):
-            rig = Rig().pretend_identified(emitter=2175 - direction * 1900)
-            rig.set_speed(s)
-            rig.controlled_run_to(rig.head.emitter + direction * 3800, wait=False)
-            assert rig.head.ramp_top == tops[s, direction]
-    # Ten per cent more motor constant, twenty more friction: 175 + 43 + 96 = 314 is clipped, and the ramp still ends.
-    rig = Rig(187, 43.2, 33.6).pretend_identified(slope=187, right=43, left=34, emitter=200)
-    rig.run_to(3800, wait=False)
-    rows = rig.record(2, SIGNALS)
-    assert rig.read_status() == OK
-    end = int(np.flatnonzero(rows["controller.head.state"] == HIGH_STEADY)[0])
-    assert rows["controller.head.drive"][end - 1] == 300 == rows["controller.head.drive_cmd"].max()
-    assert rows["controller.head.drive"][end] == 175 + 43 == 314 - 96
-    assert end * TICK < 0.1
+        for s in range(18, 241):
+            head = started(s, direction=direction)
+            assert head.steady == math.floor(170 * s / 256) + FRICTION[direction]
+            # Below 10 in/s there is no ramp, but a start of friction + IR.
+            tops[s, direction] = head.ramp_top if s >= 60 else head.drive
+            assert tops[s, direction] == 96 + (head.steady if s >= 60 else FRICTION[direction])
+    assert len(tops) == 2 * 223
+    assert max(tops.values()) == 291
+    assert tops[240, LEFT] == 283
+
+
+def test_53_a_ramp_that_is_clipped_still_ends():
+    """Ten per cent more motor constant, twenty more friction: 175 + 43 + 96 = 314 is clipped at 300."""
+    clipped = []
+    for direction, friction in ((RIGHT, 43), (LEFT, 34)):
+        for s in range(60, 241):
+            top = (187 * s >> 8) + friction + 96
+            head = started(s, slope=187, right=43, left=34, direction=direction)
+            assert head.ramp_top == min(top, 300)
+            if top > 300:
+                clipped.append((s, direction, top))
+    assert max(top for *_, top in clipped) == 314
+    assert {d for _, d, _ in clipped} == {RIGHT, LEFT}
+    for s, direction, top in clipped:
+        rig = Rig(187, 43.2, 33.6).pretend_identified(slope=187, right=43, left=34, emitter=2175 - direction * 1800)
+        rig.set_speed(s)
+        rig.controlled_run_to(2175 + direction * 1800, wait=False)
+        rows = rig.record(2, SIGNALS)
+        assert rig.read_status() == OK
+        end = int(np.flatnonzero(rows["controller.head.state"] == HIGH_STEADY)[0])
+        drive = rows["controller.head.drive"]
+        # At the clip, or before it where the speed is reached first.
+        assert drive[end - 1] == np.abs(rows["controller.head.drive_cmd"]).max() <= 300
+        assert drive[end - 1] == 300 or rows["controller.head.interval_us"][end] * s <= 20_000
+        assert drive[end - 1] == 300 or top < 314
+        assert drive[end] == top - 96
+        assert end * TICK < 0.1
 
 
 # ---------------------------------------------------------------------------------------------- claims as properties
@@ -1339,14 +1476,14 @@ def _rig_for_starts() -> Rig:
     return Rig()
 
 
-def started(s: int, *, slope: int = 170, friction: int = 36) -> HeadComputer:
-    """The computer just after it has begun a controlled run to the right at speed s."""
+def started(s: int, *, slope: int = 170, right: int = 36, left: int = 28, direction: int = RIGHT) -> HeadComputer:
+    """The computer just after it has begun a controlled run at speed s."""
     rig = _rig_for_starts()
     rig.r.restore(bytes(len(rig.r.snapshot())))
-    rig.pretend_identified(slope=slope, right=friction, emitter=100)
+    rig.pretend_identified(slope=slope, right=right, left=left, emitter=2175 - direction * 2075)
     rig.set_speed(s)
-    rig.send(0xA2, 4200 >> 8, 4200 & 0xFF)
-    assert (rig.head.speed, rig.head.direction) == (s, RIGHT)
+    rig.controlled_run_to(2175 + direction * 2025, wait=False)
+    assert (rig.head.speed, rig.head.direction) == (s, direction)
     return rig.head
 
 
