@@ -22,6 +22,7 @@ OVERSHOOT = 4  # counts by which the speed may pass the velocity table after the
 CURRENT_STEP = 0.02  # share of the current limit by which the current may pass it before the comparator is asked again
 
 LEAST_GAIN_MARGIN = 1.5
+STIFF = 3.0  # gain margin below which a carriage that does not come to rest hunts; above it, it lacks damping
 EDGE_LIMIT = 0.2  # largest displacement of an edge [turn of the carrier] (`sensing.phase_detector.JITTER_LIMIT`)
 JITTER_PEAK = 3  # peak of the noise over its rms (`kernel.noise.bell`)
 INTEGRAL_PACE = 1.5
@@ -234,8 +235,8 @@ def _current(m: PhaseFigures) -> Iterator[Caution]:
 
 
 def _force(m: PhaseFigures) -> Iterator[Caution]:
-    """The force follows the velocity table; in position mode the carriage can stop, and stands when it says so."""
-    asked, available, ready = m.spec.method.table_acceleration, m.acceleration, m.spec.method.ready_time
+    """The force follows the velocity table, and in position mode the carriage can stop."""
+    asked, available = m.spec.method.table_acceleration, m.acceleration
     if asked >= available:
         gentler = remedy.most("method.table_acceleration", available * (1 - BARELY), "raise limits.effort")
         value = f"{text(m.force_limit, 'N')}, for {max(0.0, available):.3g} m/s^2 against friction"
@@ -251,10 +252,6 @@ def _force(m: PhaseFigures) -> Iterator[Caution]:
             "the carriage runs past its target, and with it past the positioning point if it is fast",
             "raise method.threshold, or lower method.table_acceleration",
         )
-    if ready < m.switch_time:
-        value, advice = text(ready, "s"), remedy.least("method.ready_time", m.switch_time)
-        allowed = f"at least the time of an even stop from the change of mode, {text(m.switch_time, 's')}"
-        yield Caution("method.ready_time", value, allowed, "the axis says that it is ready before it stands", advice)
 
 
 def _speed(m: PhaseFigures) -> Iterator[Caution]:
@@ -280,17 +277,27 @@ def _speed(m: PhaseFigures) -> Iterator[Caution]:
 
 
 def _settling(m: PhaseFigures) -> Iterator[Caution]:
-    """The position loop settles, and friction does not hold it off."""
-    k1, k2, k3 = m.spec.method.position_gains
-    rest = m.breakaway_counts / (k1 * k3)
+    """The position loop settles before the axis says that it is ready, and friction does not hold it off."""
+    (k1, k2, k3), ready = m.spec.method.position_gains, m.spec.method.ready_time
+    rest, arrived = m.breakaway_counts / (k1 * k3), f"up to {m.spec.arrived_steps} steps, which count as arrived"
+    end, lower = (
+        m.approach,
+        "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)",
+    )
     if m.gain_margin < LEAST_GAIN_MARGIN:
         value, consequence = f"{m.gain_margin:.3g}", "the carriage oscillates about its target, or barely comes to rest"
-        advice = "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)"
-        yield Caution("gain margin of the position loop", value, f"at least {LEAST_GAIN_MARGIN:g}", consequence, advice)
-    elif m.overshoot > m.spec.arrived_steps:
-        value, allowed = f"{m.overshoot:.2g} steps", f"up to {m.spec.arrived_steps} steps, which count as arrived"
+        yield Caution("gain margin of the position loop", value, f"at least {LEAST_GAIN_MARGIN:g}", consequence, lower)
+    elif math.isinf(end.settling) and m.gain_margin < STIFF:
+        value, consequence = f"{end.off_at_ready:.2g} steps", "whole counts of the speed word swing it about its target"
+        yield Caution("carriage after ready", value, arrived, consequence, lower)
+    elif end.overshoot > m.spec.arrived_steps:
         consequence = "the carriage runs past its target and swings back after the axis has said that it is ready"
-        yield Caution("overshoot of a move", value, allowed, consequence, _calmer(m))
+        yield Caution("overshoot of a move", f"{end.overshoot:.2g} steps", arrived, consequence, _calmer(m))
+    elif ready < end.settling:
+        value = f"{text(ready, 's')}, when a move may be {end.off_at_ready:.2g} steps off"
+        allowed = f"at least the settling from the change of mode, {text(end.settling, 's')}"
+        advice = remedy.least("method.ready_time", end.settling)
+        yield Caution("method.ready_time", value, allowed, "the axis says that it is ready before it stands", advice)
     if rest > 2:
         value = f"{m.breakaway_counts:.3g} counts, {rest:.3g} steps of error"
         allowed = f"up to 2 steps, {2 * k1 * k3} counts"
@@ -304,7 +311,8 @@ def _calmer(m: PhaseFigures) -> str:
     tap = m.spec.clock.sample_tap + 1
     slower = PhaseFigures(m.spec.changed(clock={"sample_tap": tap}))
     gains = "raise KP2 of method.position_gains, and KS2 or KS3 of method.speed_gains with it"
-    cures = 0 < slower.overshoot <= m.spec.arrived_steps and slower.gain_margin >= LEAST_GAIN_MARGIN
+    calm = slower.approach.overshoot <= m.spec.arrived_steps and slower.approach.settling <= m.spec.method.ready_time
+    cures = calm and slower.gain_margin >= LEAST_GAIN_MARGIN
     return remedy.least("clock.sample_tap", tap, gains) if cures else gains
 
 

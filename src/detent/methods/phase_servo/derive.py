@@ -8,8 +8,12 @@ the velocity table; sections are those of the phase-servo specification.
 import math
 from bisect import bisect_left
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from detent.files.findings import Derived, count_figure, quantity_figure
 from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
@@ -21,8 +25,16 @@ if TYPE_CHECKING:
 STIFFEST = 1e3
 """Steps per sample that a step of error may be worth for the exact model of the loop to be worth its numbers."""
 
-SWING = 2 * math.pi
-"""Time in which the position loop has been farthest beyond its target, over the inverse of its natural frequency."""
+SUBSTEPS = 8
+"""Steps of a speed sample, at least, in which an approach is computed."""
+
+PHASES = 6
+"""Places within a speed sample at which an approach begins."""
+
+LONGEST_LOOK = 12
+"""Time for which it is looked at from the change of mode, over the inverse of the loop's natural frequency."""
+
+MOST_STEPS = 1500  # of an approach at most
 
 
 class PhaseFigures:
@@ -67,7 +79,6 @@ class PhaseFigures:
         self.switch_speed = (spec.table_velocity(spec.method.threshold + 1) + 0.5) * self.speed_per_count
         self.switch_distance = spec.method.threshold * spec.step  # way that is left then [m]
         self.switch_deceleration = self.switch_speed**2 / (2 * self.switch_distance)  # even, to the target [m/s^2]
-        self.switch_time = 2 * self.switch_distance / self.switch_speed  # of that deceleration [s]
 
     def _fill_loops(self, spec: PhaseServoSpec) -> None:
         """Both loops, without the delay of the sample."""
@@ -101,21 +112,71 @@ class PhaseFigures:
         return 0.0 if self._loop is None else self._loop.stability_limit() / self._loop.gain
 
     @cached_property
-    def overshoot(self) -> float:
-        """How far position mode takes the carriage beyond its target [step]; infinite where it does not settle.
+    def approach(self) -> "Approach":
+        """How moves end."""
+        return approach(self)
 
-        It enters with the entry before the change of mode, and with what the velocity loop lags behind the table.
-        """
-        if self._loop is None or not self._loop.is_stable:
-            return math.inf
-        spec, window, transition = self.spec, self.spec.sample_period, self._loop.transition()
-        lag = spec.method.table_acceleration / spec.step / self.velocity_loop
-        speed = spec.table_velocity(spec.method.threshold + 1) / window + lag
-        state, reached = [-float(spec.method.threshold), speed, self._loop.scale * speed * window], 0.0
-        for _ in range(math.ceil(SWING / self.position_loop / window)):
-            state = (transition @ state).tolist()
-            reached = max(reached, state[0])
-        return reached
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """The last part of a move, in the worst of the ways in which it was tried; NaN where speed mode does not end."""
+
+    overshoot: float  # how far position mode takes the carriage beyond its target [step]
+    settling: float  # from the change of mode until it counts as arrived for good [s]; infinite if it does not
+    off_at_ready: float  # how far off its target it may be when the axis says that it is ready, or later [step]
+
+
+def approach(m: PhaseFigures) -> Approach:
+    """The last steps of speed mode and position mode, with all that the exact model of the loop leaves out.
+
+    That are whole counts of the speed word, whole steps of error, friction and the winding's lag. Side by side go moves
+    that come along the table from four times the threshold, and one from rest a pitch away; the speed sample begins
+    anywhere. A move to the left is the mirror image, but for a pulse that comes a step later: so is the second.
+    """
+    spec, window, method = m.spec, m.spec.sample_period, m.spec.method
+    (s1, s2, s3), (k1, k2, k3), threshold = method.speed_gains, method.position_gains, method.threshold
+    lag = spec.motor.inductance / m.resistance
+    steps = max(SUBSTEPS, min(math.ceil(4 * window / lag), 4 * SUBSTEPS))  # of a sample
+    dt, share = window / steps, -math.expm1(-window / steps / lag)
+    push, rub = (force / m.mass / spec.step * dt for force in (m.force_per_ampere, m.coulomb))
+    half, limit = 1 << (spec.drive.pwm_bits - 1), min(spec.limits.effort, m.stall_current)
+    starts = np.array([4 * threshold, 4 * threshold + 1, max(spec.detector.counts, threshold + 2)])
+    table = np.array([spec.table_velocity(n) for n in range(int(starts.max()) + 2)])
+    x, begun = np.repeat(0.05 - starts, PHASES), np.tile(np.arange(PHASES) / PHASES, len(starts))
+    v = np.repeat(np.where(starts == starts[2], 0, table[starts]) / window, PHASES)
+    i, word, opened = np.zeros(len(x)), np.round(v * window), np.floor(x - v * begun * window)
+    closes, switched = np.round((1 - begun) * steps), np.full(len(x), -1)
+    look = min(math.ceil(LONGEST_LOOK / m.position_loop / dt), MOST_STEPS)
+    places: list[NDArray[np.float64]] = []
+    for k in range(2 * MOST_STEPS):
+        place = np.floor(x)
+        left = np.clip(-place, 0, len(table) - 1).astype(int)
+        switched = np.where((switched < 0) & (left <= threshold), k, switched)
+        in_position = switched >= 0
+        if in_position.all() and (k >= switched.max() + look or (k % steps == 0 and not (v.any() or word.any()))):
+            break
+        error = -place - (place >= 0) if method.corrector else -place - 1
+        u = np.where(in_position, k3 * (k1 * error - k2 * word), s3 * (s1 * table[left] - s2 * word))
+        volts = np.clip(u, -half, half - 1) * m.volts_per_count - m.volts_per_speed * spec.step * v
+        i = np.clip(i + (volts / m.resistance - i) * share, -limit, limit)
+        v = v + push * i
+        v = np.sign(v) * np.maximum(np.abs(v) - rub, 0.0)
+        x = x + v * dt
+        places.append(x)
+        at_sample, place = (k + 1 - closes) % steps == 0, np.floor(x)
+        word, opened = np.where(at_sample, place - opened, word), np.where(at_sample, place, opened)
+    way = np.array(places)
+    ends = [way[k : k + look, n] for n, k in enumerate(switched) if 0 <= k < len(way)]
+    if not ends:
+        return Approach(math.nan, math.nan, math.nan)
+    outside = [np.flatnonzero(np.abs(end) > spec.arrived_steps) for end in ends]
+    last = max(int(out[-1]) + 1 if len(out) else 0 for out in outside)
+    ready = round(method.ready_time / dt)
+    return Approach(
+        overshoot=max(0.0, *(float(end.max()) for end in ends)),
+        settling=math.inf if last > 0.75 * look else last * dt,
+        off_at_ready=max(float(np.abs(end[min(ready, 3 * len(end) // 4) :]).max()) for end in ends),
+    )
 
 
 def weakest_output(spec: PhaseServoSpec) -> float:
@@ -183,7 +244,9 @@ def _motion(m: PhaseFigures) -> Iterator[Derived]:
     yield quantity_figure(
         "deceleration from there", m.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
     )
-    yield quantity_figure("time from there", m.switch_time, "s", f"2 x {way} / v, braking evenly")
+    if math.isfinite(m.approach.settling):
+        formula = f"until a move stays within {spec.arrived_steps} steps, with whole counts, friction and winding"
+        yield quantity_figure("settling from there", m.approach.settling, "s", formula)
     supply, resistance = spec.drive.supply, m.resistance
     yield quantity_figure("moving mass", m.mass, "kg", "carriage + (rotor + pulley) / r^2")
     yield quantity_figure("force at the current limit", m.force_limit, "N", "limits.effort x k")
@@ -206,10 +269,11 @@ def _loops(m: PhaseFigures) -> Iterator[Derived]:
         ("position loop", m.position_loop, "sqrt(KP1 KP3 x (count of the drive word) k / (R m) / step)"),
     ):
         yield Derived(name, value, "rad/s", f"{value:.4g} rad/s", formula)
-    if math.isfinite(m.overshoot):
-        formula = "exact model of position mode, from the change of mode with the velocity loop's lag"
-        text = f"{m.overshoot:.2g} steps, {format_quantity(m.overshoot * m.spec.step, 'm')}"
-        yield Derived("overshoot of a move", m.overshoot, "step", text, formula)
+    if math.isfinite(m.approach.overshoot):
+        formula = "from the last steps of speed mode, with whole counts, friction and winding"
+        over = m.approach.overshoot
+        text = f"{over:.2g} steps, {format_quantity(over * m.spec.step, 'm')}"
+        yield Derived("overshoot of a move", over, "step", text, formula)
     formula = "(KP2 KP3 velocity feedback + back-EMF) / (2 x position loop), without delays"
     yield Derived("damping of the position loop", m.damping, "", f"{m.damping:.3g}", formula)
     yield count_figure("drive that breaks loose", m.breakaway_counts, "static x R / k / (count of the drive word)")

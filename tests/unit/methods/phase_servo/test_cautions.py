@@ -1,10 +1,12 @@
 """Warnings about a phase-servo axis that can be built; each value that a remedy names ends its warning."""
 
+import numpy as np
 import pytest
 from tests.phase_servo_rig import Rig
 from tests.remedies import check_caution
 
 from detent.methods.phase_servo.checks import find_cautions
+from detent.methods.phase_servo.derive import PhaseFigures
 
 BURST = '[disturbance.lines.burst]\nkind = "{}"\n{}\n'
 
@@ -27,7 +29,9 @@ CASES = [
     (["method.table_acceleration=40 m/s^2"], "force at the current limit"),
     (["limits.effort=0.1 A"], "force at the current limit"),
     (["mechanics.carriage_mass=1.6 kg"], "deceleration from the change of mode"),
-    (["method.ready_time=2 ms"], "method.ready_time"),
+    (["method.ready_time=1 ms"], "method.ready_time"),
+    (["clock.oscillator=12 MHz", "clock.sample_tap=13"], "method.ready_time"),
+    (["clock.oscillator=16 MHz", "clock.sample_tap=14", "method.position_gains=[4, 12, 1]"], "carriage after ready"),
     (["drive.supply=2.4 V", "limits.effort=1.2 A"], "supply"),
     (["drive.supply=0.2 V", "limits.effort=0.1 A"], "supply"),
     (["limits.speed=0.37 m/s"], "speed above the table, slew limit of the tracker"),
@@ -89,6 +93,44 @@ def test_what_is_switched_off_is_not_warned_about(load_text, good_text):
 
 def test_a_little_jitter_is_harmless_even_at_the_boundary_of_two_steps(load_text, good_text):
     assert cautions(load_text, good_text, "detector.jitter=20 ns") == {}
+
+
+def after_ready(rig, pitches):
+    """How far off its target a move ends, at the worst, from ready on for 15 ms [steps]."""
+    rig.command(pitches)
+    rig.run(0.1e-3)
+    while rig.r.controller.sequencer.ready == 0:
+        rig.run(0.1e-3)
+    way = rig.record(15e-3, ["plant.train.position"], every=50)["plant.train.position"]
+    return float(np.abs(way - rig.target).max()) / rig.step
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("oscillator", "tap", "told"),
+    [(8, 12, None), (16, 13, None), (12, 13, "method.ready_time"), (20, 14, "method.ready_time"),
+     (24, 14, "method.ready_time"), (12, 12, "overshoot of a move"), (20, 13, "overshoot of a move"),
+     (8, 11, "overshoot of a move"), (12, 14, "gain margin of the position loop")],
+)  # fmt: skip
+def test_what_other_oscillators_and_taps_do_to_a_move_is_told(load_text, good_text, oscillator, tap, told):
+    """At 12 MHz with tap 13 a move stood 3.2 steps off when the axis said that it was ready, and nothing was told.
+
+    A count of the speed word is worth four steps of error. The longer sample makes the damping 0.8, the carriage comes
+    within 3 steps at once and needs 4.7 ms for the last two, of which ready leaves it 3.
+    """
+    overrides = (f"clock.oscillator={oscillator} MHz", f"clock.sample_tap={tap}")
+    found = cautions(load_text, good_text, *overrides)
+    assert (told in found) if told else not found
+    rig = Rig(*overrides, locked=True)
+    worst = max(after_ready(rig, pitches) for pitches in (2, 6, -6, 3))
+    assert (worst > 2) == (told is not None)
+    figures = PhaseFigures(load_text(good_text, *overrides).spec)
+    if told == "method.ready_time":
+        assert worst == pytest.approx(figures.approach.off_at_ready, rel=0.4)
+        late = Rig(*overrides, f"method.ready_time={1.15 * figures.approach.settling} s", locked=True)
+        assert max(after_ready(late, pitches) for pitches in (2, 6, -6, 3)) <= 2.2
+    elif told == "overshoot of a move":
+        assert worst == pytest.approx(figures.approach.overshoot, rel=0.25)
 
 
 @pytest.mark.compiled
