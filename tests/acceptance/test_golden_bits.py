@@ -21,11 +21,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.places import ROOT
 
 import detent
+from detent.control.deviation_counter import RUN
 from detent.kernel.registers import Registers
+from detent.methods.print_head.controller import load_line
 
 EXAMPLES = Path(detent.__file__).parent / "examples"
 GOLDEN = Path(__file__).with_name("golden_bits.json")
@@ -39,8 +42,8 @@ KERNELS = ({"OPENBLAS_CORETYPE": "Prescott"} | NARROW, {"OPENBLAS_CORETYPE": "Ha
 FIRST = 4000
 """Ticks of the shorter job, from the first command on."""
 
-SAMPLES, TICKS = 25, 2000
-"""Of each of the commands, sampled every so many ticks."""
+SAMPLES = 25
+"""Of each of the commands."""
 
 
 @dataclass
@@ -54,13 +57,17 @@ class Job:
     acknowledge: Callable[[], object] = lambda: None  # the host's answer to an event
     feed: Callable[[str], tuple[Any, ...]] = lambda _: ()  # what the host has laid ready for `advance`, by motor
     later: Callable[[int], object] = lambda _: None  # what the host itself keeps of the time goes on by so many ticks
+    ticks: int = 2000  # from sample to sample: each command has time to be done
 
 
 def print_head() -> Job:
-    """Two lines, one each way, its encoder shaking."""
+    """Two lines with ink, one each way, its encoder shaking."""
     from tests.print_head_rig import Rig
 
     rig = Rig(overrides=["encoder.jitter=3 deg", "encoder.missing_edges=0.0005"]).pretend_identified()
+    # Until there was ink no column was fired, and the bits of the column timer and of the paper said nothing.
+    for bank in (0, 1):
+        load_line(rig.r.controller, bank, [range(k, k + 2) for k in range(240 + 7 * bank, 560, 5)])
 
     def acknowledge() -> None:
         if rig.head.status.latch.flag:
@@ -76,20 +83,29 @@ def print_head() -> Job:
 
 
 def phase_servo() -> Job:
-    """A pitch there and back, with noise on its detector."""
+    """Two pitches there and three back against a force, each with speed mode, position mode, ready, stop and integral.
+
+    With a noise of 0.5 us, two steps, as it was, the pulses of the noise alone counted the first pitch down within a
+    millisecond, and what was left was the noise. The noise is now that of a good comparator.
+    """
     from tests.phase_servo_rig import Rig
 
-    rig = Rig("detector.jitter=0.5 us", "detector.gain_error=2 %", "detector.offset_error=1 %", locked=True)
-    commands = (lambda: rig.command(1), lambda: rig.command(-1))
-    return Job({"": rig.p}, {"": rig.r}, commands, rig.run_ticks, rig.acknowledge)
+    errors = ("detector.jitter=15 ns", "detector.gain_error=2 %", "detector.offset_error=1 %")
+    push = (f"disturbance.push.{key}" for key in ("force=3 N", "at=1 ms", "duration=1 s"))
+    rig = Rig(*errors, *push, locked=True)
+    commands = (lambda: rig.command(2), lambda: rig.command(-3))
+    return Job({"": rig.p}, {"": rig.r}, commands, rig.run_ticks, rig.acknowledge, ticks=8000)
 
 
 def filtered_servo() -> Job:
-    """Command pulses there and back."""
+    """Command pulses there and back, with a few of noise between them; the slide comes to rest after each.
+
+    At 20 000 pulses/s, as it was, the speed counter was about to wrap after 60 ms: a fault, and the rest coasting.
+    """
     from tests.filtered_servo_rig import Rig
 
-    rig = Rig(plant=("encoder.jitter=5 deg", "disturbance.lines.inserted=20 Hz"))
-    commands = (lambda: rig.go(9000), lambda: rig.go(-9000, 12_345.0))
+    rig = Rig(plant=("encoder.jitter=5 deg", "disturbance.lines.inserted=4 Hz"))
+    commands = (lambda: rig.go(1400, 5000.0), lambda: rig.go(-1900, 6543.0))
     return Job({"": rig.p}, {"": rig.r}, commands, rig.run_ticks, rig.acknowledge)
 
 
@@ -183,12 +199,23 @@ def bits(job: Job, *, whole: bool) -> dict[str, str]:
     job.commands[0]()
     job.run(FIRST)
     found["first"] = add(job.state)
-    for command in job.commands if whole else ():
-        for _ in range(SAMPLES):
-            job.run(TICKS)
+    if whole:
+        for _ in course(job):
             found["whole"] = add(job.state)
-        command()
     return found
+
+
+def course(job: Job) -> Iterator[int]:
+    """The job from its first command on, sample by sample; gives the number of the command that is being done.
+
+    Each is followed to its end before the next. The first one used to be given twice, and none went back.
+    """
+    for number in range(len(job.commands)):
+        if number:
+            job.commands[number]()
+        for _ in range(SAMPLES):
+            job.run(job.ticks)
+            yield number
 
 
 def all_bits(*, whole: bool) -> dict[str, dict[str, str]]:
@@ -227,6 +254,55 @@ def golden() -> dict[str, dict[str, str]]:
 @pytest.mark.compiled
 def test_every_register_has_its_golden_bits(golden):
     assert all_bits(whole=True) == golden
+
+
+@pytest.mark.compiled
+def test_the_standard_job_of_the_print_head_fires_columns_both_ways():
+    job = print_head()
+    axis: Any = job.state[""]
+    head = axis.controller.head
+    job.commands[0]()
+    landed = [(head.direction, int(head.columns.fired)) for _ in course(job)]
+    fired = [max(count for direction, count in landed if direction == d) for d in (1, -1)]
+    assert fired[0] > 50
+    assert fired[1] > fired[0] + 50
+
+
+@pytest.mark.compiled
+def test_the_standard_job_of_the_phase_servo_moves_settles_and_holds_both_ways():
+    job = phase_servo()
+    axis: Any = job.state[""]
+    states: list[set[tuple[int, int, int]]] = [set(), set()]
+    places, integrals = [axis.plant.train.position], []
+    job.commands[0]()
+    for number in course(job):
+        s = axis.controller.sequencer
+        states[number].add((s.mode, s.ready, s.stop))
+        places[number + 1 :] = [axis.plant.train.position]
+        integrals.append(axis.controller.law.integral)
+    # Speed mode, position mode, ready, stop; and there the integral holds the force.
+    every = {(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)}
+    assert states == [every, every]
+    step = detent.load(EXAMPLES / "phase_servo.toml").spec.step
+    assert np.diff(places) / step == pytest.approx([128, -192], abs=2)
+    assert min(integrals) <= -4
+    assert axis.controller.guard.code == 0
+
+
+@pytest.mark.compiled
+def test_the_standard_job_of_the_filtered_servo_moves_and_comes_to_rest_both_ways():
+    job = filtered_servo()
+    axis: Any = job.state[""]
+    deviation = axis.controller.deviation
+    places, rests = [deviation.position], []
+    job.commands[0]()
+    for number in course(job):
+        assert deviation.state == RUN
+        places[number + 1 :] = [deviation.position]
+        rests[number:] = [deviation.deviation]
+    assert np.diff(places) == pytest.approx([1400, -1900], abs=10)
+    # It lags 100 pulses and more while it moves; the ringing of the filtered loop is all but over.
+    assert np.abs(rests).max() <= 8
 
 
 @pytest.mark.wide

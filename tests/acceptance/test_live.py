@@ -20,7 +20,8 @@ from detent.kernel.registers import CONTROLLER, PLANT, Registers
 from detent.methods.cascade.system import Cascade, along
 from detent.methods.registry import METHODS
 
-TICKS = 100_000
+SAMPLES = 50
+"""Of the standard job, each of so many ticks as it takes from one to the next: both of its commands."""
 
 MACHINE = ("detent.plant", "detent.drive", "detent.sensing.encoder", "detent.sensing.interference")
 """What no controller may know."""
@@ -75,11 +76,12 @@ def stretches(job: Job, name: str, ticks: int) -> Iterator[Stretch]:
 @pytest.mark.parametrize("make", JOBS, ids=lambda make: make.__name__)
 def test_01_a_controller_does_the_same_on_recorded_lines(make):
     job = make()
+    ticks = SAMPLES * job.ticks
     for name, p in job.params.items():
         axis: Any = job.state[name]
         controller, lines = axis.controller.copy(), axis.lines.copy()
         picks, passed = places(type(lines), PLANT), 0
-        for one in stretches(job, name, TICKS):
+        for one in stretches(job, name, ticks):
             memory = bytearray(bytes(controller))
             for k, value in one.written.items():
                 memory[k] = value
@@ -88,7 +90,7 @@ def test_01_a_controller_does_the_same_on_recorded_lines(make):
             assert diff(controller, one.controller) == {}
             assert out_of(lines) == one.out
             passed += len(one.rows)
-        assert passed >= TICKS
+        assert passed >= ticks
 
 
 @pytest.mark.parametrize("name", METHODS)
