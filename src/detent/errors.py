@@ -154,6 +154,16 @@ TABLE_REFUSAL_TEXT: dict[int, str] = {
 """Why the positioner of a rotary table refuses a start, by its reason (control.table_positioner)."""
 
 
+COURSE_REFUSAL_TEXT: dict[int, str] = {
+    1: "a place or a velocity that is no finite number, or beyond 1e9 m or 1e12 m/s; send one that the axis can have",
+    2: "the target lies beyond the soft limit {limit}; name one between {lowest} and {highest}, or widen the limits",
+    3: "the velocity is above the largest one, {speed}; ask for a lower one, or raise the limit of the speed",
+    4: "the limits are none that a motion could keep: speed and acceleration must be 1e-9 to 1e12, the jerk too or 0, "
+    "the lower soft limit not above the upper one; correct them",
+}
+"""Why the course of a live axis refuses a command (planning.course); what is under way goes on."""
+
+
 def describe_sb1(code: int) -> str:
     """Say what a status byte means and what to do.
 
