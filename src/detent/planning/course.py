@@ -95,14 +95,17 @@ def go_to(p: CourseLimits, c: Course, target: float) -> int:
 
 @step
 def run_at(p: CourseLimits, c: Course, velocity: float) -> int:
-    """To a velocity, until something else is commanded or the stop must begin that ends at the soft limit."""
+    """To a velocity, until something else is commanded or the stop must begin that ends at the soft limit.
+
+    A velocity below `LEAST` is none: a stop.
+    """
     if not is_usable(p):
         return UNUSABLE_LIMITS
     if not -LARGEST <= velocity <= LARGEST:
         return OUT_OF_RANGE
     if abs(velocity) > p.speed:
         return TOO_FAST
-    if velocity == 0.0:
+    if abs(velocity) < LEAST:
         come_to_rest(p, c)
     elif c.mode != RUN or c.run != velocity or differs(p, c.asked):
         take_limits(p, c, -FARTHEST, FARTHEST)

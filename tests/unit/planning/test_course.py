@@ -271,8 +271,11 @@ def test_a_jog_may_turn_slow_down_and_end(m):
         for _ in range(75):
             checked(m, p, c, T)
         assert (c.velocity, c.acceleration) == (velocity, 0.0)
-    assert m.run_at(p, c, 0.0) == m.TAKEN
-    assert c.mode == m.STOP
+    for velocity in (0.0, -0.9e-9, 5e-324):
+        m.run_at(p, c, 0.25)
+        m.advance(p, c, T)
+        assert m.run_at(p, c, velocity) == m.TAKEN
+        assert c.mode == m.STOP
     follow(m, p, c, T)
 
 
