@@ -70,6 +70,7 @@ def setup(app: Any) -> None:
     app.add_html_math_renderer("mathml", (put_formula("inline"), None), (put_formula("block"), None))
     import figures
     import figures_cascade
+    import figures_course
     import figures_house
     import figures_rotary
     import figures_servos
@@ -82,4 +83,5 @@ def setup(app: Any) -> None:
     figures_rotary.draw_all()
     figures_steppers.draw_all()
     figures_cascade.draw_all()
+    figures_course.draw_all()
     figures_house.draw_all()
