@@ -97,17 +97,18 @@ def go_to(p: CourseLimits, c: Course, target: float) -> int:
 def run_at(p: CourseLimits, c: Course, velocity: float) -> int:
     """To a velocity, until something else is commanded or the stop must begin that ends at the soft limit.
 
-    A velocity below `LEAST` is none: a stop.
+    A velocity below `LEAST` is none: a stop, which is never refused.
     """
+    if abs(velocity) < LEAST:
+        come_to_rest(p, c)
+        return TAKEN
     if not is_usable(p):
         return UNUSABLE_LIMITS
     if not -LARGEST <= velocity <= LARGEST:
         return OUT_OF_RANGE
     if abs(velocity) > p.speed:
         return TOO_FAST
-    if abs(velocity) < LEAST:
-        come_to_rest(p, c)
-    elif c.mode != RUN or c.run != velocity or differs(p, c.asked):
+    if c.mode != RUN or c.run != velocity or differs(p, c.asked):
         take_limits(p, c, -FARTHEST, FARTHEST)
         c.mode, c.run = RUN, velocity
         lay(c)
@@ -351,7 +352,7 @@ def lay_stretch(c: Course, t: float, x: float, v: float, a: float, j: float) -> 
 
 @step
 def advance(p: CourseLimits, c: Course, period: float) -> None:
-    """One sample; `p` may be other limits than at the last one."""
+    """One sample; `p` may be other limits than at the last one. A period that is no time is no sample."""
     if c.mode == REST or not 0.0 < period <= LONGEST_PERIOD:
         return
     if c.due or differs(p, c.asked):
