@@ -22,6 +22,7 @@ from detent.files.findings import Caution, Contradiction, Derived
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.methods.linear import LinearModel
+    from detent.methods.position import PositionSensor
     from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
@@ -140,6 +141,8 @@ class Method(Protocol[SpecT]):
     takes: ClassVar[str]  # place of the class of its jobs
     reads: ClassVar[str]  # place of what reads a job file
     runs: ClassVar[str]  # place of what makes a job: ``run(spec, job, recorder=, progress=)``
+    senses: ClassVar[str] = ""
+    """Place of what counts its position: ``senses(spec)``, by the name of the motor; of a single one by ""."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
@@ -247,6 +250,15 @@ class Method(Protocol[SpecT]):
                 "look at its steps with run and compare"
             )
         return LinearModel(spec.axis.name, self.brought(self.linear_loops)(spec), self.leaves_out)
+
+    def sensors(self, spec: SpecT) -> "Mapping[str, PositionSensor]":
+        """What counts the position of each of its motors; of a single one by the name ""."""
+        if not self.senses:
+            raise DetentError(
+                f"{spec.axis.name}: got an axis of the method {self.name}, which does not say what counts its "
+                "position; expected: a method with `senses`; add it to the class of the method"
+            )
+        return self.brought(self.senses)(spec)
 
     def compare(self, spec: SpecT, progress: "Progress | None" = None) -> "tuple[Comparison, ...]":
         """The method beside its alternatives on this axis; none by default."""

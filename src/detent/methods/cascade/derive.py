@@ -11,10 +11,24 @@ from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, quantity_figure
 from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.position import PositionSensor, Sensed
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
     from detent.methods.cascade.loop import LinearLoop
+
+
+def position_sensors(spec: CascadeSpec) -> dict[str, PositionSensor]:
+    """The encoder of the position loop; one that reads the position itself is kept in nanometres or nanoradians."""
+    scale = spec.encoder_of("position").resolution or 1e-9
+    sensor = f"incremental encoder of the {spec.method.feedback.position}"
+    window = max(1, round(spec.method.in_position / scale))
+    return {
+        "": PositionSensor(
+            sensor=sensor, kind=Sensed.INCREMENTAL, scale=scale, unit=spec.unit("m"),
+            ends=(spec.limits.lowest, spec.highest), window=window,
+        )
+    }  # fmt: skip
 
 
 def dead_time(spec: CascadeSpec) -> float:

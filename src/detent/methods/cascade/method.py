@@ -26,6 +26,7 @@ class CascadeMethod(Method[CascadeSpec]):
     rotary: type[CascadeSpec] | None = rotary_model(CascadeSpec)
     catalogue = DC_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
+    senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:Cascade", "system:CascadeParams"
     signals = "run:CASCADE_SIGNALS"

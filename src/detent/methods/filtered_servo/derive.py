@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, quantity_figure
 from detent.methods.filtered_servo.schema import FilteredServoSpec
+from detent.methods.position import PositionSensor, Sensed
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
 
 RAMP_WINDOWS = 2000  # windows of a ramp that are computed at most: its beginning is forgotten by then
 SETTLING_WINDOWS = 200  # windows after a ramp in which the largest count is looked for
+
+
+def position_sensors(spec: FilteredServoSpec) -> dict[str, PositionSensor]:
+    """The encoder on the motor shaft."""
+    ends, window = (0.0, spec.limits.travel), max(1, spec.method.in_position)
+    sensor = "incremental encoder on the motor shaft"
+    return {"": PositionSensor(sensor=sensor, kind=Sensed.INCREMENTAL, scale=spec.pulse, ends=ends, window=window)}
 
 
 class FilteredFigures:

@@ -32,6 +32,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     spec = FilteredServoSpec
     catalogue = DC_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
+    senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:FilteredServo", "system:FilteredServoParams"
     every = 10

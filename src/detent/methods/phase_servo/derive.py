@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from detent.files.findings import Derived, count_figure, quantity_figure
 from detent.methods.phase_servo.schema import TABLE_ENTRIES, PhaseServoSpec
+from detent.methods.position import PositionSensor, Sensed
 from detent.units import format_quantity
 
 if TYPE_CHECKING:
@@ -35,6 +36,17 @@ LONGEST_LOOK = 12
 """Time for which it is looked at from the change of mode, over the inverse of the loop's natural frequency."""
 
 MOST_STEPS = 1500  # of an approach at most
+
+
+def position_sensors(spec: PhaseServoSpec) -> dict[str, PositionSensor]:
+    """The resolver: its word is absolute within a pitch."""
+    counts, lag = spec.detector.counts, spec.detector.lag_counts
+    return {
+        "": PositionSensor(
+            sensor=f"resolver of {counts} counts a pitch, lag {lag}", kind=Sensed.BAND, scale=spec.step,
+            ends=(0.0, spec.limits.travel), band=counts, window=spec.arrived_steps,
+        )
+    }  # fmt: skip
 
 
 class PhaseFigures:

@@ -37,6 +37,7 @@ class PhaseServoMethod(MoveMethod[PhaseServoSpec]):
     spec = PhaseServoSpec
     catalogue = DC_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
+    senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:PhaseServo", "system:PhaseServoParams"
     every = 256

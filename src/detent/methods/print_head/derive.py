@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 from detent.files.findings import Derived, count_figure, quantity_figure
 from detent.files.quantities import INCH
+from detent.methods.position import PositionSensor, Sensed
 from detent.methods.print_head.schema import EMITTER, FULL_DRIVE_COUNTS, SPEED_STEP, PrintHeadSpec, speed_value
 from detent.units import format_quantity
 
@@ -18,6 +19,12 @@ DIRECTIONS = ("right", "left")
 TURN_AROUND_TIME = 0.133  # turn-around at 40 in/s the ramp is made for [s] (3.10)
 RUN_UP_RESERVE = 1.05  # run-up before a print line, in stop distances (3.4)
 FRAME_RESERVE = 12  # emitters a turning point keeps away from a frame
+
+
+def position_sensors(spec: PrintHeadSpec) -> dict[str, PositionSensor]:
+    """The emitters of the encoder, counted from the left frame."""
+    ends, sensor = (0.0, spec.limits.travel), "incremental encoder on the motor shaft"
+    return {"": PositionSensor(sensor=sensor, kind=Sensed.INCREMENTAL, scale=EMITTER, ends=ends)}
 
 
 class HeadFigures:

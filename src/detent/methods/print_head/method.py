@@ -20,6 +20,7 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
     spec = PrintHeadSpec
     catalogue = DC_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
+    senses = "derive:position_sensors"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:PrintHead", "system:PrintHeadParams"
     every = 10

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from detent.files.findings import Derived, count_figure, quantity_figure
+from detent.methods.position import PositionSensor, Sensed
 from detent.methods.rotary_table.loop import HeldLoop
 from detent.methods.rotary_table.schema import FineTable, RotaryTableSpec
 from detent.units import format_quantity
@@ -21,6 +22,21 @@ if TYPE_CHECKING:
 TICK = 1e-4  # base tick [s] (`methods.rotary_table.system`)
 
 POINTS = 256  # places of a turn at which the errors of a resolver are looked at, those of `kernel.turn_table`
+
+
+def position_sensors(spec: RotaryTableSpec) -> dict[str, PositionSensor]:
+    """Two resolvers that show the angle within the turn; their zero is that of the calibration (3.1)."""
+    fine, coarse = spec.detector.fine, spec.detector.coarse
+    sensor = (
+        f"resolvers of {fine.counts} and {coarse.counts} counts, gear 1:{spec.ratio}, "
+        f"calibrated at {fine.mounting!r} rad and {coarse.mounting!r} rad"
+    )
+    window = max(1, spec.method.in_position)
+    return {
+        "": PositionSensor(
+            sensor=sensor, kind=Sensed.ABSOLUTE, scale=spec.count, unit="rad", band=spec.period, window=window
+        )
+    }
 
 
 class TableFigures:

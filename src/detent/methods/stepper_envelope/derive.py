@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.files.findings import Derived
+from detent.methods.position import PositionSensor, Sensed
 from detent.methods.stepper_envelope.build import make_step_ramp, start_hz, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.rules import Motor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
@@ -27,6 +28,17 @@ PULL_OUT_FORMULA = {
     "first order": "T_po0 / sqrt(1 + (f / f_c)^2)",
     "points": "between the points of the curve",
 }
+
+
+def position_sensors(spec: StepperEnvelopeSpec) -> dict[str, PositionSensor]:
+    """No sensor: the pulses of each motor, counted from the lower end of its travel."""
+    return {
+        name: PositionSensor(
+            sensor="none; pulses are counted", kind=Sensed.INCREMENTAL, scale=table.step,
+            origin=table.mechanics.lower_end, ends=(table.mechanics.lower_end, table.upper_end),
+        )
+        for name, table in spec.stepper.items()
+    }  # fmt: skip
 
 
 class MotorFigures(Motor):

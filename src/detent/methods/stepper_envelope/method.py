@@ -31,6 +31,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     spec = StepperEnvelopeSpec
     catalogue = STEPPER_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
+    senses = "derive:position_sensors"
     refuses, warns = "rules:RULES", "checks:find_cautions"
     state, params = "system:Stepper", "system:StepperParams"
     every = 100
