@@ -26,7 +26,7 @@ Made = TypeVar("Made")
 _HEADING = re.compile(r"([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _POINT_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _COMMA_NUMBER = re.compile(_POINT_NUMBER.pattern.replace(r"\.", ","))
-_WHOLE_NUMBER = re.compile(r"([+-]?)0*([0-9]{1,9})")
+_WHOLE_NUMBER = re.compile(r"([+-]?)0*([0-9]{1,19})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,8 @@ class CsvRows(Generic[AnyRow]):
         names = [split_heading(cell)[0].partition("[")[0].strip().lower() for cell in self.header.cells]
         if not any(name in self.fields for name in names):
             first = self.model.one_of[0]
-            remedy = f"begin with a header such as {self.heading_of(first)}{self.separator}{self.heading_of('dwell')}"
+            other = next(key for key in self.fields if key not in self.model.one_of)
+            remedy = f"begin with a header such as {self.heading_of(first)}{self.separator}{self.heading_of(other)}"
             self.refuse_header(f"names of columns: {self._headings()}", remedy)
             return
         for index, cell in enumerate(self.header.cells):
