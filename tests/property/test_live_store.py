@@ -15,7 +15,7 @@ from detent.methods.position import PositionSensor, Sensed
 
 NAMES = st.sampled_from(["1", "2", "loading", "é", "a,b"])
 COUNTS = st.integers(0, TRAVEL)
-READINGS = st.integers(-LARGEST, LARGEST)
+READINGS = st.integers(-LARGEST, LARGEST) | st.integers(-2 * TRAVEL, 2 * TRAVEL)
 
 
 class StoreMachine(RuleBasedStateMachine):

@@ -44,19 +44,9 @@ class MarkError(DiskError):
 class Store:
     """The store of one axis, for one process at a time.
 
-    Positions are int64 counts of `sensor`. A store that is absent is made; one that does not fit is kept aside, and
-    `aside` says so. Until `restore` has judged what was kept, the position is unknown.
-
-    Parameters
-    ----------
-    path : Path or str
-        The file; `store_path` says where it lies by default.
-    sensor : PositionSensor
-        What positions mean, of the axis file (`Method.sensors`).
-    clock : callable
-        Gives the time of day.
-    place : str
-        Where the store lies, if not where `here` says.
+    Positions are int64 counts of `sensor`, which the axis file gives (`Method.sensors`). A store that is absent is
+    made; one that does not fit is kept aside, and `aside` says so. Until `restore` has judged what was kept, the
+    position is unknown. `clock` gives the time of day; `place` says where the store lies, if not where `here` does.
     """
 
     def __init__(

@@ -96,33 +96,36 @@ def judge(sensor: PositionSensor, saved: Saved | None, reading: int | None) -> J
 def _judge_reading(sensor: PositionSensor, saved: Saved, reading: int | None) -> Judgement:
     if saved.offset is None or reading is None:
         return Judgement(Trust.UNKNOWN, Why.NO_OFFSET if saved.offset is None else Why.NO_READING)
-    places = shown_places(sensor, saved, reading + saved.offset)
-    if not places:
+    place = shown_place(sensor, saved, reading + saved.offset)
+    if place is None:
         return Judgement(Trust.UNKNOWN, Why.OUTSIDE)
-    shown = min(places, key=lambda place: abs(place - saved.counts))
+    shown, is_only = place
     distance = shown - saved.counts
     if sensor.is_circle:
         distance = (distance + sensor.band // 2) % sensor.band - sensor.band // 2
-    if len(places) > 1:
+    if not is_only:
         return Judgement(Trust.UNKNOWN, Why.AMBIGUOUS, None, shown, distance)
     if not saved.moving and abs(distance) > sensor.window:
         return Judgement(Trust.UNKNOWN, Why.MOVED, None, shown, distance)
     return Judgement(Trust.RESTORED, Why.UNIQUE if saved.moving else Why.READ, shown, shown, distance)
 
 
-def shown_places(sensor: PositionSensor, saved: Saved, place: int) -> list[int]:
-    """Places at which the axis can stand with this reading, the nearest to where it was left and its neighbours.
+def shown_place(sensor: PositionSensor, saved: Saved, place: int) -> tuple[int, bool] | None:
+    """Of the places at which the axis can stand with this reading the nearest to where it was left; is it the only one.
 
     An axis that was held at rest stands within half a band of where it was left.
     """
     if sensor.is_circle:
-        return [place % sensor.band]
+        return place % sensor.band, True
     low, high = sensor.reach or (-math.inf, math.inf)
     if sensor.kind is Sensed.ABSOLUTE:
-        return [place] if low <= place <= high else []
-    half = sensor.band // 2
+        return (place, True) if low <= place <= high else None
+    band, half = sensor.band, sensor.band // 2
+    near = saved.counts + (place - saved.counts + half) % band - half
     if sensor.held and not saved.moving:
-        low, high = max(low, saved.counts - (sensor.band - 1) // 2), min(high, saved.counts + half)
-    left = max(min(saved.counts, high), low)
-    near = left + (place - left + half) % sensor.band - half
-    return [int(one) for one in (near, near - sensor.band, near + sensor.band) if low <= one <= high]
+        return (near, True) if low <= near <= high else None
+    if sensor.reach is None:
+        return near, False
+    low, high = sensor.reach
+    first, last = low + (place - low) % band, high - (high - place) % band
+    return (min(max(near, first), last), first == last) if first <= last else None

@@ -72,6 +72,12 @@ def test_on_a_circle_the_distance_is_the_short_way():
     assert (judged.why, judged.shown, judged.distance) == (Why.MOVED, TRAVEL - 10, -20)
 
 
+@pytest.mark.parametrize(("left", "stands"), [(340, 15_048), (19_654, 8517), (-300, 5000), (TRAVEL + 300, 5000)])
+def test_of_many_bands_that_fit_none_is_taken_however_near_the_end_it_was_left(left, stands):
+    saved = replace(MOVING, counts=left)
+    assert judge(SENSORS["band"], saved, read(SENSORS["band"], stands, 77)).why is Why.AMBIGUOUS
+
+
 def test_a_turn_more_of_an_axis_without_ends_is_not_excluded():
     endless = sensor(Sensed.BAND, ends=None)
     assert judge(endless, PARKED, 4923 % BAND).why is Why.AMBIGUOUS
