@@ -53,9 +53,10 @@ class Event:
 
 
 class RecordingDisk:
-    """Connections whose writes are noted in `events`."""
+    """Connections whose writes are noted in `events`, with the syncs that `synchronous` asks for."""
 
-    def __init__(self) -> None:
+    def __init__(self, synchronous: str = "FULL") -> None:
+        self._synchronous = synchronous
         self.events: list[Event] = []
         self._files: dict[int, str] = {}
         self._kept: list[object] = []  # what SQLite points at
@@ -73,7 +74,13 @@ class RecordingDisk:
 
     def connect(self, path: Path) -> sqlite3.Connection:
         name = f"{path.absolute().as_uri()}?vfs={self.name}"
-        return sqlite3.connect(name, uri=True, timeout=0.0, isolation_level=None)
+        synchronous = self._synchronous
+
+        class Connection(sqlite3.Connection):
+            def execute(self, sql, *values):
+                return super().execute(sql.replace("synchronous=FULL", f"synchronous={synchronous}"), *values)
+
+        return sqlite3.connect(name, uri=True, timeout=0.0, isolation_level=None, factory=Connection)
 
     def _open(self, vfs, name, file, flags, told):
         result = self._base_open(self._base, name, file, flags, told)

@@ -14,10 +14,12 @@ import scipy.io
 from detent import example, load, load_trace
 from detent.identify.analyse.analyses import ANALYSES, analyse
 from detent.identify.fit.identification import identify
+from detent.live.positions import load_positions
 from detent.logs.mapping import load_mapping, parse_options
 from detent.logs.read_log import read_log
 from detent.methods.check import check_spec
 from detent.methods.load import read_axis
+from detent.methods.registry import METHODS
 from detent.record.trace import Trace
 from detent.record.trace_files import save_trace
 from detent.units import parse_quantity
@@ -72,6 +74,11 @@ def job_of(name: str) -> Callable[[Path], object]:
     return lambda path: axis(name).load_job(path)
 
 
+def positions(path: Path) -> object:
+    (sensor,) = METHODS["cascade"].sensors(axis("cascade.toml").spec).values()
+    return load_positions(path, sensor)
+
+
 def units(path: Path) -> object:
     text = text_of(path)
     return [attempt(text, unit) for unit in ("m", "s", "Hz", "kg", "K", "%", "rad/s")]
@@ -109,6 +116,8 @@ OPTIONS = (
 )
 QUANTITIES = ("12 mm", "-2.5 %", "3 in/s^2", "1e3 kg*m**2", "0.3125 µm", "20 °C", "3/4 in", "1 N·m/A", "5 1/s")
 TEXT = "letter\twith tabs\n\x0cpage two, b\u0301, 12.5 mm\r\noverstruck\rline\n"
+POSITIONS = "name,position [mm],counts,tolerance [um]\n1,12.5,12500,10\n2,0.75,,\nloading,,40000,5\n"
+POSITIONS_TOML = '[[position]]\nname = "1"\nposition = "12.5 mm"\ncounts = 12500\ntolerance = "10 um"\n'
 MOVES = '[[move]]\nto = "10 mm"\nspeed = "0.1 m/s"\nrepeat = 3\n[[move]]\nby = "-2 mm"\ndwell = "5 ms"\n'
 
 # ---- recordings
@@ -234,6 +243,8 @@ TARGETS = {
         Target("job sequence", ".toml", job_of("rotary_table.toml"), examples("index_sequence.toml"), cases=50),
         Target("job tiles", ".csv", job_of("stage.toml"), examples("tiles.csv")),
         Target("job zoom", ".toml", job_of("zoom.toml"), examples("zoom_sequence.toml"), cases=50),
+        Target("positions", ".csv", positions, given(POSITIONS)),
+        Target("positions toml", ".toml", positions, given(POSITIONS_TOML), cases=50),
         Target("mapping", ".toml", load_mapping, given(MAPPING), cases=50),
         Target("--column", ".txt", lambda path: parse_options(text_of(path).split("\n")), given(*OPTIONS)),
         Target("log csv", ".csv", read_log, csv_logs, cases=25),

@@ -18,8 +18,8 @@ from detent.files.quantities import Length
 from detent.files.read import Row, read_tables, refuse
 from detent.files.read_csv import CsvRows
 from detent.files.source import parse_source
-from detent.files.text import check_target, decode_utf8, read_data, write_text
-from detent.live.rows import LARGEST, MOST_NAME, MOST_POSITIONS, Position
+from detent.files.text import check_target, decode_utf8, read_data, short, write_text
+from detent.live.rows import LARGEST, MOST_NAME, MOST_POSITIONS, NAME, Position, is_name
 from detent.methods.position import PositionSensor
 from detent.units import format_quantity
 
@@ -27,7 +27,7 @@ AnyRow = TypeVar("AnyRow", bound=Row)
 
 KINDS = (".csv", ".toml")
 _WHAT_IT_IS = "a position table (.csv or .toml)"
-_TURN = 2.0**-50  # share of a position that two ways of writing it may differ by
+_ROUNDED = 2.0**-50  # share of a position that two ways of writing it may differ by
 
 
 class PositionRow(Row, frozen=True):
@@ -82,24 +82,29 @@ def _counts(row: PositionRow, sensor: PositionSensor) -> int:
 
 
 def _faults(file: str, made: Iterable[tuple[int, PositionRow]], sensor: PositionSensor) -> Iterator[FileProblem]:
-    """Names given twice; positions and counts that are not the same place."""
+    """Names that will not do or are given twice; places that are none, or two."""
     names: set[str] = set()
+    low, high = sensor.reach or (-LARGEST - 1, LARGEST)
     for line, row in made:
+        if not is_name(row.name):
+            yield FileProblem(file, line, 1, "name", f'"{short(row.name)}"', NAME, "give it such a name")
         if row.name in names:
             allowed, remedy = "each name once", "remove one of them, or give it another name"
-            yield FileProblem(file, line, 1, "name", f'"{row.name}" again', allowed, remedy)
+            yield FileProblem(file, line, 1, "name", f'"{short(row.name)}" again', allowed, remedy)
         names.add(row.name)
-        if row.counts is None or row.position is None:
-            continue
-        meant = sensor.position(row.counts)
-        if abs(meant - row.position) > 0.5 * sensor.scale + _TURN * abs(meant):
-            where = format_quantity(row.position, sensor.unit, 6)
+        counts, key = _counts(row, sensor), "position" if row.counts is None else "counts"
+        meant = sensor.position(counts)
+        if row.position is not None and abs(meant - row.position) > 0.5 * sensor.scale + _ROUNDED * abs(meant):
             yield FileProblem(
-                file, line, 1, "counts", f"{row.counts} counts at {where}",
+                file, line, 1, "counts", f"{counts} counts at {format_quantity(row.position, sensor.unit, 6)}",
                 f"{sensor.counts(row.position)} counts, as this axis has there",
                 "the table is of an axis with another scale: take the counts out where the positions hold, and the "
                 "positions where the counts do",
             )  # fmt: skip
+        elif not low <= counts <= high:
+            ends = " to ".join(format_quantity(sensor.position(end), sensor.unit, 6) for end in (low, high))
+            got = f"{format_quantity(meant, sensor.unit, 6)} ({counts} counts)"
+            yield FileProblem(file, line, 1, key, got, ends, "give a place within the travel")
 
 
 def save_positions(path: Path | str, positions: Iterable[Position], sensor: PositionSensor) -> Path:

@@ -2,12 +2,22 @@
 
 from dataclasses import dataclass
 
+from detent.files.text import shown
+
 VERSION = 1  # of the meaning of the rows
 MOST_POSITIONS = 1000  # of a table
 MOST_EDITS = 2000  # changed entries that can be undone
 MOST_NAME = 80  # characters
 LARGEST = (1 << 63) - 1  # counts
 COUNTERS = ("moves", "distance", "enabled", "faults", "starts")  # counts of way; microseconds enabled
+
+
+NAME = f"1 to {MOST_NAME} characters of one line without blanks around them"
+
+
+def is_name(text: str) -> bool:
+    """Whether a position may have this name: what is shown and typed as it is."""
+    return 0 < len(text) <= MOST_NAME and text == text.strip() and text.isprintable() and shown(text) == text
 
 
 @dataclass(frozen=True, slots=True)

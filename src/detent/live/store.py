@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any, Self
 
 from detent.errors import DetentError, DiskError
-from detent.files.text import did_you_mean, shown
+from detent.files.text import did_you_mean, short
 from detent.live.opening import here, open_fitting
 from detent.live.rows import (
     COUNTERS,
     LARGEST,
     MOST_EDITS,
-    MOST_NAME,
     MOST_POSITIONS,
+    NAME,
     Constant,
     Counter,
     Edit,
@@ -29,6 +29,7 @@ from detent.live.rows import (
     Motion,
     Position,
     Reference,
+    is_name,
 )  # fmt: skip
 from detent.live.sealed import Change, Connect, connect
 from detent.live.trust import Judgement, Saved, Trust, Why, judge
@@ -190,7 +191,7 @@ class Store:
         if found is None:
             remedy = did_you_mean(name, self.positions, "teach it first")
             raise DetentError(
-                f'{self.path}: got the unknown position "{shown(name)}"; expected: one of the table; {remedy}'
+                f'{self.path}: got the unknown position "{short(name)}"; expected: one of the table; {remedy}'
             )
         return found
 
@@ -198,7 +199,7 @@ class Store:
         """Make a place that the axis stands at an entry, in the place of one of this name."""
         if self.trust is Trust.UNKNOWN:
             raise DetentError(
-                f'{self.path}: got "{shown(name)}" to teach while the position is unknown ({self._standing.why}); '
+                f'{self.path}: got "{short(name)}" to teach while the position is unknown ({self._standing.why}); '
                 "expected: once it is known; home the axis, or type the position in"
             )
         return self.edit(name, counts, tolerance)
@@ -251,11 +252,9 @@ class Store:
 
     def _entry(self, name: str, counts: int, tolerance: int) -> Position:
         """A new entry, checked."""
-        if not 0 < len(name) <= MOST_NAME or name != name.strip() or shown(name) != name or not name.isprintable():
-            raise DetentError(
-                f'{self.path}: got the name "{shown(name)[:MOST_NAME]}"; expected: 1 to {MOST_NAME} characters of one '
-                "line without blanks around them; give the position such a name"
-            )
+        if not is_name(name):
+            got = f'{self.path}: got the name "{short(name)}"'
+            raise DetentError(f"{got}; expected: {NAME}; give the position such a name")
         self._check_counts(f'the position "{name}"', counts)
         if not 0 <= tolerance <= LARGEST:
             raise DetentError(

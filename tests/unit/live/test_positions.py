@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 from tests.live_rig import SENSORS, memory_folder, open_store, table_of
 
@@ -38,10 +40,11 @@ def test_people_write_units_or_counts(tmp_path):
 def test_numbers_of_any_axis_fit(tmp_path):
     file = tmp_path / "table.csv"
     file.write_text(f"name,counts\n1,{2**63 - 1}\n2,-9223372036854775808\n", encoding="utf-8")
-    assert load_positions(file, RULED) == [("1", 2**63 - 1, 0), ("2", -(2**63), 0)]
+    endless = replace(RULED, ends=None)
+    assert load_positions(file, endless) == [("1", 2**63 - 1, 0), ("2", -(2**63), 0)]
     file.write_text(f"name,counts\n1,{2**63}\n", encoding="utf-8")
     with pytest.raises(InputError) as refused:
-        load_positions(file, RULED)
+        load_positions(file, endless)
     assert [(one.line, one.key) for one in refused.value.problems] == [(2, "counts")]
 
 
@@ -59,6 +62,9 @@ def test_counts_of_another_scale_are_other_places(tmp_path):
     [
         ("name,position [mm]\n1,2\n1,3\n", "name", 3),
         ("name,position [mm]\n,3\n", "name", 2),
+        ("name,position [mm]\na\u202eb,3\n", "name", 2),
+        ("name,position [mm]\n1,3\n2,20.006\n", "position", 3),
+        ("name,counts\n1,-6\n", "counts", 2),
         ("name,position [mm],counts\n1,,\n", "position", 2),
         ("name,position [s]\n1,3\n", "", 1),
         ("name,position\n1,3\n", "", 1),
