@@ -19,8 +19,10 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from hashlib import blake2b
+from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
+from weakref import WeakValueDictionary
 
 from detent.errors import DetentError, DiskError
 
@@ -37,7 +39,7 @@ _TYPES = {int: "INTEGER", float: "REAL", str: "TEXT"}
 _OF_THE_DISK = {3, 5, 6, 7, 8, 9, 10, 13, 14, 23}
 _BUSY = {5, 6}
 _LOCKS = 0x40000000  # where SQLite locks a file [byte]
-_OPEN: dict[tuple[int, int], int] = {}  # files that are open here, by disk and number, and the process that says so
+_OPEN: "WeakValueDictionary[tuple[int, int], SealedFile]" = WeakValueDictionary()  # here, by disk and number
 
 
 class StoreHeldError(DetentError):
@@ -83,12 +85,12 @@ class SealedFile:
         except BaseException:
             self._connection.close()
             raise
-        self._place = identity(path)
-        _OPEN[self._place] = os.getpid()
+        self.place, self.process = identity(path), os.getpid()
+        _OPEN[self.place] = self
 
     def close(self) -> None:
         """Let others open it; the empty journal goes while it is still locked."""
-        _OPEN.pop(self._place, None)
+        _OPEN.pop(self.place, None)
         with suppress(sqlite3.Error):
             self._connection.execute("PRAGMA journal_mode=DELETE")
         self._connection.close()
@@ -111,7 +113,7 @@ class SealedFile:
     def change(self) -> Generator["Change"]:
         """What is done inside is durable when this ends, or nothing of it is: then with a `DiskError`."""
         with self._told("cannot be written"):
-            if identity(self.path) != self._place:
+            if identity(self.path) != self.place:
                 raise DiskError(
                     f"{self.path}: cannot be written (it was removed or replaced while it was open); "
                     "stop the axis and start it again"
@@ -151,6 +153,8 @@ class SealedFile:
             else:
                 self._check()
             self._connection.execute("COMMIT")
+        except OSError as error:
+            raise _disk_error(self.path, "cannot be opened", error) from error
         except (sqlite3.Error, UnicodeError) as error:
             code = _code(error)
             if code in _BUSY:
@@ -238,7 +242,12 @@ class Change:
 
 def _plain(kind: type, value: Any) -> Any:
     """A value as SQLite gives it back: a word of an enumeration as text, a zero without a sign."""
-    return float(value) + 0.0 if kind is float else kind(value)
+    if kind is not int:
+        return float(value) + 0.0 if kind is float else kind(value)
+    number = index(value)
+    if not -(1 << 63) <= number < 1 << 63:
+        raise DetentError(f"{number} to keep; expected: whole numbers of 64 bits; look for a sensor that counts wrong")
+    return number
 
 
 def _table(kind: type) -> str:
@@ -371,7 +380,8 @@ def identity(path: Path) -> tuple[int, int]:
 
 def _refuse_second(path: Path) -> None:
     """Refuse a file that is open here: to open and close it once more would give its locks away."""
-    if _OPEN.get(identity(path)) == os.getpid():
+    known = _OPEN.get(identity(path))
+    if known is not None and known.process == os.getpid():  # not of the process that this one was forked from
         raise StoreHeldError(path, f"this process ({os.getpid()})")
 
 

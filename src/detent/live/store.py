@@ -43,7 +43,7 @@ class MarkError(DiskError):
 
 
 class Store:
-    """The store of one axis, for one process at a time.
+    """The store of one axis, for one process at a time, and one thread of it.
 
     Positions are int64 counts of `sensor`, which the axis file gives (`Method.sensors`). A store that is absent is
     made; one that does not fit is kept aside, and `aside` says so. Until `restore` has judged what was kept, the

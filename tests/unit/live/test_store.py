@@ -1,4 +1,5 @@
 import errno
+import gc
 import os
 import resource
 import shutil
@@ -277,6 +278,23 @@ def test_a_second_opener_is_told_who_has_it(store):
     with again(store) as late:
         assert late.aside is None
         assert table_of(late) == {"1": (1, 0)}
+
+
+def test_a_store_that_was_forgotten_is_not_held(path):
+    for _ in range(3):
+        forgotten = open_store(path, HELD)
+        forgotten._file._connection.close()
+        del forgotten
+        gc.collect()
+
+
+@pytest.mark.parametrize("counts", [1 << 63, -(1 << 63) - 1])
+def test_a_position_is_a_number_of_64_bits(store, counts):
+    store.moving()
+    for keep in (store.parked, lambda number: store.refer(number, "index")):
+        with pytest.raises(DetentError, match="64 bits"):
+            keep(counts)
+    assert store.saved.moving
 
 
 def test_a_store_that_is_taken_away_is_written_no_more(store):
