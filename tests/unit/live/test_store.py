@@ -16,7 +16,7 @@ from tests.live_rig import SENSORS, TRAVEL, Model, memory_folder, open_store, ta
 
 from detent.errors import DetentError, DiskError
 from detent.live.rows import VERSION
-from detent.live.sealed import APPLICATION, StoreHeldError
+from detent.live.sealed import APPLICATION, DamagedError, StoreHeldError
 from detent.live.store import MarkError
 from detent.live.trust import Trust, Why
 
@@ -112,6 +112,22 @@ def test_a_position_that_is_distrusted_stays_so(store):
     store.parked(1000)
     with again(store) as late:
         assert late.restore().why is Why.UNREFERENCED
+
+
+def test_an_absolute_sensor_does_not_bring_back_what_was_distrusted_or_never_known(path):
+    with open_store(path, RULED) as store:
+        store.refer(1000, "index", 923)
+        store.moving()
+        store.distrust()
+        with again(store) as late:
+            assert late.saved.moving
+            assert late.restore(4923).why is Why.UNREFERENCED
+            late.parked(5000)
+            late.refer(5000, "index", 4923)
+            with again(late) as later:  # which begins to move before it was judged
+                later.moving()
+                with again(later) as last:
+                    assert last.restore(4923).why is Why.UNREFERENCED
 
 
 def test_a_reference_at_rest_and_one_in_motion(path):
@@ -383,6 +399,8 @@ def test_no_flipped_bit_of_any_byte_gets_through(path, tried):
         (lambda content: content[:68] + b"\0\0\0\1" + content[72:], "another application"),
         (lambda content: content[:60] + (VERSION + 1).to_bytes(4, "big") + content[64:], f"version {VERSION + 1}"),
         (lambda content: content[:8192] + bytes(4096) + content[12288:], ""),
+        # a free page that there is not, which the next change would write to
+        (lambda content: content[:39] + b"\1" + content[40:], "SQLite"),
     ],
 )
 def test_what_is_no_store_is_kept_aside(path, damage, reason):
@@ -430,6 +448,24 @@ def test_entries_are_read_from_what_was_kept_aside(path):
     connection.close()
     with open_store(path, HELD) as store:
         assert [(one.name, one.counts) for one in store.aside.positions] == [("2", 6000)]
+
+
+def test_what_another_process_has_kept_aside_meanwhile_is_not_moved_again(path, monkeypatch):
+    filled(path)
+    good = path.read_bytes()
+    path.write_bytes(b"x" * 200)
+
+    def check(file, _version):
+        if file.read_bytes() != good:
+            file.rename(file.with_name("aside by another"))
+            file.with_name("new").write_bytes(good)
+            file.with_name("new").rename(file)
+            raise DamagedError("as another process found as well")
+
+    monkeypatch.setattr("detent.live.sealed._check_head", check)
+    with open_store(path, HELD) as store:
+        assert store.aside is None
+        assert store.restore().counts == 5000
 
 
 def test_stores_that_are_kept_aside_do_not_replace_one_another(path):
