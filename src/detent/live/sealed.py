@@ -153,9 +153,11 @@ class SealedFile:
             else:
                 self._check()
             self._connection.execute("COMMIT")
+        except (TypeError, ValueError) as error:  # a flipped bit makes a text of a number, or of a text what is none
+            raise DamagedError("a value is not of its kind") from error
         except OSError as error:
             raise _disk_error(self.path, "cannot be opened", error) from error
-        except (sqlite3.Error, UnicodeError) as error:
+        except sqlite3.Error as error:
             code = _code(error)
             if code in _BUSY:
                 raise StoreHeldError(self.path, holder_of(self.path)) from None
@@ -292,7 +294,7 @@ def _signed(number: int) -> int:
 def salvage(path: Path, kind: type[RowT]) -> list[RowT]:
     """Rows of a file that is not open, damaged or not, that are those of their seals."""
     found: list[RowT] = []
-    with suppress(sqlite3.Error, UnicodeError):
+    with suppress(sqlite3.Error, TypeError, ValueError):
         reader = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.0)
         try:
             for *values, seal in reader.execute(f"SELECT * FROM {_table(kind)}"):  # noqa: S608
