@@ -151,6 +151,19 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     return f"{value / scale:.{digits}g} {prefixed}"
 
 
+def in_unit_of(value: float, unit: str, like: str, digits: int = 4) -> str:
+    """Write an SI value in the unit that a text has, spaced as there; with a prefix of its own if that has none.
+
+    >>> in_unit_of(0.9123, "kg", "850 g"), in_unit_of(0.07, "m", "3in")
+    ('912.3 g', '2.756in')
+    """
+    match = _NUMBER_THEN_UNIT.fullmatch(like)
+    if match is None or not match[2]:
+        return format_quantity(value, unit, digits)
+    shown = float(value / _conversion_factor(match[2].strip(), unit))
+    return f"{shown:.{digits}g}{like[match.end(1) : match.start(2)]}{match[2].rstrip()}"
+
+
 def in_degrees(value: float, unit: str) -> tuple[float, str]:
     """An angle as people read it, and the unit of that: degrees, or rpm from ten turns a second.
 

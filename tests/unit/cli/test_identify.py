@@ -90,7 +90,7 @@ def test_stated_constants_are_held_against_the_log_and_replaced() -> None:
     answer = call("identify", write_log(Path("log.csv")), "--axis", axis, "--write", axis)
     assert answer.status == 0, answer.err
     assert "not as the axis file: mass: the file says 4.4 kg, the log " in answer.out
-    assert "# 4.4 kg before" in Path(axis).read_text("utf-8")
+    assert "# weighed; identified, 4.4 kg before: 95 %: " in Path(axis).read_text("utf-8")
     assert call("identify", "log.csv", "--axis", axis, "--json").data["outside"] == []
 
 

@@ -9,13 +9,13 @@ constant force, the slowest moves static friction. They go to and fro inside the
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from detent.axisfile.motion import unit_in
-from detent.errors import AxisError, DetentError, InputError
-from detent.files.locate import Path, Place, locate_keys
+from detent.errors import AxisError, DetentError
+from detent.files.patch import Change, NewValue, patch
 from detent.files.source import parse_source
 from detent.identify.fit.identification import Identification
 from detent.identify.fit.loop_fit import Loops, fit_loops
@@ -43,20 +43,31 @@ Move = tuple[float, float, float]  # target, speed, and rest after it [s]
 
 def axis_toml(found: Identification, base: str | None = None, file: str = "axis file", reading: str = "") -> str:
     """Write an axis file."""
-    if found.verdict == "refused":
-        raise AxisError("no axis file: nothing that was identified is trusted; record what the refusals name")
-    if base is None:
-        made = _whole_file(found, reading)
-    else:
-        spec = cascade_spec(base, file)
-        made = patch(base, [n for n in FileNumbers(found, spec).numbers() if n.trusted], file)
+    _refuse_untrusted(found)
+    if base is not None:
+        return patched_axis(found, base, file)[0]
+    made = _whole_file(found, reading)
     axis_of(parse_source(file, made))
     return made
 
 
+def patched_axis(found: Identification, base: str, file: str) -> tuple[str, list[Change]]:
+    """Put what was identified and is trusted into an axis file."""
+    _refuse_untrusted(found)
+    numbers = [n for n in FileNumbers(found, cascade_spec(base, file)).numbers() if n.trusted]
+    made, changes = patch(base, [NewValue(n.key, n.value, n.unit, n.note) for n in numbers], file)
+    cascade_spec(made, file)
+    return made, changes
+
+
+def _refuse_untrusted(found: Identification) -> None:
+    if found.verdict == "refused":
+        raise AxisError("no axis file: nothing that was identified is trusted; record what the refusals name")
+
+
 def cascade_spec(text: str, file: str) -> CascadeSpec:
     """Read the text of an axis file of the cascade method."""
-    return CascadeSpec.of(axis_of(parse_source(file, text)).spec, file)
+    return CascadeSpec.of(axis_of(parse_source(file, text.removeprefix("\ufeff"))).spec, file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,58 +184,6 @@ def _line(number: Number) -> str:
 def _said(line: str, comment: str) -> str:
     """A line and its comment, all comments in one column."""
     return f"{line:<35} # {comment}"
-
-
-# ---- numbers put into a file
-
-
-def patch(text: str, numbers: Iterable[Number], file: str) -> str:
-    """Put numbers into an axis file: where they stand, or into their table."""
-    # What is said of one goes into a comment behind it, or into a line of its own above where there is one already.
-    newline = "\r\n" if "\r\n" in text else "\n"
-    lines = text.split(newline)
-    for number in numbers:
-        path = tuple(number.key.split("."))
-        # Every number moves the lines below it.
-        places = locate_keys("\n".join(lines))
-        if path in places:
-            _replace(lines, places[path], number)
-        else:
-            _add(lines, places, path, number, file)
-    return newline.join(lines)
-
-
-def _replace(lines: list[str], place: Place, number: Number) -> None:
-    """Put a number in the place of another."""
-    row = place.line - 1
-    line = lines[row]
-    begin = line.index(place.text, line.index("=", place.column - 1))
-    head, tail = line[:begin], line[begin + len(place.text) :]
-    lines[row] = f"{head}{number.text}{tail}"
-    if tail.strip():
-        indent = line[: len(line) - len(line.lstrip())]
-        was = "" if place.text == number.text else f"{place.text.strip(chr(34))} before; "
-        lines.insert(row, f"{indent}# {was}{number.note}")
-    else:
-        lines[row] += f"  # {number.note}"
-
-
-def _add(lines: list[str], places: dict[Path, Place], path: Path, number: Number, file: str) -> None:
-    """Add a number to its table, or the table too."""
-    table, said = path[:-1], f"{path[-1]} = {number.text}  # {number.note}"
-    name = ".".join(table)
-    keys = [place.line for known, place in places.items() if known[:-1] == table]
-    keys = [line for line in keys if not lines[line - 1].lstrip().startswith("[")]
-    header = places.get(table)
-    if header is not None and lines[header.line - 1].lstrip().startswith("["):
-        lines.insert(max([header.line, *keys]), said)
-        return
-    if keys:
-        got, allowed = f"{name} without a table of its own", f"[{name}], which {path[-1]} can be added to"
-        raise InputError.of_file(file, got, allowed, "write its keys below such a line")
-    while lines and not lines[-1].strip():
-        lines.pop()
-    lines += ["", f"[{name}]", said, ""]
 
 
 # ---- a list of moves
