@@ -180,6 +180,7 @@ class Axis(OnScreen):
         job_file: str | Path | None = None,
         clock: Callable[[], datetime] = now,
         progress: Progress | None = None,
+        force: bool = False,
     ) -> "Run":
         """Do a job from power-on.
 
@@ -199,6 +200,8 @@ class Axis(OnScreen):
             ``clock()`` gives the date of the run; the same date gives the same bytes of report and trace.
         progress : callable, optional
             ``progress(share, text)``.
+        force : bool
+            Stream the trace in place of a file that detent did not write.
 
         Returns
         -------
@@ -220,18 +223,20 @@ class Axis(OnScreen):
         made = self._evidence(source, names, every, clock)
         with given_as(loaded.name, job):
             if every:
-                return self._recorded(loaded, made, trace_file, progress)
+                return self._recorded(loaded, made, trace_file, progress, force=force)
             result = method.run(loaded, progress=progress)
             return Run(self, result, None, evidence=replace(made, figures=hash_figures(result.to_dict())))
 
-    def _recorded(self, job: Job, made: RunEvidence, trace_file: str | Path | None, progress: Progress | None) -> "Run":
+    def _recorded(
+        self, job: Job, made: RunEvidence, trace_file: str | Path | None, progress: Progress | None, *, force: bool
+    ) -> "Run":
         """Do a job and record what the evidence says."""
         method = self.simulated
         about: dict[str, str | float | int] = {"axis": self.name, "job": job.name, "seed": method.seed}
         fidelity = getattr(self.spec.axis, "fidelity", None)
         about |= {"fidelity": fidelity} if fidelity else {}
         recorder = Recorder(method.registers, made.signals, every=made.every, period=method.tick)
-        with TraceWriter(trace_file, recorder.trace(**about)) if trace_file else nullcontext() as writer:
+        with TraceWriter(trace_file, recorder.trace(**about), force=force) if trace_file else nullcontext() as writer:
             if writer is not None:
                 recorder.pass_on(writer.append, KEPT_ROWS)
             result = method.run(job, recorder=recorder, progress=progress)
@@ -353,13 +358,15 @@ class Timing(OnScreen):
         title = f"Timing of {w.title}: {w.begin * 1e-12:.9g} s to {w.end * 1e-12:.9g} s"
         return Screen(title, [Block("", (), rows, 28, ".waveforms.signals")], ".plot()  .save('timing.vcd')")
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def plot(self, path: str | Path | None = None, *, force: bool = False) -> "Figure":
         """Draw the timing diagram.
 
         Parameters
         ----------
         path : path, optional
             PNG, SVG or PDF file that it is written to as well.
+        force : bool
+            Replace a file that detent did not write.
 
         Returns
         -------
@@ -373,11 +380,11 @@ class Timing(OnScreen):
         """
         from detent.page.timing import plot_timing
 
-        return plot_timing(self.waveforms, path)
+        return plot_timing(self.waveforms, path, force=force)
 
-    def save(self, path: str | Path) -> Path:
-        """Write a VCD file, which GTKWave and Surfer open."""
-        save_vcd(self.waveforms, path)
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write a VCD file, which GTKWave and Surfer open; `force` as of `plot`."""
+        save_vcd(self.waveforms, path, force=force)
         return Path(path)
 
 
@@ -449,8 +456,8 @@ class Run(OnScreen):
         told |= self.result.to_dict() | {"check": list(self.cautions)}
         return told | ({"evidence": self.evidence.to_dict()} if self.evidence else {})
 
-    def report(self, path: str | Path) -> Path:
-        """Write the report as one self-contained HTML file."""
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the report as one self-contained HTML file; `force` replaces one that detent did not write."""
         from detent.page.render import write_page
 
         settings = {"axis file": self.axis.file.file, "seed": str(self.axis.simulated.seed)} | self.settings
@@ -460,12 +467,12 @@ class Run(OnScreen):
         page = self.axis.method.page(self.axis.spec, self.result, shown)
         checked = [Note("warning", f"Known before the run, from detent check: {text}") for text in self.cautions]
         carried = {ELEMENT: self.evidence.to_dict()} if self.evidence else {}
-        write_page(path, replace(page, notes=[*page.notes, *checked], embedded=carried))
+        write_page(path, replace(page, notes=[*page.notes, *checked], embedded=carried), force=force)
         return Path(path)
 
-    def save(self, path: str | Path) -> Path:
-        """Write the trace; the suffix chooses HDF5, CSV or Parquet."""
-        save_trace(self._trace(), path)
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the trace; the suffix chooses HDF5, CSV or Parquet; `force` replaces a file that is not detent's."""
+        save_trace(self._trace(), path, force=force)
         return Path(path)
 
     def plot(
@@ -473,6 +480,8 @@ class Run(OnScreen):
         signals: str | Iterable[str] = "*",
         path: str | Path | None = None,
         t_range: tuple[float, float] | None = None,
+        *,
+        force: bool = False,
     ) -> "Figure":
         """Draw signals against time, one plot area per unit.
 
@@ -484,6 +493,8 @@ class Run(OnScreen):
             PNG, SVG or PDF file that it is written to as well.
         t_range : (float, float), optional
             First and last moment, since power-on [s].
+        force : bool
+            Replace a file that detent did not write.
 
         Returns
         -------
@@ -497,7 +508,8 @@ class Run(OnScreen):
         """
         from detent.page.plots import plot_signals
 
-        return plot_signals(self._trace(), [signals] if isinstance(signals, str) else list(signals), path, t_range)
+        wanted = [signals] if isinstance(signals, str) else list(signals)
+        return plot_signals(self._trace(), wanted, path, t_range, force=force)
 
     def _trace(self) -> Trace:
         if self.trace is None:

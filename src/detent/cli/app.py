@@ -117,6 +117,7 @@ def option(names: str, metavar: str, about: str, **more: Any) -> Any:
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 Set = Annotated[list[str] | None, option("--set", "KEY=VALUE", "Replace or add a value of the file; repeat for more.")]
 Json = Annotated[bool, option("--json", "", "Print machine-readable JSON instead of text.")]
+Force = Annotated[bool, option("--force", "", "Replace files that detent did not write, or that were edited since.")]
 Job = Annotated[
     Path | None, option("--job", "", "What the axis does: a file of the kind that its method takes, see below.")
 ]

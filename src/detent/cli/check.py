@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from detent.cli.app import File, Json, Set, app, option
+from detent.cli.app import File, Force, Json, Set, app, option
 from detent.cli.terminal import folder_for, print_json, print_table, progress_bar, say, tell
 from detent.errors import DetentError
 
@@ -40,16 +40,18 @@ def compare(
     overrides: Set = None,
     figure: Annotated[Path, option("--figure", "", FIGURE)] = Path("comparison.html"),
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
     from detent.axis import load
+    from detent.files.marks import refuse_others
     from detent.files.text import FIGURES, check_target
     from detent.page.draw import draw_figures
     from detent.page.frame import comparison_page
     from detent.page.render import write_page
 
-    check_target(figure, (".html", *FIGURES))
+    check_target(figure, (".html", *FIGURES), force=force)
     axis = load(file, overrides or [])
     with progress_bar(quiet=as_json) as progress:
         progress(0.1, "running the axis in several ways")
@@ -57,11 +59,12 @@ def compare(
         progress(0.9, "drawing")
         if figure.suffix.lower() == ".html":
             files = [figure]
-            write_page(figure, comparison_page(axis.name, found, {"axis file": axis.file.file}))
+            write_page(figure, comparison_page(axis.name, found, {"axis file": axis.file.file}), force=force)
         else:
             files = [figure if k == 1 else figure.with_stem(f"{figure.stem}-{k}") for k in range(1, len(found) + 1)]
+            refuse_others(files, force=force)  # before the first of them is drawn
             for one, path in zip(found, files, strict=True):
-                draw_figures(one.figures(), path)
+                draw_figures(one.figures(), path, force=force)
     if as_json:
         data = [{"title": one.table.title} | one.to_dict() for one in found]
         print_json({"comparisons": data, "files": [str(path) for path in files]})
@@ -79,6 +82,7 @@ def envelope(
     motor: Annotated[str, option("--motor", "NAME", "Only this motor of the file. Default: every one.")] = "",
     output: Annotated[Path | None, option("--output -o", "FOLDER", "Where they go. Default: envelope/FILE")] = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write a stepper's tables: CSV, a C header with the step rule in C99, and a figure, for each motor of the file."""
@@ -90,7 +94,8 @@ def envelope(
         raise DetentError(f"--motor: got {motor!r}; expected: {', '.join(found)}; name a motor of the file")
     chosen = {motor: found[motor]} if motor else found
     folder = output or Path("envelope") / file.stem
-    with folder_for("--output", folder) as made:
+    names = [f"{name}.{kind}" for name in chosen for kind in KINDS]
+    with folder_for("--output", folder, names, force=force) as made:
         for name, tables in chosen.items():
             for kind in KINDS:
                 tables.save(made / f"{name}.{kind}")

@@ -1,16 +1,18 @@
 """`detent identify`: from recordings to constants with limits, and a verdict. `detent analyse`: single questions."""
 
 import shlex
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from detent.cli.app import LOGS, NOT_DONE, Columns, Json, Mapping, app, option
+from detent.cli.app import LOGS, NOT_DONE, Columns, Force, Json, Mapping, app, option
 from detent.cli.terminal import print_json, print_table, progress_bar, say, tell
 from detent.errors import DetentError
 
 if TYPE_CHECKING:
+    from detent.files.patch import Change
     from detent.identify.analysed import Analysed
     from detent.identify.fit.identification import Method
     from detent.identify.identified import Identified
@@ -25,7 +27,10 @@ AXIS = (
     "Cascade axis file: constants it states outside of the intervals are named, --write puts the identified ones into "
     "it, --job keeps its limits."
 )
-WRITE = "Write an axis file (TOML): a new one, or that of --axis, changed."
+WRITE = (
+    "Write an axis file (TOML): a new one, or that of --axis, changed. Into a file that somebody wrote only what was "
+    "identified is put: comments, units and layout stay."
+)
 REPORT = "Write the report, one self-contained HTML file."
 JOB = "Write a list of moves (TOML) that shows what the logs do not."
 Effort = Annotated[str | None, option("--effort", "ROLE", EFFORT)]
@@ -45,6 +50,7 @@ def identify(
     job: Annotated[Path | None, option("--job", "FILE", JOB)] = None,
     report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Find an axis's mass, friction and delay in recordings, each with its limits; refuse what they do not tell.
@@ -54,7 +60,7 @@ def identify(
     """
     from detent.identify.identified import identify_axis
 
-    _check_outputs(axis, write, job, report)
+    axis = _check_outputs(axis, write, job, report, force=force)
     if method not in METHODS:
         raise DetentError(f"--method: got {method!r}; expected: {' or '.join(METHODS)}; choose one of these")
     chosen = cast("Method", METHODS[method])
@@ -68,36 +74,49 @@ def identify(
         )  # fmt: skip
         outside = done.contrasts()
         progress(0.97, "writing")
-        written, errors = _write(done, write, job, report)
+        changes = _changes(done, write, force=force)
+        written, errors = _write(done, write, job, report, force=force)
     if as_json:
         names, reasons = [str(path) for path in written], [str(error) for error in errors]
-        print_json(done.to_dict() | {"files": names, "not_written": reasons})
+        told = {"files": names, "not_written": reasons, "changes": [one._asdict() for one in changes]}
+        print_json(done.to_dict() | told)
     else:
         _print(done, [str(one) for one in outside])
         for error in errors:
             say(f"not written: {error}", "bold red")
         for path in written:
             say(f"written: {path}")
+            if path == write:
+                for change in changes:
+                    say(f"  {change}")
         if done.refusals and job is None:
             say("--job FILE writes moves that show what is missing")
     if done.verdict != "trusted" or errors:
         raise typer.Exit(max([NOT_DONE, *(error.exit_status for error in errors)]))
 
 
-def _check_outputs(axis: Path | None, *targets: Path | None) -> None:
-    """Refuse what could not be written, before the work is done."""
+def _check_outputs(axis: Path | None, *targets: Path | None, force: bool) -> Path | None:
+    """Refuse what could not be written, before the work is done; the axis file that the logs belong to.
+
+    Where none is named, that is the one of --write, unless that is replaced as a whole.
+    """
+    from detent.files.marks import is_ours
     from detent.files.text import check_target
 
+    write, job, _ = targets
+    if axis is None and write is not None and not force and not is_ours(write):
+        axis = write
+    is_kept = axis is not None and write is not None and write.exists() and axis.exists() and write.samefile(axis)
     for path, ending, what in zip(targets, (".toml", ".toml", ".html"), ("an axis", "a job", "a report"), strict=True):
         if path is not None:
-            check_target(path, (ending,), what)
-    write, job, _ = targets
+            check_target(path, (ending,), what, force=force or (path is write and is_kept))
     if job is not None and job in (write, axis):
         raise DetentError(f"--job {job}: got the name of the axis file; expected: a file of its own; choose another")
+    return axis
 
 
 def _write(
-    done: "Identified", axis: Path | None, job: Path | None, report: Path | None
+    done: "Identified", axis: Path | None, job: Path | None, report: Path | None, *, force: bool
 ) -> tuple[list[Path], list[DetentError]]:
     """Files that were written, and why others were not: what was found is shown all the same."""
     written: list[Path] = []
@@ -106,10 +125,17 @@ def _write(
         if path is None:
             continue
         try:
-            written.append(save(path))
+            written.append(save(path, force=force))
         except DetentError as error:
             errors.append(error)
     return written, errors
+
+
+def _changes(done: "Identified", axis: Path | None, *, force: bool) -> "list[Change]":
+    """What becomes of an axis file; nothing where it is not written, which the writing says."""
+    with suppress(DetentError):
+        return [] if axis is None else done.changes(axis, force=force)
+    return []
 
 
 # ---- what a person reads
@@ -220,6 +246,7 @@ def analyse(
     mass: Mass = 0.0,
     report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Ask a recording single questions: friction, winding, resonances, steps, encoder; each answer has its limits.
@@ -231,12 +258,12 @@ def analyse(
     from detent.identify.analysed import analyse as ask
 
     if report is not None:
-        check_target(report, (".html",), "a report")
+        check_target(report, (".html",), "a report", force=force)
     with progress_bar(quiet=as_json) as progress:
         found = ask(
             log, what or (), mapping=mapping, columns=columns or [], effort=effort or "", mass=mass, progress=progress
         )
-        files = [] if report is None else [str(found.report(report))]
+        files = [] if report is None else [str(found.report(report, force=force))]
     if as_json:
         print_json(found.to_dict() | {"files": files})
     else:

@@ -1,6 +1,5 @@
 """What there is to look at: signals as pictures, what can be recorded, files to start from."""
 
-import filecmp
 import json
 import math
 import shlex
@@ -12,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from detent import examples
-from detent.cli.app import File, Job, Json, ListsMethods, Set, app, option, unknown_method
+from detent.cli.app import File, Force, Job, Json, ListsMethods, Set, app, option, unknown_method
 from detent.cli.terminal import folder_for, print_json, progress_bar, split_names, tell
 from detent.errors import DetentError, InputError
 
@@ -31,6 +30,7 @@ def timing(
     figure: Annotated[Path, option("--figure", "", "PNG, SVG or PDF.")] = Path("timing.png"),
     vcd: Annotated[Path, option("--vcd", "", "VCD file for GTKWave or Surfer.")] = Path("timing.vcd"),
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
@@ -38,7 +38,8 @@ def timing(
     from detent.files.text import check_target, together
     from detent.page.timing import MAX_SIGNALS
 
-    check_target(figure)
+    check_target(figure, force=force)
+    check_target(vcd, (vcd.suffix.lower(),), "a VCD file", force=force)
     axis = load(file, overrides or [])
     begin = _time("--at", at)
     length = _time("--for", duration) if duration is not None else 80 * axis.simulated.tick
@@ -51,8 +52,8 @@ def timing(
         progress(1.0, "drawing")
         # A picture that refuses so many signals takes none away from the VCD file.
         with together() if len(found.waveforms.signals) <= MAX_SIGNALS else nullcontext():
-            saved = found.save(vcd)
-            found.plot(figure)
+            saved = found.save(vcd, force=force)
+            found.plot(figure, force=force)
         files = [figure, saved]
     if as_json:
         print_json({"signals": [s.name for s in found.waveforms.signals], "files": [str(path) for path in files]})
@@ -87,6 +88,7 @@ def plot(
     stop: Annotated[str, option("--to", "TIME", "Last moment, the same.")] = "",
     *,
     incomplete: Annotated[bool, option("--incomplete", "", "Take a trace of a run that broke off.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Draw any recorded registers against time; without --signals, list them."""
@@ -109,7 +111,7 @@ def plot(
 
     begin = _moment("--from", start) if start else -math.inf
     end = _moment("--to", stop) if stop else math.inf
-    plot_signals(loaded, names, output, (begin, end) if start or stop else None)
+    plot_signals(loaded, names, output, (begin, end) if start or stop else None, force=force)
     if as_json:
         print_json({"files": [str(output)]})
     else:
@@ -120,17 +122,20 @@ def plot(
 def examples_command(
     copy: Annotated[Path | None, option("--copy", "FOLDER", "Copy all examples into this folder.")] = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """List the packaged example files, or copy them to start from."""
+    from detent.files.marks import refuse_others
+    from detent.files.text import have_same_bytes
+
     found = examples()
     if copy is not None:
-        with folder_for("--copy", copy) as made:
-            there = [path for path in found if (copy / path.name).exists()]
-            existing = [path.name for path in there if not _same(path, copy / path.name)]
-            if existing:
-                told = f"it holds another {', '.join(existing)} already; nothing was copied; choose another folder"
-                raise DetentError(f"--copy {copy}: {told}")
+        with folder_for("--copy", copy, force=force) as made:
+            # An example carries no mark: whoever copies it edits it.
+            refuse_others(
+                [copy / path.name for path in found if not have_same_bytes(path, copy / path.name)], force=force
+            )
             for path in found:
                 shutil.copyfile(path, made / path.name)
         found = [copy / path.name for path in found]
@@ -144,11 +149,6 @@ def examples_command(
     else:
         axis, job = (shlex.quote(str(copy / name)) for name in ("print_head.toml", "letter.txt"))
         tell(f"\nCopied to {copy}. Try: detent run {axis} --job {job}")
-
-
-def _same(path: Path, other: Path) -> bool:
-    """True for files of the same bytes."""
-    return other.is_file() and filecmp.cmp(path, other, shallow=False)
 
 
 def _about(path: Path) -> str:

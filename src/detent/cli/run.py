@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from detent import __version__
-from detent.cli.app import LOGS, NOT_DONE, Columns, Job, Json, ListsMethods, Mapping, Set, app, option
+from detent.cli.app import LOGS, NOT_DONE, Columns, Force, Job, Json, ListsMethods, Mapping, Set, app, option
 from detent.cli.terminal import folder_for, print_json, progress_bar, say, split_names
 from detent.errors import DetentError, InputError
 
@@ -49,10 +49,12 @@ def run(
     comparison: Annotated[bool, option("--compare/--no-compare", "", COMPARE)] = True,
     again: Annotated[Path | None, option("--again", "FILE", AGAIN)] = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Do a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
     from detent.axis import given_as, load
+    from detent.files.marks import refuse_others
 
     if again is not None:
         if file is not None or job is not None or replay is not None or overrides or columns or mapping is not None:
@@ -65,15 +67,16 @@ def run(
     if file is None:
         raise DetentError("run: got no axis file; expected: an axis file, or --again FILE; name one")
     kinds = _trace_kinds("h5,csv" if formats is None else formats) if every != 0 else []
-    axis = load(file, overrides or [])
     source = _source(job, replay, mapping, columns or [])
-    loaded = axis.load_job(source) if replay is None else axis.load_recording(source, mapping, columns or [])
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
-    wanted = [*axis.simulated.signals, *split_names(signals)]
-    axis.check_signals(wanted)
     # A report must not stand beside another run's trace.
     files = ("report.html", *(f"trace.{kind}" for kind in TRACE_KINDS))
-    with folder_for("--output", folder, files) as made, progress_bar(quiet=as_json) as progress:
+    refuse_others([folder / name for name in files], force=force)
+    axis = load(file, overrides or [])
+    loaded = axis.load_job(source) if replay is None else axis.load_recording(source, mapping, columns or [])
+    wanted = [*axis.simulated.signals, *split_names(signals)]
+    axis.check_signals(wanted)
+    with folder_for("--output", folder, files, force=force) as made, progress_bar(quiet=as_json) as progress:
         store = made / "trace.h5" if kinds else None
         with given_as(loaded.name, source):
             done = axis.run(loaded, signals=wanted, every=every, trace_file=store, job_file=job, progress=progress)

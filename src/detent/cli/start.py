@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from detent.cli.app import Json, Set, app, option, unknown_method
+from detent.cli.app import Force, Json, Set, app, option, unknown_method
 from detent.cli.terminal import print_json, print_table, tell
 from detent.errors import DetentError
 
@@ -23,6 +23,7 @@ def new(
     file: Annotated[Path | None, typer.Argument(help=NEW, show_default=False)] = None,
     overrides: Set = None,
     *,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write an axis file to start from: every key with its unit, range, default and meaning; it checks and runs."""
@@ -32,10 +33,10 @@ def new(
 
     if method not in METHODS:
         raise unknown_method("new", method)
-    target = check_target(file or Path(f"{method}.toml"), (".toml",), "an axis file")
-    if target.exists():
-        raise DetentError(f"{target}: it is there already; nothing was written; choose another name")
-    write_text(target, starting_axis(METHODS[method], target, overrides or []))
+    target = check_target(file or Path(f"{method}.toml"), (".toml",), "an axis file", force=force)
+    if target.exists() and not force:  # one that detent wrote, such as what was identified, is no place to begin at
+        raise DetentError(f"{target}: it is there already; nothing was written; choose another name, or add --force")
+    write_text(target, starting_axis(METHODS[method], target, overrides or []), force=force)
     if as_json:
         print_json({"method": method, "files": [str(target)]})
         return

@@ -106,11 +106,11 @@ def print_table(title: str, heads: Iterable[str], rows: Iterable[Iterable[Any]],
 
 
 @contextmanager
-def folder_for(option: str, folder: Path, others: Collection[str] = ()) -> Generator[Path]:
+def folder_for(option: str, folder: Path, others: Collection[str] = (), *, force: bool = False) -> Generator[Path]:
     """Make a folder, and give the place to make its files in, as of `placing`; what keeps them out becomes an error."""
     with write_errors(f"{option} {folder}"):
         end_of_links(folder).mkdir(parents=True, exist_ok=True)
-        with placing(folder, others) as made:
+        with placing(folder, others, force=force) as made:
             yield made
 
 

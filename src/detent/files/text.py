@@ -1,6 +1,7 @@
 """Files read as far as their kind allows, written whole or not at all, or refused with the reason; short texts."""
 
 import errno
+import filecmp
 import gzip
 import os
 import re
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.errors import DetentError, DiskError, FileProblem, InputError
+from detent.files.marks import is_ours, refuse_others
 
 MAX_SHOWN = 60  # characters of a value shown in a message
 
@@ -192,14 +194,17 @@ _UNFINISHED: dict[Path, Path | None] = {}  # what is being made now; its name, o
 _WRITTEN: dict[Path, None] = {}  # what has been, in that order
 
 
-def check_target(path: str | Path, suffixes: Collection[str] = FIGURES, what: str = "a figure") -> Path:
-    """Refuse a place that cannot take a file, before any work is done."""
+def check_target(
+    path: str | Path, suffixes: Collection[str] = FIGURES, what: str = "a figure", *, force: bool = False
+) -> Path:
+    """Refuse a place that cannot take a file, or has one that detent did not write, before any work is done."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise DetentError(f"{path}: {what} cannot be saved as {path.suffix!r}; use one of {', '.join(suffixes)}")
     if not path.parent.is_dir() or path.is_dir():
         reason = "it is a folder" if path.is_dir() else f"no folder {path.parent}"
         raise DetentError(f"{path}: cannot be written ({reason}); make it, or choose another place")
+    refuse_others([path], force=force)
     return path
 
 
@@ -221,16 +226,19 @@ def end_of_links(path: Path) -> Path:
 
 
 @contextmanager
-def writing(path: Path) -> Generator[Path]:
+def writing(path: Path, *, force: bool = False) -> Generator[Path]:
     """Give the place to write a file to: at the end it gets its name, after a failure nothing is left of it.
 
-    A link is written through, and stays one. Inside of `together` it gets its name when that ends.
+    A link is written through, and stays one. A file that detent did not write is replaced by `force` only, or by the
+    same bytes; it is looked at before the work, and once more at the end. Inside of `together` it gets its name when
+    that ends.
     """
     with write_errors(path):
         end = end_of_links(path)
         if end.exists() and not end.is_file():
             kind = errno.EISDIR if end.is_dir() else errno.EINVAL
             raise OSError(kind, os.strerror(kind) if end.is_dir() else "it is no file but a device")
+    refuse_others([path], force=force)
     part = end.with_name(f"{end.name}{_PART}")
     with ExitStack() as alone, write_errors(path):
         group = _GROUP.get()
@@ -241,7 +249,7 @@ def writing(path: Path) -> Generator[Path]:
         yield part
         with part.open("rb+") as whole:
             os.fsync(whole.fileno())
-        file = _Whole(part, end, path)
+        file = _Whole(part, end, path, force)
         if group:
             group.files.append(file)
         else:
@@ -254,6 +262,7 @@ class _Whole(NamedTuple):
     part: Path
     end: Path
     path: Path  # as it was given
+    force: bool  # whether it may replace a file that detent did not write
 
 
 @dataclass
@@ -286,6 +295,8 @@ def together() -> Generator[None]:
 
 def _name(files: Sequence[_Whole]) -> None:
     """Give files that belong together their names."""
+    for file in files:
+        _refuse_replacing([(file.part, file.path)], force=file.force)
     _UNFINISHED.update({file.part: file.end for file in files})
     for file in files[1:]:
         with write_errors(file.path):
@@ -306,17 +317,19 @@ def _drop(part: Path) -> None:
 
 
 @contextmanager
-def placing(folder: Path, others: Collection[str] = ()) -> Generator[Path]:
+def placing(folder: Path, others: Collection[str] = (), *, force: bool = False) -> Generator[Path]:
     """Give a folder to make files in that belong together: at the end all get their names in `folder`, or none does.
 
     Those of an earlier time stay until then; of `others`, names that such files may have, what was not made anew goes
-    with them. One process at a time places files into a folder. What a killed one left there is removed, or given its
-    names if all of it had been made.
+    with them. What detent did not write is replaced, or goes, by `force` only; all `others` are looked at before the
+    work. One process at a time places files into a folder. What a killed one left there is removed, or given its names
+    if all of it had been made.
     """
     for name in others:
         if (folder / name).is_dir():
             with write_errors(folder / name):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    refuse_others([folder / name for name in others], force=force)
     with _held(folder, folder) as alone:
         made = folder / f"{_MADE}{os.getpid()}"
         for left in [*folder.glob(f"{_MADE}*")] if alone else [made]:
@@ -327,6 +340,7 @@ def placing(folder: Path, others: Collection[str] = ()) -> Generator[Path]:
             yield made
             for name in others:
                 (made / name).touch()  # empty: it only goes
+            _refuse_replacing([(one, folder / one.name) for one in sorted(made.iterdir())], force=force)
             made.rename(made.with_suffix(_WHOLE))
         except DetentError as error:
             # Of the place that files are made in nobody need know.
@@ -335,6 +349,16 @@ def placing(folder: Path, others: Collection[str] = ()) -> Generator[Path]:
         finally:
             _finish(made)
             del _UNFINISHED[made]
+
+
+def have_same_bytes(path: Path, other: Path) -> bool:
+    """True for files of which one may be had for the other."""
+    return other.is_file() and filecmp.cmp(path, other, shallow=False)
+
+
+def _refuse_replacing(made: Iterable[tuple[Path, Path]], *, force: bool) -> None:
+    """Refuse to give files that were made the names of others' files, unless these hold the same."""
+    refuse_others([name for one, name in made if not (is_ours(name) or have_same_bytes(one, name))], force=force)
 
 
 def _finish(made: Path) -> None:
@@ -350,7 +374,7 @@ def _finish(made: Path) -> None:
         for file in files:
             name = made.parent / file.name
             if file.stat().st_size and name.is_symlink():  # it may lead to another disk
-                with writing(name) as part:
+                with writing(name, force=True) as part:
                     shutil.move(file, part)
             elif file.stat().st_size:
                 _WRITTEN[file.replace(name)] = None
@@ -402,9 +426,9 @@ def abandon() -> list[Path]:
     return [path for path in _WRITTEN if path.exists()]
 
 
-def write_text(path: str | Path, text: str) -> Path:
+def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
     """Write a file of text; a file name in it need not be valid UTF-8, the file must be."""
     path = Path(path)
-    with writing(path) as part:
+    with writing(path, force=force) as part:
         part.write_text(text, encoding="utf-8", errors="replace", newline="\n")
     return path

@@ -72,12 +72,12 @@ class Analysed(OnScreen):
         title = "\n".join([f"{self.log.name}, analysed", *(f"{n}: {text}" for n, text in self.recommendations.items())])
         return Screen("\n".join([title, *self.remarks]), [], ".answers  .report('report.html')")
 
-    def report(self, path: str | Path) -> Path:
-        """Write the report as one self-contained HTML file."""
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the report as one self-contained HTML file; `force` replaces one that detent did not write."""
         from detent.identify.page.analysed import analysed_page
         from detent.page.render import write_page
 
-        write_page(path, analysed_page(self))
+        write_page(path, analysed_page(self), force=force)
         return Path(path)
 
     def to_dict(self) -> dict[str, Any]:

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from detent.errors import DetentError
+from detent.files.marks import is_ours, is_signed, signed
+from detent.files.patch import Change
 from detent.files.screen import Block, OnScreen, Screen
+from detent.files.source import read_source
 from detent.files.text import write_text
 from detent.identify.fit import untold
 from detent.identify.fit.estimate import Estimate
@@ -15,7 +18,7 @@ from detent.identify.fit.identification import Identification, Method, Verdict, 
 from detent.identify.fit.verdict import Refusal
 from detent.identify.remarks import remarks_of
 from detent.identify.write.file_numbers import Contrast, contrasts
-from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job
+from detent.identify.write.outputs import axis_toml, cascade_spec, excitation_job, patched_axis
 from detent.logs.log import Log
 from detent.logs.read_log import read_log
 from detent.methods.cascade.schema import CascadeSpec
@@ -136,34 +139,77 @@ class Identified(OnScreen):
         spec = self._spec()
         return [] if spec is None else contrasts(self.found, spec)
 
-    def save(self, path: str | Path) -> Path:
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Write an axis file: that of the axis with the identified constants, or a new one.
+
+        Into a file that somebody wrote, or has edited, only the identified values are put, in the units it has; its
+        comments, order and layout stay. A file that detent wrote is replaced.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        force : bool
+            Replace whatever is there by a whole file; the file of the axis itself gets values all the same.
 
         Raises
         ------
         AxisError
             Nothing is trusted, or not the mass.
         DetentError
-            The file cannot be written, or its axis is of another kind.
+            The file cannot be written, or its axis is of another kind; or another axis file than that of the axis
+            stands there, which detent did not write.
         """
-        return write_text(path, axis_toml(self.found, self.axis or None, self.axis_name or str(path), self.reading))
+        path = Path(path)
+        base = self._base(path, force=force)
+        if base is None:
+            made = axis_toml(self.found, None, str(path), self.reading)
+        else:
+            made, _ = patched_axis(self.found, base, self._name(path))
+        own = base is not None and self._is_put_into(path, force=force)
+        return write_text(path, made if own and not is_signed(str(base)) else signed(path, made), force=force or own)
 
-    def save_job(self, path: str | Path) -> Path:
+    def changes(self, path: str | Path, *, force: bool = False) -> list[Change]:
+        """What `save` changes of an axis file: each key with its value before and after; nothing of a new file."""
+        base = self._base(Path(path), force=force)
+        return [] if base is None else patched_axis(self.found, base, self._name(Path(path)))[1]
+
+    def _name(self, path: Path) -> str:
+        return self.axis_name or str(path)
+
+    def _is_put_into(self, path: Path, *, force: bool) -> bool:
+        """True for a file that keeps what it has but for the identified values."""
+        if self.axis_name:
+            return path.exists() and Path(self.axis_name).exists() and path.samefile(self.axis_name)
+        return not force and not is_ours(path)
+
+    def _base(self, path: Path, *, force: bool) -> str | None:
+        """Text of the axis file that gets the values: as it stands now where it is the one that is written."""
+        return _text_of(path) if self._is_put_into(path, force=force) else self.axis or None
+
+    def save_job(self, path: str | Path, *, force: bool = False) -> Path:
         """Write a list of moves that shows what the logs did not, within the limits of axis or logs.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        force : bool
+            Replace one that detent did not write, or that was edited since.
 
         Raises
         ------
         DetentError
             The limits are not known, or the file cannot be written.
         """
-        return write_text(path, excitation_job(self.found, self._spec()))
+        return write_text(path, signed(Path(path), excitation_job(self.found, self._spec())), force=force)
 
-    def report(self, path: str | Path) -> Path:
-        """Write the report as one self-contained HTML file."""
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the report as one self-contained HTML file; `force` replaces one that detent did not write."""
         from detent.identify.page.page import identify_page
         from detent.page.render import write_page
 
-        write_page(path, identify_page(self.found, self.remarks))
+        write_page(path, identify_page(self.found, self.remarks), force=force)
         return Path(path)
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,10 +229,16 @@ class Identified(OnScreen):
 
 
 def _text_of(axis: str | Path) -> str:
-    """Text of an axis file; raises where anything is wrong with it, or where it is of another method."""
+    """Text of an axis file, with its line ends and its byte order mark."""
+    return read_source(Path(axis)).content.decode("utf-8")
+
+
+def _checked_text(axis: str | Path) -> str:
+    """The same; raises where anything is wrong with it, or where it is of another method."""
     from detent.methods.load import read_axis
 
-    text = read_axis(axis).source.content.decode("utf-8-sig")
+    read_axis(axis)
+    text = _text_of(axis)
     cascade_spec(text, str(axis))
     return text
 
@@ -237,7 +289,7 @@ def identify_axis(  # noqa: PLR0913 - the options of `detent identify`
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
     tell = progress or untold
-    text = "" if axis is None else _text_of(axis)
+    text = "" if axis is None else _checked_text(axis)
     if not paths:
         raise DetentError("identify: got no log; expected: one or more; name the recordings of the axis")
     read: list[Log] = []

@@ -84,7 +84,7 @@ class LinearModel(OnScreen):
         )
         return Screen("\n".join([title, *self.notes]), [Block("", heads, rows)], ".bode()")
 
-    def bode(self, cuts: Sequence[str] = (), path: str | Path | None = None) -> Figure:
+    def bode(self, cuts: Sequence[str] = (), path: str | Path | None = None, *, force: bool = False) -> Figure:
         """Draw the Bode diagram of open loops.
 
         Parameters
@@ -93,6 +93,8 @@ class LinearModel(OnScreen):
             Places of the cuts; by default all.
         path : path, optional
             PNG, SVG or PDF file that it is written to as well.
+        force : bool
+            Replace a file that detent did not write.
 
         Returns
         -------
@@ -104,9 +106,9 @@ class LinearModel(OnScreen):
         DetentError
             A cut is unknown, or the file cannot be written.
         """
-        path = None if path is None else check_target(path)
+        path = None if path is None else check_target(path, force=force)
         chosen = {cut: self[cut] for cut in cuts or self.loops}
-        with new_figure(path, 9.0, 5.6) as figure:
+        with new_figure(path, 9.0, 5.6, force=force) as figure:
             levels, phases = figure.subplots(2, sharex=True)
             for (cut, loop), colour in zip(chosen.items(), COLOURS, strict=False):
                 self._draw(levels, phases, cut, loop, colour)

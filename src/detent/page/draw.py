@@ -34,12 +34,12 @@ BANDS = {"good": ("#0a7d55", 0.11), "brake": ("#d67814", 0.16)}
 Part = tuple[float, Callable[[Any, Any], None]]  # height [in], and what draws it into a place of the picture
 
 
-def draw_figures(figures: Sequence[Figure], path: str | Path) -> None:
+def draw_figures(figures: Sequence[Figure], path: str | Path, *, force: bool = False) -> None:
     """Draw figures above one another into a file; DetentError if its suffix or place will not do."""
-    path = check_target(path)
+    path = check_target(path, force=force)
     parts = [part for figure in figures if figure for part in _parts(figure)]
     heights = [height for height, _ in parts]
-    with new_figure(path, WIDTH, sum(heights) + 0.3) as canvas:
+    with new_figure(path, WIDTH, sum(heights) + 0.3, force=force) as canvas:
         grid = canvas.add_gridspec(len(parts), 1, height_ratios=heights)
         for place, (_, draw) in zip(grid, parts, strict=True):
             draw(canvas, place)

@@ -15,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from detent.errors import DetentError
+from detent.files.marks import WROTE
 from detent.files.text import check_target, shown, writing
 from detent.page.chart import thin_indices
 from detent.record.trace import Trace
@@ -51,10 +52,15 @@ STYLE: dict[str, Any] = {
 
 
 def plot_signals(
-    trace: Trace, signals: Sequence[str], path: str | Path | None = None, t_range: tuple[float, float] | None = None
+    trace: Trace,
+    signals: Sequence[str],
+    path: str | Path | None = None,
+    t_range: tuple[float, float] | None = None,
+    *,
+    force: bool = False,
 ) -> Figure:
     """Draw signals over time, one plot area per unit, above one another; into a file too where one is named."""
-    path = None if path is None else check_target(path)
+    path = None if path is None else check_target(path, force=force)
     names = trace.match(signals)
     if not names:
         raise DetentError(f"{path or 'plot'}: no signal was asked for; name one of: {', '.join(trace.signals)}")
@@ -65,7 +71,7 @@ def plot_signals(
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(trace.units.get(name, ""), []).append(name)
-    with new_figure(path, 9.0, 1.0 + 2.1 * len(groups)) as figure:
+    with new_figure(path, 9.0, 1.0 + 2.1 * len(groups), force=force) as figure:
         axes: list[Axes] = list(figure.subplots(len(groups), sharex=True, squeeze=False)[:, 0])
         scale, unit = (1e3, "ms") if trace.time[-1] - trace.time[0] < 1.0 else (1.0, "s")
         for area, (group_unit, members) in zip(axes, groups.items(), strict=True):
@@ -124,7 +130,7 @@ def _kind() -> Any:
 
 
 @contextmanager
-def new_figure(path: Path | None, width: float, height: float) -> Generator[Figure]:
+def new_figure(path: Path | None, width: float, height: float, *, force: bool = False) -> Generator[Figure]:
     """Give an empty figure [in] and write it at the end, without pyplot: no window, no global state."""
     mpl: Any = importlib.import_module("matplotlib")
     with mpl.rc_context(STYLE), warnings.catch_warnings():
@@ -141,6 +147,7 @@ def new_figure(path: Path | None, width: float, height: float) -> Generator[Figu
         for area in figure.axes:
             area.set_position(area.get_position().from_extents(area.get_position().extents.round(6)))
         kind = path.suffix.lower().removeprefix(".")
-        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-        with writing(path) as part:
-            figure.savefig(part, format=kind, metadata=metadata)
+        made = f"{WROTE}, Matplotlib {mpl.__version__}"
+        metadata = {"svg": {"Date": None, "Creator": made}, "pdf": {"CreationDate": None, "Creator": made}}
+        with writing(path, force=force) as part:
+            figure.savefig(part, format=kind, metadata=metadata.get(kind, {"Software": made}))

@@ -25,9 +25,9 @@ SIGNS = {"good": "✔", "warn": "!", "bad": "✘"}
 FOR_THE_PAGE = {"title", "about"}  # what is said of a chart outside the plot area
 
 
-def write_page(path: str | Path, page: Page) -> None:
+def write_page(path: str | Path, page: Page, *, force: bool = False) -> None:
     """Write a page as one self-contained HTML file, in place of one that is there; DetentError if that fails."""
-    write_text(path, render_page(page))
+    write_text(path, render_page(page), force=force)
 
 
 def render_page(page: Page) -> str:

@@ -68,10 +68,14 @@ _UNITS = ((10**12, "s"), (10**9, "ms"), (10**6, "µs"), (10**3, "ns"))
 
 
 def plot_timing(
-    waveforms: Waveforms, path: str | Path | None = None, *, marks: Sequence[tuple[int, str]] = ()
+    waveforms: Waveforms,
+    path: str | Path | None = None,
+    *,
+    marks: Sequence[tuple[int, str]] = (),
+    force: bool = False,
 ) -> Figure:
     """Draw a timing diagram; its height grows with the signals, `marks` are moments since power-on [ps]."""
-    path = None if path is None else check_target(path)
+    path = None if path is None else check_target(path, force=force)
     count = len(waveforms.signals)
     if not 1 <= count <= MAX_SIGNALS:
         raise DetentError(
@@ -83,7 +87,8 @@ def plot_timing(
     scale = _Scale(waveforms.begin, unit_ps, unit, (waveforms.end - waveforms.begin) / unit_ps)
     rows, headings, depth = _arrange(waveforms.signals)
     above = MARK_LINE * len(marks)
-    with new_figure(path, WIDTH, (depth + above) * ROW + (1.1 if waveforms.title else 0.75)) as figure:
+    height = (depth + above) * ROW + (1.1 if waveforms.title else 0.75)
+    with new_figure(path, WIDTH, height, force=force) as figure:
         area: Axes = figure.subplots()
         if waveforms.title:
             figure.suptitle(shown(waveforms.title), x=0.01, ha="left", fontsize=11, fontweight="bold")

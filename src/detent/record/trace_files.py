@@ -126,14 +126,14 @@ class TraceWriter:
     2
     """
 
-    def __init__(self, path: str | Path, head: Trace) -> None:
+    def __init__(self, path: str | Path, head: Trace, *, force: bool = False) -> None:
         self.path = Path(path)
         self.rows = 0
         self._last_time = -np.inf
         # A copy of a trace that broke off stays one that broke off.
         self._whole = not broke_off(head.attributes)
         with ExitStack() as stack:
-            self._disk = _Disk(stack.enter_context(writing(self.path)))
+            self._disk = _Disk(stack.enter_context(writing(self.path, force=force)))
             self._file: Any = _h5py().File(self._disk, "w")
             self._sets = self._write_head(head)
             self._naming = stack.pop_all()
@@ -259,13 +259,13 @@ def _h5py() -> Any:
 # ---- for other tools
 
 
-def write_csv(path: Path, columns: Mapping[str, Column]) -> None:
+def write_csv(path: Path, columns: Mapping[str, Column], *, force: bool = False) -> None:
     """Write columns as CSV, piece by piece: a row of their headings, then a row per moment.
 
     Floats carry every digit needed to read the same bits back (17 at most), integers stay integers, booleans
     become 0 and 1.
     """
-    with writing(path) as part, part.open("w", encoding="utf-8", newline="") as stream:
+    with writing(path, force=force) as part, part.open("w", encoding="utf-8", newline="") as stream:
         csv.writer(stream, lineterminator="\n").writerow(columns)
         for first in range(0, len(next(iter(columns.values()))), CSV_ROWS):
             texts = [_texts(values[first : first + CSV_ROWS]) for values in columns.values()]
@@ -280,20 +280,20 @@ def _texts(values: Column) -> list[str]:
     return list(map(repr, values.tolist()))
 
 
-def _write_parquet(table: _Table, path: Path) -> None:
+def _write_parquet(table: _Table, path: Path, *, force: bool) -> None:
     """Write columns as Parquet, group by group; units and descriptions are their metadata, attributes the schema's."""
     arrow, parquet = need_parquet()
     kinds = {name: arrow.from_numpy_dtype(values.dtype) for name, values in table.columns.items()}
     told = {name: {"unit": table.units.get(name, ""), "doc": table.docs.get(name, "")} for name in kinds}
     fields = [arrow.field(name, kind, metadata=told[name]) for name, kind in kinds.items()]
     schema = arrow.schema(fields, metadata={"detent": json.dumps({"format": FORMAT, **table.attributes})})
-    with writing(path) as part, parquet.ParquetWriter(part, schema) as writer:
+    with writing(path, force=force) as part, parquet.ParquetWriter(part, schema) as writer:
         for first in range(0, len(table.columns[TIME]), PARQUET_ROWS):
             block = [arrow.array(values[first : first + PARQUET_ROWS]) for values in table.columns.values()]
             writer.write_table(arrow.table(block, schema=schema))
 
 
-def _write_table_csv(table: _Table, path: Path) -> None:
+def _write_table_csv(table: _Table, path: Path, *, force: bool) -> None:
     """A header row such as ``t [s],motor.current [A]``; descriptions and attributes are not in the file.
 
     Nor can it say that the run broke off: such a trace would pass for a whole one.
@@ -305,19 +305,19 @@ def _write_table_csv(table: _Table, path: Path) -> None:
         )
     units = table.units
     labels = {name: f"{name} [{units[name]}]" if units.get(name) else name for name in table.columns}
-    write_csv(path, {labels[name]: values for name, values in table.columns.items()})
+    write_csv(path, {labels[name]: values for name, values in table.columns.items()}, force=force)
 
 
-_WRITERS: dict[str, Callable[[_Table, Path], None]] = {".csv": _write_table_csv, ".parquet": _write_parquet}
+_WRITERS: dict[str, Callable[..., None]] = {".csv": _write_table_csv, ".parquet": _write_parquet}
 
 
-def convert_trace(store: str | Path, path: str | Path) -> None:
+def convert_trace(store: str | Path, path: str | Path, *, force: bool = False) -> None:
     """Write an HDF5 trace again as CSV or Parquet, in constant memory however long it is."""
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
         raise DetentError(f"{path}: a trace cannot be converted to {suffix!r}; use {' or '.join(_WRITERS)}")
     with _open_store(Path(store)) as table:
-        _WRITERS[suffix](table, Path(path))
+        _WRITERS[suffix](table, Path(path), force=force)
 
 
 def size_as_csv(store: str | Path) -> int:
@@ -330,14 +330,14 @@ def size_as_csv(store: str | Path) -> int:
         return sum(len(str(value)) + 1 for values in taken for value in values) * rows // max(looked_at, 1)
 
 
-def save_trace(trace: Trace, path: str | Path) -> None:
-    """Write a trace in the format its suffix names."""
+def save_trace(trace: Trace, path: str | Path, *, force: bool = False) -> None:
+    """Write a trace in the format its suffix names; in place of a file that detent did not write by `force` only."""
     suffix = Path(path).suffix.lower()
     if suffix in STORES:
-        with TraceWriter(path, trace) as writer:
+        with TraceWriter(path, trace, force=force) as writer:
             writer.append(trace.columns)
     elif suffix in _WRITERS:
-        _WRITERS[suffix](_Table(trace.columns, trace.units, trace.docs, trace.attributes), Path(path))
+        _WRITERS[suffix](_Table(trace.columns, trace.units, trace.docs, trace.attributes), Path(path), force=force)
     else:
         allowed = ", ".join([*STORES, *_WRITERS])
         raise DetentError(f"{path}: a trace cannot be saved as {suffix!r}; use one of {allowed}")

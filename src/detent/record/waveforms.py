@@ -30,6 +30,7 @@ from vcd.common import Timescale, TimescaleUnit, VarType
 from vcd.writer import VCDWriter
 
 from detent.errors import DetentError
+from detent.files.marks import WROTE
 from detent.files.screen import OnScreen
 from detent.files.text import writing
 from detent.kernel.registers import Leaf
@@ -261,7 +262,7 @@ SCALES = [(number * length, Timescale(number, unit)) for length, unit in _UNITS 
 DEFAULT_TITLE = "detent"  # name of the outermost scope of waveforms without title
 
 
-def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
+def save_vcd(waveforms: Waveforms, path: str | Path, *, force: bool = False) -> None:
     """Write waveforms as a VCD file.
 
     The same waveforms give the same bytes. Time is counted in the coarsest of 1, 10, 100 ps, ns or µs that hits every
@@ -270,7 +271,7 @@ def save_vcd(waveforms: Waveforms, path: str | Path) -> None:
     path = Path(path)
     if not waveforms.signals:
         raise DetentError(f"{path}: there are no signals; expected: one or more; name registers to record")
-    with writing(path) as part, part.open("w", encoding="ascii", newline="\n") as stream:
+    with writing(path, force=force) as part, part.open("w", encoding="ascii", newline="\n") as stream:
         _write(waveforms, stream)
 
 
@@ -278,7 +279,7 @@ def _write(waveforms: Waveforms, stream: Any) -> None:
     common = math.gcd(waveforms.begin, waveforms.end, *(int(np.gcd.reduce(s.times)) for s in waveforms.signals))
     scale, timescale = next((length, scale) for length, scale in SCALES if common % length == 0)
     # An empty date is left out; the default would be the time of day.
-    writer = VCDWriter(stream, timescale, date="", init_timestamp=waveforms.begin // scale)
+    writer = VCDWriter(stream, timescale, date="", version=WROTE, init_timestamp=waveforms.begin // scale)
     # A name that every viewer takes: letters, digits and underscores, no digit first.
     name = re.sub(r"[^A-Za-z0-9_]+", "_", waveforms.title).strip("_") or DEFAULT_TITLE
     top = "_" + name if name[0].isdigit() else name

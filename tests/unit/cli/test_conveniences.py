@@ -118,7 +118,7 @@ def test_plot_takes_a_time_with_its_unit(trace, ends, monkeypatch):
     from detent.page import plots
 
     seen = []
-    monkeypatch.setattr(plots, "plot_signals", lambda *words: seen.append(words[-1]))
+    monkeypatch.setattr(plots, "plot_signals", lambda *words, **_options: seen.append(words[-1]))
     assert call("plot", trace, "--signals", "x", "--from", ends[0], "--to", ends[1])[0] == 0
     assert seen == [pytest.approx((6.0, 8.0))]
 

@@ -62,7 +62,7 @@ def test_in_the_first_second_it_is_a_sentence(
 
 
 @pytest.mark.parametrize(("number", "status"), BY)
-@pytest.mark.parametrize("kind", ["writing(Path('told.txt'))", "placing(Path('.'))"])
+@pytest.mark.parametrize("kind", ["writing(Path('told.txt'), force=True)", "placing(Path('.'))"])
 def test_a_half_made_file_goes_and_the_earlier_one_stays(
     number: int, status: int, kind: str, tmp_path: Path, tried: Callable[..., None]
 ) -> None:

@@ -19,7 +19,7 @@ from detent.files.text import abandon, placing, together, write_text, writing
 def test_a_file_gets_its_name_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "told.txt"
     path.write_text("before", encoding="utf-8")
-    with writing(path) as part:
+    with writing(path, force=True) as part:
         part.write_text("after", encoding="utf-8")
         assert path.read_text(encoding="utf-8") == "before"
     assert path.read_text(encoding="utf-8") == "after"
@@ -34,7 +34,7 @@ def test_after_a_failure_nothing_is_left_and_the_old_file_stays(
     write_text(path, "before")
 
     def fail() -> None:
-        with writing(path) as part:
+        with writing(path, force=True) as part:
             part.write_text("half", encoding="utf-8")
             raise error
 
@@ -69,7 +69,7 @@ def test_a_link_is_written_through_and_stays_one(tmp_path):
     again = linked(tmp_path, "again.txt", "link.txt")
     within = linked(tmp_path, "folder", "far")
     for path, text in ((link, "one"), (again, "two"), (within / "kept.txt", "three")):
-        write_text(path, text)
+        write_text(path, text, force=True)
         assert (tmp_path / "far" / "kept.txt").read_text() == text
     assert [path.is_symlink() for path in (link, again, within)] == [True] * 3
     assert [path.name for path in (tmp_path / "far").iterdir()] == ["kept.txt"]
@@ -80,7 +80,7 @@ def test_what_a_link_leads_to_stays_whole_when_writing_fails(tmp_path):
     link = linked(tmp_path, "link.txt", "kept.txt")
 
     def fail() -> None:
-        with writing(link) as part:
+        with writing(link, force=True) as part:
             part.write_text("half")
             raise RuntimeError
 
@@ -131,7 +131,7 @@ def at(event, args):
         if last < 0:
             os._exit(9)
 sys.addaudithook(at)
-with text.placing(folder, ("report.html", "trace.h5", "trace.csv")) as made:
+with text.placing(folder, ("report.html", "trace.h5", "trace.csv"), force=True) as made:
     text.write_text(made / "report.html", "new")
     text.write_text(made / "trace.h5", "new")
 """
@@ -296,7 +296,7 @@ def test_what_a_killed_one_left_of_a_file_does_not_stand_in_the_way(tmp_path: Pa
 
 def test_a_folder_that_is_given_up_leaves_what_was_there(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("old")
-    with suppress(KeyError), placing(tmp_path, ("a", "b")) as made:
+    with suppress(KeyError), placing(tmp_path, ("a", "b"), force=True) as made:
         write_text(made / "a", "new")
         raise KeyError
     assert held(tmp_path) == {"a": "old"}

@@ -74,7 +74,7 @@ def kept(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     canvases: list[Any] = []
 
     @contextmanager
-    def keep(_path: Path, width: float, height: float) -> Any:
+    def keep(_path: Path, width: float, height: float, **_options: Any) -> Any:
         canvases.append(Canvas(figsize=(width, height), layout="constrained"))
         yield canvases[-1]
 

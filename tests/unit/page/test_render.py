@@ -105,7 +105,7 @@ def test_the_vendored_library_carries_its_licence() -> None:
 
 def test_a_page_replaces_the_one_before_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
     target = tmp_path / "a.html"
-    target.write_text("before", encoding="utf-8")
+    write_page(target, replace(page(), title="before"))
     write_page(target, page())
     assert target.read_text(encoding="utf-8") == render_page(page())
     assert list(tmp_path.iterdir()) == [target]

@@ -19,10 +19,10 @@ import numpy as np
 from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
-from detent import __version__
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
+from detent.files.marks import signed
 from detent.files.screen import OnScreen
 from detent.files.text import check_target, shown, write_text
 from detent.methods.stepper_envelope.build import make_tables
@@ -114,7 +114,7 @@ def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:
 # ---- CSV
 
 
-def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
+def write_envelope_csv(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
     """Write both tables as CSV, one row per step.
 
     Step i lies between the boundaries i and i + 1; `position` is that of boundary i. `permissible` is the frequency
@@ -129,13 +129,13 @@ def write_envelope_csv(tables: EnvelopeTables, path: str | Path) -> None:
         columns[f"{name}.zone_limit [Hz]"] = table.zones.hz
         columns[f"{name}.permissible [Hz]"] = table.permissible_hz()
         columns[f"{name}.period [tick]"] = tables.periods(table)
-    write_csv(Path(path), columns)
+    write_csv(Path(path), columns, force=force)
 
 
 # ---- C header
 
 
-def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
+def write_envelope_header(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
     """Write tables, ramp list, registers and step rule of one motor as a C99 header that needs only <stdint.h>.
 
     Every name in it begins with that of the motor, so that one firmware can include several; two headers of one motor,
@@ -145,7 +145,8 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path) -> None:
     """
     text = _header(tables)
     code = text.partition("\n#ifndef")[2]  # without the comment in front: it may name another axis
-    write_text(path, text.replace(MARK, f"0x{zlib.crc32(code.encode()):08X}"))
+    text = text.replace(MARK, f"0x{zlib.crc32(code.encode()):08X}")
+    write_text(path, signed(Path(path), text), force=force)
 
 
 def _header(tables: EnvelopeTables) -> str:
@@ -159,7 +160,6 @@ def _header(tables: EnvelopeTables) -> str:
         tables=tables,
         motor=tables.motor,
         MOTOR=tables.motor.upper(),
-        version=__version__,
         ramp=ramp,
         limit=limit,
         limits=[f"{hz:g} Hz" for hz in tables.up.zones.limits],
@@ -194,15 +194,15 @@ def _numbers(values: NDArray[Any]) -> str:
 # ---- figure
 
 
-def plot_envelope(tables: EnvelopeTables, path: str | Path) -> None:
+def plot_envelope(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
     """Draw the permissible frequency over the position: upwards above the axis, downwards below it.
 
     The run between a direction's extremes is filled; outside of them a dashed line shows what the table allows there.
     What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and above.
     """
-    path = check_target(path)
+    path = check_target(path, force=force)
     top = HEADROOM * max(tables.up.zones.limits)
-    with new_figure(path, 9.0, 5.4) as figure:
+    with new_figure(path, 9.0, 5.4, force=force) as figure:
         area = figure.subplots()
         outside = False
         for table, colour in ((tables.up, BLUE), (tables.down, ORANGE)):
@@ -315,8 +315,10 @@ class Envelope(OnScreen):
 
     tables: EnvelopeTables
 
-    def save(self, path: str | Path) -> Path:
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
         """Write the tables; the suffix chooses CSV (.csv), a C99 header with the step rule (.h), or a figure.
+
+        A file that detent did not write, or that was edited since, is replaced by `force` only.
 
         Raises
         ------
@@ -325,7 +327,7 @@ class Envelope(OnScreen):
         """
         path = Path(path)
         writers = {".csv": write_envelope_csv, ".h": write_envelope_header}
-        writers.get(path.suffix.lower(), plot_envelope)(self.tables, path)
+        writers.get(path.suffix.lower(), plot_envelope)(self.tables, path, force=force)
         return path
 
     def to_dict(self) -> dict[str, Any]:
