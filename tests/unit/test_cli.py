@@ -677,16 +677,16 @@ def files_in(folder: Path) -> dict[str, bytes]:
 # ---- full disks
 
 ON_A_FULL_DISK = [
-    ("run", AXIS, "--job", LETTER, "--output", "out"),
-    ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out"),
-    ("plot", "trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png"),
-    ("compare", AXIS, "--figure", "out/comparison.html"),
-    ("timing", AXIS, "--at", "20 ms", "--vcd", "out/timing.vcd", "--figure", "out/timing.png"),
-    ("envelope", str(detent.example("zoom.toml")), "--output", "out"),
+    ("run", AXIS, "--job", LETTER, "--output", "out", "--force"),
+    ("run", AXIS, "--job", LETTER, "--every", "0", "--output", "out", "--force"),
+    ("plot", "trace.h5", "--signals", "plant.train.velocity", "--output", "out/plot.png", "--force"),
+    ("compare", AXIS, "--figure", "out/comparison.html", "--force"),
+    ("timing", AXIS, "--at", "20 ms", "--vcd", "out/timing.vcd", "--figure", "out/timing.png", "--force"),
+    ("envelope", str(detent.example("zoom.toml")), "--output", "out", "--force"),
     ("examples", "--copy", "out"),
     ("new", "cascade", "out/new.toml"),
-    ("analyse", "log.csv", "--what", "steps", "--report", "out/found.html"),
-    ("identify", "log.csv", "--report", "out/found.html"),
+    ("analyse", "log.csv", "--what", "steps", "--report", "out/found.html", "--force"),
+    ("identify", "log.csv", "--report", "out/found.html", "--force"),
 ]
 
 

@@ -92,13 +92,16 @@ def plot(
     as_json: Json = False,
 ) -> None:
     """Draw any recorded registers against time; without --signals, list them."""
+    from detent.files.text import check_target
     from detent.record.trace import BROKEN_OFF, broke_off
     from detent.record.trace_files import load_trace
 
+    names = split_names(signals)
+    if names:
+        check_target(output, force=force)
     loaded = load_trace(trace)
     if broke_off(loaded.attributes) and not incomplete:
         raise InputError.of_file(str(trace), *BROKEN_OFF, "record again, or draw it as it is with --incomplete")
-    names = split_names(signals)
     if not names:
         rows = [{"name": n, "unit": loaded.units.get(n, ""), "doc": loaded.docs.get(n, "")} for n in loaded.signals]
         if as_json:
