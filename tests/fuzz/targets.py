@@ -12,6 +12,7 @@ import numpy as np
 import scipy.io
 
 from detent import example, load, load_trace
+from detent.files.patch import NewValue, patch
 from detent.identify.analyse.analyses import ANALYSES, analyse
 from detent.identify.fit.identification import identify
 from detent.live.positions import load_positions
@@ -63,6 +64,12 @@ def check(path: Path) -> object:
 
 def override(path: Path) -> object:
     return check_spec(read_axis(example("cascade.toml"), text_of(path).split("\n"))).to_dict()
+
+
+def put(path: Path) -> object:
+    read_axis(path)
+    numbers = {"mechanics.motor_mass": "kg", "mechanics.friction.offset": "N", "drive.delay": "", "encoder.new": ""}
+    return patch(path.read_bytes().decode(), [NewValue(key, 1.5, unit, "") for key, unit in numbers.items()], "axis")
 
 
 @cache
@@ -232,6 +239,7 @@ TARGETS = {
     for target in (
         *(Target(f"axis {name}", ".toml", check, examples(f"{name}.toml"), cases=15) for name in AXES),
         Target("axis stepper_envelope", ".toml", check, examples("zoom.toml", "stage.toml"), cases=15),
+        Target("axis patched", ".toml", put, examples("cascade.toml"), cases=15),
         Target("--set", ".txt", override, given(*OVERRIDES, "\n".join(OVERRIDES)), cases=15),
         Target("units", ".txt", units, given(*QUANTITIES), cases=300),
         Target("job text", ".txt", job_of("print_head.toml"), examples("letter.txt")),

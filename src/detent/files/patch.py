@@ -51,14 +51,15 @@ def patch(text: str, values: Iterable[NewValue], file: str) -> tuple[str, list[C
 
     order = "\ufeff" if text.startswith("\ufeff") else ""
     text = text.removeprefix(order)
-    wanted, made = tomllib.loads(text), ""
+    made, changes, fits = "", list[Change](), False
     try:
+        wanted = tomllib.loads(text)
         made, changes = _put_all(text, values)
         for change in changes:
             put_value(wanted, tuple(change.key.split(".")), tomllib.loads(f"value = {change.after}")["value"])
         fits = tomllib.loads(made) == wanted
     except (TOMLKitError, ValueError):
-        changes, fits = [], False
+        pass
     if not fits:
         raise InputError.of_file(
             file, "an order of tables that no values can be put into", "each table before those inside it",

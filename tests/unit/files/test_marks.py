@@ -134,7 +134,7 @@ def test_an_envelope_is_known_by_its_heading(tmp_path: Path) -> None:
 # ---- texts that people edit
 
 
-@pytest.mark.parametrize("name", ["a.toml", "a.h"])
+@pytest.mark.parametrize("name", ["a.toml", "a.h", "a.txt"])
 def test_an_edited_text_is_theirs(name: str) -> None:
     path, text = Path(name), "first\nsecond\n"
     made = signed(path, text)
