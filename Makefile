@@ -47,11 +47,12 @@ demo: venv-base ## simulate the example print head printing a letter; say where 
 
 # Files go whole to one process per processor: what a file prepares is prepared once. They go in the order that
 # tests/conftest.py gives them, not by how many tests they hold: the longest have few.
+WHOLE_FILES := -n auto --dist loadfile --no-loadscope-reorder
 test: venv-test ## the tests, without those that take long
-	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark $(PYTEST_ARGS)
+	$(PYTEST) $(WHOLE_FILES) -p no:benchmark $(PYTEST_ARGS)
 
 test-wide: venv-test ## thousands of numbered cases, dozens of logs, other processors' kernels
-	$(PYTEST) -m wide -n auto --dist loadgroup -p no:benchmark $(PYTEST_ARGS)
+	$(PYTEST) -m "wide and not long" $(WHOLE_FILES) -p no:benchmark $(PYTEST_ARGS)
 
 test-long: venv-test ## the tests that take long
 	$(PYTEST) -m long $(PYTEST_ARGS)
@@ -64,7 +65,7 @@ OLDEST  := $(addprefix tests/unit/,axisfile cli files page record test_axis.py t
 test-lowest: venv-dev ## files, pages, commands and a run of each method, with the oldest dependencies allowed
 	$(BIN)/uv venv --quiet --clear --seed --python '$(PYTHON)' $(LOWEST)
 	$(BIN)/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --only-binary :all: --editable '.[test]'
-	$(LOWEST)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark \
+	$(LOWEST)/bin/python -m pytest $(WHOLE_FILES) -p no:benchmark \
 	    -m "not long and not wide and not process" -W default::DeprecationWarning $(OLDEST) $(PYTEST_ARGS)
 
 LOCK := requirements-dev.txt
@@ -78,7 +79,7 @@ locked: venv-dev ## bring .venv to the versions of requirements-dev.txt, and to 
 	$(BIN)/uv pip install --quiet --python $(VENV) --no-deps --editable .
 
 tried: venv-test ## attack detent: kills, full disks, damaged files, hostile text; the figures of the page about that
-	$(PYTEST) -m "not bench" -n auto --dist loadgroup -p no:benchmark --tried docs/tried.toml $(PYTEST_ARGS)
+	$(PYTEST) -m "not bench" $(WHOLE_FILES) -p no:benchmark --tried docs/tried.toml $(PYTEST_ARGS)
 
 bench: venv-test ## how fast: nanoseconds per tick, seconds to compile, milliseconds to start
 	$(PYTEST) -m bench tests/bench --benchmark-columns=min,median,max,rounds $(PYTEST_ARGS)

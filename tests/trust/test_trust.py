@@ -13,8 +13,6 @@ from tests.trust.judge import FIRST_BAD, judge_all, judge_number, numbers_of
 from tests.trust.plants import BAD, make_case
 from tests.trust.table import CONSTANTS, coverage_table, figures_of, page, sections
 
-pytestmark = pytest.mark.xdist_group("trust")  # in `make test-wide` one process judges the logs, once
-
 GOOD_LOGS, BAD_LOGS = 350, 150
 
 LEAST, MOST = 0.93, 0.975

@@ -19,7 +19,7 @@ from tests.identify_files import AXIS, write_log
 import detent
 from detent.files.text import placing
 
-pytestmark = [pytest.mark.wide, pytest.mark.compiled]
+pytestmark = [pytest.mark.early, pytest.mark.wide, pytest.mark.compiled]
 
 KILLS, SOON = 15, 6  # of each command; of these in `make test-wide`
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -176,7 +176,7 @@ def _heeds(process: int, by: int) -> bool:
 @pytest.mark.parametrize(
     "number", [*range(SOON), *(pytest.param(number, marks=pytest.mark.long) for number in range(SOON, KILLS))]
 )
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in COMMANDS])
+@pytest.mark.parametrize("name", COMMANDS)
 def test_ended_at_any_moment(name: str, number: int, tried: Callable[..., None]) -> None:
     chance = random.Random(f"{name} {number}")
     by, known = SIGNALS[number % len(SIGNALS)], done(name)
