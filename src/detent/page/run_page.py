@@ -50,9 +50,16 @@ def run_headline(
     )
 
 
-def stopped_after(made: int, asked: str, seconds: float) -> str:
-    """Say how far a run came that was not done: "Stopped after 3 of 10 moves, 1.2 s into the job."."""
-    return f"Stopped after {count(made)} of {asked}, {duration(seconds)} into the job."
+def stopped_after(run: RunRecord[Any], made: int, asked: str, *, began: bool) -> str:
+    """Say how far a run came that was not done: "Stopped after 3 of 10 moves, 1.2 s into the job.".
+
+    No time of its job has passed for an axis that never `began` with it.
+    """
+    if began:
+        return (
+            f"Stopped after {count(made)} of {asked}, {duration(max(run.time_end - run.time_ready, 0.0))} into the job."
+        )
+    return f"Stopped {duration(run.time_end)} after power-on, before the first of {asked}."
 
 
 def made_card(title: str, made: int, asked: int, below: str) -> Card:

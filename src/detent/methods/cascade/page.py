@@ -120,7 +120,7 @@ def _whose(move: CascadeMove) -> str:
 def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
     error, asked = units_of(spec).error, count(run.job.count, "move")
     if not run.done:
-        return run_headline(spec.axis.name, run, stopped_after(arrived(run), asked, run.seconds))
+        return run_headline(spec.axis.name, run, stopped_after(run, arrived(run), asked, began=bool(run.moves)))
     lead = (
         f"{asked} in {duration(run.seconds)}. "
         f"On the way the axis was never more than {error(run.worst_following)} from where it should be"

@@ -142,7 +142,8 @@ def moves_page(
 def _headline(view: MoveView, figures: MoveFigures) -> Headline:
     run, asked = figures.run, count(figures.asked, figures.word)
     if not run.done:
-        return run_headline(view.spec.axis.name, run, stopped_after(len(figures.there), asked, figures.seconds))
+        far = stopped_after(run, len(figures.there), asked, began=bool(run.moves))
+        return run_headline(view.spec.axis.name, run, far)
     lead = f"{asked} in {duration(figures.seconds)}."
     if error := figures.error:
         counts = f"{number(error.value / view.unit.size, 2)} {view.unit.words}"
@@ -162,6 +163,7 @@ def _cards(view: MoveView, figures: MoveFigures) -> list[Card]:
     for title, found, limit in (
         ("Worst overshoot", figures.overshoot, math.inf),
         ("Worst error at rest", figures.error, run.tolerance),
+        ("Off its target in the end", figures.short, run.tolerance),
     ):
         if found:
             allowed = f", allowed {length(limit)}" if math.isfinite(limit) else ""

@@ -28,16 +28,21 @@ class MoveFigures:
         self.run, moves = run, run.moves
         self.word = "character" if run.job.kind == "text" else "move"  # what is counted
         self.asked = len(run.job.moves)
-        # From the first readiness to the end of the job [s].
-        self.seconds = max(run.time_end - run.time_ready, 0.0) if moves else 0.0
+        # From the first readiness to the end of the job [s]; from power-on where the axis never was ready.
+        self.seconds = max(run.time_end - run.time_ready, 0.0)
         self.there = [move for move in moves if arrived(run, move)]
         self.went = [move for move in self.there if abs(move.target - move.start) > run.tolerance]  # and went anywhere
         # Those of which the axis said so before they were within the tolerance for good, and the earliest of them [s].
         self.early = [move for move in self.there if move.early > SOONEST]
         self.earliest = worst(self.early, lambda move: move.early)
         self.longest = worst(self.went, lambda move: move.settling)  # time to settle [s]
-        self.overshoot = worst(moves, lambda move: move.overshoot)  # farthest beyond a target [m]
-        self.error = worst(moves, lambda move: abs(move.error))  # largest magnitude at the end of a dwell [m]
+        # Of a move that the axis gave up on its way there is no overshoot, and no rest; what it is off is told as such.
+        given_up = [move for move in moves if math.isnan(move.ready)]
+        reached = [move for move in moves if move not in given_up or move.overshoot > 0]
+        self.overshoot = worst(reached, lambda move: move.overshoot)  # farthest beyond a target [m]
+        # Largest magnitude at the end of a dwell, and where the axis gave up [m].
+        self.error = worst([move for move in moves if move not in given_up], lambda move: abs(move.error))
+        self.short = worst(given_up, lambda move: abs(move.error))
         self.peak_speed = worst(moves, lambda move: move.peak_speed)  # [m/s]
 
 
@@ -55,6 +60,9 @@ def move_summary(run: MoveRun, unit: CountUnit) -> list[tuple[str, str]]:
     for name, found in (("overshoot", figures.overshoot), ("error at rest", figures.error)):
         if found:
             rows.append((name, f"worst {length(found.value)}, {unit.counts(found.value)} ({whose(found.of)})"))
+    if short := figures.short:
+        off = f"{length(short.value)}, {unit.counts(short.value)} ({whose(short.of)})"
+        rows.append(("off its target in the end", off))
     if early := figures.earliest:
         moves = count(len(figures.early), "move")
         rows.append(("ready too early", f"{moves}, by up to {milliseconds(early.value)} ({whose(early.of)})"))

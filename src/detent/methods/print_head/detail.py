@@ -48,12 +48,19 @@ STATE_EVENTS = {
 }
 
 BEFORE_STOP, AFTER_RAMP = 10e-3, 20e-3  # shown of the steady speeds on both sides of a turn-around [s]
+LAST = 1.0  # shown of the end of a run that failed, at most [s]
 TOP_SPEED = 240  # end of the axis of speed, 40 in/s [1/6 in/s]
 
 IN_THE_LINE = (
     "Above: the speed. Below: the drive value the axis computer sent, 300 counts being the full supply. The drive is a "
     "sum: friction + back-EMF (grows with speed) + a fixed IR part, added while speeding up, subtracted while slowing "
     "down. Look for: speed on the dashed line, flat while printing."
+)
+
+IN_THE_END = (
+    "The last second, or less where a line was printed before. Above: the speed. Below: the drive value the axis "
+    "computer sent, 300 counts being the full supply. Look for: a drive that moves nothing, or a speed that it did not "
+    "make."
 )
 
 IN_THE_TURN = (
@@ -68,11 +75,35 @@ def how_figures(run: PrintRun, trace: Trace | None) -> list[Figure]:
     shown = [_identified_figure(run), _constants_figure(run)]
     if trace is not None and has(trace, SIGNALS):
         lines = recorded_whole(trace, run.lines)
-        shown = [_line_figure(lines, trace), _turn_figure(lines, trace), *shown]
+        shown = [_end_figure(run, trace), _line_figure(lines, trace), _turn_figure(lines, trace), *shown]
     return [figure for figure in shown if figure]
 
 
 # ---- over time
+
+
+def _end_figure(run: PrintRun, trace: Trace) -> Figure | None:
+    """The last of a run that failed, after the last line that was printed."""
+    begin = max(run.lines[-1].stop if run.lines else 0.0, run.time_end - LAST)
+    rows = None if run.done else stretch(trace, SIGNALS, begin, run.time_end)
+    if rows is None:
+        return None
+    events = [*_events(rows), Event(float(rows.t[-1]), "the run ends here")]
+    label = f"time from {begin:.3f} s after power-on on"
+    charts = _profile(rows, Timeline(name="end", t=rows.t, label=label, bands=[_transition(rows)], events=events))
+    return Figure(title="How the run ended: speed and drive", caption=IN_THE_END, charts=charts, events=events)
+
+
+def _profile(rows: Stretch, timeline: Timeline, *more: Curve) -> list[Chart]:
+    """Speed, with more curves beside it, above the drive value."""
+    value = rows["controller.head.drive_cmd"]
+    drive = Curve(label="drive value", colour="drive", width=2, step=True, y=value, digits=1)
+    return time_charts(timeline, [
+        Panel(
+            name=f"{timeline.name}-speed", label="speed [in/s]", zero=True, curves=[*more, _true_speed(rows, POINTS)]
+        ),
+        Panel(name=f"{timeline.name}-drive", label="drive [count]", zero=True, curves=[drive]),
+    ])  # fmt: skip
 
 
 def _line_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
@@ -89,16 +120,11 @@ def _line_figure(lines: list[LineRecord], trace: Trace) -> Figure | None:
     speed = rows["controller.head.speed"] * rows["controller.head.direction"] * (SPEED_STEP / INCH)
     demand = np.where(moving & (rows.t <= line.stop - line.start), speed, np.nan)
     demanded = Curve(label="demanded", colour="muted", dash=(6, 4), y=demand, thin=0)
-    value = rows["controller.head.drive_cmd"]
-    drive = Curve(label="drive value", colour="drive", width=2, step=True, y=value, digits=1)
     fired = np.flatnonzero(np.diff(rows["controller.head.columns.fired"]))
     spans = [(float(rows.t[fired[0]]), float(rows.t[fired[-1] + 1]))] if fired.size else []
     bands, events = [Band(label="printing", colour="good", spans=spans), _transition(rows)], _events(rows)
     timeline = Timeline(name="profile", t=rows.t, label="time since the move began", bands=bands, events=events)
-    charts = time_charts(timeline, [
-        Panel(name="profile-speed", label="speed [in/s]", zero=True, curves=[demanded, _true_speed(rows, POINTS)]),
-        Panel(name="profile-drive", label="drive [count]", zero=True, curves=[drive]),
-    ])  # fmt: skip
+    charts = _profile(rows, timeline, demanded)
     title = f"Line {line.number}, printed to the {'right' if line.direction > 0 else 'left'}: speed and drive"
     return Figure(title=title, caption=IN_THE_LINE, charts=charts, events=events)
 
@@ -172,7 +198,8 @@ def _identified_figure(run: PrintRun) -> Figure | None:
     )
     if not all(found.valid for found in run.identified.values()):
         sides = [side for side, found in run.identified.items() if not found.valid]
-        known = f"Not identified, {' and '.join(sides)}: the axis works with its defaults."
+        end = "the axis works with its defaults" if run.lines else "the run ended before, with the defaults in force"
+        known = f"Not identified, {' and '.join(sides)}: {end}."
     caption = (
         f"The drive value that holds a speed. {known} Where it meets the axis is the drive that overcomes friction. "
         "Look for: the line on the dashed truth."

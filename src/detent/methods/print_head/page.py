@@ -24,6 +24,7 @@ from detent.page.run_page import (
     run_headline,
     stopped_after,
     stretch,
+    time_card,
     warnings,
     whole_or_first,
 )
@@ -95,7 +96,8 @@ def _plain(value: int, word: str = "") -> str:
 def _headline(spec: PrintHeadSpec, run: PrintRun) -> Headline:
     asked, words = count(len(run.job.lines), "line"), ("Printed", "Not printed")
     if not run.done:
-        return run_headline(spec.axis.name, run, stopped_after(len(run.lines), asked, run.print_time), words=words)
+        far = stopped_after(run, len(run.lines), asked, began=run.print_time > 0)
+        return run_headline(spec.axis.name, run, far, words=words)
     characters, pages = count(run.job.characters, "character"), count(run.job.pages, "page")
     lead = f"{asked} and {characters} on {pages} in {duration(run.print_time)}."
     doubt = "Printed, but off its columns" if run.beyond else ""
@@ -106,22 +108,25 @@ def _headline(spec: PrintHeadSpec, run: PrintRun) -> Headline:
 
 def _cards(run: PrintRun) -> list[Card]:
     lines, seconds = run.lines, run.print_time
-    rate = run.characters_per_second if seconds > 0 else None
-    shown = [
-        made_card("Lines printed", len(lines), len(run.job.lines), count(run.characters, "character")),
-        Card("Throughput", number(rate), "characters/s", f"in {duration(seconds)}"),
-    ]
+    shown = [made_card("Lines printed", len(lines), len(run.job.lines), count(run.characters, "character"))]
+    if run.done:
+        rate = number(run.characters_per_second if seconds > 0 else None)
+        shown.append(Card("Throughput", rate, "characters/s", f"in {duration(seconds)}"))
+    elif seconds > 0:
+        shown.append(time_card(seconds, "until it stopped"))
+    else:
+        shown.append(time_card(run.time_end, "of homing and identification, until it stopped"))
     if run.columns:
         below = f"rms {length(run.rms_error)}, allowed {length(COLUMN_LIMIT)}"
         shown.append(card("Worst column error", length(run.worst_error), below, bad=run.beyond > 0))
     if lines:
         fastest = max(line.speed for line in lines)
         at_top = f"in {count(sum(line.speed == fastest for line in lines))} of {count(len(lines))} lines"
+        speed = f"{number(fastest)}{GAP}m/s, {at_top}"
+        shown.append(Card("Top print speed", inches_per_second(fastest), "in/s", speed))
+    if len(lines) > 1:
         turns = sum(line.turn_around for line in lines)
-        shown += [
-            Card("Top print speed", inches_per_second(fastest), "in/s", f"{number(fastest)}{GAP}m/s, {at_top}"),
-            Card("Turn-arounds", count(turns), f"of {count(len(lines) - 1)}", "line changes without a stop"),
-        ]
+        shown.append(Card("Turn-arounds", count(turns), f"of {count(len(lines) - 1)}", "line changes without a stop"))
     return shown
 
 
@@ -196,16 +201,18 @@ def _path_figure(spec: PrintHeadSpec, run: PrintRun, trace: Trace | None) -> Fig
     rows = stretch(trace, SIGNALS, 0.0, LONGEST)
     if rows is None:
         return None
-    caption = Markup(
-        'The head between the frames (0 to {}{}in). Thick: printing, <span class="right">to the right</span> or '
-        '<span class="left">to the left</span>. Thin: the way between. Look for: long thin stretches are time without '
-        "print."
-    ).format(number(spec.limits.travel / INCH), GAP)
+    frames = Markup("The head between the frames (0 to {}{}in).").format(number(spec.limits.travel / INCH), GAP)
+    look = Markup(
+        ' Thick: printing, <span class="right">to the right</span> or <span class="left">to the left</span>. Thin: the '
+        "way between. Look for: long thin stretches are time without print."
+    )
+    caption = frames + look if run.lines else frames + " No line was printed."
     position, right = rows["plant.train.position"] / INCH, rows["plant.train.velocity"] > 0
     printing = _printing(run, rows)
     thick = [
         Curve(label=f"printing to the {name}", colour=name, width=3, thin=POINTS // 2, y=np.where(on, position, np.nan))
         for name, on in (("right", printing & right), ("left", printing & ~right))
+        if on.any()
     ]
     panel = Panel(
         name="path",
@@ -217,7 +224,7 @@ def _path_figure(spec: PrintHeadSpec, run: PrintRun, trace: Trace | None) -> Fig
         curves=[Curve(label="moving", colour="muted", width=1, y=position), *thick],
     )
     return Figure(
-        title=whole_or_first(float(rows.t[-1]), run.time_end, "The whole job"),
+        title=whole_or_first(float(rows.t[-1]), run.time_end, "The whole job" if run.done else "Until it stopped"),
         caption=caption,
         charts=time_charts(Timeline(name="path", t=rows.t, unit="s"), [panel]),
     )

@@ -79,7 +79,7 @@ def table_page(
 def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
     run, name, asked = figures.run, spec.axis.name, count(figures.run.job.count, "step")
     if not run.done:
-        return run_headline(name, run, stopped_after(len(figures.made), asked, figures.seconds))
+        return run_headline(name, run, stopped_after(run, len(figures.made), asked, began=bool(run.steps)))
     lead = f"{asked} in {duration(figures.seconds)}."
     if figures.deviation:
         crossed = f" and crossed the end of its turn {times(run.crossings)}" if run.crossings else ""

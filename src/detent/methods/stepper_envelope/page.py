@@ -75,7 +75,7 @@ def _headline(figures: StageFigures) -> Headline:
     asked = count(figures.asked, figures.word)
     if not run.done:
         if len(run.moves) < figures.asked:
-            return run_headline(axis, run, stopped_after(len(run.moves), asked, figures.seconds))
+            return run_headline(axis, run, stopped_after(run, len(run.moves), asked, began=bool(run.moves)))
         return run_headline(axis, run, f"{count(figures.placed)} of {asked} in place.")
     lead = f"{asked} in {duration(figures.seconds)}, {figures.rate}; no step was lost."
     if isfinite(figures.faster):
@@ -87,9 +87,10 @@ def _cards(figures: StageFigures) -> list[Card]:
     run, word = figures.run, figures.word
     beside = figures.asked - figures.placed
     below = f"{count(beside)} not" if beside else "every rotor on its step"
+    stopped = "until it stopped" if len(run.moves) < figures.asked else "for the whole job"
     shown = [
         made_card(f"{word.capitalize()}s in place", figures.placed, figures.asked, below),
-        time_card(figures.seconds, figures.rate if run.done else "for the whole job"),
+        time_card(figures.seconds, figures.rate if run.done else stopped),
     ]
     if figures.steps:
         first, below = figures.first_lost, f"of {count(figures.steps)} made"
@@ -145,16 +146,18 @@ def _path_curves(figures: StageFigures, rows: Stretch, name: str, part: slice) -
     table = figures.spec.stepper[name]
     lower, steps = table.mechanics.lower_end, rows[f"{name}.controller.rule.position"][part]
     aim = target_of(figures, name, rows.trace.time[rows.rows][part])
-    target = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * MM, thin=0)
+    # A manual run has no target: one who makes nothing else has no curve.
+    aimed = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * MM, thin=0)
+    target = [] if np.isnan(aim).all() else [aimed]
     counted = (lower + steps * table.step) * MM
     if not has(rows.trace, [f"{name}.plant.rotor.lag"]):
-        return [target, Curve(label="counted position", colour="speed", width=2, y=counted, digits=4, thin=POINTS)]
+        return [*target, Curve(label="counted position", colour="speed", width=2, y=counted, digits=4, thin=POINTS)]
     # The field is where the steps are counted: the rotor lags behind it.
     place = (lower + (steps - rows[f"{name}.plant.rotor.lag"][part]) * table.step) * MM
     rotor = Curve(label="true position", colour="speed", width=2, y=place, digits=4, thin=POINTS)
     if not any(motion.motor.lost for motion in figures.motions if motion.name == name):
-        return [target, rotor]
-    return [target, Curve(label="counted position", colour="left", dash=(3, 3), y=counted, digits=4, thin=0), rotor]
+        return [*target, rotor]
+    return [*target, Curve(label="counted position", colour="left", dash=(3, 3), y=counted, digits=4, thin=0), rotor]
 
 
 def target_of(figures: StageFigures, name: str, t: Numbers) -> Numbers:
