@@ -21,7 +21,7 @@ from detent.errors import FileProblem, InputError
 
 WROTE = f"detent {__version__}"  # who made a file, for formats that have a place for that
 _HEAD, _FOOT = 1 << 16, 1 << 24  # most bytes looked at from the begin of a file, and from its end
-_COMMENTS = {".h": "/* {} */"}  # how a line is said that is no part of a text, where not as TOML does
+IN_TOML, IN_C = "# {}", "/* {} */"  # how a line is said that is no part of a text
 _SIGNED = re.compile(r"(?:# |/\* )detent \S+ wrote this, checksum ([0-9A-F]{8}); edited, it is yours\.(?: \*/)?\r?\n")
 _ORDER = "\ufeff"  # byte order mark
 # Columns of a trace, and of the tables of an envelope; all others have the dotted name of a register.
@@ -29,14 +29,13 @@ _BEGINS = ["t [s]"], ["step", "position [m]"]
 _REGISTER = re.compile(r"tick \[tick\]|\w+(?:\.\w+)+(?: \[[^\[\]]*\])?")
 
 
-def signed(path: Path, text: str) -> str:
+def signed(text: str, comment: str = IN_TOML) -> str:
     """A text that people may edit, with the line in front that says that nobody has."""
     plain, newline = text.removeprefix(_ORDER), "\r\n" if "\r\n" in text else "\n"
     found = _SIGNED.match(plain)
     bare = plain[found.end() :] if found else plain
     line = f"{WROTE} wrote this, checksum {_checksum(bare)}; edited, it is yours."
     order = _ORDER if text.startswith(_ORDER) else ""
-    comment = _COMMENTS.get(path.suffix.lower(), "# {}")
     return f"{order}{comment.format(line)}{newline}{bare}"
 
 

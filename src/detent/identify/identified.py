@@ -167,7 +167,7 @@ class Identified(OnScreen):
         else:
             made, _ = patched_axis(self.found, base, self._name(path))
         own = base is not None and self._is_put_into(path, force=force)
-        return write_text(path, made if own and not is_signed(str(base)) else signed(path, made), force=force or own)
+        return write_text(path, made if own and not is_signed(str(base)) else signed(made), force=force or own)
 
     def changes(self, path: str | Path, *, force: bool = False) -> list[Change]:
         """What `save` changes of an axis file: each key with its value before and after; nothing of a new file."""
@@ -202,7 +202,7 @@ class Identified(OnScreen):
         DetentError
             The limits are not known, or the file cannot be written.
         """
-        return write_text(path, signed(Path(path), excitation_job(self.found, self._spec())), force=force)
+        return write_text(path, signed(excitation_job(self.found, self._spec())), force=force)
 
     def report(self, path: str | Path, *, force: bool = False) -> Path:
         """Write the report as one self-contained HTML file; `force` replaces one that detent did not write."""

@@ -12,7 +12,7 @@ from tests.unit.page.samples import page
 
 import detent
 from detent.errors import InputError
-from detent.files.marks import is_ours, is_signed, refuse_others, signed
+from detent.files.marks import IN_C, IN_TOML, is_ours, is_signed, refuse_others, signed
 from detent.files.text import check_target, placing, write_text, writing
 from detent.methods.registry import METHODS
 from detent.page.plots import new_figure
@@ -50,8 +50,8 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "a.hdf5": lambda path: save_trace(trace(), path),
     "a.csv": lambda path: save_trace(trace(), path),
     "a.parquet": lambda path: save_trace(trace(), path),
-    "a.toml": lambda path: write_text(path, signed(path, "a = 1\n")),
-    "a.h": lambda path: write_text(path, signed(path, "int a;\n")),
+    "a.toml": lambda path: write_text(path, signed("a = 1\n")),
+    "a.h": lambda path: write_text(path, signed("int a;\n", IN_C)),
 }
 
 
@@ -134,23 +134,23 @@ def test_an_envelope_is_known_by_its_heading(tmp_path: Path) -> None:
 # ---- texts that people edit
 
 
-@pytest.mark.parametrize("name", ["a.toml", "a.h", "a.txt"])
-def test_an_edited_text_is_theirs(name: str) -> None:
-    path, text = Path(name), "first\nsecond\n"
-    made = signed(path, text)
+@pytest.mark.parametrize("comment", [IN_TOML, IN_C])
+def test_an_edited_text_is_theirs(comment: str) -> None:
+    text = "first\nsecond\n"
+    made = signed(text, comment)
     assert made.endswith(text)
     assert made.count("\n") == 3
     assert is_signed(made)
-    assert signed(path, made) == made
+    assert signed(made, comment) == made
     for edited in (made + " ", made.replace("second", "third"), made.removesuffix("\n"), text, ""):
         assert not is_signed(edited)
 
 
 def test_line_ends_and_a_mark_of_the_order_are_no_edits() -> None:
-    made = signed(Path("a.toml"), "first\nsecond\n")
+    made = signed("first\nsecond\n")
     windows = "\ufeff" + made.replace("\n", "\r\n")
     assert is_signed(windows)
-    assert signed(Path("a.toml"), "\ufefffirst\r\nsecond\r\n") == windows
+    assert signed("\ufefffirst\r\nsecond\r\n") == windows
 
 
 # ---- before the work, and at its end

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
-from detent.files.marks import signed
+from detent.files.marks import IN_C, signed
 from detent.files.screen import OnScreen
 from detent.files.text import check_target, shown, write_text
 from detent.methods.stepper_envelope.build import make_tables
@@ -146,7 +146,7 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path, *, force: bo
     text = _header(tables)
     code = text.partition("\n#ifndef")[2]  # without the comment in front: it may name another axis
     text = text.replace(MARK, f"0x{zlib.crc32(code.encode()):08X}")
-    write_text(path, signed(Path(path), text), force=force)
+    write_text(path, signed(text, IN_C), force=force)
 
 
 def _header(tables: EnvelopeTables) -> str:

@@ -186,8 +186,9 @@ def test_no_name_ends_the_comment(tmp_path, name):
     plain = header(tables(motor="m", axis="plain"), tmp_path / "m.h")
     assert code_of(text) == code_of(plain)
     assert "??" not in text
-    assert text.index("*/") > text.index("An entry of a table")
-    assert all(line.startswith(" *") for line in text[: text.index("*/")].splitlines()[1:-1])
+    _, _, comment = text.partition("\n")  # behind the line that says who wrote it
+    assert comment.index("*/") > comment.index("An entry of a table")
+    assert all(line.startswith(" *") for line in comment[: comment.index("*/")].splitlines()[1:-1])
 
 
 def test_no_name_steers_the_figure(tmp_path):
@@ -205,6 +206,6 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path, write):
     with pytest.raises(DetentError, match=r"cannot be written \(No such file"):
         write(tables(), tmp_path / "nowhere" / "zoom.x")
     (tmp_path / "zoom.x").write_text("kept until the new one is whole")
-    write(tables(), tmp_path / "zoom.x")
+    write(tables(), tmp_path / "zoom.x", force=True)
     assert [path.name for path in tmp_path.iterdir()] == ["zoom.x"]
     assert "kept" not in (tmp_path / "zoom.x").read_text()
