@@ -30,10 +30,20 @@ class NewValue(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What became of a key."""
+    """What became of a key.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key.
+    before : str
+        The value as it was written; empty where the file did not have it.
+    after : str
+        As it is written now.
+    """
 
     key: str
-    before: str  # as it was written; empty where the file did not have it
+    before: str
     after: str
 
     def __str__(self) -> str:
