@@ -6,7 +6,7 @@ from detent.files.text import shown
 
 VERSION = 1  # of the meaning of the rows
 MOST_POSITIONS = 1000  # of a table
-MOST_EDITS = 2000  # changed entries that can be undone
+MOST_EDITS = 500  # changed entries that can be undone
 MOST_NAME = 80  # characters
 LARGEST = (1 << 63) - 1  # counts
 COUNTERS = ("moves", "distance", "enabled", "faults", "starts")  # counts of way; microseconds enabled
