@@ -8,9 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 from detent.identify.fit.estimate import Estimate
-from detent.methods.cascade.units import Scale, Units
 from detent.page.chart import Curve
 from detent.page.parts import Numbers
+from detent.page.units import Scale, Units
 from detent.page.words import GAP, number
 
 UNKNOWN = 10.0  # half of an interval over the value from which on nothing is known about a constant

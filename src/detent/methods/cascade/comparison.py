@@ -15,12 +15,13 @@ from detent.methods.cascade.build import motion_limits
 from detent.methods.cascade.host import CascadeHost
 from detent.methods.cascade.page import POINTS
 from detent.methods.cascade.schema import CascadeSpec, DisturbanceTable
-from detent.methods.cascade.units import Units, milliseconds
+from detent.methods.cascade.units import milliseconds
 from detent.methods.moves.run import time_to_settle
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import ComparisonOnScreen
 from detent.page.table import Cell, Table, TextTable
+from detent.page.units import Units
 from detent.page.words import GAP, number
 from detent.planning.profile import MotionLimits, Numbers, plan_move
 from detent.record.machine import Progress

@@ -9,7 +9,7 @@ import numpy as np
 
 from detent.methods.cascade.run import CascadeMove, CascadeRun
 from detent.methods.cascade.schema import CascadeSpec
-from detent.methods.cascade.units import Scale, Units, milliseconds, units_of
+from detent.methods.cascade.units import milliseconds, units_of
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -28,6 +28,7 @@ from detent.page.run_page import (
     worst,
 )
 from detent.page.table import Cell, bar_cell, left_out, long_table, offset_cell
+from detent.page.units import Scale, Units
 from detent.page.words import GAP, count, duration, number
 from detent.record.trace import Trace
 
