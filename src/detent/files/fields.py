@@ -62,6 +62,13 @@ class Unit:
             raise PydanticCustomError("quantity", "not a quantity", context) from None
 
 
+@dataclass(frozen=True, slots=True)
+class OwnTables:
+    """Annotation of tables that the user names: those of some names have a model of their own."""
+
+    models: tuple[tuple[str, "type[Table]"], ...]
+
+
 class Table(BaseModel, frozen=True):
     """A table of a file: unknown keys are errors, nothing is converted silently, nothing changes later.
 
@@ -179,6 +186,11 @@ def table_of(field: FieldInfo) -> type[Table] | None:
     return None
 
 
+def tables_of(field: FieldInfo) -> dict[str, type[Table]]:
+    """Models of the tables of some names, where they have one of their own."""
+    return dict(next((entry.models for entry in field.metadata if isinstance(entry, OwnTables)), ()))
+
+
 def type_of(field: FieldInfo) -> object:
     """Type of a value that is stated: that of the field, without None."""
     stated: object = field.annotation
@@ -214,7 +226,7 @@ def example_of(field: FieldInfo) -> str:
 def leaf_fields(table: type[Table]) -> Sequence[tuple[tuple[str, ...], FieldInfo]]:
     """All values a table can hold, tables below it included, in the order of declaration.
 
-    Where the user names the tables, `AnyName` stands in the path.
+    Where the user names the tables, `AnyName` stands in the path; names with a model of their own follow.
     """
     return tuple(_leaves_below(table, ()))
 
@@ -226,6 +238,8 @@ def _leaves_below(table: type[Table], prefix: tuple[str, ...]) -> Iterator[tuple
             yield path, field
         elif is_named(field):
             yield from _leaves_below(below, (*path, AnyName(extra_of(field, "name"))))
+            for own, model in tables_of(field).items():
+                yield from _leaves_below(model, (*path, own))
         else:
             yield from _leaves_below(below, path)
 

@@ -24,6 +24,7 @@ from detent.files.fields import (
     list_example,
     options_of,
     table_of,
+    tables_of,
     unit_of,
 )
 from detent.files.locate import Path
@@ -66,6 +67,12 @@ def key_rows(model: type[Table]) -> tuple[KeyRow, ...]:
     )
 
 
+def own_rows(model: type[Table], beside: type[Table]) -> tuple[KeyRow, ...]:
+    """Keys that a model has, and another beside it has not."""
+    known = {row.key for row in key_rows(beside)}
+    return tuple(row for row in key_rows(model) if row.key not in known)
+
+
 def starting_file(model: type[Table], stated: Mapping[Path, object], given: Mapping[Path, object] | None = None) -> str:
     """Text of a file with every key: those stated here or needed to begin with as they are, the others as comments.
 
@@ -94,7 +101,8 @@ def _table_lines(table: type[Table], path: Path, values: _Values, *, live: bool)
             yield from _key_lines(field, own, values, live=live)
         elif is_named(field):
             names = {known[len(own)] for known in values.stated if known[: len(own)] == own} or {example_of(field)}
-            below += [(field, inside, (*own, name)) for name in sorted(names)]
+            models = tables_of(field)
+            below += [(field, models.get(name, inside), (*own, name)) for name in sorted(names)]
         elif not is_rows(field):
             below.append((field, inside, own))
     for field, inside, own in below:

@@ -32,6 +32,7 @@ def at_least(value: float, unit: str, digits: int = 4) -> str:
 def _written(value: float, unit: str, digits: int, rounding: str) -> str:
     if unit in IN_DEGREES:
         shown, name = in_degrees(value, unit)  # what is rounded is the number that is written
+        shown = float(f"{shown:.13g}")  # a round figure in degrees comes back from radians off by the last bit
         return f'"{_rounded(shown, digits, rounding):.{digits}g} {name}"'
     return f'"{format_quantity(_rounded(value, digits, rounding), unit, digits)}"'
 

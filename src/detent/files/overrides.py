@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from pydantic.fields import FieldInfo
 
@@ -11,6 +11,8 @@ from detent.files.fields import AnyName, Table, example_of, fits, is_list, leaf_
 from detent.files.locate import Path
 from detent.files.problems import dotted, field_at
 from detent.files.text import did_you_mean
+
+Leaf = TypeVar("Leaf")
 
 
 def apply_overrides(
@@ -21,7 +23,7 @@ def apply_overrides(
     for text in overrides:
         key, equals, value = (part.strip() for part in text.partition("="))
         path = tuple(key.split("."))
-        wanted = next((leaf for pattern, leaf in known.items() if fits(pattern, path)), None)
+        wanted = _at(known, path)
         if not equals or not value:
             remedy = f"write it as in --set '{_example_override(tables, known.items())}'"
             problems.append(FileProblem("--set", 0, 0, key, f'"{text}"', "KEY=VALUE", remedy))
@@ -39,6 +41,12 @@ def apply_overrides(
             put_value(tables, path, _override_value(wanted, value))
             texts[path] = value
     return texts, problems
+
+
+def _at(known: Mapping[Path, Leaf], path: Path) -> Leaf | None:
+    """What is known of the key at a path: of a table of this very name, or of one of any name."""
+    found = (leaf for pattern, leaf in known.items() if fits(pattern, path))
+    return known[path] if path in known else next(found, None)
 
 
 def _may_be_none(model: type[Table], path: Path, wanted: FieldInfo | None) -> bool:
@@ -65,7 +73,8 @@ def _example_override(tables: dict[str, Any], known: Iterable[tuple[Path, FieldI
 def _keys_near(tables: dict[str, Any], known: Iterable[Path], path: Path) -> list[str]:
     """Keys that a misspelt one may have been meant to be, with its own names and with those of the file."""
     near: list[str] = []
-    for pattern in known:
+    alike = [pattern for pattern in known if pattern[-1] == path[-1]]
+    for pattern in alike or known:
         own = named_as(pattern, path)
         keys = [*filled(tables, pattern), *([] if any(isinstance(part, AnyName) for part in own) else [own])]
         near += [dotted(key) for key in keys]
@@ -145,7 +154,7 @@ def apply_changes(tables: dict[str, Any], changes: Mapping[str, Any], model: typ
         if value is None:
             _take_out(tables, path)
             continue
-        unit = next((unit for pattern, unit in units.items() if fits(pattern, path)), "")
+        unit = _at(units, path) or ""
         written = _with_unit(value, unit)
         table = tables
         for key in path[:-1]:

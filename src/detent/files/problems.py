@@ -15,6 +15,7 @@ from detent.files.fields import (
     describe_allowed,
     example_of,
     extra_of,
+    fits,
     is_list,
     is_named,
     is_rows,
@@ -24,6 +25,7 @@ from detent.files.fields import (
     named_as,
     options_of,
     table_of,
+    tables_of,
     type_of,
     unit_of,
 )
@@ -107,8 +109,8 @@ class Reporter:
         place = f"in {self._header(tuple(around))}" if around else "at the top of the file"
         near = nearest_key(self._root, path)
         leaves = [known for known, _ in leaf_fields(self._root)]
-        elsewhere = [known for known in leaves if known[-1] == key]
-        alike = nearest(key, {known[-1] for known in leaves}, 0.8)
+        elsewhere = [known for known in leaves if known[-1] == key and not fits(known, path)]
+        alike = nearest(key, {known[-1] for known in leaves if known[-1] != key}, 0.8)
         if near:
             remedy = f'did you mean "{near}"?'
         elif elsewhere:
@@ -218,6 +220,7 @@ def field_at(root: type[Table], path: Path) -> FieldInfo:
     for key in path:
         if field is not None and (is_named(field) or isinstance(key, Index)):
             # One of the tables, whatever its name or number: a required table like any other.
+            table = tables_of(field).get(key, table)
             field = FieldInfo(annotation=table, description=field.description)
         else:
             field = keys_of(table)[key] if table else None

@@ -14,7 +14,18 @@ from pydantic import ValidationError
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
 from detent.errors import FileProblem, InputError
-from detent.files.fields import Table, example_of, held_leaves, is_named, leaf_fields, table_of, unit_of
+from detent.files.fields import (
+    AnyName,
+    Table,
+    example_of,
+    fits,
+    held_leaves,
+    is_named,
+    leaf_fields,
+    named_as,
+    table_of,
+    unit_of,
+)
 from detent.files.findings import Contradiction
 from detent.files.locate import Path, Place
 from detent.files.overrides import apply_changes, apply_overrides, as_table, filled, nested, put_value
@@ -29,7 +40,6 @@ from detent.units import QuantityError, parse_quantity
 
 DICTIONARY = "dictionary"  # where an axis that has no file comes from
 METHOD_KEY: Path = ("axis", "method")
-MOTION_KEY: Path = ("axis", "motion")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -101,7 +111,7 @@ def axis_of(source: Source, overrides: Sequence[str] = (), changes: dict[str, An
 
 
 def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]) -> Method[Any]:
-    """Method the file names, for its motion; without one nothing else can be said: each has its own keys."""
+    """Method the file names, for its motions; without one nothing else can be said: each has its own keys."""
     name, stated = _stated(source, overrides, changes, METHOD_KEY)
     if name is None and not source.is_whole:  # it may stand in a line that was left out
         raise InputError(source.problems)
@@ -115,8 +125,11 @@ def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]
         raise InputError([reporter.problem(METHOD_KEY, "nothing", _all_methods(), remedy)])
     if isinstance(name, str) and name in METHODS:
         method = METHODS[name]
-        turns = method.rotary is not None and _stated(source, overrides, changes, MOTION_KEY)[0] == "rotary"
-        return method.turned() if turns else method
+        pattern = method.motion_key
+        given = (tuple(text.partition("=")[0].strip().split(".")) for text in overrides)
+        keys = {*filled(source.tables, pattern), *filled(changes, pattern)} | {k for k in given if fits(pattern, k)}
+        turning = (key for key in keys if key and _stated(source, overrides, changes, key)[0] == "rotary")
+        return method.turned(frozenset(turning))
     remedy = did_you_mean(str(name).replace("-", "_").replace(" ", "_"), METHODS, "write one of these")
     overridden = {METHOD_KEY: f'"{name}"'} if stated else {}
     reporter = Reporter(source.file, source.places, overridden, Table, {METHOD_KEY: stated})
@@ -126,12 +139,12 @@ def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]
 
 def _stated(source: Source, overrides: Sequence[str], changes: dict[str, Any], path: Path) -> tuple[object, str]:
     """Value of a key that decides how the others are read, and what overrides the file with it; empty where it does."""
-    changed = _value_at(changes, path)
+    changed = value_at(changes, path)
     if changed is not None:
         return changed, DICTIONARY if source.file == DICTIONARY else "replace"
     parts = [text.partition("=") for text in overrides]
     values = [value.strip().strip("\"'") for key, _, value in parts if key.strip() == dotted(path)]
-    return (values[-1], "--set") if values else (_value_at(source.tables, path), "")
+    return (values[-1], "--set") if values else (value_at(source.tables, path), "")
 
 
 def _all_methods() -> str:
@@ -152,7 +165,7 @@ def _apply_catalogue(layers: _Layers, reporter: Reporter, method: Method[Any]) -
 
 def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path: Path, keys: dict[str, bool]) -> None:
     """One motor: `path` is that of its key ``catalogue``, `keys` are those of its table: whether each is needed."""
-    name = _value_at(layers.tables, path)
+    name = value_at(layers.tables, path)
     if not name:
         return
     around = path[:-1]
@@ -170,7 +183,7 @@ def _apply_motor(layers: _Layers, reporter: Reporter, catalogue: Catalogue, path
         )
         layers.doubtful.add(around)
         return
-    motor = as_table(_value_at(layers.tables, around))
+    motor = as_table(value_at(layers.tables, around))
     for key, value in constants.items():
         if key not in motor and key in keys:
             motor[key] = value
@@ -226,24 +239,26 @@ def _tell(
     """Problems of one validation, without those that only follow from others."""
     told = told_errors(found, reporter, method.spec, is_whole=is_whole, doubtful=layers.doubtful)
     for path, problem, error in told:
-        if error["type"] == "quantity":
-            yield replace(problem, remedy=problem.remedy + _other_motion(method, path, error["input"]))
+        if error["type"] in {"quantity", "extra_forbidden"}:
+            yield replace(problem, remedy=problem.remedy + _other_motion(method, path, error))
         else:
             # The model knows the one method it was made for; a file may name any.
             yield replace(problem, allowed=_all_methods()) if path == METHOD_KEY else problem
 
 
-def _other_motion(method: Method[Any], path: Path, value: object) -> str:
-    """What to add to a remedy where a quantity would do for an axis of the other motion; empty where it would not."""
-    if method.rotary is None or not isinstance(value, str):
+def _other_motion(method: Method[Any], path: Path, error: Mapping[str, Any]) -> str:
+    """What to add to a remedy where a key or its quantity would do for the other motion; empty where it would not."""
+    key = named_as(method.motion_key, path)
+    if not key or any(isinstance(part, AnyName) for part in key):
         return ""
-    turns = method.spec is method.rotary
-    other = METHODS[method.name].spec if turns else method.rotary
+    other = METHODS[method.name].turned(method.turning ^ {key}).spec
     try:
-        parse_quantity(value, unit_of(field_at(other, path)))
-    except QuantityError:
+        unit = unit_of(field_at(other, path))
+        if error["type"] == "quantity":
+            parse_quantity(str(error["input"]) if isinstance(error["input"], str) else "", unit)
+    except (KeyError, QuantityError):
         return ""
-    return f', or set axis.motion = "{"linear" if turns else "rotary"}"'
+    return f', or set {dotted(key)} = "{"linear" if key in method.turning else "rotary"}"'
 
 
 def _contradictions(found: Iterable[Contradiction], layers: _Layers, reporter: Reporter) -> Iterator[FileProblem]:
@@ -294,7 +309,7 @@ def _around(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     return tables
 
 
-def _value_at(tables: dict[str, Any], path: Path) -> object:
+def value_at(tables: dict[str, Any], path: Path) -> object:
     """Value of a key in nested tables; None where there is none."""
     return _around(tables, path).get(path[-1])
 
@@ -311,5 +326,5 @@ def _origins(source: Source, layers: _Layers, spec: Table) -> tuple[dict[str, st
             origins[key], texts[key] = f"line {source.places[path].line}", source.places[path].text.strip("\"'")
         elif path in layers.catalogue:
             origins[key] = f"catalogue {layers.catalogue[path]}"
-            texts[key] = str(_value_at(layers.tables, path))
+            texts[key] = str(value_at(layers.tables, path))
     return origins, texts

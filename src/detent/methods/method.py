@@ -11,13 +11,15 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import import_module
 from operator import attrgetter
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeVar
 
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
 from detent.errors import DetentError
+from detent.files.fields import leaf_fields
 from detent.files.findings import Caution, Contradiction, Derived
+from detent.files.locate import Path
 
 if TYPE_CHECKING:
     from detent.kernel.registers import Registers
@@ -90,7 +92,7 @@ class Simulated:
     signals: tuple[str, ...]  # registers that a run records unless told otherwise
     timing: tuple[str, ...]  # the same for a timing diagram
     clocking: "Clocking"  # how registers change inside a tick
-    load: Callable[[Path], Any]  # reads a job file of the kind the method takes
+    load: Callable[[FilePath], Any]  # reads a job file of the kind the method takes
     job: type | tuple[type, ...]  # class of the jobs it takes; the first is that of the files that `load` reads
     run: Callable[..., Any]  # ``run(job, recorder=, progress=)`` makes a job
     sample_job: Callable[[], Any]  # a short job for looking at signals
@@ -122,7 +124,9 @@ class Method(Protocol[SpecT]):
     pace: ClassVar[str]  # its base tick and how many lie between two rows of a trace, for help texts
     spec: type[SpecT]  # model of the whole file
     rotary: type[SpecT] | None = None
-    """The model where ``axis.motion = "rotary"``; None where the method has no such key."""
+    """The model where every key ``motion`` is "rotary"; None where the method has no such key."""
+    turning: frozenset[Path] = frozenset()
+    """Which of these keys say so in the file at hand."""
     catalogue: Catalogue | None = None  # motors that ``motor.catalogue`` may name
 
     fills: ClassVar[str] = ""  # place of what gives a specification the defaults that depend on another table
@@ -164,10 +168,20 @@ class Method(Protocol[SpecT]):
 
     # ---- the axis file
 
-    def turned(self) -> Self:
-        """The same method with the model of an axis that turns."""
+    @property
+    def motion_key(self) -> Path:
+        """The key that says whether the axis slides or turns, of each motor where it is theirs; empty without one."""
+        paths = [path for path, _ in leaf_fields(self.spec) if path[-1] == "motion"]
+        return paths[0] if paths else ()
+
+    def model_of(self, turning: frozenset[Path]) -> type[SpecT]:
+        """The model of a file in which these keys say that something turns."""
+        return self.rotary if turning and self.rotary else self.spec
+
+    def turned(self, turning: frozenset[Path]) -> Self:
+        """The same method with the model of a file in which these keys say that something turns."""
         made = copy(self)
-        made.spec = self.rotary or self.spec
+        made.spec, made.turning = self.model_of(turning), turning
         return made
 
     @cached_property
@@ -209,7 +223,7 @@ class Method(Protocol[SpecT]):
         del spec
         return Clocking()
 
-    def load(self, spec: SpecT, path: Path) -> Any:
+    def load(self, spec: SpecT, path: FilePath) -> Any:
         """Read a job file."""
         del spec
         return self.brought(self.reads)(path)

@@ -7,9 +7,9 @@ from typing import Any
 from detent.errors import InputError
 from detent.files.keys import starting_file
 from detent.files.locate import Path
-from detent.files.overrides import apply_overrides
+from detent.files.overrides import apply_overrides, filled
 from detent.files.source import parse_source
-from detent.methods.load import METHOD_KEY, MOTION_KEY, axis_of
+from detent.methods.load import METHOD_KEY, axis_of, value_at
 from detent.methods.method import Method
 
 HEAD = """\
@@ -30,11 +30,10 @@ def starting_axis(method: Method[Any], file: FilePath, overrides: Sequence[str] 
 
     The axis gets the name of `file`, where it will be.
     """
-    turned = method.turned() if method.rotary else method
     stated: dict[str, Any] = {}
-    apply_overrides(stated, overrides, turned.spec)
-    motion = stated.get(MOTION_KEY[0], {}).get(MOTION_KEY[1])
-    model = turned.spec if motion == "rotary" else method.spec
+    apply_overrides(stated, overrides, method.spec)
+    keys = (key for key in filled(stated, method.motion_key) if key)
+    model = method.model_of(frozenset(key for key in keys if value_at(stated, key) == "rotary"))
     tables: dict[str, Any] = {"axis": {"name": file.stem[:80], METHOD_KEY[1]: method.name}}
     texts, problems = apply_overrides(tables, overrides, model)
     if problems:

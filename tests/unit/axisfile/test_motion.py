@@ -1,15 +1,17 @@
 """One schema for an axis that slides and for one that turns."""
 
 import math
+from typing import ClassVar
 
 import pytest
 from pydantic import Field, ValidationError
 from tests.bad_files import example_text
 from tests.dump import dump_spec
 
-from detent.axisfile.motion import ROTARY_UNITS, rotary_model, unit_in
+from detent.axisfile.motion import ROTARY_UNITS, MovingTable, motors_model, rotary_model, unit_in
 from detent.errors import InputError
-from detent.files.fields import Table, describe_allowed, leaf_fields, optional, required, unit_of
+from detent.files.fields import Naming, Table, describe_allowed, leaf_fields, named, optional, required, unit_of
+from detent.files.problems import field_at
 from detent.files.quantities import Force, Length, Time
 from detent.methods.registry import METHODS
 from detent.units import KINDS, parse_quantity
@@ -102,6 +104,81 @@ def test_a_table_without_lengths_stays_itself():
     assert rotary_model(PlainTable) is PlainTable
     assert rotary_model(OuterTable) is ROTARY
     assert ROTARY.__doc__ == OuterTable.__doc__
+
+
+class GearedTable(Table, frozen=True):
+    """What stands where a motor turns."""
+
+    ratio: float = required("a ratio", "3", ge=1.0)
+    end: Length = optional("an end", 0.0, ge=-1.0, le=1.0)
+
+
+class ScrewTable(Table, frozen=True):
+    """What stands where a motor slides."""
+
+    lead: Length = required("a lead", '"1 mm"', gt=0.0)
+
+    turned: ClassVar[type[Table]] = GearedTable
+
+
+class OneMotor(MovingTable, frozen=True):
+    """A motor."""
+
+    way: Length = required("a way", '"1 m"', gt=0.0)
+    screw: ScrewTable
+    stops: list[Length] = optional("stops", [])
+
+
+class SeveralMotors(Table, frozen=True):
+    """A file of motors."""
+
+    motor: dict[str, OneMotor] = named("a motor", Naming("NAME", "[a-z]+", "letters", "x"), min_length=1)
+
+
+SLIDES = {"way": "2 m", "screw": {"lead": "3 mm"}, "stops": ["1 m", "2 m"]}
+TURNS = {"motion": "rotary", "way": "2 rad", "screw": {"ratio": 3.0, "end": "90 mrad"}, "stops": ["1 rad", "180 deg"]}
+
+
+def test_each_of_several_motors_is_read_by_its_own_motion():
+    read = SeveralMotors.model_validate({"motor": {"x": SLIDES, "phi": TURNS}}).motor
+    assert (read["x"].turns, read["phi"].turns) == (False, True)
+    assert read["x"].screw.lead == 0.003
+    assert (read["phi"].screw.ratio, read["phi"].screw.end) == (3.0, 0.09)
+    assert read["phi"].stops == [1.0, math.pi]
+    assert (read["x"].text(0.002, "m"), read["phi"].text(math.pi, "m")) == ("2 mm", "180 deg")
+    assert [table.unit("m/s") for table in read.values()] == ["m/s", "rad/s"]
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "place"),
+    [
+        ("phi", {**TURNS, "way": "2 m"}, ("way",)),
+        ("phi", {**TURNS, "screw": {"ratio": 0.5}}, ("screw", "ratio")),
+        ("phi", {**TURNS, "screw": {"ratio": 2.0, "lead": "1 mm"}}, ("screw", "lead")),
+        ("x", {**SLIDES, "way": "2 rad"}, ("way",)),
+        ("x", {**SLIDES, "motion": "round"}, ("motion",)),
+    ],
+)
+def test_what_is_wrong_with_a_motor_has_its_place_in_the_file(name, wrong, place):
+    with pytest.raises(ValidationError) as caught:
+        SeveralMotors.model_validate({"motor": {"x": SLIDES, "phi": TURNS, name: wrong}})
+    assert [error["loc"] for error in caught.value.errors()] == [("motor", name, *place)]
+
+
+def test_keys_of_a_motor_that_turns_are_found_by_its_name():
+    mixed = motors_model(SeveralMotors, frozenset({"phi"}))
+    assert motors_model(SeveralMotors, frozenset()) is SeveralMotors
+    assert unit_of(field_at(mixed, ("motor", "x", "way"))) == "m"
+    assert unit_of(field_at(mixed, ("motor", "phi", "way"))) == "rad"
+    assert field_at(mixed, ("motor", "phi", "screw", "ratio")).is_required()
+    with pytest.raises(KeyError):
+        field_at(mixed, ("motor", "x", "screw", "ratio"))
+    paths = [path for path, _ in leaf_fields(mixed)]
+    assert ("motor", "phi", "screw", "ratio") in paths
+    assert ("motor", "NAME", "screw", "lead") in paths
+    assert isinstance(mixed.model_validate({"motor": {"x": SLIDES, "phi": TURNS}}), SeveralMotors)
+    everything = [path[-1] for path, _ in leaf_fields(rotary_model(SeveralMotors))]
+    assert everything == ["motion", "way", "ratio", "end", "stops"]
 
 
 def test_only_units_and_examples_differ():

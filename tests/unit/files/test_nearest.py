@@ -18,6 +18,10 @@ from detent.methods.phase_servo.schema import PhaseServoSpec
         (0.4175, "%", '"41.75 %"', '"41.75 %"'),
         (12345.0, "N", '"12.34 kN"', '"12.35 kN"'),
         (3.0, "", '"3"', '"3"'),
+        # A round figure in degrees stays one, though radians give it back a last bit beside it.
+        (math.radians(29), "rad", '"29 deg"', '"29 deg"'),
+        (math.radians(60), "rad", '"60 deg"', '"60 deg"'),
+        (math.radians(12.34567), "rad", '"12.34 deg"', '"12.35 deg"'),
     ],
 )
 def test_short_values_beside_a_bound(value, unit, down, up):

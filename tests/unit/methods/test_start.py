@@ -17,7 +17,8 @@ from detent.methods.start import starting_axis
 
 FILE = Path("somewhere/carriage.toml")
 TURNED = [name for name in METHODS if METHODS[name].rotary]
-STARTS = [(name, ()) for name in METHODS] + [(name, ("axis.motion=rotary",)) for name in TURNED]
+STARTS = [(name, ()) for name in METHODS]
+STARTS += [(name, (f"{'.'.join(METHODS[name].motion_key).replace('NAME', 'x')}=rotary",)) for name in TURNED]
 each_start = pytest.mark.parametrize(("name", "overrides"), STARTS, ids=str)
 
 
@@ -31,7 +32,8 @@ def uncommented(text: str) -> str:
 
 
 def model_of(name: str, overrides: tuple[str, ...]) -> type[Table]:
-    return METHODS[name].rotary if overrides else METHODS[name].spec
+    method = METHODS[name]
+    return method.model_of(frozenset(tuple(text.partition("=")[0].split(".")) for text in overrides))
 
 
 @each_start
@@ -47,9 +49,10 @@ def test_it_holds_every_key_with_its_meaning_and_its_range(name, overrides):
     text = start(name, *overrides)
     places = parse_source(str(FILE), uncommented(text)).places
     told = " ".join(line.lstrip("# ") for line in text.splitlines())
-    for path, _ in leaf_fields(model_of(name, overrides)):
+    model = METHODS[name].rotary if overrides else METHODS[name].spec
+    for path, _ in leaf_fields(model):
         assert any(fits(path, place) for place in places), path
-    for row in key_rows(model_of(name, overrides)):
+    for row in key_rows(model):
         assert f"{row.doc}: {row.allowed}" in told, row.key
 
 
