@@ -67,7 +67,7 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
 
 JOBS = {
     "index_sequence.toml": "rotary_table.toml", "zoom_sequence.toml": "zoom.toml", "tiles.csv": "stage.toml",
-    "turn_moves.csv": "turntable.toml",
+    "turn_moves.csv": "turntable.toml", "photo_places.csv": "photo_table.toml",
 }  # fmt: skip
 """Jobs that only an axis can read, and an axis they are for."""
 

@@ -72,17 +72,27 @@ def axis_file() -> str:
 
 
 def keys_of(method: Any) -> str:
-    """Every key of a method's axis file, one section per table."""
-    from detent.files.keys import key_rows
+    """Every key of a method's axis file, one section per table, those that only an axis that turns has at the end."""
+    from detent.files.keys import key_rows, own_rows
 
+    text = _sections(method.spec, key_rows(method.spec))
+    if method.rotary and (rows := own_rows(method.rotary, method.spec)):
+        text += "\n" + _sections(method.rotary, rows, ' with `motion = "rotary"`')
+    return text
+
+
+def _sections(model: Any, keys: Any, where: str = "") -> str:
+    """Some keys of a model, one section per table."""
     sections: dict[str, list[tuple[str, ...]]] = {}
-    for row in key_rows(method.spec):
+    for row in keys:
         place, _, key = row.key.rpartition(".")
         default = f"must be stated, such as {code(row.example)}" if row.required else row.default or "none"
         sections.setdefault(place, []).append((code(key), default, row.allowed, row.unit, row.doc))
-    docs = dict(_tables(method.spec))
+    docs = dict(_tables(model))
     head = ("key", "default", "allowed", "SI unit inside", "meaning")
-    return "\n".join(f"### `[{place}]`\n\n{docs[place]}\n\n{table(head, rows)}" for place, rows in sections.items())
+    return "\n".join(
+        f"### `[{place}]`{where}\n\n{docs[place]}\n\n{table(head, rows)}" for place, rows in sections.items()
+    )
 
 
 def _tables(model: Any, prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -3,13 +3,16 @@
 import shlex
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from detent.cli.app import Force, Json, Set, app, option, unknown_method
 from detent.cli.terminal import print_json, print_table, tell
 from detent.errors import DetentError
+
+if TYPE_CHECKING:
+    from detent.files.keys import KeyRow
 
 NAME = typer.Argument(help="Control method; `detent keys` lists them.", show_default=False)
 NEW = "The file, a new one. Default: METHOD.toml"
@@ -53,9 +56,7 @@ def keys(
     as_json: Json = False,
 ) -> None:
     """List what an axis file may say: every key with its unit, range, default and meaning."""
-    from detent.files.keys import key_rows
-
-    found = {title: key_rows(model) for title, model in _models(method).items()}
+    found = _keys(method)
     known = {row.key.rpartition(".")[2] for rows in found.values() for row in rows}
     found = {title: [row for row in rows if row.holds(search)] for title, rows in found.items()}
     if not any(found.values()):
@@ -73,17 +74,17 @@ def keys(
             print_table(title, heads, cells)
 
 
-def _models(word: str) -> dict[str, Any]:
-    """Models of the files to tell of, by the name of the method."""
+def _keys(word: str) -> "dict[str, tuple[KeyRow, ...]]":
+    """Keys of the files to tell of, by the name of the method; those that only an axis that turns has at the end."""
+    from detent.files.keys import key_rows, own_rows
     from detent.methods.registry import METHODS
 
-    if not word:
-        return {method.name: method.spec for method in METHODS.usable()}
-    if word in METHODS:
-        return {word: METHODS[word].spec}
+    if not word or word in METHODS:
+        methods = [METHODS[word]] if word else METHODS.usable()
+        return {one.name: key_rows(one.spec) + own_rows(one.rotary or one.spec, one.spec) for one in methods}
     if not Path(word).exists():
         raise unknown_method("keys", word, "an axis file")
     from detent.methods.load import load_spec
 
     spec = load_spec(word)
-    return {spec.axis.method: type(spec)}
+    return {spec.axis.method: key_rows(type(spec))}

@@ -57,8 +57,8 @@ class Units:
     def of(self, unit: str) -> Scale:
         """Unit in which a signal of this SI unit is drawn."""
         scales = {"m": self.place, "rad": self.place, "m/s": self.speed, "rad/s": self.speed}
-        scales["rad/s^2"] = Scale(180 / math.pi, "deg/s²")
-        return scales.get(unit) or Scale(1.0, unit.replace("^2", "²").replace("*", " "))
+        scales |= {"rad/s^2": Scale(180 / math.pi, "deg/s²"), "rad/s^3": Scale(180 / math.pi, "deg/s³")}
+        return scales.get(unit) or Scale(1.0, unit.replace("^2", "²").replace("^3", "³").replace("*", " "))
 
     def written(self, value: float, unit: str) -> str:
         """Write a difference of a signal of this SI unit."""

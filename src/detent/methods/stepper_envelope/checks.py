@@ -136,11 +136,11 @@ def _resonance(m: MotorFigures) -> Iterator[Caution]:
     for name, speed in ({"limits.speed": m.table.limits.speed} | speeds).items():
         hz = m.table.hz(speed)
         if low < hz < high:
-            other = "choose another lead, or change the inertia"
+            other = f"choose another {m.table.mechanics.way_name}, or change the inertia"
             slower = m.most(name, low * m.table.step) if low >= m.start_hz else other
             yield Caution(
                 name,
-                f"{text(speed, 'm/s')}, {text(hz, 'Hz')}",
+                f"{m.table.text(speed, 'm/s')}, {text(hz, 'Hz')}",
                 f"below {text(low, 'Hz')} or above {text(high, 'Hz')}: the natural frequency is "
                 f"{text(m.motor.swinging_hz, 'Hz')}",
                 "the steps come in time with the swing of the rotor: noise, vibration, at worst lost steps",
@@ -160,8 +160,8 @@ def _ways(m: MotorFigures) -> Iterator[Caution]:
             yield Caution(
                 f"way between extremes.{name} and extremes.turn",
                 f"{way} steps",
-                f"{m.shortest_way} or more, {text(m.shortest_way * table.step, 'm')}: two ramps",
-                f"the run reaches {text(speed, 'm/s')}, {text(peak, 'Hz')}, never limits.speed",
+                f"{m.shortest_way} or more, {table.text(m.shortest_way * table.step, 'm')}: two ramps",
+                f"the run reaches {table.text(speed, 'm/s')}, {text(peak, 'Hz')}, never limits.speed",
                 m.most("limits.speed", speed) if fastest_zone < speed * (1 - 1e-3) else apart,
             )
     for name, zone in table.zone.items():
@@ -170,7 +170,7 @@ def _ways(m: MotorFigures) -> Iterator[Caution]:
             yield Caution(
                 f"zone.{name}",
                 f"{steps:.3g} steps long",
-                f"at least {FEWEST_ZONE_STEPS} steps, {text(FEWEST_ZONE_STEPS * table.step, 'm')}",
+                f"at least {FEWEST_ZONE_STEPS} steps, {table.text(FEWEST_ZONE_STEPS * table.step, 'm')}",
                 "it holds for every step that it touches, so that its bounds are off by up to a step",
                 "make it longer, or its motor's steps finer",
             )

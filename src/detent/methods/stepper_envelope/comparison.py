@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from detent.axisfile.motion import unit_in
 from detent.control.step_comparison import BRAKING_DISTANCE, CONSTANT_FREQUENCY, PERMISSIBLE_FREQUENCY
 from detent.control.step_rule import start_move
 from detent.methods.stepper_envelope.build import changed, stepper_motor
 from detent.methods.stepper_envelope.envelope_files import envelope_tables
 from detent.methods.stepper_envelope.host import StageMotor
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
-from detent.methods.stepper_envelope.summary import MM, stated, time_text
+from detent.methods.stepper_envelope.summary import speed_text, stated, time_text, units_of, way_text
 from detent.page.chart import Chart, Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import ComparisonOnScreen
@@ -70,17 +71,21 @@ class StepComparison(ComparisonOnScreen):
         Ways [step].
     courses : dict of tuple of Course by method
         One for each way; the envelope's are first.
+    motion : str
+        "linear", or "rotary" where the motor turns what it moves: rad for m.
     """
 
     motor: str
     step: float
     ways: tuple[int, ...]
     courses: dict[str, tuple[Course, ...]]
+    motion: str = "linear"
 
     @property
     def table(self) -> TextTable:
         """Time of each way and steps lost, for the terminal."""
-        title = f"Motor {self.motor}: time of a way, and steps lost ({format_quantity(self.step, 'm')} a step)"
+        step = format_quantity(self.step, unit_in(self.motion, "m"))
+        title = f"Motor {self.motor}: time of a way, and steps lost ({step} a step)"
         heads = ("method", *(f"{way} steps" for way in self.ways), "worked out per step")
         rows: list[tuple[str, ...]] = []
         for method, courses in self.courses.items():
@@ -99,7 +104,7 @@ class StepComparison(ComparisonOnScreen):
             f"are where they lose no step. On the longest way it is {times} times as quick as the constant start "
             f"frequency. {_losers(self)}"
         )
-        heads = [(f"{count(way, 'step')}, {stated(way * self.step * MM)}{GAP}mm", True) for way in self.ways]
+        heads = [(f"{count(way, 'step')}, {way_text(self, way * self.step)}", True) for way in self.ways]
         longest = [max(one.seconds for one in column) for column in zip(*self.courses.values(), strict=True)]
         rows: list[list[str | Cell]] = []
         for method, courses in self.courses.items():
@@ -117,7 +122,8 @@ class StepComparison(ComparisonOnScreen):
     def to_dict(self) -> dict[str, Any]:
         """Plain data for ``--json``."""
         runs = {name: [asdict(course) for course in courses] for name, courses in self.courses.items()}
-        return {"motor": self.motor, "step": self.step, "ways": list(self.ways), "methods": runs}
+        own = {"motor": self.motor, "motion": self.motion, "step": self.step}
+        return own | {"ways": list(self.ways), "methods": runs}
 
 
 def _losers(found: StepComparison) -> str:
@@ -146,7 +152,7 @@ def compare_steps(spec: StepperEnvelopeSpec, progress: Progress | None = None) -
             if progress is not None:
                 progress(done / len(METHODS), f"motor {name}: {method}")
             courses[method] = tuple(_course(spec, name, method, way) for way in ways)
-        found.append(StepComparison(name, table.step, ways, courses))
+        found.append(StepComparison(name, table.step, ways, courses, table.motion))
     return tuple(found)
 
 
@@ -205,6 +211,8 @@ class JerkComparison(ComparisonOnScreen):
         What the table gives without the axis's zones; speed is that of each step.
     smooth : Profile
         Ruckig's.
+    motion : str
+        "linear", or "rotary" where the motor turns what it moves: rad for m.
     """
 
     motor: str
@@ -214,6 +222,7 @@ class JerkComparison(ComparisonOnScreen):
     jerk: float
     envelope: Profile
     smooth: Profile
+    motion: str = "linear"
 
     @property
     def magnified(self) -> float:
@@ -226,15 +235,18 @@ class JerkComparison(ComparisonOnScreen):
     def table(self) -> TextTable:
         """Times of both profiles, for the terminal."""
         limits = ((self.speed, "m/s"), (self.acceleration, "m/s^2"), (self.jerk, "m/s^3"))
-        told = ", ".join(format_quantity(value, unit) for value, unit in limits)
-        title = f"Motor {self.motor}: {format_quantity(self.way, 'm')} without zones, limits {told}"
+        told = ", ".join(self._text(value, unit) for value, unit in limits)
+        title = f"Motor {self.motor}: {self._text(self.way, 'm')} without zones, limits {told}"
         rows: list[tuple[str, ...]] = []
         for name, profile in (("envelope", self.envelope), ("time-optimal, jerk limited (ruckig)", self.smooth)):
             more = profile.seconds - self.envelope.seconds
             longer = "" if profile is self.envelope else f"{more * 1e3:+.1f} ms, {more / self.envelope.seconds:+.1%}"
-            peak = format_quantity(float(profile.speed.max()), "m/s")
+            peak = self._text(float(profile.speed.max()), "m/s")
             rows.append((name, format_quantity(profile.seconds, "s"), longer, peak))
         return TextTable(title, ("profile", "time", "beside the envelope", "peak speed"), rows)
+
+    def _text(self, value: float, linear: str) -> str:
+        return format_quantity(value, unit_in(self.motion, linear))
 
     def figures(self) -> tuple[Figure, ...]:
         """Speed of both profiles: the whole way, and its two ends magnified."""
@@ -252,32 +264,36 @@ class JerkComparison(ComparisonOnScreen):
         """Plain data for ``--json``."""
         names = ("motor", "way", "speed", "acceleration", "jerk")
         times = {"envelope_seconds": self.envelope.seconds, "smooth_seconds": self.smooth.seconds}
-        return {name: getattr(self, name) for name in names} | times
+        return {name: getattr(self, name) for name in names} | {"motion": self.motion} | times
 
 
 def _told(found: JerkComparison) -> str:
     envelope, smooth = found.envelope.seconds, found.smooth.seconds
     more = 100 * (smooth / envelope - 1)
     quicker = f"{number(abs(more), 2)}{GAP}% {'longer' if more >= 0 else 'shorter'}"
+    units = units_of(found)
+    acceleration, jerk = (units.of(unit_in(found.motion, f"m/s^{n}")) for n in (2, 3))
     return (
-        f"{stated(found.way * MM)}{GAP}mm of motor {found.motor} without zones, with the same largest speed "
-        f"({stated(found.speed * MM)}{GAP}mm/s) and acceleration ({stated(found.acceleration)}{GAP}m/s²): the "
+        f"{way_text(found, found.way)} of motor {found.motor} without zones, with the same largest speed "
+        f"({speed_text(found, found.speed)}) and acceleration "
+        f"({stated(found.acceleration * acceleration.factor)}{GAP}{acceleration.name}): the "
         f"envelope takes {time_text(envelope)}, the time-optimal profile of limited jerk "
-        f"({number(found.jerk)}{GAP}m/s³, by ruckig) {time_text(smooth)}, {quicker}. A stepper may begin and end at "
-        "its start frequency at once; the profile begins at standstill. Near the top the envelope spares acceleration "
-        "where the torque falls; of that the profile knows nothing."
+        f"({number(found.jerk * jerk.factor)}{GAP}{jerk.name}, by ruckig) {time_text(smooth)}, {quicker}. A stepper "
+        "may begin and end at its start frequency at once; the profile begins at standstill. Near the top the envelope "
+        "spares acceleration where the torque falls; of that the profile knows nothing."
     )
 
 
 def _chart(found: JerkComparison, name: str, stretch: tuple[float, float], title: str = "") -> Chart:
     """Speed over a stretch of time, in milliseconds where it has a title of its own."""
-    t = np.linspace(*stretch, POINTS)
+    t, scale = np.linspace(*stretch, POINTS), units_of(found).speed
     curves = [
-        Curve(label="jerk limited", colour="left", width=2, dash=(6, 4), y=found.smooth.at(t) * MM),
-        Curve(label="envelope", colour="speed", width=2, y=found.envelope.at(t) * MM),
+        Curve(label="jerk limited", colour="left", width=2, dash=(6, 4), y=found.smooth.at(t) * scale.factor),
+        Curve(label="envelope", colour="speed", width=2, y=found.envelope.at(t) * scale.factor),
     ]
-    span = (0.0, round(1.15 * found.speed * MM, 3))
-    panel = Panel(name=name, label="speed [mm/s]", height=200, zero=True, span=span, curves=curves, title=title)
+    span = (0.0, round(1.15 * found.speed * scale.factor, 3))
+    label = f"speed [{scale.name}]"
+    panel = Panel(name=name, label=label, height=200, zero=True, span=span, curves=curves, title=title)
     timeline = Timeline(name=name, t=t, label="time since the start signal", unit="ms" if title else "s")
     return time_charts(timeline, [panel])[0]
 
@@ -291,7 +307,7 @@ def compare_jerk(spec: StepperEnvelopeSpec, name: str = "") -> JerkComparison:
     sections = move_sections(0.0, way, limits)
     t = np.linspace(0.0, float(sections.t[-1]), 2001)
     smooth, envelope = Profile(t, sections.at(t)[1]), _envelope_profile(spec, name)
-    return JerkComparison(name, way, limits.speed, limits.acceleration, limits.jerk, envelope, smooth)
+    return JerkComparison(name, way, limits.speed, limits.acceleration, limits.jerk, envelope, smooth, table.motion)
 
 
 def _envelope_profile(spec: StepperEnvelopeSpec, name: str) -> Profile:

@@ -131,10 +131,10 @@ def _steps(m: MotorFigures) -> Iterator[Row]:
     """What a step is, and how many there are."""
     table = m.table
     whole = table.steps * table.step
-    rest = f", {format_quantity(whole, 'm', 7)}" if table.limits.travel - whole > 1e-6 * table.step else ""
+    rest = f", {m.table.text(whole, 'm', 7)}" if table.limits.travel - whole > 1e-6 * table.step else ""
     per_turn, finer = m.motor.steps_per_turn * m.motor.microsteps, " / microsteps" if m.motor.microsteps > 1 else ""
     hz = f"{format_quantity(m.max_hz, 'Hz')}, {m.max_hz / per_turn * 60:.4g} rpm"
-    yield "step", table.step, "m", "", f"travel per revolution / steps per turn{finer}"
+    yield "step", table.step, table.unit("m"), "", f"{table.mechanics.way_formula} / steps per turn{finer}"
     yield "step angle", m.motor.step_angle, "rad", "", f"1 turn / steps per turn{finer}"
     yield "travel", table.steps, "count", f"{table.steps} steps{rest}", "limits.travel / step, rounded down"
     yield "largest frequency f_max", m.max_hz, "Hz", hz, "limits.speed / step"
@@ -143,16 +143,16 @@ def _steps(m: MotorFigures) -> Iterator[Row]:
 def _rotor(m: MotorFigures) -> Iterator[Row]:
     """How the rotor with its load swings and starts."""
     text = f"{format_quantity(m.inertia, 'kg*m^2')}, load {m.motor.load_inertia / m.motor.rotor_inertia:.3g} x rotor"
-    yield "inertia J", m.inertia, "kg*m^2", text, "rotor + screw + coupling + mass x (lead / 2 pi)^2"
+    yield "inertia J", m.inertia, "kg*m^2", text, m.table.mechanics.inertia_formula
     yield "natural frequency", m.natural_hz, "Hz", "", "sqrt(steps per turn / 4 x holding torque / J) / 2 pi"
-    speed, relative = format_quantity(m.start_hz * m.table.step, "m/s"), m.start_hz / m.motor.swinging_hz
+    speed, relative = m.table.text(m.start_hz * m.table.step, "m/s"), m.start_hz / m.motor.swinging_hz
     text = f"{format_quantity(m.start_hz, 'Hz')} ({speed}), {relative:.3g} x natural"
     formula = "bare start frequency / sqrt(1 + J_load / J_rotor) / start_safety, at most f_max"
     yield "start frequency", m.start_hz, "Hz", text, formula
     # The distance from its step at which friction can hold a resting rotor.
     error = math.asin(min(m.motor.friction_torque / m.motor.holding_torque, 1.0)) * 2 / math.pi
     kind, way = "full steps" if m.motor.microsteps > 1 else "steps", error * m.table.step * m.motor.microsteps
-    text = f"{error:.3g} {kind}, {format_quantity(way, 'm')}"
+    text = f"{error:.3g} {kind}, {m.table.text(way, 'm')}"
     if m.motor.microsteps > 1:
         formula = "holding torque x sin(90 deg / microsteps)"
         yield "incremental torque of a microstep", m.motor.incremental_torque, "N*m", "", formula
@@ -176,9 +176,9 @@ def _ramp(m: MotorFigures) -> Iterator[Row]:
     entries, way, fast = len(m.ramp), m.shortest_way, m.travel_time
     text = f"{entries} entries, {format_quantity(m.ramp.duration, 's')}"
     yield "ramp", entries, "count", text, "f^2 grows by 2 a(f) per step (3.1)"
-    text = f"{entries - 1} steps, {format_quantity((entries - 1) * m.table.step, 'm')}"
+    text = f"{entries - 1} steps, {m.table.text((entries - 1) * m.table.step, 'm')}"
     yield "braking distance from f_max", entries - 1, "count", text, "entries of the ramp - 1"
-    text = f"{way} steps, {format_quantity(way * m.table.step, 'm')}"
+    text = f"{way} steps, {m.table.text(way * m.table.step, 'm')}"
     yield "shortest way that reaches f_max", way, "count", text, "2 x entries of the ramp - 1"
     times = m.table.steps / m.start_hz / fast
     text = f"{format_quantity(fast, 's')}, {times:.3g} x as fast as at the start frequency"

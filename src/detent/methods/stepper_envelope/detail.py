@@ -9,7 +9,17 @@ import numpy as np
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec, StepperTable
 from detent.methods.stepper_envelope.stage_job import StageJog, StageMove
 from detent.methods.stepper_envelope.stage_trace import Leg, MadeSteps, legs_of, of, runs_chart, runs_of, step_torques
-from detent.methods.stepper_envelope.summary import MM, PULL_OUT_LAG, Motion, StageFigures, called, margin_text, stated
+from detent.methods.stepper_envelope.summary import (
+    PULL_OUT_LAG,
+    Motion,
+    StageFigures,
+    called,
+    margin_text,
+    speed_text,
+    stated,
+    units_of,
+    way_text,
+)
 from detent.page.chart import Band, Chart, Curve, Panel, Timeline, line_chart, thin_indices, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Section
@@ -98,18 +108,14 @@ def _table_figure(shown: ShownMotion) -> Figure:
     way = motion.motor.stop - motion.motor.start
     turned = f", with {count(len(legs) - 1, 'turn')} on the way" if len(legs) > 1 else ""
     caption = (
-        f"Shown is {shown.why}: motor {motion.name}, {_mm(abs(way))} {'up' if way > 0 else 'down'}{turned}. The grey "
-        "ground is now the table of this very move, which ends at its extremes: every step was looked up in it. Look "
-        "for: the line on the edge of the grey."
+        f"Shown is {shown.why}: motor {motion.name}, {way_text(table, abs(way))} {'up' if way > 0 else 'down'}"
+        f"{turned}. The grey ground is now the table of this very move, which ends at its extremes: every step was "
+        "looked up in it. Look for: the line on the edge of the grey."
     )
     # The extremes of a manual run are the ends of the travel.
     runs = runs_of(motion.name, table, legs, ARC_POINTS, () if isinstance(shown.asked, StageJog) else legs)
     title = "Frequency against position, under the table of the move"
     return Figure(title=title, caption=caption, charts=[runs_chart(runs, "detail-runs", height=260)])
-
-
-def _mm(length: float) -> str:
-    return f"{stated(length * MM)}{GAP}mm"
 
 
 def _torque_figure(shown: ShownMotion) -> Figure | None:
@@ -190,8 +196,9 @@ def _rotor_charts(shown: ShownMotion, rows: Stretch, events: Sequence[Event]) ->
     rotor_lag = rotor_lag / shown.table.drive.microsteps
     # A step per period, 0 at rest.
     hz = np.divide(shown.spec.controller.timer, period, out=np.zeros(len(period)), where=period > 0)
-    field = table.step * hz * direction
-    rotor = velocity * table.mechanics.travel_per_revolution / (2 * math.pi)
+    speed = units_of(table).speed
+    field = table.step * hz * direction * speed.factor
+    rotor = velocity * table.mechanics.per_turn / (2 * math.pi) * speed.factor
     unit = "ms" if rows.t[-1] < 1 else "s"
     timeline = Timeline(name="detail", t=rows.t, label="time since the start signal", unit=unit, events=events)
     reach = max(float(np.abs(rotor_lag).max()), PULL_OUT_LAG)
@@ -199,9 +206,9 @@ def _rotor_charts(shown: ShownMotion, rows: Stretch, events: Sequence[Event]) ->
     out_of_step = reach > 5 * PULL_OUT_LAG  # on this scale the bounds are one line
     lag = Curve(label="field less rotor", colour="drive", width=2 if out_of_step else 1, y=rotor_lag, thin=POINTS)
     return time_charts(timeline, [
-        Panel(name="detail-speed", label="speed [mm/s]", height=200, zero=True, curves=[
-            Curve(label="rotor", colour="muted", width=1, y=rotor * MM, thin=POINTS),
-            Curve(label="field: what is commanded", colour="speed", width=2, step=True, y=field * MM, thin=POINTS),
+        Panel(name="detail-speed", label=f"speed [{speed.name}]", height=200, zero=True, curves=[
+            Curve(label="rotor", colour="muted", width=1, y=rotor, thin=POINTS),
+            Curve(label="field: what is commanded", colour="speed", width=2, step=True, y=field, thin=POINTS),
         ]),
         Panel(name="detail-lag", label="lag [step]", height=220, zero=True, span=(-1.3 * reach, 1.3 * reach),
               levels=[] if out_of_step else [(PULL_OUT_LAG, wrong), (-PULL_OUT_LAG, "")], curves=[lag]),
@@ -232,14 +239,15 @@ def motion_events(shown: ShownMotion) -> list[Event]:
     asked, motion, legs = shown.asked, shown.motion, shown.legs
     begin, events = motion.move.begin, [Event(motion.seconds, "the last step is over")]
     if isinstance(asked, StageJog):
-        events.append(Event(0.0, f"the joystick asks for {stated(asked.speed * MM)}{GAP}mm/s"))
+        events.append(Event(0.0, f"the joystick asks for {speed_text(shown.table, asked.speed)}"))
         events.append(Event(asked.duration, "the joystick is let go"))
     else:
         others = ", ".join(other for other in asked.motors if other != motion.name)
         events.append(Event(0.0, "start signal" + (f", at the same time for {others}" if others else "")))
         if change := asked.change:
             made, way = legs[0].made, legs[0].direction
-            text = f"at {_mm(change.at)} the stop is changed to {_mm(change.to)}"
+            at, to = (way_text(shown.table, place) for place in (change.at, change.to))
+            text = f"at {at} the stop is changed to {to}"
             passed = np.flatnonzero((made.position - shown.table.step_at(change.at)) * way >= 0)
             events += [Event(float(made.t[first]) - begin, text) for first in passed[:1]]
     for leg in legs[1:]:

@@ -19,6 +19,7 @@ import numpy as np
 from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
+from detent.axisfile.motion import unit_in
 from detent.control import step_rule
 from detent.control.step_rule import StepRule
 from detent.control.step_timer import StepTimer
@@ -28,6 +29,7 @@ from detent.files.text import check_target, shown, write_text
 from detent.methods.stepper_envelope.build import make_tables
 from detent.methods.stepper_envelope.controller import StepperControllerParams, load_rule
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
+from detent.methods.stepper_envelope.summary import units_of
 from detent.page.parts import Numbers
 from detent.page.plots import COLOURS, new_figure
 from detent.planning.step_envelope import ENTRY_BYTES, INDEX_BITS, INDEX_MASK, StepEnvelope, envelope_memory
@@ -41,13 +43,12 @@ Axes = Any
 LINE = 110  # longest line of a comment in the header
 PER_LINE = 16  # numbers of up to five digits in a line of the header; of longer ones, half as many
 MARK = "\0mark"  # stands for the checksum of a header's code, until that is known
-METRE_DIGITS = 12  # decimals of a position in metres: a picometre, far below any step
+PLACE_DIGITS = 12  # decimals of a position in metres or radians: a picometre, far below any step
 
 BLUE, ORANGE = COLOURS[:2]
 GREY = "#7d8996"
 INK = "#17202a"
 
-MM = 1e-3
 HEADROOM = 1.32  # height of each half over its largest limit: room for the limits and, further out, the direction
 UPRIGHT, NONE = 0.07, 0.015  # parts of the travel: narrower zones have their limit written upright, or not at all
 BESIDE = 0.17  # part of the travel that the name of an extreme may take, beside its point
@@ -65,9 +66,10 @@ class EnvelopeTables(OnScreen):
     down: StepEnvelope  # and towards falling ones: the same ramp, travel and numbering of the zone limits
     clock_hz: int  # ticks of the step timer per second [Hz]
     reload: bool  # words are periods of the timer in ticks instead of frequencies in Hz
-    travel_per_step: float  # travel of the moved mass per step [m]
+    travel_per_step: float  # travel of what is moved per step [m]
     first_position: float = 0.0  # place of step boundary 0 [m]
     pause: int = 1  # waiting time of a reversal, in periods of the start frequency, 0..255
+    motion: str = "linear"  # "rotary" where the motor turns what it moves: rad for m
 
     @property
     def steps(self) -> int:
@@ -108,6 +110,7 @@ def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:
         travel_per_step=table.step,
         first_position=table.mechanics.lower_end,
         pause=table.drive.reversal_pause,
+        motion=table.motion,
     )
 
 
@@ -117,13 +120,14 @@ def envelope_tables(spec: StepperEnvelopeSpec, name: str) -> EnvelopeTables:
 def write_envelope_csv(tables: EnvelopeTables, path: str | Path, *, force: bool = False) -> None:
     """Write both tables as CSV, one row per step.
 
-    Step i lies between the boundaries i and i + 1; `position` is that of boundary i. `permissible` is the frequency
-    that ramp and zone allow; `period` is what the timer loads for it, words rounded. A step that is not allowed (a
-    sentinel) has index -1, and 0 for permissible and period.
+    Step i lies between the boundaries i and i + 1; `position` is that of boundary i, in rad for a motor that turns.
+    `permissible` is the frequency that ramp and zone allow; `period` is what the timer loads for it, words rounded. A
+    step that is not allowed (a sentinel) has index -1, and 0 for permissible and period.
     """
     steps = np.arange(tables.steps)
     position = tables.first_position + steps * tables.travel_per_step
-    columns: dict[str, NDArray[Any]] = {"step": steps, "position [m]": np.round(position, METRE_DIGITS)}
+    unit = unit_in(tables.motion, "m")
+    columns: dict[str, NDArray[Any]] = {"step": steps, f"position [{unit}]": np.round(position, PLACE_DIGITS)}
     for name, table in (("up", tables.up), ("down", tables.down)):
         columns[f"{name}.index"] = table.indices()
         columns[f"{name}.zone_limit [Hz]"] = table.zones.hz
@@ -151,8 +155,8 @@ def write_envelope_header(tables: EnvelopeTables, path: str | Path, *, force: bo
 
 def _header(tables: EnvelopeTables) -> str:
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True)  # noqa: S701 - C
-    metres = partial(format_quantity, unit="m", digits=6)
-    environment.filters |= {"comment": _comment, "numbers": _numbers, "metres": metres}
+    places = partial(format_quantity, unit=unit_in(tables.motion, "m"), digits=6)
+    environment.filters |= {"comment": _comment, "numbers": _numbers, "place": places}
     template = resources.files("detent.methods.stepper_envelope").joinpath("step_rule.h.in").read_text(encoding="utf-8")
     ramp, limit = tables.words()
     memory = envelope_memory(tables.up.ramp, tables.up.zones)
@@ -198,7 +202,8 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path, *, force: bool = Fal
     """Draw the permissible frequency over the position: upwards above the axis, downwards below it.
 
     The run between a direction's extremes is filled; outside of them a dashed line shows what the table allows there.
-    What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and above.
+    What the zones forbid is grey. Steps and Hz are at the left and below, mm and mm/s at the right and
+    above, or degrees of a motor that turns.
     """
     path = check_target(path, force=force)
     top = HEADROOM * max(tables.up.zones.limits)
@@ -222,11 +227,13 @@ def plot_envelope(tables: EnvelopeTables, path: str | Path, *, force: bool = Fal
         area.xaxis.get_major_locator().set_params(integer=True)
         area.set_xlabel("position [step]")
         area.set_ylabel("permissible step frequency [Hz]")
-        # The same in mm and mm/s.
-        step, first = tables.travel_per_step / MM, tables.first_position / MM
-        area.secondary_xaxis("top", functions=_line(first, step)).set_xlabel("position [mm]")
-        per_step = format_quantity(tables.travel_per_step, "m", 4).replace("um", "µm")
-        area.secondary_yaxis("right", functions=_line(0.0, step)).set_ylabel(f"speed [mm/s], {per_step} a step")
+        # The same in mm and mm/s, or in degrees.
+        units = units_of(tables)
+        step, first = (way * units.place.factor for way in (tables.travel_per_step, tables.first_position))
+        area.secondary_xaxis("top", functions=_line(first, step)).set_xlabel(f"position [{units.place.name}]")
+        per_step = format_quantity(tables.travel_per_step, unit_in(tables.motion, "m"), 4).replace("um", "µm")
+        speed = f"speed [{units.speed.name}], {per_step} a step"
+        area.secondary_yaxis("right", functions=_line(0.0, step)).set_ylabel(speed)
         area.set_title(shown(f"How fast may every step be? Motor {tables.motor}, axis {tables.axis}"), pad=12)
         figure.legend(loc="outside lower center", ncols=2, fontsize=9)
 
@@ -337,6 +344,7 @@ class Envelope(OnScreen):
             "motor": t.motor,
             "steps": t.steps,
             "step": t.travel_per_step,
+            "motion": t.motion,
             "ramp": len(t.up.ramp),
             "start_hz": float(t.up.ramp.hz[0]),
             "top_hz": float(t.up.ramp.hz[-1]),

@@ -231,7 +231,7 @@ class StageHost:
             motor = self.stage.motors[name]
             goal = move.place_of(name, self.goal[name])
             for key, got, allowed, remedy in move_faults(motor.table, name, move, motor.place, goal):
-                where = f"motor {name} at {text(motor.place, 'm')}" + (f", {key}" if key != name else "")
+                where = f"motor {name} at {motor.table.text(motor.place, 'm')}" + (f", {key}" if key != name else "")
                 raise AxisError(f"{where}: got {got}; expected: {allowed}; try: {remedy}")
             turn = None if move.turn is None else motor.table.step_inside(move.turn)
             leg, self.goal[name] = Leg(motor.position, motor.table.step_inside(goal), turn), goal
@@ -330,7 +330,7 @@ def _job_problems(spec: StepperEnvelopeSpec, job: StageJob) -> Iterator[tuple[in
         if isinstance(move, StageJog):
             table = spec.stepper[move.motor]
             if not 1.0 <= table.hz(abs(move.speed)) <= table.max_hz * (1 + 1e-9):
-                got, slowest, top = (text(v, "m/s") for v in (move.speed, table.step, table.limits.speed))
+                got, slowest, top = (table.text(v, "m/s") for v in (move.speed, table.step, table.limits.speed))
                 remedy = f"write {top}, or correct limits.speed"
                 yield move.row, "speed", got, f"{slowest} to {top}, either way", remedy
             goal[move.motor] = math.nan  # where a manual run ends is not known before it is made
@@ -356,16 +356,16 @@ def move_faults(
     if outside or math.isnan(start) or math.isnan(goal):
         return
     here, there = table.step_inside(start), table.step_inside(goal)
-    way = f"from {text(table.position_of(here), 'm', 6)} to {text(table.position_of(there), 'm', 6)}"
+    way = f"from {table.text(table.position_of(here), 'm', 6)} to {table.text(table.position_of(there), 'm', 6)}"
     if move.turn is not None:
         turn = table.step_inside(move.turn)
         if (turn - here) * (there - turn) >= 0:
-            got, allowed = f"{text(move.turn, 'm', 6)} on the way {way}", "a place from which the motor comes back"
-            yield "turn", got, allowed, "set turn beyond both, or remove it"
+            got = f"{table.text(move.turn, 'm', 6)} on the way {way}"
+            yield "turn", got, "a place from which the motor comes back", "set turn beyond both, or remove it"
     if move.change is not None:
         at = table.step_inside(move.change.at)
         if at == here or (at - here) * (there - at) < 0:
-            got = f"{text(move.change.at, 'm', 6)}, which the motor does not pass {way}"
+            got = f"{table.text(move.change.at, 'm', 6)}, which the motor does not pass {way}"
             yield "changed_at", got, "a place on the way, its end included", "set it there, or correct the target"
 
 
@@ -376,6 +376,7 @@ def _outside(table: StepperTable, place: float) -> tuple[str, str, str] | None:
     end = max(table.steps * table.step, table.limits.travel) + table.step / 2
     if math.isnan(place) or -table.step / 2 <= place - lower <= end:
         return None
-    nearest = text(lower if place < lower else upper, "m")
+    nearest = table.text(lower if place < lower else upper, "m")
     remedy = f"go to {nearest} at the most, or correct limits.travel and mechanics.lower_end of the motor"
-    return f"the position {text(place, 'm', 6)}", f"from {text(lower, 'm')} to {text(upper, 'm')}", remedy
+    allowed = f"from {table.text(lower, 'm')} to {table.text(upper, 'm')}"
+    return f"the position {table.text(place, 'm', 6)}", allowed, remedy

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from detent.axisfile.catalogue import STEPPER_MOTORS
+from detent.axisfile.motion import motors_model, rotary_model
+from detent.files.locate import Path as Key
 from detent.methods.method import Method, Simulated
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 
@@ -29,6 +31,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     jobs = "moves of several motors, or tiles (.csv, .toml)"
     pace = "2 us, every 100th"
     spec = StepperEnvelopeSpec
+    rotary: type[StepperEnvelopeSpec] | None = rotary_model(StepperEnvelopeSpec)
     catalogue = STEPPER_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
     senses = "derive:position_sensors"
@@ -38,6 +41,10 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     takes, runs = "stage_job:StageJob", "run:run_stage"
     sums_up, reports = "summary:stage_summary_rows", "page:stage_page"
     says = "{job}: every move arrived on {axis}, no step was lost.", "Not done: {failure}"
+
+    def model_of(self, turning: frozenset[Key]) -> type[StepperEnvelopeSpec]:
+        """The model of a file in which some motors turn."""
+        return motors_model(self.spec, frozenset(motor for _, motor, _ in turning))
 
     def tick(self, spec: StepperEnvelopeSpec) -> float:
         """Time step of the rotors [s]."""
@@ -54,7 +61,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
 
     def load(self, spec: StepperEnvelopeSpec, path: Path) -> "StageJob":
         """Moves of its motors."""
-        return self.brought("stage_job:load_stage_job")(path, tuple(spec.stepper))
+        return self.brought("stage_job:load_stage_job")(path, tuple(spec.stepper), spec.turning)
 
     def sample_job(self, spec: StepperEnvelopeSpec) -> "StageJob":
         """All motors 200 steps, as far as their ways go."""

@@ -13,7 +13,15 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJog
 from detent.methods.stepper_envelope.stage_plan import plan_figure
 from detent.methods.stepper_envelope.stage_trace import MadeSteps, Runs, motor_runs, recorded_steps, runs_chart
-from detent.methods.stepper_envelope.summary import MM, Motion, StageFigures, margin_text, stated
+from detent.methods.stepper_envelope.summary import (
+    Motion,
+    StageFigures,
+    margin_text,
+    speed_text,
+    stated,
+    units_of,
+    way_text,
+)
 from detent.page.chart import Curve, Panel, Timeline, time_charts
 from detent.page.figure import Figure
 from detent.page.frame import Card, Comparison, Headline, Page, Section, card, comparison_section
@@ -33,6 +41,7 @@ from detent.page.run_page import (
     whole_or_first,
 )
 from detent.page.table import Cell, left_out, long_table
+from detent.page.units import Units
 from detent.page.words import GAP, count, duration, further, number
 from detent.record.trace import Trace
 
@@ -125,8 +134,8 @@ def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
     t = rows.t[part]
     panels = [
         Panel(
-            name=f"path-{k}", label=f"{name} [mm]", height=170, curves=_path_curves(figures, rows, name, part),
-            about=f"Position of {name} over time",
+            name=f"path-{k}", label=f"{name} [{figures.units(name).place.name}]", height=170,
+            curves=_path_curves(figures, rows, name, part), about=f"Position of {name} over time",
         )
         for k, name in enumerate(names[:MOST_MOTORS])
     ]  # fmt: skip
@@ -143,17 +152,17 @@ def _path_figure(figures: StageFigures, trace: Trace | None) -> Figure | None:
 
 def _path_curves(figures: StageFigures, rows: Stretch, name: str, part: slice) -> list[Curve]:
     """Target, and where the rotor was; the counted position if it is not that, or if nothing better was recorded."""
-    table = figures.spec.stepper[name]
+    table, scale = figures.spec.stepper[name], figures.units(name).place.factor
     lower, steps = table.mechanics.lower_end, rows[f"{name}.controller.rule.position"][part]
     aim = target_of(figures, name, rows.trace.time[rows.rows][part])
     # A manual run has no target: one who makes nothing else has no curve.
-    aimed = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * MM, thin=0)
+    aimed = Curve(label="target", colour="muted", dash=(6, 4), step=True, y=aim * scale, thin=0)
     target = [] if np.isnan(aim).all() else [aimed]
-    counted = (lower + steps * table.step) * MM
+    counted = (lower + steps * table.step) * scale
     if not has(rows.trace, [f"{name}.plant.rotor.lag"]):
         return [*target, Curve(label="counted position", colour="speed", width=2, y=counted, digits=4, thin=POINTS)]
     # The field is where the steps are counted: the rotor lags behind it.
-    place = (lower + (steps - rows[f"{name}.plant.rotor.lag"][part]) * table.step) * MM
+    place = (lower + (steps - rows[f"{name}.plant.rotor.lag"][part]) * table.step) * scale
     rotor = Curve(label="true position", colour="speed", width=2, y=place, digits=4, thin=POINTS)
     if not any(motion.motor.lost for motion in figures.motions if motion.name == name):
         return [*target, rotor]
@@ -183,10 +192,11 @@ def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[
         "stops anywhere keeps to its ramp. "
     )
     for k, one in enumerate(runs[:MOST_MOTORS]):
-        caption += f"1{GAP}000{GAP}Hz is {stated(one.table.step * 1e6)}{GAP}mm/s.{_zones_text(one)}"
+        caption += f"1{GAP}000{GAP}Hz is {speed_text(one.table, one.table.step * 1e3)}.{_zones_text(one)}"
         if one.window != one.travel:
-            low, high = (stated(place * MM) for place in one.travel)
-            caption += f" The travel goes from {low} to {high}{GAP}mm; drawn is what was used."
+            low, high = one.travel
+            low = stated(low * units_of(one.table).place.factor)
+            caption += f" The travel goes from {low} to {way_text(one.table, high)}; drawn is what was used."
         if one.left_out:
             caption += f" {further(one.left_out, 'move')} not drawn."
         drawn.append(Figure(title=f"Motor {one.name}", caption=caption, charts=[runs_chart(one, f"runs-{k}")]))
@@ -198,9 +208,8 @@ def _runs_figures(figures: StageFigures, made: Mapping[str, MadeSteps]) -> list[
 
 def _zones_text(runs: Runs) -> str:
     """Zones by name: in the figure not all have room for theirs."""
-    named = [
-        f"{name} ({stated(zone.begin * MM)} to {stated(zone.end * MM)}{GAP}mm)" for name, zone in runs.zones.items()
-    ]
+    table, scale, zones = runs.table, units_of(runs.table).place.factor, runs.zones.items()
+    named = [f"{name} ({stated(zone.begin * scale)} to {way_text(table, zone.end)})" for name, zone in zones]
     if not named:
         return ""
     more = f" and {count(len(named) - MOST_ZONES)} more" if len(named) > MOST_ZONES else ""
@@ -211,12 +220,16 @@ def _every_move(figures: StageFigures) -> Figure:
     run = figures.run
     labelled, astray = any(move.label for move in run.moves), any(motion.off for motion in figures.motions)
     name = [("tile" if figures.word == "tile" else "name", False)] if labelled else []
-    heads = [("move", True), *name, ("start [s]", True), ("motor", False), ("from [mm]", True), ("to [mm]", True),
-             ("way [mm]", False), ("time [ms]", True), ("peak [Hz]", True), ("lag [step]", True), ("margin", True),
+    # Motors that slide beside motors that turn: each cell has its unit.
+    units = {figures.units(motion.name).place.name for motion in figures.motions}
+    unit, own = (f" [{'/'.join(units)}]", False) if len(units) < 2 else ("", True)
+    heads = [("move", True), *name, ("start [s]", True), ("motor", False), (f"from{unit}", True), (f"to{unit}", True),
+             (f"way{unit}", False), ("time [ms]", True), ("peak [Hz]", True), ("lag [step]", True), ("margin", True),
              ("lost [step]", True), *([("off [step]", True)] if astray else [])]  # fmt: skip
     rows: list[list[str | Cell]] = []
     for move, motions in zip(run.moves, figures.by_move, strict=True):
-        cells = [_cells(motion) for motion in motions] or [["none: stays", *[""] * 9]]
+        cells = [_cells(motion, figures.units(motion.name), own=own) for motion in motions]
+        cells = cells or [["none: stays", *[""] * 9]]
         lead = [count(move.number), *([move.label] if labelled else []), f"{move.begin - run.time_ready:.3f}"]
         # Number and name stand in the first row only.
         heading = [lead, *([[""] * len(lead)] * (len(cells) - 1))]
@@ -231,15 +244,16 @@ def _every_move(figures: StageFigures) -> Figure:
     return Figure(title=f"Every {figures.word}", caption=caption, table=long_table(heads, rows))
 
 
-def _cells(motion: Motion) -> list[str | Cell]:
-    """Cells of a motion, the last of which is left out where every rotor stands in its place."""
+def _cells(motion: Motion, units: Units, *, own: bool) -> list[str | Cell]:
+    """Cells of a motion, with units of their own or not; the last is left out where every rotor stands in its place."""
     motor, way = motion.motor, motion.motor.stop - motion.motor.start
     look, side = ("right", "↑ up") if way >= 0 else ("left", "↓ down")
-    arrow = Markup('<span class="arrow {}">{}</span> {}').format(look, side, stated(abs(way) * MM))
+    unit, scale = f"{GAP}{units.place.name}" if own else "", units.place.factor
+    arrow = Markup('<span class="arrow {}">{}</span> {}{}').format(look, side, stated(abs(way) * scale), unit)
     return [
         motion.name,
-        _place(motor.start),
-        _place(motor.target),
+        _place(motor.start * scale) + unit,
+        _place(motor.target * scale) + unit,
         Cell(text=arrow, nowrap=True),
         number(motion.seconds * 1e3),
         count(round(motor.peak_hz)),
@@ -251,5 +265,5 @@ def _cells(motion: Motion) -> list[str | Cell]:
 
 
 def _place(position: float) -> str:
-    """In mm; a rounding error below 0 is 0."""
-    return f"{round(position * MM, 3) + 0.0:.3f}".replace("-", "\u2212")
+    """A position in its unit; a rounding error below 0 is 0."""
+    return f"{round(position, 3) + 0.0:.3f}".replace("-", "\u2212")

@@ -25,23 +25,15 @@ FASTEST_SWING = 0.1  # largest swing of the rotor about its step in a time step 
 MOST_STEPS = 10_000_000  # longest travel in steps: both tables of a motor then take 40 MB
 PLACE_DIGITS = 7  # digits of a place that a remedy names: a step of a micrometre in a travel of metres
 SURE_REST = 0.5  # distance from its step, in steps, from which a resting rotor counts as a step off
-STEEPEST = 1e4  # acceleration with which the torque alone limits the ramp [m/s^2]
+STEEPEST = math.inf  # acceleration with which the torque alone limits the ramp
 
 # What each of these depends on, as keys of a motor.
 TORQUE_KEYS = (
     "drive.supply drive.current drive.bridge_resistance motor.pull_out motor.resistance motor.inductance "
     "motor.rated_current motor.pull_out_torque motor.corner_frequency motor.curve_frequency motor.curve_torque"
 )
-STEP_KEYS = "mechanics.travel_per_revolution motor.steps_per_turn drive.microsteps"
 PLACE_KEYS = "limits.travel mechanics.lower_end"
-LOAD_KEYS = "mechanics.travel_per_revolution mechanics.moving_mass mechanics.screw_inertia mechanics.coupling_inertia"
-START_KEYS = (
-    "motor.start_frequency drive.start_safety motor.steps_per_turn motor.holding_torque motor.rotor_inertia "
-    f"{LOAD_KEYS}"
-)
-RAMP_KEYS = f"limits.speed limits.acceleration drive.torque_safety mechanics.friction_torque {TORQUE_KEYS} {START_KEYS}"
-
-REMEDIES = Remedies(StepperEnvelopeSpec)
+START_KEYS = "motor.start_frequency drive.start_safety motor.steps_per_turn motor.holding_torque motor.rotor_inertia"
 
 
 class Motor:
@@ -49,6 +41,14 @@ class Motor:
 
     def __init__(self, spec: StepperEnvelopeSpec, name: str) -> None:
         self.spec, self.name, self.table = spec, name, spec.stepper[name]
+        self.remedies, mechanics = Remedies(type(spec)), self.table.mechanics
+        self.step_keys = f"mechanics.{mechanics.way_key} motor.steps_per_turn drive.microsteps"
+        self.load_keys = " ".join(f"mechanics.{key}" for key in mechanics.load_keys)
+        self.start_keys = f"{START_KEYS} {self.load_keys}"
+        self.ramp_keys = (
+            "limits.speed limits.acceleration drive.torque_safety mechanics.friction_torque "
+            f"{TORQUE_KEYS} {self.start_keys}"
+        )
 
     def keys(self, names: str) -> str:
         """Keys as the file has them, each once."""
@@ -61,11 +61,11 @@ class Motor:
 
     def most(self, name: str, bound: float, otherwise: str = UNITS, digits: int = 4) -> str:
         """Remedy: the largest short value that is not above a bound."""
-        return REMEDIES.most(self.keys(name), bound, otherwise, digits)
+        return self.remedies.most(self.keys(name), bound, otherwise, digits)
 
     def least(self, name: str, bound: float, otherwise: str = UNITS, digits: int = 4) -> str:
         """Remedy: the smallest short value that is not below a bound."""
-        return REMEDIES.least(self.keys(name), bound, otherwise, digits)
+        return self.remedies.least(self.keys(name), bound, otherwise, digits)
 
     def put(self, name: str, value: object) -> str:
         """Remedy: a value as the file writes it."""
@@ -75,11 +75,15 @@ class Motor:
 
     def below(self, name: str, place: float) -> str:
         """Remedy: a place that is not above another."""
-        return self.most(name, round(place, 12), digits=PLACE_DIGITS)
+        return self.most(name, self._plain(place), digits=PLACE_DIGITS)
 
     def above(self, name: str, place: float) -> str:
         """Remedy: a place that is not below another."""
-        return self.least(name, round(place, 12), digits=PLACE_DIGITS)
+        return self.least(name, self._plain(place), digits=PLACE_DIGITS)
+
+    def _plain(self, place: float) -> float:
+        """A place without the error of arithmetic; that of an angle goes where it is written in degrees."""
+        return place if self.table.turns else round(place, 12)
 
 
 Found = Iterator[Contradiction]
@@ -96,18 +100,18 @@ def _steps(m: Motor) -> Found:
         whole = m.put("motor.steps_per_turn", max(4, round(per_turn / 4) * 4))
         yield m.wrong("motor.steps_per_turn", "a multiple of 4: a tooth pitch has four full steps", whole)
     if table.steps < 1:
-        allowed = f"at least one step, {text(step, 'm')}"
-        yield m.wrong(f"limits.travel {STEP_KEYS}", allowed, m.least("limits.travel", step))
+        allowed = f"at least one step, {table.text(step, 'm')}"
+        yield m.wrong(f"limits.travel {m.step_keys}", allowed, m.least("limits.travel", step))
     elif table.steps > MOST_STEPS:
-        allowed = f"up to {MOST_STEPS} steps of {text(step, 'm')}: a table has an entry for each"
-        yield m.wrong(f"limits.travel {STEP_KEYS}", allowed, m.most("limits.travel", MOST_STEPS * step))
+        allowed = f"up to {MOST_STEPS} steps of {table.text(step, 'm')}: a table has an entry for each"
+        yield m.wrong(f"limits.travel {m.step_keys}", allowed, m.most("limits.travel", MOST_STEPS * step))
     if not 1 <= hz <= MAX_HZ:
         slow = build.changed(table, "limits.speed", MAX_HZ * step * (1 - BARELY))
         lower = m.most("limits.speed", MAX_HZ * step) if not _is_drivable(m, slow) or build.ramp_fits(slow) else ""
         yield m.wrong(
-            f"limits.speed {STEP_KEYS}",
-            f"from {text(step, 'm/s')} to {text(MAX_HZ * step, 'm/s')}, step frequencies of 1 Hz to {MAX_HZ} Hz, here "
-            f"{hz:.5g} Hz",
+            f"limits.speed {m.step_keys}",
+            f"from {table.text(step, 'm/s')} to {table.text(MAX_HZ * step, 'm/s')}, step frequencies of 1 Hz to "
+            f"{MAX_HZ} Hz, here {hz:.5g} Hz",
             m.least("limits.speed", step) if hz < 1 else lower or "lower limits.speed to what the torque allows",
         )
 
@@ -118,10 +122,10 @@ def _timer(m: Motor) -> Found:
     if m.name != max(m.spec.stepper, key=lambda name: m.spec.stepper[name].max_hz):
         return
     if abs(clock - round(clock)) > 1e-6:
-        yield wrong("controller.timer", "a whole number of Hz", REMEDIES.exactly("controller.timer", round(clock)))
+        yield wrong("controller.timer", "a whole number of Hz", m.remedies.exactly("controller.timer", round(clock)))
     elif clock < LEAST_TICKS * fastest * (1 - BARELY) and fastest <= MAX_HZ:
         yield m.wrong(
-            "controller.timer limits.speed mechanics.travel_per_revolution",
+            f"controller.timer limits.speed mechanics.{m.table.mechanics.way_key}",
             f"at least {LEAST_TICKS} ticks in the period of {text(fastest, 'Hz')}",
             m.least("controller.timer", LEAST_TICKS * fastest, "lower limits.speed"),
         )
@@ -143,7 +147,7 @@ def _has_places(table: StepperTable) -> bool:
 
 def _travel(table: StepperTable) -> str:
     lower = table.mechanics.lower_end
-    return f"on the travel, from {text(lower, 'm')} to {text(lower + table.limits.travel, 'm')}"
+    return f"on the travel, from {table.text(lower, 'm')} to {table.text(lower + table.limits.travel, 'm')}"
 
 
 def _inside(m: Motor, name: str, place: float) -> Found:
@@ -167,8 +171,8 @@ def _places(m: Motor) -> Found:
         higher = m.above("extremes.turn", table.position_of(places[name] + 1))
         yield m.wrong(
             f"extremes.turn extremes.{name} {PLACE_KEYS}",
-            f"above extremes.{name}, {text(getattr(extremes, name), 'm')}, by a step of {text(table.step, 'm')} or "
-            "more: there the run upwards ends and the run downwards begins",
+            f"above extremes.{name}, {table.text(getattr(extremes, name), 'm')}, by a step of "
+            f"{table.text(table.step, 'm')} or more: there the run upwards ends and the run downwards begins",
             higher if places[name] < table.steps else "move both apart",
         )
 
@@ -181,7 +185,7 @@ def _constants(m: Motor) -> Found:
     way = m.table.motor.pull_out
     for name in (name for name in build.NEEDED[way] if getattr(m.table.motor, name) is None):
         path = m.keys(f"motor.{name}")
-        example = describe_kind(unit_of(field_at(StepperEnvelopeSpec, tuple(path.split(".")))))[1]
+        example = describe_kind(unit_of(field_at(type(m.spec), tuple(path.split(".")))))[1]
         other = "or name a motor of the catalogue that has it, " if way == "winding" else ""
         yield m.wrong(
             f"motor.{name} motor.pull_out",
@@ -253,7 +257,7 @@ def _ramp(m: Motor) -> Found:
     if not build.starts(table):
         torque = build.stepper_motor(table).pull_out(start)
         yield m.wrong(
-            f"mechanics.friction_torque drive.torque_safety limits.speed {TORQUE_KEYS} {START_KEYS}",
+            f"mechanics.friction_torque drive.torque_safety limits.speed {TORQUE_KEYS} {m.start_keys}",
             f"below {text(torque / table.drive.torque_safety, 'N*m')}: the pull-out torque at the start frequency, "
             f"{text(torque, 'N*m')} at {text(start, 'Hz')}, over torque_safety; nothing is left to accelerate with",
             "lower friction or drive.torque_safety, or choose a stronger motor",
@@ -261,7 +265,7 @@ def _ramp(m: Motor) -> Found:
         return
     found = build.make_step_ramp(table)
     end = float(found.hz[min(len(found), MAX_RAMP) - 1])
-    reached = f"it ends with entry {len(found)} at {text(end * table.step, 'm/s')}, {text(end, 'Hz')}"
+    reached = f"it ends with entry {len(found)} at {table.text(end * table.step, 'm/s')}, {text(end, 'Hz')}"
     if found.hz[-1] >= table.max_hz:
         reached = f"it has {len(found)} entries"
     # A zone or a start above that speed would be wrong in its place.
@@ -270,14 +274,14 @@ def _ramp(m: Motor) -> Found:
     slower = m.most("limits.speed", end * table.step) if has_slower else ""
     if build.ramp_fits(build.changed(table, "limits.acceleration", STEEPEST)):
         yield m.wrong(
-            f"limits.acceleration {RAMP_KEYS}",
+            f"limits.acceleration {m.ramp_keys}",
             f"such that the ramp up to limits.speed has {MAX_RAMP} entries or fewer, each {LEAST_GAIN_HZ:g} Hz above "
             f"the last; here {reached}",
             slower or "raise limits.acceleration, or lower limits.speed",
         )
         return
     yield m.wrong(
-        RAMP_KEYS,
+        m.ramp_keys,
         f"such that the pull-out torque over torque_safety is enough for friction and for {MAX_RAMP} steps of ramp up "
         f"to it; here {reached}",
         slower or "choose a stronger motor, or less load",
@@ -289,7 +293,7 @@ def _start_frequency(m: Motor) -> Found:
     if _has_pull_out(m) and (hz := build.bare_start_hz(m.table)) < 1:
         safety = m.table.drive.start_safety * hz
         yield m.wrong(
-            START_KEYS,
+            m.start_keys,
             f"such that the start frequency with load and reserve is 1 Hz or more, here {text(hz, 'Hz')}",
             m.most("drive.start_safety", safety, "check the units of torque and inertia"),
         )
@@ -302,7 +306,7 @@ def _rotor_swing(m: Motor) -> Found:
     most = FASTEST_SWING / (2 * math.pi * build.instant(m.spec))
     if hz > most:
         yield m.wrong(
-            f"motor.rotor_inertia motor.holding_torque motor.steps_per_turn {LOAD_KEYS} drive.current "
+            f"motor.rotor_inertia motor.holding_torque motor.steps_per_turn {m.load_keys} drive.current "
             "motor.rated_current controller.timer",
             f"such that the rotor swings about its step with {text(most, 'Hz')} or less, here {text(hz, 'Hz')}",
             m.least("motor.rotor_inertia", motor.inertia * (hz / most) ** 2 - load),
@@ -321,7 +325,8 @@ def _zone_places(m: Motor) -> Found:
             after = zone.begin + table.step
             fits = _is_inside(table, zone.begin) and _is_inside(table, after)
             longer = m.above(end, after) if fits else "correct begin and end"
-            yield m.wrong(f"{end} {begin} {PLACE_KEYS}", f"above the zone's begin, {text(zone.begin, 'm')}", longer)
+            allowed = f"above the zone's begin, {table.text(zone.begin, 'm')}"
+            yield m.wrong(f"{end} {begin} {PLACE_KEYS}", allowed, longer)
         elif zone.end <= lower or zone.begin >= lower + table.limits.travel:
             allowed = f"{_travel(table)}; here the whole zone is not"
             remedy = "remove the zone, or correct limits.travel or mechanics.lower_end"
@@ -346,7 +351,8 @@ def _zone_overlap(m: Motor) -> Found:
             apart = m.below(f"{first}.end", following.begin)
         yield m.wrong(
             f"{second}.begin {first}.end {second}.end {first}.begin {second}.direction {first}.direction",
-            f"at or above the end of zone {name}, {text(zone.end, 'm')}: a step has one limit in each direction",
+            f"at or above the end of zone {name}, {m.table.text(zone.end, 'm')}: a step has one limit in each "
+            "direction",
             apart,
         )
 
@@ -363,13 +369,13 @@ def _zone_speed(m: Motor) -> Found:
     for name, zone in table.zone.items():
         speed = f"zone.{name}.speed"
         if zone.speed > fastest * (1 + BARELY):
-            allowed = f"up to limits.speed, {text(fastest, 'm/s')}: a faster zone has no effect"
+            allowed = f"up to limits.speed, {table.text(fastest, 'm/s')}: a faster zone has no effect"
             yield m.wrong(f"{speed} limits.speed", allowed, m.most(speed, fastest, digits=digits))
         elif table.hz(zone.speed) < start * (1 - BARELY):
             yield m.wrong(
-                f"{speed} {START_KEYS}",
-                f"at least the speed of the start frequency, {text(slowest, 'm/s')} at {text(start, 'Hz')}: no ramp "
-                "leads below it",
+                f"{speed} {m.start_keys}",
+                f"at least the speed of the start frequency, {table.text(slowest, 'm/s')} at {text(start, 'Hz')}: no "
+                "ramp leads below it",
                 m.least(speed, slowest, digits=digits),
             )
 
@@ -380,7 +386,7 @@ def _zone_speed(m: Motor) -> Found:
 def _names(spec: StepperEnvelopeSpec) -> Found:
     """In a list of places the name of a motor is not a column of another one, with its unit."""
     for name in spec.stepper:
-        other, unit = unit_in_name(name, spec.stepper)
+        other, unit = unit_in_name(name, spec.stepper, spec.turning)
         if unit is not None:
             whose = f"motor {other}" if other in spec.stepper else other
             allowed = f'a name that is no column of {whose} in a list of places: there "{name}" is {whose} in {unit}'

@@ -11,7 +11,6 @@ from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.methods.stepper_envelope.stage_job import StageJob, StageJog, StageMove
 from detent.record.machine import AnyRecorder, Progress
 from detent.record.run import EDGE, RunRecord
-from detent.units import format_quantity
 
 MOTOR_SIGNALS = (
     "controller.rule.position", "controller.rule.index", "controller.rule.state", "controller.rule.direction",
@@ -32,7 +31,7 @@ PULL_OUT_LAG = 2.0
 
 @dataclass(frozen=True, slots=True)
 class MotorMove:
-    """How one motor made a move; lengths in metres, times in seconds since power-on.
+    """How one motor made a move; places in metres, of a motor that turns in radians; times in seconds since power-on.
 
     Attributes
     ----------
@@ -229,9 +228,10 @@ def _doubts(spec: StepperEnvelopeSpec, result: StageRun) -> Iterator[str]:
     """What looks wrong about a run whose rotors kept their steps: how near they came to losing them."""
     for move, name, motor in result.made:
         if motor.overrun:
+            target = spec.stepper[name].text(motor.target, "m")
             yield (
-                f"move {move.number}: the stop of {name} was changed to {format_quantity(motor.target, 'm')} when the "
-                "motor was too fast to stop there; it stopped as soon as it could and came back; change it earlier"
+                f"move {move.number}: the stop of {name} was changed to {target} when the motor was too fast to stop "
+                "there; it stopped as soon as it could and came back; change it earlier"
             )
     made = result.made
     lagging = max(made, key=lambda one: one[2].peak_lag, default=None)

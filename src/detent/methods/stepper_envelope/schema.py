@@ -3,14 +3,20 @@
 Sections in brackets are those of the stepper-envelope specification. One file describes one or several motors, each
 with its own mechanics, tables and control unit; they share the step timer's clock and nothing else. Positions count
 from `mechanics.lower_end`, upwards.
+
+The keys are written for a motor that slides what it moves. Where its ``motion`` is "rotary" they hold with rad for m
+(`axisfile.motion`), and its mechanics are those of `RotaryMechanicsTable`. In the code of this method, what is said to
+be in m is then in rad.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from abc import abstractmethod
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Le
 from pydantic import Field
 
+from detent.axisfile.motion import MovingTable
 from detent.axisfile.tables import AxisSpec, AxisTable
 from detent.files.fields import Naming, Table, named, optional, required
 from detent.files.quantities import (
@@ -47,6 +53,7 @@ ZONE_NAME = Naming(
     example="fine",
 )
 MOST_MOTORS = 16
+FAR = 1e3  # farthest end of a travel [m]: a kilometre, or 159 turns
 
 
 class StepperAxisTable(AxisTable, frozen=True):
@@ -73,11 +80,16 @@ class ControllerTable(Table, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the motor must never exceed."""
 
-    travel: Length = required("free way between its two ends", '"40 mm"', start='"200 mm"', gt=0.0, le=100.0)
-    speed: Velocity = required("largest speed ever commanded", '"20 mm/s"', start='"60 mm/s"', gt=0.0, le=100.0)
-    acceleration: Acceleration = required(
-        "acceleration of the linear part of the ramp (3.1)", '"0.2 m/s^2"', start='"1 m/s^2"', gt=0.0, le=1e4
+    travel: Length = required(
+        "free way between its two ends", '"40 mm"', start='"200 mm"', turned='"360 deg"', gt=0.0, le=FAR
     )
+    speed: Velocity = required(
+        "largest speed ever commanded", '"20 mm/s"', start='"60 mm/s"', turned='"45 deg/s"', gt=0.0, le=1e3
+    )
+    acceleration: Acceleration = required(
+        "acceleration of the linear part of the ramp (3.1)", '"0.2 m/s^2"', start='"1 m/s^2"', turned='"180 deg/s^2"',
+        gt=0.0, le=1e6,
+    )  # fmt: skip
 
 
 class MotorTable(Table, frozen=True):
@@ -146,20 +158,91 @@ class DriveTable(Table, frozen=True):
     )
 
 
-class MechanicsTable(Table, frozen=True):
-    """Spindle and what it moves."""
+class ShaftTable(Table, frozen=True):
+    """What is at every shaft, whatever it moves."""
+
+    coupling_inertia: Inertia = optional("coupling", 0.0, ge=0.0, le=10.0)
+    friction_torque: Torque = optional("Coulomb friction at the shaft", 0.0, ge=0.0, le=1e3)
+    lower_end: Length = optional("position of the lower end of the travel", 0.0, ge=-FAR, le=FAR)
+    start_position: Length = optional(
+        "where the motor stands at power-on", math.nan, derived="mechanics.lower_end", ge=-FAR, le=2 * FAR
+    )
+
+    way_key: ClassVar[str]  # key that the way per motor turn is made of
+    way_name: ClassVar[str]  # what it is called, and how the way follows from it
+    way_formula: ClassVar[str]
+    load_keys: ClassVar[tuple[str, ...]]  # keys that the inertia is made of
+    inertia_formula: ClassVar[str]
+
+    @property
+    @abstractmethod
+    def per_turn(self) -> float:
+        """Way of the axis per motor turn [m]."""
+
+    @property
+    @abstractmethod
+    def inertia(self) -> float:
+        """All that turns with the rotor [kg m^2]."""
+
+
+class LeadTable(Table, frozen=True):
+    """Keys of a motor that slides what it moves."""
 
     travel_per_revolution: Length = required(
         "lead of the spindle: travel per motor turn", '"1 mm"', start='"8 mm"', ge=1e-6, le=10.0
     )
     moving_mass: Mass = optional("stage, lens group or other mass that is moved", 0.0, start='"500 g"', ge=0.0, le=1e4)
     screw_inertia: Inertia = optional("spindle", 0.0, ge=0.0, le=10.0)
-    coupling_inertia: Inertia = optional("coupling", 0.0, ge=0.0, le=10.0)
-    friction_torque: Torque = optional("Coulomb friction at the shaft", 0.0, ge=0.0, le=1e3)
-    lower_end: Length = optional("position of the lower end of the travel", 0.0, ge=-100.0, le=100.0)
-    start_position: Length = optional(
-        "where the motor stands at power-on", math.nan, derived="mechanics.lower_end", ge=-100.0, le=200.0
+
+
+class GearTable(Table, frozen=True):
+    """Keys of a motor that turns what it moves."""
+
+    gear_ratio: float = optional(
+        "rotary: motor turns per turn of the axis; 1: what turns sits on the motor's shaft",
+        1.0,
+        start="10",
+        ge=1e-3,
+        le=1e6,
     )
+    load_inertia: Inertia = optional(
+        "rotary: table, dial, valve or other load, behind the gear", 0.0, start='"0.002 kg*m^2"', ge=0.0, le=1e4
+    )
+    gear_inertia: Inertia = optional("rotary: gear, at the motor shaft", 0.0, ge=0.0, le=10.0)
+
+
+class RotaryMechanicsTable(ShaftTable, GearTable, frozen=True):
+    """Gear and what it turns."""
+
+    way_key, way_name, way_formula = "gear_ratio", "gear ratio", "1 turn / gear ratio"
+    load_keys = ("gear_ratio", "load_inertia", "gear_inertia", "coupling_inertia")
+    inertia_formula = "rotor + gear + coupling + load / gear ratio^2"
+
+    @property
+    def per_turn(self) -> float:
+        """Angle of the axis per motor turn [rad]."""
+        return 2 * math.pi / self.gear_ratio
+
+    @property
+    def inertia(self) -> float:
+        """All that turns with the rotor, the load as J / gear_ratio^2 [kg m^2]."""
+        load = self.load_inertia * (self.per_turn / (2 * math.pi)) ** 2
+        return self.gear_inertia + self.coupling_inertia + load
+
+
+class MechanicsTable(ShaftTable, LeadTable, frozen=True):
+    """Spindle and what it moves."""
+
+    turned: ClassVar[type[Table]] = RotaryMechanicsTable
+
+    way_key, way_name, way_formula = "travel_per_revolution", "lead", "travel per revolution"
+    load_keys = ("travel_per_revolution", "moving_mass", "screw_inertia", "coupling_inertia")
+    inertia_formula = "rotor + screw + coupling + mass x (lead / 2 pi)^2"
+
+    @property
+    def per_turn(self) -> float:
+        """Travel of the axis per motor turn [m]."""
+        return self.travel_per_revolution
 
     @property
     def inertia(self) -> float:
@@ -169,7 +252,7 @@ class MechanicsTable(Table, frozen=True):
 
 
 def _extreme(description: str, derived: str = "mechanics.lower_end") -> Any:
-    return optional(description, math.nan, derived=derived, ge=-100.0, le=200.0)
+    return optional(description, math.nan, derived=derived, ge=-FAR, le=2 * FAR)
 
 
 class ExtremesTable(Table, frozen=True):
@@ -183,9 +266,9 @@ class ExtremesTable(Table, frozen=True):
 class ZoneTable(Table, frozen=True):
     """A stretch of the travel with its own speed limit."""
 
-    begin: Length = required("lower end of the zone", '"10 mm"', ge=-100.0, le=200.0)
-    end: Length = required("upper end of the zone", '"13 mm"', ge=-100.0, le=200.0)
-    speed: Velocity = required("largest speed inside it", '"5 mm/s"', gt=0.0, le=100.0)
+    begin: Length = required("lower end of the zone", '"10 mm"', turned='"80 deg"', ge=-FAR, le=2 * FAR)
+    end: Length = required("upper end of the zone", '"13 mm"', turned='"100 deg"', ge=-FAR, le=2 * FAR)
+    speed: Velocity = required("largest speed inside it", '"5 mm/s"', turned='"20 deg/s"', gt=0.0, le=1e3)
     direction: Literal["both", "up", "down"] = optional("direction of motion that it holds for", "both")
 
 
@@ -197,9 +280,14 @@ class MethodTable(Table, frozen=True):
     )
 
 
-class StepperTable(Table, frozen=True):
+class StepperTable(MovingTable, frozen=True):
     """One motor of the axis, with its mechanics and its tables."""
 
+    motion: Literal["linear", "rotary"] = optional(
+        "whether the motor slides or turns what it moves; one that turns has rad for m in every key, and in its "
+        "mechanics gear_ratio, load_inertia and gear_inertia",
+        "linear",
+    )
     limits: LimitsTable
     motor: MotorTable
     drive: DriveTable = Field(default_factory=DriveTable)
@@ -211,7 +299,7 @@ class StepperTable(Table, frozen=True):
     @property
     def step(self) -> float:
         """Travel per pulse, a step or a microstep [m]."""
-        return self.mechanics.travel_per_revolution / (self.motor.steps_per_turn * self.drive.microsteps)
+        return self.mechanics.per_turn / (self.motor.steps_per_turn * self.drive.microsteps)
 
     @property
     def held_torque(self) -> float:
@@ -257,6 +345,11 @@ class StepperEnvelopeSpec(AxisSpec, frozen=True):
     axis: StepperAxisTable
     controller: ControllerTable = Field(default_factory=ControllerTable)
     stepper: dict[str, StepperTable] = named("a motor by its name", MOTOR_NAME, min_length=1, max_length=MOST_MOTORS)
+
+    @property
+    def turning(self) -> frozenset[str]:
+        """Names of the motors that turn what they move."""
+        return frozenset(name for name, table in self.stepper.items() if table.turns)
 
 
 def fill_derived(spec: StepperEnvelopeSpec) -> StepperEnvelopeSpec:

@@ -3,7 +3,7 @@
 A stage goes to a place with every motor that the move names, and stands there for a while: a microscope takes a
 picture of a tile then. A move of one motor may also turn on its way, or have its stop extreme changed while it runs; a
 manual run is what an operator does with a joystick. Everything is in SI units, and nothing is known of the motors but
-their names.
+their names, and which of them turn: what is said to be in m is in rad for those.
 
 In TOML each ``[[move]]`` names motors: ``x = "12 mm"`` is a place, ``by = {x = "1 mm"}`` a way from the place before.
 
@@ -15,25 +15,30 @@ columns than those of `CSV_KEYS` are passed over; with ``tile`` the file is a li
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import AfterValidator, create_model
+from pydantic import AfterValidator, ValidationInfo, create_model
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from detent.axisfile.motion import unit_in
 from detent.errors import FileProblem
-from detent.files.fields import Table, optional
-from detent.files.quantities import Length, Time, Velocity
+from detent.files.fields import Table, Unit, extra_of, optional
+from detent.files.quantities import Angle, Length, Time, Velocity
 from detent.files.read import Row, check_values, example_value, read_tables
 from detent.files.read_csv import Column, CsvRows, split_heading
 from detent.files.screen import OnScreen
 from detent.files.source import parse_source
 from detent.files.text import MAX_SHOWN, read_text, short
 from detent.methods.moves.job import MOST_MOVES, MoveFile, expand_moves
+from detent.units import QuantityError, describe_kind, parse_quantity
 
 
 def _check_label(text: str) -> str:
@@ -51,7 +56,11 @@ def _check_speed(speed: float | None) -> float | None:
 Label = Annotated[str, AfterValidator(_check_label)]
 
 CSV_KEYS = ("dwell", "repeat", "label", "tile")  # keys beside the motors that a list of places may have
-_NAME_UNITS = {"m": ("um", "mm", "cm", "m", "in"), "s": ("us", "ms", "s")}  # a name such as ``x_um`` may end in them
+# A name such as ``x_um`` may end in these units.
+_NAME_UNITS = {"m": ("um", "mm", "cm", "m", "in"), "rad": ("arcsec", "arcmin", "deg", "rad"), "s": ("us", "ms", "s")}
+_EXAMPLES = {"m": ("12 mm", "1 mm"), "rad": ("90 deg", "5 deg")}  # of a place and of a way
+_OF_ONE_MOTOR = {"turn": "m", "changed_at": "m", "changed_to": "m", "speed": "m/s"}
+"""Keys of a row in units of the one motor that it names, with their units where it slides."""
 _PREFERRED = "nominal"
 _MOST_NAMED = 12
 _LABEL = f"text of up to {MAX_SHOWN} printable characters"
@@ -61,6 +70,7 @@ class StageRow(Row, frozen=True):
     """A move or a manual run as a file says it; `stage_row` adds the motors, whose keys are places."""
 
     motors: ClassVar[tuple[str, ...]] = ()
+    turning: ClassVar[frozenset[str]] = frozenset()
     by: Table | None = optional("ways of motors from the places before", None)
     turn: Length | None = optional("where the motor turns before it goes to its place", None)
     changed_at: Length | None = optional("where the motor is when its stop is changed", None)
@@ -78,6 +88,32 @@ class StageRow(Row, frozen=True):
     def faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
         """Keys that do not go together, or that the row lacks."""
         yield from (cls._jog_faults if "jog" in stated else cls._move_faults)(stated, is_whole=is_whole)
+        yield from cls._unit_faults(stated)
+
+    @classmethod
+    def unit(cls, motor: str, linear: str = "m") -> str:
+        """Unit of a quantity of a motor, by that of a motor that slides."""
+        return unit_in("rotary" if motor in cls.turning else "linear", linear)
+
+    @classmethod
+    def _motors_in(cls, stated: Mapping[str, Any]) -> list[str]:
+        """Motors that an automatic move names."""
+        by = cast("dict[str, Any]", stated["by"]) if isinstance(stated.get("by"), dict) else {}
+        return [motor for motor in cls.motors if motor in stated or motor in by]
+
+    @classmethod
+    def _unit_faults(cls, stated: Mapping[str, Any]) -> Iterator[FileProblem]:
+        """What is not in a unit of the one motor that the row names, where some slide and some turn."""
+        named = [stated["jog"]] if "jog" in stated else cls._motors_in(stated)
+        is_mixed = 0 < len(cls.turning) < len(cls.motors)
+        motor = named[0] if is_mixed and len(named) == 1 and named[0] in cls.motors else ""
+        for key in (key for key in _OF_ONE_MOTOR if motor and key in stated):
+            unit, value = cls.unit(motor, _OF_ONE_MOTOR[key]), stated[key]
+            try:
+                parse_quantity(value if isinstance(value, str) else "", unit)
+            except QuantityError as error:
+                allowed = f"{describe_kind(unit)[0]}: the motor {motor} {'turns' if motor in cls.turning else 'slides'}"
+                yield FileProblem.of_key(key, "", allowed, error.remedy)
 
     @classmethod
     def _jog_faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
@@ -96,7 +132,7 @@ class StageRow(Row, frozen=True):
     def _move_faults(cls, stated: Mapping[str, Any], *, is_whole: bool) -> Iterator[FileProblem]:
         """What is wrong with an automatic move as a whole."""
         by = cast("dict[str, Any]", stated["by"]) if isinstance(stated.get("by"), dict) else {}
-        ways = [motor for motor in cls.motors if motor in stated or motor in by]
+        ways = cls._motors_in(stated)
         for key in ("speed", "duration"):
             if key in stated:
                 remedy = f'remove it, for the tables decide how fast; or add jog = "{cls.motors[0]}" for a manual run'
@@ -106,7 +142,8 @@ class StageRow(Row, frozen=True):
             yield FileProblem.of_key(f"by.{motor}", f"{motor} and by.{motor}", allowed, "remove one of the two")
         if not ways and is_whole and (not stated.get("by") or by):
             motors, first = ", ".join(cls.motors), cls.motors[0]
-            remedy = f'add {first} = "12 mm" or by = {{{first} = "1 mm"}}'
+            place, way = _EXAMPLES[cls.unit(first)]
+            remedy = f'add {first} = "{place}" or by = {{{first} = "{way}"}}'
             yield FileProblem.of_key(first, "no motor", f"a place or a way for at least one of {motors}", remedy)
         changed = [key for key in ("changed_at", "changed_to") if key in stated]
         if changed and is_whole:
@@ -133,20 +170,51 @@ class PlaceRow(StageRow, frozen=True):
     tile: Label = optional("what a place is called", "", allowed=_LABEL)
 
 
+class UnitOfMotor(Unit):
+    """Unit of the motor that a row names, where some slide and some turn: `StageRow.faults` tells them apart."""
+
+    __slots__ = ()
+
+    def read(self, value: object, info: ValidationInfo) -> object:
+        """Read a quantity in the unit of either."""
+        for motion in ("linear", "rotary"):
+            with suppress(PydanticCustomError):
+                return Unit(unit_in(motion, self.symbol)).read(value, info)
+        return 1.0  # it is one of the faults
+
+
 @lru_cache(maxsize=64)
-def stage_row(motors: tuple[str, ...], base: type[StageRow] = StageRow) -> type[StageRow]:
-    """Model of a row whose places and ways are those of some motors."""
+def stage_row(
+    motors: tuple[str, ...], base: type[StageRow] = StageRow, turning: frozenset[str] = frozenset()
+) -> type[StageRow]:
+    """Model of a row whose places and ways are those of some motors, of which some may turn."""
     # Names of motors are keys only: as fields they could be words of pydantic.
-    length: Any = Length
+    units: dict[str, Any] = {motor: Angle if motor in turning else Length for motor in motors}
     places: dict[str, Any] = {
-        f"m{number}": (length | None, optional(f"place of {motor}", None, alias=motor))
-        for number, motor in enumerate(motors)
+        f"m{number}": (unit | None, optional(f"place of {motor}", None, alias=motor))
+        for number, (motor, unit) in enumerate(units.items())
     }
     by: Any = create_model("StageWays", __base__=Table, **places)
-    ways: Any = (by | None, StageRow.model_fields["by"])
-    row = create_model("StageRow", __base__=base, by=ways, **places)
-    row.motors = motors
+    fields: dict[str, Any] = places | {"by": (by | None, StageRow.model_fields["by"])}
+    for key, linear in _OF_ONE_MOTOR.items() if turning else ():
+        is_mixed = len(turning) < len(motors)
+        unit = UnitOfMotor(linear) if is_mixed else Unit(unit_in("rotary", linear))
+        fields[key] = _in_unit(base.model_fields[key], unit)
+    row = create_model("StageRow", __base__=base, **fields)
+    row.motors, row.turning = motors, turning
     return row
+
+
+def _in_unit(field: FieldInfo, unit: Unit) -> tuple[Any, FieldInfo]:
+    """Annotation and declaration of a quantity that need not be there, in another unit."""
+    made, quantity = copy(field), cast("Any", Annotated[float, unit])
+    kind: Any = quantity | None
+    # The annotation brings what else is checked, and pydantic joins both.
+    made.metadata, made.annotation = [], None
+    if extra_of(field, "allowed"):
+        extra = cast("dict[str, Any]", field.json_schema_extra)
+        made.json_schema_extra = extra | {"allowed": f"{describe_kind(unit.symbol)[0]} other than 0"}
+    return (Annotated[kind, *field.metadata] if field.metadata else kind), made
 
 
 def places_of(table: Table | None, motors: Sequence[str]) -> dict[str, float]:
@@ -301,18 +369,18 @@ class StageJob(OnScreen):
 # ---- files
 
 
-def load_stage_job(path: str | PathLike[str], motors: Sequence[str]) -> StageJob:
-    """Read the job of a stepper stage with these motors; whether the axis can do it is not checked here."""
+def load_stage_job(path: str | PathLike[str], motors: Sequence[str], turning: frozenset[str] = frozenset()) -> StageJob:
+    """Read the job of a stepper stage with these motors, of which some turn; that it can do it is not checked here."""
     file = Path(path)
     text = read_text(file, (".csv", ".toml"), "a list of places (.csv) or of moves (.toml)")
     repeat, kind, notes = 1, "moves", ()
     if file.suffix.lower() == ".csv":
-        table = PlaceRows(str(file), text, stage_row(tuple(motors), PlaceRow))
+        table = PlaceRows(str(file), text, stage_row(tuple(motors), PlaceRow, turning))
         made = table.read(_make_move, MOST_MOVES)
         kind, notes = "tiles" if table.has_tiles else "moves", table.notes
     else:
         source = parse_source(str(file), text)
-        model: Any = stage_row(tuple(motors))
+        model: Any = stage_row(tuple(motors), StageRow, turning)
         found = read_tables(source, cast("type[MoveFile[StageRow]]", MoveFile[model]))
         made = [_make_move(source.line_of("move", number), row) for number, row in enumerate(found.move)]
         repeat = found.repeat
@@ -332,12 +400,13 @@ def _make_move(line: int, row: StageRow) -> tuple[StageMove | StageJog, int]:
     return StageMove(1, line, targets, by, row.dwell, label, row.turn, change), row.repeat
 
 
-def unit_in_name(name: str, motors: Iterable[str]) -> tuple[str, str | None]:
+def unit_in_name(name: str, motors: Iterable[str], turning: Container[str] = ()) -> tuple[str, str | None]:
     """Key and unit of a heading that ends in its unit, perhaps with further words, such as ``x_um`` of motor x."""
     # A motor x_um before a motor x, which could have such a column too.
     for key in sorted((*motors, "dwell"), key=len, reverse=True):
         token = name.removeprefix(f"{key}_").partition("_")[0]
-        if name.startswith(f"{key}_") and token in _NAME_UNITS["s" if key == "dwell" else "m"]:
+        unit = "s" if key == "dwell" else "rad" if key in turning else "m"
+        if name.startswith(f"{key}_") and token in _NAME_UNITS[unit]:
             return key, token
     return name, None
 
@@ -374,19 +443,24 @@ class PlaceRows(CsvRows[StageRow]):
     def read_heading(self, index: int, cell: str) -> Column:
         """Read key and unit of a column; a slip of one that says something of the motion must not be passed over."""
         name, unit = split_heading(cell)
-        key, unit = unit_in_name(name, self.model.motors) if unit is None else (name, unit)
+        key, unit = self._unit_in(name) if unit is None else (name, unit)
         if key in self.model.motors or key in CSV_KEYS:
             return self.column_of(index, key, unit)
         head = name.partition("_")[0].lower()
         # By the first letter: wells of a plate have nothing to do with a dwell.
         near = [word for word in difflib.get_close_matches(head, ("dwell", "repeat"), cutoff=0.8) if head[0] == word[0]]
         meant = name.lower()  # motors have small letters
-        meant = unit_in_name(meant, self.model.motors)[0] if unit is None else meant
+        meant = self._unit_in(meant)[0] if unit is None else meant
         near += [meant] if meant in self.model.motors else []
         if not near:
             return Column()
         allowed = ", ".join(map(self.heading_of, (*self.model.motors, "dwell", "repeat")))
         return self.refuse_heading(index, f'the unknown column "{short(cell)}"', allowed, f'did you mean "{near[0]}"?')
+
+    def _unit_in(self, name: str) -> tuple[str, str | None]:
+        """Key and unit of a heading that ends in its unit; a motor that turns may have one in mm, which is refused."""
+        key, unit = unit_in_name(name, self.model.motors, self.model.turning)
+        return (key, unit) if unit else unit_in_name(name, self.model.turning)
 
     def _choose(self, motor: str) -> None:
         """Pass over all columns of a motor but one."""

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from detent.methods.stepper_envelope.run import StageMoveRecord
 from detent.methods.stepper_envelope.summary import StageFigures, stated, time_text
 from detent.page.figure import Figure
+from detent.page.units import Scale
 from detent.page.words import GAP, count, further, number
 
 WIDTH, HEIGHT = 1000.0, 560.0  # most room that the drawing takes, in its own units
@@ -39,9 +40,10 @@ class Tile:
 class TilePlan:
     """The tiles as one sees them from above, in the units of the drawing: up is to larger positions."""
 
-    def __init__(self, motors: tuple[str, str], start: Place, tiles: Sequence[Tile]) -> None:
+    def __init__(self, motors: tuple[str, str], start: Place, tiles: Sequence[Tile], unit: Scale) -> None:
         self.motors = motors  # what moves the stage to the right, and what moves it up in the picture
         self.start, self.tiles = start, tiles  # where the stage stood first; in the order of the visits, at least one
+        self.unit = unit  # of places
         drawn = tiles[:MOST_TILES]
         self.usual = median(tile.move.seconds for tile in drawn) or 1.0  # time of the way to a tile [s]
         xs, ys = ([tile.target[axis] for tile in drawn] for axis in (0, 1))
@@ -58,11 +60,11 @@ class TilePlan:
         self.about = f"Plan of {count(len(drawn), 'tile')} in their order"
         self.way = [self._at(place) for place in (start, *(tile.place for tile in drawn))]
         self.radius = min(max(min(self.sides) / 14, 1.5), 4.0)  # of the points at the stops
-        # The bar of the scale: the largest of 1, 2 and 5 times a power of ten in a fifth of the width [m].
-        wanted = 0.2 * WIDTH / self.scale
+        # The bar of the scale: the largest of 1, 2 and 5 times a power of ten in a fifth of the width, in that unit.
+        wanted = 0.2 * WIDTH / self.scale * unit.factor
         power = 10.0 ** math.floor(math.log10(wanted))
         length = max((step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted), default=power)
-        self.bar, self.length = length * self.scale, f"{stated(length * 1e3)} mm"
+        self.bar, self.length = length / unit.factor * self.scale, f"{stated(length)} {unit.name}"
         self.swatches = {
             f"{time_text(self.usual)}, the median, or less": self._look(self.usual),
             f"{time_text(LONG * self.usual)} or more": self._look(LONG * self.usual),
@@ -114,8 +116,8 @@ def plan_figure(figures: StageFigures) -> Figure | None:
         "Every square is a tile, where it was asked for, with its name; the line goes through the places where the "
         "rotors stood, in the order of the visits, and the ring is the first. Both axes move together: a tile is done "
         "when both are settled. The squares are as large as the tiles are apart, not as the camera sees. The stage "
-        f"came from {plan.motors[0]} {stated(plan.start[0] * 1e3)}, {plan.motors[1]} "
-        f"{stated(plan.start[1] * 1e3)}{GAP}mm."
+        f"came from {plan.motors[0]} {stated(plan.start[0] * plan.unit.factor)}, {plan.motors[1]} "
+        f"{stated(plan.start[1] * plan.unit.factor)}{GAP}{plan.unit.name}."
     )
     left_out = len(plan.tiles) - MOST_TILES
     if left_out > 0:
@@ -124,12 +126,14 @@ def plan_figure(figures: StageFigures) -> Figure | None:
 
 
 def tile_plan(figures: StageFigures) -> TilePlan | None:
-    """Tiles of a list that names two motors; the first of the axis file goes to the right, the second up."""
+    """Tiles of a list that names two motors of one motion; the first of the file goes to the right, the second up."""
     spec, run = figures.spec, figures.run
     motors = [name for name in spec.stepper if name in run.job.motors]
     if run.job.kind != "tiles" or len(motors) != 2 or not run.moves:
         return None
     across, up = motors
+    if figures.units(across) != figures.units(up):  # one slides, the other turns: no drawing has one scale for both
+        return None
     start = {name: spec.stepper[name].mechanics.start_position for name in motors}
     target, off = dict(start), dict.fromkeys(motors, 0)
     tiles: list[Tile] = []
@@ -138,4 +142,4 @@ def tile_plan(figures: StageFigures) -> TilePlan | None:
             target[motion.name], off[motion.name] = motion.motor.target, motion.off
         place = {name: target[name] - off[name] * spec.stepper[name].step for name in motors}
         tiles.append(Tile(move, (target[across], target[up]), (place[across], place[up]), any(off.values())))
-    return TilePlan((across, up), (start[across], start[up]), tiles)
+    return TilePlan((across, up), (start[across], start[up]), tiles, figures.units(up).place)

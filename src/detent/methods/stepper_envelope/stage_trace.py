@@ -12,7 +12,7 @@ from detent.control.step_rule import TURN
 from detent.methods.stepper_envelope.build import make_step_ramp, stepper_motor, zone_maps
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord
 from detent.methods.stepper_envelope.schema import StepperTable, ZoneTable
-from detent.methods.stepper_envelope.summary import MM, StageFigures, stated
+from detent.methods.stepper_envelope.summary import StageFigures, speed_text, units_of
 from detent.page.chart import Chart, Curve, Loop, Panel, loop_chart
 from detent.page.parts import Numbers
 from detent.page.run_page import has
@@ -244,7 +244,8 @@ def runs_of(name: str, table: StepperTable, legs: Sequence[Leg], points: int, bo
 def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:
     """Draw the steps of a motor under its envelope, up above zero and down below it."""
     at, up, down = runs.permitted()
-    max_hz = runs.table.max_hz
+    max_hz, place = runs.table.max_hz, units_of(runs.table).place
+    scale = place.factor
     unit, per_hz, digits = ("kHz", 1e-3, 4) if max_hz >= LONG_NUMBERS else ("Hz", 1.0, 1)
     permitted = [
         Curve(label=f"permissible, {word}", colour="muted", step=True, fill=True, y=sign * hz * per_hz, digits=digits)
@@ -252,7 +253,7 @@ def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:
         if hz.any()
     ]
     most = max_hz * per_hz
-    limit = f"limit {count(round(max_hz))}{GAP}Hz, {stated(max_hz * runs.table.step * MM)}{GAP}mm/s"
+    limit = f"limit {count(round(max_hz))}{GAP}Hz, {speed_text(runs.table, max_hz * runs.table.step)}"
     # A half in which nothing is permitted has little room.
     span = tuple(round(HEADROOM * most * (1.0 if half.any() else 0.1), 3) for half in (down, up))
     panel = Panel(
@@ -261,15 +262,18 @@ def runs_chart(runs: Runs, name: str, *, height: int = 300) -> Chart:
         about=f"Step frequency of {runs.name} over position, under the envelope",
     )  # fmt: skip
     loops = [
-        Loop(label=f"steps made, {word}", colour=colour, x=arc.position * MM, y=arc.hz * sign * per_hz, digits=digits)
+        Loop(
+            label=f"steps made, {word}", colour=colour, x=arc.position * scale, y=arc.hz * sign * per_hz, digits=digits
+        )
         for word, colour, sign in (("up", "right", 1), ("down", "left", -1))
         for arc in runs.arcs
         if arc.direction == sign
     ]
     bands: list[Chart] = []
     for zone_name, zone in runs.zones.items():
-        part = [round(zone.begin * MM, 4), round(zone.end * MM, 4)]
-        told = f"{zone_name}: {stated(zone.speed * MM)} mm/s"
+        part = [round(zone.begin * scale, 4), round(zone.end * scale, 4)]
+        told = f"{zone_name}: {speed_text(runs.table, zone.speed)}".replace(GAP, " ")
         told += "" if zone.direction == "both" else f", {zone.direction} only"
         bands.append({"spans": [part], "colour": "brake", "label": told})
-    return loop_chart(panel, at * MM, f"position of {runs.name} [mm]", loops) | {"bands": bands}
+    label = f"position of {runs.name} [{place.name}]"
+    return loop_chart(panel, at * scale, label, loops) | {"bands": bands}

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from detent.methods.stepper_envelope.run import PULL_OUT_LAG, MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.schema import StepperEnvelopeSpec
 from detent.page.run_page import Worst, worst
+from detent.page.units import Units
 from detent.page.words import GAP, count, duration, milliseconds, number
-
-MM = 1e3  # mm per m
 
 
 class Motion(NamedTuple):
@@ -60,7 +59,7 @@ class StageFigures:
         self.lag = largest(self.motions, lambda motion: motion.motor.peak_lag)  # of a rotor behind its field [step]
         self.rest = largest(self.motions, lambda motion: abs(motion.motor.rest_lag))  # when a move was done [step]
         self.peak_hz = largest(self.motions, lambda motion: motion.motor.peak_hz)
-        self.peak_speed = largest(self.motions, lambda motion: motion.motor.peak_hz * spec.stepper[motion.name].step)
+        self.peak_speeds = self._fastest()  # of the motors that slide, and of those that turn
         needy = [motion for motion in self.motions if math.isfinite(motion.motor.margin)]
         least = largest(needy, lambda motion: -motion.motor.margin)
         self.margin = least and Worst(-least.value, least.of)  # smallest torque margin; None if none needed torque
@@ -68,6 +67,19 @@ class StageFigures:
     def _longest(self, time: Callable[[Motion], float]) -> float:
         """Sum over the moves of the longest time of a motor [s]."""
         return sum(max(map(time, motions), default=0.0) for motions in self.by_move)
+
+    def units(self, name: str) -> Units:
+        """Units in which places and speeds of a motor are written."""
+        return units_of(self.spec.stepper[name])
+
+    def _fastest(self) -> list[str]:
+        """The largest speed of the motors with each unit of it, in words."""
+        found: dict[Units, float] = {}
+        for motion in self.motions:
+            table = self.spec.stepper[motion.name]
+            speed = motion.motor.peak_hz * table.step
+            found[units_of(table)] = max(speed, found.get(units_of(table), 0.0))
+        return [units.speed_text(speed) for units, speed in found.items()]
 
     def astray(self, motion: Motion) -> bool:
         """Whether a motion of its own did not end in its place."""
@@ -110,9 +122,9 @@ def stage_summary_rows(spec: StepperEnvelopeSpec, run: StageRun) -> list[tuple[s
     if margin := figures.margin:
         least = number(margin.value)
         rows.append(("torque margin", f"at least {least} ({figures.whose(margin.of)}); falls behind below 1"))
-    if (peak := figures.peak_hz) and (fastest := figures.peak_speed):
-        speed = number(fastest.value * MM)
-        rows.append(("peak", f"{count(round(peak.value))} Hz ({figures.whose(peak.of)}), {speed} mm/s"))
+    if peak := figures.peak_hz:
+        speeds = " and ".join(figures.peak_speeds)
+        rows.append(("peak", f"{count(round(peak.value))} Hz ({figures.whose(peak.of)}), {speeds}"))
     return [(name, text.replace(GAP, " ")) for name, text in rows]
 
 
@@ -123,6 +135,30 @@ def stated(value: float) -> str:
     ('0.5', '55', '−40', '87.44')
     """
     return f"{float(f'{value:.4g}'):.12g}".replace("-", "−")
+
+
+class Moving(Protocol):
+    """A motor, or what is told of one: it slides or turns what it moves."""
+
+    @property
+    def motion(self) -> str:
+        """Either "linear" or "rotary"."""
+        ...
+
+
+def units_of(one: Moving) -> Units:
+    """Units in which pages write places and speeds of a motor."""
+    return Units(rotary=one.motion == "rotary")
+
+
+def way_text(one: Moving, way: float) -> str:
+    """Write a place or a way [m] that a file states, with its unit: 12 mm, or 90 deg of a motor that turns."""
+    return f"{stated(way * units_of(one).place.factor)}{GAP}{units_of(one).place.name}"
+
+
+def speed_text(one: Moving, speed: float) -> str:
+    """Write a speed [m/s] that a file states, with its unit."""
+    return f"{stated(speed * units_of(one).speed.factor)}{GAP}{units_of(one).speed.name}"
 
 
 def time_text(seconds: float) -> str:

@@ -1,6 +1,7 @@
 """Real runs of the example stages, and curves of their pages."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -19,8 +20,8 @@ MM = 1e-3
 Played = tuple[StepperEnvelopeSpec, StageRun, Trace]
 
 
-def play(example: str, job: StageJob, *overrides: str, every: int = 50) -> Played:
-    spec = load_spec(detent.example(example), overrides)
+def play(example: str | Path, job: StageJob, *overrides: str, every: int = 50) -> Played:
+    spec = load_spec(detent.example(example) if isinstance(example, str) else example, overrides)
     assert isinstance(spec, StepperEnvelopeSpec)
     recorder = Recorder(stage_registers(spec), stage_signals(spec), every=every, period=instant(spec))
     return spec, run_stage(spec, job, recorder=recorder), recorder.trace()

@@ -8,6 +8,7 @@ from detent.methods.stepper_envelope.comparison import METHODS, Course, JerkComp
 from detent.methods.stepper_envelope.run import MotorMove, StageMoveRecord, StageRun
 from detent.methods.stepper_envelope.stage_job import StageJob, StageMove
 from detent.methods.stepper_envelope.stage_plan import Tile, TilePlan
+from detent.page.units import Units
 
 STEP = 5e-6
 MM = 1e-3
@@ -62,7 +63,8 @@ def tile_plan(**changes: object) -> TilePlan:
         tile(1, 5 * MM, 7 * MM, seconds=0.4), tile(2, 5.4 * MM, 7 * MM), tile(3, 5.4 * MM, 7.3 * MM),
         tile(4, 5 * MM, 7.3 * MM),
     ]  # fmt: skip
-    return TilePlan(**({"motors": ("x", "y"), "start": (0.0, 0.0), "tiles": tiles} | changes))
+    plan = {"motors": ("x", "y"), "start": (0.0, 0.0), "tiles": tiles, "unit": Units(rotary=False).place}
+    return TilePlan(**(plan | changes))
 
 
 # ---- comparisons

@@ -94,6 +94,7 @@ CHANGES = {
 ELSEWHERE = {
     "axis.name": "test_the_motor_does_not_know",
     "axis.method": "tests/unit/methods/test_registry.py",
+    "motion": "test_rotary.py",
     "controller.settle_time": "test_the_motor_does_not_know; tests of the stage's runs",
 }
 
