@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from detent.cli import app, docs
-from detent.files.keys import key_rows
+from detent.files.keys import key_rows, own_rows
 from detent.methods.registry import METHODS
 
 MOVES = "target [mm],dwell [ms]\n5,10\n2,10\n"
@@ -76,9 +76,12 @@ def test_wrong_words_leave_nothing_behind(words, says, tmp_path):
 @pytest.mark.parametrize("method", METHODS)
 def test_keys_tells_every_key_of_a_method(method):
     status, out, _ = call("keys", method, "--json")
-    rows = json.loads(out)
+    rows, spec = json.loads(out), METHODS[method].spec
+    turned = own_rows(METHODS[method].rotary or spec, spec)
     assert status == 0
-    assert [row["key"] for row in rows] == [row.key for row in key_rows(METHODS[method].spec)]
+    assert [row["key"] for row in rows] == [row.key for row in key_rows(spec) + turned]
+    own = ["gear_ratio", "load_inertia", "gear_inertia"] if method == "stepper_envelope" else []
+    assert [row.key.rpartition(".")[2] for row in turned] == own
     assert {row["method"] for row in rows} == {method}
 
 
