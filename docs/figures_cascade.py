@@ -33,14 +33,14 @@ def one_move(axis: Any, target: float, *, dwell: float = 0.0, signals: tuple[str
 
 
 def feed_forward() -> None:
-    """Following error of one move with more and more feed-forward."""
+    """Following error of one move with more and more feedforward."""
     shares: tuple[tuple[str, tuple[str, ...]], ...] = (
         ("none", ("velocity", "acceleration", "viscous", "coulomb")),
         ("velocity", ("acceleration", "viscous", "coulomb")),
         ("velocity, acceleration", ("viscous", "coulomb")),
         ("all of it", ()),
     )
-    with picture("feed-forward.svg", 2, 4.6) as (coarse, fine):
+    with picture("feedforward.svg", 2, 4.6) as (coarse, fine):
         for (name, off), colour in zip(shares, (GREY, ORANGE, GREEN, BLUE), strict=True):
             run = one_move(slide(*(f"method.feed_forward.{key}=0" for key in off)), 0.27)
             part = run.trace.between(run.result.moves[0].begin, run.result.moves[0].end)
@@ -55,7 +55,7 @@ def feed_forward() -> None:
 
 
 def profiles() -> None:
-    """A move in four ways, as `detent compare` draws it."""
+    """A move in four variants, as `detent compare` draws it."""
     from detent.page.draw import draw_figures
 
     # Its table stands in the text, as the terminal prints it.

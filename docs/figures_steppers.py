@@ -357,7 +357,7 @@ def margin() -> None:
 
 
 def smooth_ramp(found: Any, step: float) -> Any:
-    """The rising part of a profile of limited jerk as a ramp list: the frequency of each of its steps."""
+    """The rising part of a profile of jerk-limited as a ramp list: the frequency of each of its steps."""
     from detent.planning.step_ramp import StepRamp
 
     v, a, j = found.speed, found.acceleration, found.jerk
@@ -371,7 +371,7 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 
 def jerk() -> None:
-    """Start by the envelope and by a profile of limited jerk, each as a ramp list, on the rotor."""
+    """Start by the envelope and by a profile of jerk-limited, each as a ramp list, on the rotor."""
     from detent.methods.stepper_envelope.comparison import compare_jerk
     from detent.methods.stepper_envelope.controller import load_rule
     from detent.methods.stepper_envelope.system import tables
@@ -382,7 +382,7 @@ def jerk() -> None:
     listed = smooth_ramp(compare_jerk(spec, MOTOR), spec.stepper[MOTOR].step)
     names = ("controller.timer.period", "plant.rotor.angle", "plant.rotor.commanded")
     with picture("jerk.svg", 1, 3.8, columns=2, share_x=False) as (speed, start):
-        for text, colour, ramp_list in (("envelope", BLUE, None), ("limited jerk", ORANGE, listed)):
+        for text, colour, ramp_list in (("envelope", BLUE, None), ("jerk-limited", ORANGE, listed)):
             motor = standing(way, *OPEN)
             if ramp_list is not None:
                 table = motor.tables.up.zones

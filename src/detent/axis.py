@@ -78,7 +78,7 @@ class Axis(OnScreen):
     def screen(self) -> Screen:
         """Its method, and what its file states."""
         stated = [(key, self.file.texts[key], origin) for key, origin in self.file.origins.items()]
-        blocks = [Block("", ("key", "value", "origin"), stated, 28, ".check().rows has every value in effect")]
+        blocks = [Block("", ("key", "value", "origin"), stated, 28, ".check().rows has every effective value")]
         title = f"{self.name}, an axis of the method {self.method.title}\n{self.file.file}"
         return Screen(title, blocks, ".check()  .run(job)  .replace({KEY: value})  .linear()  .compare()")
 
@@ -264,7 +264,7 @@ class Axis(OnScreen):
         )
 
     def compare(self, progress: Progress | None = None) -> tuple[Comparison, ...]:
-        """Hold the method against the ways it was made to better, on this axis.
+        """Compare the method with the alternatives that it improves on, on this axis.
 
         Print head: one `DriveComparison`. Phase servo: `NoiseComparison` and `HoldComparison`. Filtered servo: one
         `FeedbackComparison`. Rotary table: one `AngleComparison`. Steppers: a `StepComparison` per motor and a

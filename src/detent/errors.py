@@ -98,43 +98,44 @@ SB1_TEXT: dict[int, str] = {
     0x01: "the command is unknown or illegal; send one of the commands of the protocol, with its count of data bytes",
     0x02: "a position or a speed is out of range; keep positions between the frames and speeds between 3 and 40 in/s",
     0x04: "the axis is not calibrated; send CALCULATE PARAMETERS before the first motion",
-    0x08: "the head is obstructed or stalled, or moves against its drive, and the drive is off; clear the way, check "
-    "the leads of motor and encoder, then send CALCULATE PARAMETERS",
-    0x10: "the measured slope or friction is implausible and the default values were kept; look for a jam, "
+    0x08: "the head is obstructed or stalled, or moves against its drive, and the drive is off; clear the obstruction, "
+    "check the wiring of motor and encoder, then send CALCULATE PARAMETERS",
+    0x10: "the measured slope or friction is implausible and the default values were kept; check for a jam, "
     "a wrong supply voltage or a wrong motor, then send CALCULATE PARAMETERS",
-    0x20: "a motion command came while one was already queued and was dropped; wait for an answer before the next",
+    0x20: "a motion command arrived while one was already queued and was dropped; wait for an answer before sending "
+    "the next",
 }
 """Meaning of each bit of the axis computer's status byte SB1 (specification of the print head, 3.1)."""
 
 
 SERVO_FAULT_TEXT: dict[int, str] = {
     1: "the following error left the range of the position counter and the drive is off; lower the speed or the "
-    "command's acceleration, look for a blocked slide, or widen method.position_bits",
-    2: "the speed counter was about to wrap and the drive is off: the slide moves more pulses in a sample than it can "
-    "count; lower the speed, shorten method.sample_period, or widen method.counter_bits",
+    "command's acceleration, check for a blocked slide, or widen method.position_bits",
+    2: "the speed counter was about to wrap and the drive is off: the slide moves by more pulses per sample than it "
+    "can count; lower the speed, shorten method.sample_period, or widen method.counter_bits",
 }
 """Causes of a fault of the filtered servo (control.deviation_counter)."""
 
 
 GUARD_TEXT: dict[int, str] = {
-    2: "the sensor stood while an effort that breaks the axis loose lasted for {stuck}, and the drive is off; "
-    "look for a blocked axis, a loose coupling or a broken sensor lead (protection.stuck_time, "
+    2: "the sensor did not move although the effort exceeded breakaway for {stuck}, and the drive is off; "
+    "check for a blocked axis, a loose coupling or a broken sensor cable (protection.stuck_time, "
     "protection.stuck_effort)",
-    3: "the sensor jumped farther than any motion can go, twice, and the drive is off; look at its lead, its "
-    "shield and its supply (protection.jump)",
-    4: "the axis sped up against its own effort for {reversed}, and the drive is off; look for a sensor or a "
-    "motor with its leads exchanged, or a force beyond the effort (protection.reversed_time)",
-    10: "the following error went beyond {following}, and the drive is off; look for what blocks the axis, lower "
-    "speed or acceleration, or correct the gains",
-    11: "the command stayed at its limit for {saturated}, and the drive is off; lower the acceleration, take a "
-    "stronger drive, or look for an unstable loop (protection.saturation_time)",
-    12: "the axis ran faster than {speed}, and the drive is off; look for a force that drives it, a sensor that "
-    "counts wrong, or an unstable loop (protection.overspeed)",
-    13: "the axis did not arrive within {arrival}; look for a force it cannot hold, or allow more time",
-    32: "the axis ran over the {side} end of its way, {end}, and the drive is off; keep the moves farther from "
+    3: "the sensor jumped farther than any motion can explain, twice, and the drive is off; check its cable, shield "
+    "and supply (protection.jump)",
+    4: "the axis accelerated against its own effort for {reversed}, and the drive is off; check for a sensor or motor "
+    "with swapped leads, or an external force that exceeds the effort (protection.reversed_time)",
+    10: "the following error exceeded {following}, and the drive is off; check what blocks the axis, lower speed "
+    "or acceleration, or correct the gains",
+    11: "the command stayed at its limit for {saturated}, and the drive is off; lower the acceleration, use a "
+    "stronger drive, or check for an unstable loop (protection.saturation_time)",
+    12: "the axis ran faster than {speed}, and the drive is off; check for an external force, a miscounting sensor, or "
+    "an unstable loop (protection.overspeed)",
+    13: "the axis did not arrive within {arrival}; check for a load it cannot hold, or allow more time",
+    32: "the axis overran the {side} end of travel, {end}, and the drive is off; keep the moves farther from "
     "the ends, or damp the overshoot",
 }
-"""Faults that a controller's guard tells (control.guard), by their numbers; in all of them the first cause stays."""
+"""Faults reported by a controller's guard (control.guard), by their numbers; in all of them the first cause stays."""
 
 
 STEP_FAULT_TEXT: dict[int, str] = {
@@ -146,9 +147,9 @@ STEP_FAULT_TEXT: dict[int, str] = {
 
 
 TABLE_REFUSAL_TEXT: dict[int, str] = {
-    1: "the table was still moving; start a positioning when the one before has ended or the jog has come to rest",
+    1: "the table was still moving; start positioning when the previous one has ended or the jog has come to rest",
     2: "the position table has no such entry; add [position.NUMBER] to the axis file, or start another number",
-    3: "the way is longer than the remaining angle can count; name a nearer angle in the position's entry, or lower "
+    3: "the distance exceeds the range of the remaining angle; name a nearer angle in the position's entry, or lower "
     "detector.fine.counts",
 }
 """Why the positioner of a rotary table refuses a start, by its reason (control.table_positioner)."""

@@ -320,7 +320,7 @@ def test_the_table_never_jumps(place, acts, noise, seed, task_at):
         speed = np.degrees(seen["plant.train.motor.velocity"]) / RATIO
         assert np.abs(speed).max(initial=0) <= 63
         assert (seen["controller.positioner.angle.position"] % T == seen["controller.positioner.angle.dar"]).all()
-    rig.run_until(rig.time + 12)  # the longest way at 60 deg/s, and to rest
+    rig.run_until(rig.time + 12)  # the longest distance at 60 deg/s, and to rest
     if rig.positioner.state == HOLD:
         assert abs(rig.present - rig.target) <= (2 * noise + 2) * COUNT
         assert 0 <= rig.positioner.oar < T

@@ -137,7 +137,7 @@ def places(draw):
 )
 def test_csv_is_read_as_it_is_written(job, tiles, decoy, style, end, quote, begin, tmp_path_factory):
     (columns, units, head, table), (separator, point) = job, style
-    # What an encoder read of the first motor is passed over, where the place asked for is there too.
+    # What an encoder read of the first motor is skipped, where the place asked for is there too.
     has_decoy = decoy and "nominal" in head[0]
     header = ["tile" if tiles else "label", *head, *([f"{columns[0]}_um_reader1"] if has_decoy else []), "dwell_ms"]
     lines = [[*header, "repeat"]]

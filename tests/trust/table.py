@@ -140,7 +140,7 @@ logs whose true constants are known. Each log is one number, from which everythi
 - **The axis.** 0.1 to 200 kg, top speeds from 0.05 to 1 m/s; Coulomb and viscous friction of each direction, the same
   in half of the logs and up to a quarter apart in the others; a constant force; in a third of them static friction
   above Coulomb friction; a force that acts 0, 1 or 2 samples late.
-- **The controller.** A cascade with 8 to 25 Hz in its velocity loop, with and without integral and feed-forward. Logs
+- **The controller.** A cascade with 8 to 25 Hz in its velocity loop, with and without integral and feedforward. Logs
   of a closed loop are the difficult ones: the force answers to the noise of the encoder.
 - **The excitation.** Moves of random length, speed and ramps, some with a dwell; or six sines. 8 to 25 s at 500, 1000
   or 2000 Hz.

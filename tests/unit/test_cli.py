@@ -282,7 +282,7 @@ def test_check_shows_values_with_their_origin() -> None:
     assert re.search(rf"368\.3 mm +{re.escape(AXIS)} line \d+$", rows["limits.travel"].rstrip())
     assert rows["method.trim"].split()[-1] == "default"
     assert "catalogue JDH" in rows["motor.resistance"]
-    assert "head [/2]: every value in effect" in answer.out  # a name is a name, no markup
+    assert "head [/2]: effective values" in answer.out  # a name is a name, no markup
     assert re.search(r"^stop distance at top speed +400 emitters", answer.out, flags=re.MULTILINE)
     assert answer.out.endswith("no warnings\n")
 
@@ -610,7 +610,7 @@ def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path: P
     env = {"DETENT_CACHE_DIR": str(tmp_path / "cache")}
     first, second = (shell(*words, cwd=tmp_path, env=env) for _ in range(2))
     assert (first.status, second.status) == (0, 0)
-    assert first.err == "First run: compiling the axis, up to 15 s; later runs start at once.\n"
+    assert first.err == "First run: compiling the axis, up to 15 s; later runs start immediately.\n"
     assert second.err == ""
     assert first.out == second.out
 
@@ -622,7 +622,7 @@ def test_a_cache_that_cannot_be_made_is_said_and_the_run_is_made(tmp_path: Path)
     env = {"DETENT_CACHE_DIR": str(tmp_path / "file" / "cache")}
     answer = shell("run", AXIS, "--job", LETTER, "--every", "0", cwd=tmp_path, env=env)
     assert answer.status == 0
-    assert "it cannot be kept" in answer.err
+    assert "it cannot be cached" in answer.err
     assert "set DETENT_CACHE_DIR to a folder of yours" in answer.err
     assert answer.out.startswith("Printed letter.txt")
 
@@ -795,9 +795,9 @@ def test_a_trace_that_broke_off_is_taken_only_where_asked(tmp_path: Path, trace:
     for words, asked in ((draw, ("--incomplete",)), (study, ("--column", "incomplete=yes"))):
         refused = call(*words)
         assert refused.status == 2
-        assert "a trace of a run that broke off" in refused.err
+        assert "the trace of an aborted run" in refused.err
         assert asked[-1] in refused.err
-        assert "broke off" not in call(*words, *asked).err
+        assert "aborted" not in call(*words, *asked).err
 
 
 @pytest.mark.process

@@ -45,7 +45,7 @@ def test_run_makes_the_moves_and_leaves_report_and_trace(axis: str, job: str, un
     assert set(trace.signals) >= {*CASCADE_SIGNALS, "lines.motor.count"}
     assert trace.units["plant.machine.load.position"] == unit
     report = Path("out/report.html").read_text(encoding="utf-8")
-    assert "What profile and feed-forward are worth" in report
+    assert "Effect of profile and feedforward" in report
 
 
 def test_the_same_run_leaves_the_same_bytes() -> None:
@@ -66,7 +66,7 @@ def test_a_drive_that_goes_off_is_status_1_with_the_reason() -> None:
     wrong = ("--set", "method.following_error=15 um", "--set", "method.in_position=5 um")
     answer = call(*RUN, *wrong)
     assert answer.status == 1
-    assert answer.out.startswith("Not done: move 1 to 120 mm: the following error went beyond 15 um")
+    assert answer.out.startswith("Not done: move 1 to 120 mm: the following error exceeded 15 um")
     data = call(*RUN, "--every", "0", "--json", *wrong)
     assert data.status == 1
     assert data.data["time_off"] > 0
@@ -96,7 +96,7 @@ def test_a_recording_is_replayed_and_compared() -> None:
     assert {path.name for path in Path("out").iterdir()} == {"report.html", "trace.h5", "trace.csv"}
     report = Path("out/report.html").read_text(encoding="utf-8")
     assert "Recorded and simulated" in report
-    assert "What profile" not in report
+    assert "Effect of profile" not in report
 
 
 def test_a_replay_as_json_has_each_signal() -> None:
@@ -136,8 +136,8 @@ def test_the_own_trace_of_an_axis_can_be_replayed() -> None:
 def test_compare_shows_a_move_in_four_ways() -> None:
     answer = call("compare", CASCADE, "--figure", "profiles.svg")
     assert answer.status == 0
-    assert "A move of 250 mm at 500 mm/s, in four ways" in answer.out
-    assert answer.out.count("feed-forward") == 4
+    assert "A move of 250 mm at 500 mm/s, in four variants" in answer.out
+    assert answer.out.count("feedforward") == 4
     assert Path("profiles.svg").stat().st_size > 1000
     data = call("compare", TURNTABLE, "--json").data
     assert len(data["comparisons"][0]["cases"]) == 4
@@ -160,7 +160,7 @@ def test_python_says_the_same() -> None:
 
 BAD = {
     "neither": (["run", CASCADE], "neither --job nor --replay"),
-    "both": (["run", CASCADE, "--job", SLIDE, "--replay", "log.csv"], "--job and --replay; expected: one of them"),
+    "both": (["run", CASCADE, "--job", SLIDE, "--replay", "log.csv"], "--job and --replay; expected: only one of them"),
     "columns of no recording": ([*RUN, "--column", "force=f"], "--map or --column without --replay"),
     "another method": (["run", str(detent.example("filtered_servo.toml")), "--replay", "log.csv"], "expected: cascade"),
     "no log": (["run", CASCADE, "--replay", "none.csv"], "none.csv"),
@@ -208,7 +208,7 @@ def test_a_run_is_repeated_from_what_it_left(name: str, monkeypatch: pytest.Monk
         made = call(*RUN, "--set", "method.position_gain=35", "--trace", "h5", "-o", folder, "--json")
         assert made.data["evidence"]["date"] == "1970-01-02T00:00:00+00:00"
     again = call("run", "--again", f"one/{name}")
-    assert (again.status, again.out.partition(", ")[0]) == (0, f"one/{name}: the same bytes")
+    assert (again.status, again.out.partition(", ")[0]) == (0, f"one/{name}: byte-identical")
     assert call("run", "--again", f"one/{name}", "--json").data["same"] is True
 
 
@@ -219,7 +219,7 @@ def test_a_repetition_that_differs_says_in_what_and_is_status_1() -> None:
     page.write_text(text.replace('"overrides":[]', '"overrides":["method.position_gain=36"]'), encoding="utf-8")
     again = call("run", "--again", str(page))
     assert again.status == 1
-    assert "the first difference is in method.position_gain, of the values in effect" in again.out
+    assert "first in method.position_gain, of the effective values" in again.out
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_compare_shows_what_pulses_do_and_how_it_stands() -> None:
     answer = call("compare", PHASE, "--figure", "noise.svg")
     assert answer.status == 0
     assert "Where a move of 6 pitches ends" in answer.out
-    assert "Standing still" in answer.out
+    assert "At rest" in answer.out
     assert Path("noise.svg").stat().st_size > 1000
     assert Path("noise-2.svg").stat().st_size > 1000
 

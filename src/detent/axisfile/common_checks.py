@@ -17,7 +17,7 @@ def static_friction(tables: Mapping[str, Any], unit: str = "N") -> Iterator[Cont
     """Static friction, `static`, is at least the Coulomb friction, `coulomb`, in each table of one direction."""
     for key, table in tables.items():
         if table.static < table.coulomb:
-            least = f"at least the Coulomb friction, {text(table.coulomb, unit)}; left out it is 1.15 x coulomb"
+            least = f"at least the Coulomb friction, {text(table.coulomb, unit)}; its default is 1.15 x coulomb"
             yield wrong(f"{key}.static {key}.coulomb", least, put(f"{key}.static", at_least(table.coulomb, unit)))
 
 
@@ -111,4 +111,4 @@ def overheating(name: str, current: float, most: float | None, remedy: str) -> I
     """A current [A] that lasts is not above motor.max_current."""
     if most is not None and current > most * (1 + BARELY):
         limit = f"up to motor.max_current, {text(most, 'A')}"
-        yield Caution(name, text(current, "A"), limit, "the motor overheats if this lasts", remedy)
+        yield Caution(name, text(current, "A"), limit, "the motor overheats if this persists", remedy)

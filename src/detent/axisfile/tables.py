@@ -80,7 +80,7 @@ def usual_stiction(data: dict[str, Any]) -> float:
 class MotorTable(Table, frozen=True):
     """Constants of the brush DC motor, from a catalogue or stated."""
 
-    catalogue: str = optional("motor of the catalogue that gives the constants not stated here", "", max_length=80)
+    catalogue: str = optional("motor of the catalogue, for the constants not stated here", "", max_length=80)
     torque_constant: TorqueConstant = required("torque per current", '"0.241 N*m/A"', ge=1e-6, le=100.0)
     back_emf_constant: BackEmfConstant = optional(
         "voltage per speed", _stated_torque_constant, derived="motor.torque_constant", ge=1e-6, le=100.0
@@ -88,7 +88,9 @@ class MotorTable(Table, frozen=True):
     resistance: Resistance = required("winding and brushes", '"12 ohm"', ge=1e-3, le=1e5)
     inductance: Inductance = required("winding", '"12 mH"', ge=1e-9, le=10.0)
     rotor_inertia: Inertia = required("rotor, without load", '"260 g*cm^2"', ge=1e-12, le=0.1)
-    max_current: Current | None = optional("current the motor stands; only warned about", None, gt=0.0, le=10000.0)
+    max_current: Current | None = optional(
+        "continuous current of the motor; used for a warning only", None, gt=0.0, le=10000.0
+    )
 
 
 class FrictionTable(Table, frozen=True):
@@ -96,9 +98,7 @@ class FrictionTable(Table, frozen=True):
 
     coulomb: Force = required("friction while moving, at any speed", '"7.5 N"', ge=0.0, le=1e5)
     viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e5)
-    static: Force = optional(
-        "force that breaks the carriage loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
-    )
+    static: Force = optional("breakaway force", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5)
 
 
 class FrictionTables(Table, frozen=True):
@@ -117,7 +117,7 @@ class ScrewTable(Table, frozen=True):
     moving_mass: Mass = optional("slide with its load", 0.0, start='"110 kg"', ge=0.0, le=1e5)
     screw_inertia: Inertia = optional("screw and coupling", 0.0, ge=0.0, le=10.0)
     start_position: Length = optional(
-        "where the slide stands at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
+        "slide position at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
     )
     friction: FrictionTables
 
@@ -150,15 +150,15 @@ class BurstTable(Table, frozen=True):
     """Disturbances of the pulse lines at chosen moments: evenly spaced from `at`, or in the base ticks listed."""
 
     kind: Literal["+", "-", "remove", "lose sample", "corrupt"] = required(
-        "a + or - pulse put in, a pulse taken away, a sample lost, or a sample of the sensor inverted", '"+"'
+        "a + or - pulse inserted, a pulse removed, a sample lost, or a sample of the sensor inverted", '"+"'
     )
     at: Time | None = optional(
-        "first moment, in simulated time", None, derived="none: ticks are listed", ge=0.0, le=1e5
+        "time of the first one, in simulated time", None, derived="none: ticks are listed", ge=0.0, le=1e5
     )
     count: int = optional("how many", 1, ge=1, le=64)
-    spacing: Time = optional("time between two of them", 24e-6, ge=0.0, le=100.0)
+    spacing: Time = optional("spacing", 24e-6, ge=0.0, le=100.0)
     ticks: list[Annotated[int, Ge(0), Le(2**53)]] = optional(
-        "base ticks in place of at, count and spacing",
+        "base ticks, instead of at, count and spacing",
         [],
         allowed="up to 64 whole numbers from 0, rising, such as [20000, 20096]",
         max_length=64,
@@ -168,8 +168,8 @@ class BurstTable(Table, frozen=True):
 class InterferenceTable(Table, frozen=True):
     """Induction noise on the lines between sensor and counters, by rate; each kind at random moments."""
 
-    inserted: Frequency = optional("pulses put in, of either sign", 0.0, ge=0.0, le=1e5)
-    removed: Frequency = optional("pulses taken away", 0.0, ge=0.0, le=1e5)
+    inserted: Frequency = optional("pulses inserted, of either sign", 0.0, ge=0.0, le=1e5)
+    removed: Frequency = optional("pulses removed", 0.0, ge=0.0, le=1e5)
     lost_samples: Frequency = optional("speed samples lost", 0.0, ge=0.0, le=1e5)
     corrupted: Frequency = optional("samples of the sensor inverted for a clock", 0.0, ge=0.0, le=1e5)
     burst: BurstTable | None = None
@@ -178,7 +178,7 @@ class InterferenceTable(Table, frozen=True):
 class ObstacleTable(Table, frozen=True):
     """Something solid in the way of the carriage."""
 
-    position: Length = required("where the carriage is blocked, from the left end of its way", '"7 in"', gt=0.0)
+    position: Length = required("where the carriage is blocked, from the left end of its travel", '"7 in"', gt=0.0)
 
 
 class PushTable(Table, frozen=True):
@@ -199,10 +199,10 @@ class DisturbanceTable(Table, frozen=True):
 class ProtectionTable(Table, frozen=True):
     """What ends a motion that is not what was asked for; a time of 0 switches its watch off."""
 
-    saturation_time: Time = optional("how long the command may stay at its limit", 1.0, ge=0.0, le=1000.0)
-    stuck_time: Time = optional("how long the sensor may stand under effort", 0.05, ge=0.0, le=10.0)
+    saturation_time: Time = optional("time the command may stay at its limit", 1.0, ge=0.0, le=1000.0)
+    stuck_time: Time = optional("time without sensor motion under effort", 0.05, ge=0.0, le=10.0)
     stuck_effort: float = optional(
-        "effort under which the axis must move, as a share of the largest", math.nan,
+        "effort at which the axis must move, as a share of the largest", math.nan,
         derived="twice the static friction, from 0.3 to 1", ge=0.01, le=1.0,
     )  # fmt: skip
 
@@ -210,12 +210,12 @@ class ProtectionTable(Table, frozen=True):
 class TurnProtectionTable(ProtectionTable, frozen=True):
     """The same of an axis whose controller can trust what its sensor counts, from sample to sample and for good."""
 
-    overspeed: float = optional("speed that is a fault, as a share of limits.speed; 0: any", 1.1, ge=0.0, le=100.0)
+    overspeed: float = optional("overspeed limit, relative to limits.speed; 0: any", 1.1, ge=0.0, le=100.0)
     jump: float = optional(
-        "movement in one sample that is a jump of the sensor, as a share of what limits.speed makes; 0: any",
+        "movement in one sample that counts as a jump of the sensor, relative to that at limits.speed; 0: any",
         1.5, ge=0.0, le=100.0,
     )  # fmt: skip
-    reversed_time: Time = optional("how long the axis may speed up against its effort", 0.02, ge=0.0, le=10.0)
+    reversed_time: Time = optional("time the axis may accelerate against its effort", 0.02, ge=0.0, le=10.0)
 
 
 class MotionProtectionTable(TurnProtectionTable, frozen=True):

@@ -18,7 +18,7 @@ from detent.kernel.cache import AT_FIRST_COMPILING
 
 DONE, NOT_DONE = 0, 1
 UsageError: Any = typer.BadParameter.__base__  # typer brings a click of its own, or uses the one that is installed
-QUIET = "Print only what is wrong, and what --json asks for: `detent -q run ...`"
+QUIET = "Print only warnings and errors, and the output of --json: `detent -q run ...`"
 LOGS = "(.csv, .h5, .parquet, .mat, .npz, .jsonl)"  # recordings that can be read
 
 
@@ -101,7 +101,7 @@ app = typer.Typer(
     cls=Commands,
     help="Positioning control as software: describe an axis in one file, check it, run a job on it.",
     epilog="Exit status: 0 done, 1 the axis did not do it (the reason is shown), 2 wrong input. 130 Ctrl-C, "
-    "143 `kill`: no file is left half-written.",
+    "143 `kill`: no file is left incomplete.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # its imports take longer than the help
@@ -119,12 +119,13 @@ Set = Annotated[list[str] | None, option("--set", "KEY=VALUE", "Replace or add a
 Json = Annotated[bool, option("--json", "", "Print machine-readable JSON instead of text.")]
 Force = Annotated[bool, option("--force", "", "Replace files that detent did not write, or that were edited since.")]
 Job = Annotated[
-    Path | None, option("--job", "", "What the axis does: a file of the kind that its method takes, see below.")
+    Path | None, option("--job", "", "The job: a file of a kind that the axis's method accepts, see below.")
 ]
-Mapping = Annotated[Path | None, option("--map", "FILE", "File (TOML) of what the columns of a recording are.")]
+Mapping = Annotated[Path | None, option("--map", "FILE", "Mapping file (TOML) for the columns of a recording.")]
 COLUMNS = (
-    "What a column of a recording is, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, reference, "
-    "velocity, force, torque, current, voltage, command, position_load; what is not said is guessed, and told."
+    "Assign a column of a recording, as in 'force=vir [35.15 N]'; repeat for more. Roles: time, position, reference, "
+    "velocity, force, torque, current, voltage, command, position_load; columns not assigned are guessed, and "
+    "the guesses are reported."
 )
 Columns = Annotated[list[str] | None, option("--column", "ROLE=COLUMN", COLUMNS)]
 

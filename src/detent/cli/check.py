@@ -9,14 +9,14 @@ from detent.errors import DetentError
 
 KINDS = ("csv", "h", "png")  # of the files with the tables of a motor
 FIGURE = (
-    "A page (.html) of all comparisons, or a picture: PNG, SVG or PDF; the picture of a second comparison gets a 2 in "
-    "its name."
+    "A page (.html) of all comparisons, or a figure: PNG, SVG or PDF; a second comparison's figure gets a 2 in its "
+    "name."
 )
 
 
 @app.command()
 def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
-    """Check an axis file: every value in effect and its origin, what follows from it, what looks wrong."""
+    """Check an axis file: every effective value and its origin, derived figures, and warnings."""
     from detent.methods.check import check_spec
     from detent.methods.load import read_axis
 
@@ -25,9 +25,9 @@ def check(file: File, overrides: Set = None, *, as_json: Json = False) -> None:
         print_json(report.to_dict())
         return
     rows = [(row.key, row.value, row.origin) for row in report.rows]
-    print_table(f"{report.name}: every value in effect", ("key", "value", "origin"), rows)
+    print_table(f"{report.name}: effective values", ("key", "value", "origin"), rows)
     figures = [(figure.name, figure.text, figure.formula) for figure in report.derived]
-    print_table("What follows from them", ("figure", "value", "from"), figures)
+    print_table("Derived figures", ("figure", "value", "from"), figures)
     for caution in report.warnings:
         say(f"warning: {caution}", "yellow", wrong=True)
     number = len(report.warnings)
@@ -43,7 +43,7 @@ def compare(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Hold the axis's method against the ways it was made to better: drives, pulse noise, speed feedback."""
+    """Compare the control method with the alternatives that it improves on: drives, pulse noise, speed feedback."""
     from detent.axis import load
     from detent.files.marks import refuse_others
     from detent.files.text import FIGURES, check_target
@@ -54,7 +54,7 @@ def compare(
     check_target(figure, (".html", *FIGURES), force=force)
     axis = load(file, overrides or [])
     with progress_bar(quiet=as_json) as progress:
-        progress(0.1, "running the axis in several ways")
+        progress(0.1, "running the comparison")
         found = axis.compare(progress)
         progress(0.9, "drawing")
         if figure.suffix.lower() == ".html":
@@ -79,8 +79,8 @@ def compare(
 def envelope(
     file: File,
     overrides: Set = None,
-    motor: Annotated[str, option("--motor", "NAME", "Only this motor of the file. Default: every one.")] = "",
-    output: Annotated[Path | None, option("--output -o", "FOLDER", "Where they go. Default: envelope/FILE")] = None,
+    motor: Annotated[str, option("--motor", "NAME", "Only this motor of the file. Default: all.")] = "",
+    output: Annotated[Path | None, option("--output -o", "FOLDER", "Output folder. Default: envelope/FILE")] = None,
     *,
     force: Force = False,
     as_json: Json = False,

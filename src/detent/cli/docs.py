@@ -141,7 +141,7 @@ def command_line() -> str:
 PRINT_HEAD_STATUS = """## Print head: status byte SB1
 
 The axis computer answers every command with one status byte, SB1. `00` means done; each bit that is set means one
-thing. During a command of several bytes `FF` means: byte taken, send the next.
+thing. During a command of several bytes `FF` means: byte accepted, send the next.
 """
 SERVO_FAULTS = """## Filtered servo: faults
 

@@ -21,18 +21,22 @@ METHODS = {"regression": "regression", "output-error": "output error"}  # words 
 COLOURS = {"trusted": "bold green", "partly trusted": "bold yellow", "refused": "bold red"}
 MOST_LINES = 6  # logs, findings and refusals shown; --json and the report have them all
 
-EFFORT = "What drives the axis: force, torque, current, voltage or command. Default: the first that a log holds."
-METHOD = "regression: equations of motion, in a second; output-error: the simulation fitted to the recording too."
+EFFORT = (
+    "The signal that drives the axis: force, torque, current, voltage or command. Default: the first one in the log."
+)
+METHOD = (
+    "regression: fits the equations of motion, takes a second; output-error: also fits the simulation to the recording."
+)
 AXIS = (
-    "Cascade axis file: constants it states outside of the intervals are named, --write puts the identified ones into "
-    "it, --job keeps its limits."
+    "Cascade axis file: its constants outside the confidence intervals are reported, --write updates it with the "
+    "identified ones, --job respects its limits."
 )
 WRITE = (
     "Write an axis file (TOML): a new one, or that of --axis, changed. Into a file that somebody wrote only what was "
     "identified is put: comments, units and layout stay."
 )
 REPORT = "Write the report, one self-contained HTML file."
-JOB = "Write a list of moves (TOML) that shows what the logs do not."
+JOB = "Write a list of moves (TOML) that would supply what the logs lack."
 Effort = Annotated[str | None, option("--effort", "ROLE", EFFORT)]
 
 
@@ -53,16 +57,16 @@ def identify(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Find an axis's mass, friction and delay in recordings, each with its limits; refuse what they do not tell.
+    """Identify mass, friction and delay from recordings, with confidence limits; refuse what the data do not determine.
 
-    Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 the input
-    cannot be read.
+    Exit status: 0 all constants are trusted, 1 some or all are refused (the output says what to record), 2 wrong
+    input.
     """
     from detent.identify.identified import identify_axis
 
     axis = _check_outputs(axis, write, job, report, force=force)
     if method not in METHODS:
-        raise DetentError(f"--method: got {method!r}; expected: {' or '.join(METHODS)}; choose one of these")
+        raise DetentError(f"--method: got {method!r}; expected: {' or '.join(METHODS)}; choose one of them")
     chosen = cast("Method", METHODS[method])
     # Options that read the logs in the same way once more.
     options = ["--map", str(mapping)] if mapping is not None else []
@@ -146,7 +150,7 @@ def _print(done: "Identified", outside: list[str]) -> None:
     say(done.sentence, COLOURS[done.verdict])
     _print_refusals(done)
     for text in outside:
-        say(f"  not as the axis file: {text}", "yellow")
+        say(f"  differs from the axis file: {text}", "yellow")
     tell()
     _print_logs(found)
     if found.estimates:
@@ -203,11 +207,11 @@ def _print_ladder(found: Any) -> None:
     rows: list[tuple[str, ...]] = []
     for climb in found.climbs:
         gain = "" if climb.gain != climb.gain else f"{climb.gain:+.1f}"
-        why = "" if climb.possible else "; friction falls towards standstill"
+        why = "" if climb.possible else "; friction decreases towards standstill"
         taken = "model" if climb.rung is found.rung else "taken" if climb.taken else f"no{why}"
         rows.append((climb.rung.name, f"{climb.error:.2%}", gain, taken, climb.rung.text))
     heads = ("", "error", "gain", "", "")
-    print_table("Models: error of the effort in stretches not seen, gain in standard errors", heads, rows)
+    print_table("Models: error of the effort on held-out data, improvement in standard errors", heads, rows)
 
 
 def _print_horizons(found: Any) -> None:
@@ -219,12 +223,12 @@ def _print_horizons(found: Any) -> None:
     for one in found.horizons:
         texts = (ways.error(float(value)) for value in (one.rms, one.largest, one.moved))
         rows.append((one.name, *texts, f"{one.rms / one.moved:.2%}" if one.moved else ""))
-    title = "Simulated: the last quarter, not fitted"
-    print_table(title, ("over", "rms error", "largest", "way", "error/way"), rows, right=True)
+    title = "Simulated: the last quarter, held out"
+    print_table(title, ("over", "rms error", "largest", "travel", "error/travel"), rows, right=True)
     loop = found.closed_loop
     if loop is not None:
         told = f"rms error {ways.error(loop.rms)}, largest {ways.error(loop.largest)}; effort {loop.effort:.1%} off"
-        say(f"The same under the loops that the log shows: {told}")
+        say(f"The same with the control loops found in the log: {told}")
 
 
 # ---- single questions, each answered by its own method
@@ -232,7 +236,10 @@ def _print_horizons(found: Any) -> None:
 WHAT = "two-speeds, friction-map, winding, frequency, steps or sensors; repeat for more. Default: all."
 What = Annotated[list[str] | None, option("--what", "WORD", WHAT)]
 Mass = Annotated[
-    float, option("--mass", "NUMBER", "Effort per acceleration in SI units, for the friction map.", min=0.0)
+    float,
+    option(
+        "--mass", "NUMBER", "Mass or inertia, as effort per acceleration in SI units, for the friction map.", min=0.0
+    ),
 ]
 
 
@@ -249,10 +256,10 @@ def analyse(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Ask a recording single questions: friction, winding, resonances, steps, encoder; each answer has its limits.
+    """Analyse single aspects of a recording: friction, winding, resonances, step response, encoder.
 
-    Exit status: 0 every question named by --what has an answer that can be trusted, or, where none is named, any of
-    them; 1 otherwise (the output says what is missing); 2 the input cannot be read.
+    Exit status: 0 every analysis named by --what gives a trusted result (without --what, at least one does); 1
+    otherwise (the output says what is missing); 2 wrong input.
     """
     from detent.files.text import check_target
     from detent.identify.analysed import analyse as ask

@@ -15,25 +15,25 @@ from detent.cli.app import File, Force, Job, Json, ListsMethods, Set, app, optio
 from detent.cli.terminal import folder_for, print_json, progress_bar, split_names, tell
 from detent.errors import DetentError, InputError
 
-TIMING = "Registers in place of the usual ones, comma-separated."
-SIGNALS = "Registers, comma-separated; patterns such as 'head.*' too."
+TIMING = "Registers to show instead of the default ones, comma-separated."
+SIGNALS = "Registers, comma-separated; patterns such as 'head.*' are allowed."
 
 
 @app.command(cls=ListsMethods)
 def timing(
     file: File,
-    at: Annotated[str, option("--at", "TIME", "Where to look, since power-on, such as '21.5 ms'.")],
-    duration: Annotated[str | None, option("--for", "TIME", "How long. Default: 80 base ticks.")] = None,
+    at: Annotated[str, option("--at", "TIME", "Start of the interval, from power-on, such as '21.5 ms'.")],
+    duration: Annotated[str | None, option("--for", "TIME", "Length of the interval. Default: 80 base ticks.")] = None,
     job: Job = None,
     signals: Annotated[list[str] | None, option("--signals", "NAMES", TIMING)] = None,
     overrides: Set = None,
-    figure: Annotated[Path, option("--figure", "", "PNG, SVG or PDF.")] = Path("timing.png"),
+    figure: Annotated[Path, option("--figure", "", "Figure: PNG, SVG or PDF.")] = Path("timing.png"),
     vcd: Annotated[Path, option("--vcd", "", "VCD file for GTKWave or Surfer.")] = Path("timing.vcd"),
     *,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw the clocked signals of the axis, every clock of a short stretch, and write them as a VCD file."""
+    """Plot the clocked signals of the axis, every clock of a short interval, and write them as a VCD file."""
     from detent.axis import given_as, load
     from detent.files.text import check_target, together
     from detent.page.timing import MAX_SIGNALS
@@ -83,15 +83,15 @@ def _moment(option: str, text: str) -> float:
 def plot(
     trace: Annotated[Path, typer.Argument(help="Trace: .h5, .csv or .parquet.", show_default=False)],
     signals: Annotated[list[str] | None, option("--signals", "NAMES", SIGNALS)] = None,
-    output: Annotated[Path, option("--output -o", "FILE", "PNG, SVG or PDF.")] = Path("plot.png"),
-    start: Annotated[str, option("--from", "TIME", "First moment, such as '6 s'; a bare number is seconds.")] = "",
-    stop: Annotated[str, option("--to", "TIME", "Last moment, the same.")] = "",
+    output: Annotated[Path, option("--output -o", "FILE", "Figure: PNG, SVG or PDF.")] = Path("plot.png"),
+    start: Annotated[str, option("--from", "TIME", "Start time, such as '6 s'; a bare number is in seconds.")] = "",
+    stop: Annotated[str, option("--to", "TIME", "End time, in the same form.")] = "",
     *,
-    incomplete: Annotated[bool, option("--incomplete", "", "Take a trace of a run that broke off.")] = False,
+    incomplete: Annotated[bool, option("--incomplete", "", "Accept the trace of an aborted run.")] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw any recorded registers against time; without --signals, list them."""
+    """Plot recorded registers against time; without --signals, list them."""
     from detent.files.text import check_target
     from detent.record.trace import BROKEN_OFF, broke_off
     from detent.record.trace_files import load_trace
@@ -101,7 +101,8 @@ def plot(
         check_target(output, force=force)
     loaded = load_trace(trace)
     if broke_off(loaded.attributes) and not incomplete:
-        raise InputError.of_file(str(trace), *BROKEN_OFF, "record again, or draw it as it is with --incomplete")
+        raise InputError.of_file(str(trace), *BROKEN_OFF, "record it again, or plot it as it is with --incomplete")
+    names = split_names(signals)
     if not names:
         rows = [{"name": n, "unit": loaded.units.get(n, ""), "doc": loaded.docs.get(n, "")} for n in loaded.signals]
         if as_json:
@@ -167,7 +168,7 @@ def _about(path: Path) -> str:
 
 @app.command("registers")
 def registers_command(
-    method: Annotated[str, typer.Argument(help="Control method, or an axis file of it.")] = "print_head",
+    method: Annotated[str, typer.Argument(help="Control method, or an axis file that uses it.")] = "print_head",
     *,
     as_json: Json = False,
 ) -> None:

@@ -17,21 +17,21 @@ STYLES = {"good": "bold green", "warn": "bold yellow", "bad": "bold red"}  # of 
 TRACE_KINDS = ("h5", "csv", "parquet")
 
 REPLAY = (
-    f"In place of a job: a recording of the machine {LOGS}, of axes whose loops follow any reference. Its reference is "
-    "followed, or its effort drives the axis; recording and simulation are compared."
+    f"Instead of a job: a recording of the machine {LOGS}, for methods that can follow an arbitrary reference. The "
+    "axis follows the recorded reference, or is driven by the recorded effort; simulation and recording are compared."
 )
-OUTPUT = "Where report and trace go, in place of those of an earlier run. Default: runs/FILE-JOB"
+OUTPUT = "Folder for report and trace; replaces those of an earlier run. Default: runs/FILE-JOB"
 SIGNALS = (
-    "Registers to record beside the usual, comma-separated; patterns such as 'head.*' or 'all' too. `detent registers` "
-    "lists them."
+    "Additional registers to record, comma-separated; patterns such as 'head.*' or 'all' are allowed. `detent "
+    "registers` lists them."
 )
 EVERY = "Record every n-th base tick; 0 records nothing. Tick and default of each method: below."
 TRACE = "Trace files: h5, csv, parquet, comma-separated. Default: h5, and csv up to 20 MB."
 MOST_UNASKED = 20_000_000  # bytes of a CSV trace that nobody asked for
-COMPARE = "Show the comparison with other methods in the report, where its page has one."
+COMPARE = "Include the comparison with other methods in the report, if the method has one."
 
 
-AGAIN = "Repeat the run of a report (.html) or HDF5 trace from what it carries; say whether the bytes are the same."
+AGAIN = "Repeat the run stored in a report (.html) or HDF5 trace, and report whether the result is byte-identical."
 
 
 @app.command(cls=ListsMethods)
@@ -52,20 +52,20 @@ def run(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Do a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
+    """Run a job on the simulated axis, from power-on: print a text, make moves, run a sequence, replay a recording."""
     from detent.axis import given_as, load
     from detent.files.marks import refuse_others
 
     if again is not None:
         if file is not None or job is not None or replay is not None or overrides or columns or mapping is not None:
             raise DetentError(
-                "run: got --again with an axis file, a job or --set; expected: --again alone, the evidence names them; "
-                "leave them out"
+                "run: got --again with an axis file, a job or --set; expected: --again alone, as the stored evidence "
+                "includes them; leave them out"
             )
         _repeat(again, as_json=as_json)
         return
     if file is None:
-        raise DetentError("run: got no axis file; expected: an axis file, or --again FILE; name one")
+        raise DetentError("run: got no axis file; expected: an axis file, or --again FILE; give one")
     kinds = _trace_kinds("h5,csv" if formats is None else formats) if every != 0 else []
     source = _source(job, replay, mapping, columns or [])
     folder = output or Path("runs") / f"{file.stem}-{source.stem}"
@@ -105,8 +105,8 @@ def _repeat(path: Path, *, as_json: bool) -> None:
     before = read_evidence(path)
     if before.job is None:
         raise InputError.of_file(
-            str(path), "evidence of a replay, or of a job that came from no file", "a run of a job file",
-            "make it again from its recording, or from Python",
+            str(path), "the evidence of a replay, or of a job that was not read from a file", "a run of a job file",
+            "repeat it from its recording, or from Python",
         )  # fmt: skip
     with TemporaryDirectory(prefix="again-") as folder, progress_bar(quiet=as_json) as progress:
         axis, job = Path(folder) / "axis" / Path(before.axis.name).name, Path(folder) / Path(before.job.name).name
@@ -120,9 +120,9 @@ def _repeat(path: Path, *, as_json: bool) -> None:
     differs = first_difference(before, after) if after else "the evidence"
     same = not differs
     version = f"detent {before.version}" + ("" if before.version == __version__ else f", this is {__version__}")
-    text = f"{path}: the same bytes, {len(before.figures)} figures and {len(before.trace)} columns"
+    text = f"{path}: byte-identical, {len(before.figures)} figures and {len(before.trace)} columns"
     if not same:
-        text = f"{path}: not the same; the first difference is in {differs}"
+        text = f"{path}: differs, first in {differs}"
     text += f"; the run of {before.date} was made by {version}"
     if as_json:
         told = {"before": before.to_dict(), "after": after and after.to_dict()}
@@ -136,15 +136,17 @@ def _repeat(path: Path, *, as_json: bool) -> None:
 def _source(job: Path | None, replay: Path | None, mapping: Path | None, columns: list[str]) -> Path:
     """The file that says what the axis does: a job or a recording."""
     if job is not None and replay is not None:
-        raise DetentError("run: got --job and --replay; expected: one of them; leave one out")
+        raise DetentError("run: got --job and --replay; expected: only one of them; leave one out")
     if replay is None and (mapping is not None or columns):
         raise DetentError(
-            "run: got --map or --column without --replay; expected: beside --replay, whose columns they name; leave "
-            "them out, or name a recording"
+            "run: got --map or --column without --replay; expected: together with --replay, whose columns they assign; "
+            "leave them out, or add a recording"
         )
     found = job or replay
     if found is None:
-        raise DetentError("run: got neither --job nor --replay; expected: one of them; name a job: --job moves.csv")
+        raise DetentError(
+            "run: got neither --job nor --replay; expected: one of them; give a job, such as --job moves.csv"
+        )
     return found
 
 
@@ -152,7 +154,7 @@ def _trace_kinds(formats: str) -> list[str]:
     kinds = split_names([formats])
     for kind in kinds:
         if kind not in TRACE_KINDS:
-            raise DetentError(f"--trace: got {kind!r}; expected: h5, csv, parquet, comma-separated; choose of these")
+            raise DetentError(f"--trace: got {kind!r}; expected: h5, csv, parquet, comma-separated; choose from these")
     if "parquet" in kinds:
         from detent.record.trace_files import need_parquet
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from detent.files.keys import KeyRow
 
 NAME = typer.Argument(help="Control method; `detent keys` lists them.", show_default=False)
-NEW = "The file, a new one. Default: METHOD.toml"
-SEARCH = "Only keys with this word in name, unit, range, default or meaning."
-ABOUT = "Control method, or an axis file of it: one that turns has its own units. Default: every method."
+NEW = "The file to create. Default: METHOD.toml"
+SEARCH = "Only keys whose name, unit, range, default or meaning contains this word."
+ABOUT = "Control method, or an axis file that uses it (a rotary axis has its own units). Default: every method."
 
 
 @app.command()
@@ -29,7 +29,7 @@ def new(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write an axis file to start from: every key with its unit, range, default and meaning; it checks and runs."""
+    """Write an axis file to start from: every key with its unit, range, default and meaning; it is valid and runs."""
     from detent.files.text import check_target, write_text
     from detent.methods.registry import METHODS
     from detent.methods.start import starting_axis
@@ -45,7 +45,7 @@ def new(
         return
     name = shlex.quote(str(target))
     tell(f"Wrote {target}. Next: detent check {name}, then detent run {name} --job JOB.")
-    tell(f"A job is {METHODS[method].jobs}; `detent examples` lists some.")
+    tell(f"Its jobs: {METHODS[method].jobs}; `detent examples` lists some.")
 
 
 @app.command()
@@ -62,13 +62,13 @@ def keys(
     if not any(found.values()):
         from detent.files.text import did_you_mean
 
-        remedy = did_you_mean(search, known, "search for a shorter word, or list all without --search")
-        raise DetentError(f"--search: got {search!r}, which no key has; {remedy}")
+        remedy = did_you_mean(search, known, "use a shorter word, or omit --search to list all keys")
+        raise DetentError(f"--search: got {search!r}, which matches no key; {remedy}")
     if as_json:
         print_json([{"method": name} | asdict(row) for name, rows in found.items() for row in rows])
         return
     for title, rows in found.items():
-        heads = ("key", "SI unit", "default", "what it may be", "meaning")
+        heads = ("key", "SI unit", "default", "allowed values", "meaning")
         cells = [(r.key, r.unit, "needed" if r.required else r.default or "none", r.allowed, r.doc) for r in rows]
         if cells:
             print_table(title, heads, cells)

@@ -31,7 +31,7 @@ def _leave(number: int, _frame: object) -> None:
     for other in (signal.SIGINT, signal.SIGTERM):
         signal.signal(other, signal.SIG_IGN)
     kept = ", ".join(shown(str(path)) for path in abandon())
-    told = f"Interrupted; written, each whole: {kept}.\n" if kept else "Interrupted; no file was written or changed.\n"
+    told = f"Interrupted; written completely: {kept}.\n" if kept else "Interrupted; no file was written or changed.\n"
     with suppress(OSError):
         # A progress bar hides the cursor.
         os.write(2, ("\r\x1b[2K\x1b[?25h" if os.isatty(2) else "").encode() + told.encode(errors="backslashreplace"))
@@ -133,7 +133,7 @@ def say_compiling(why_unkept: str) -> None:
     """Say why the first run of an axis takes longer."""
     if _QUIET[0]:
         return
-    later = f"it cannot be kept ({why_unkept})" if why_unkept else "later runs start at once"
+    later = f"it cannot be cached ({why_unkept})" if why_unkept else "later runs start immediately"
     sys.stderr.write(f"First run: compiling the axis, up to 15 s; {shown(later)}.\n")
     sys.stderr.flush()
 

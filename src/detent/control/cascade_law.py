@@ -1,4 +1,4 @@
-"""Position and velocity loop of a servo axis, sampled: cascade (P over P or PI) or position PID, with feed-forward.
+"""Position and velocity loop of a servo axis, sampled: cascade (P over P or PI) or position PID, with feedforward.
 
     cascade   velocity demand = K_p e + w v_ref, limited;   u = K_v e_v + I + FF,   I' = K_i e_v
     PID       u = K_p e + I + K_d filtered(w v_ref - v_meas) + FF,                  I' = K_i e
@@ -12,7 +12,7 @@ further beyond its limit (clamping). Back-calculation would need one more time c
 nobody measures, and discharges an integral that holds a weight as soon as a fast move touches the limit.
 
 Astrom, Hagglund: Advanced PID Control (2006), sections 3.3 (derivative filter), 3.5 (windup, conditional integration).
-Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feed-forward).
+Ellis: Control System Design Guide, 4th ed. (2012), chapters 6 (cascade of P and PI) and 8 (feedforward).
 """
 
 from detent.kernel.elementary import sin
@@ -58,7 +58,7 @@ class CascadeLawParams(Registers):
     position_pid: u1 = register("0 cascade, 1 position PID")
     cascade: VelocityLoopParams = block("position P over velocity P or PI")
     pid: PidParams = block("position PID")
-    feed_forward: FeedForwardParams = block("feed-forward")
+    feed_forward: FeedForwardParams = block("feedforward")
     max_command: f8 = register("limit of the command", unit="V")
 
 
@@ -73,10 +73,10 @@ class CascadeReference(Registers):
 class CascadeLaw(Registers):
     """What the law has computed at the last sample."""
 
-    position_error: f8 = register("reference less measured position", unit="m")
+    position_error: f8 = register("reference minus measured position", unit="m")
     velocity_error: f8 = register("velocity demand less measured velocity; in the PID as filtered", unit="m/s")
     integral: f8 = register("integral part of the command", unit="V")
-    feed_forward: f8 = register("feed-forward part of the command", unit="V")
+    feed_forward: f8 = register("feedforward part of the command", unit="V")
     command: f8 = register("command", unit="V")
     limited: u1 = register("1 while the command is at its limit")
 

@@ -1,4 +1,4 @@
-"""Feed-forward of the print head: drive values from the identified slope and friction, in integers.
+"""Feedforward of the print head: drive values from the identified slope and friction, in integers.
 
 Drive = IR part (while accelerating or braking) + Coulomb friction part + back-EMF part; print-head specification 2.5,
 3.3, 3.5, 3.10. Speeds are speed values s = 6 v[in/s]; drive values are counts of 1/300 of the supply.

@@ -53,7 +53,7 @@ def put_transition(c: HeadComputer) -> None:
 
 @step
 def steady_value(p: HeadParams, c: HeadComputer, direction: int, s: int) -> int:
-    """Kept drive of the same direction and speed in the high-speed class, else the feed-forward (3.5).
+    """Kept drive of the same direction and speed in the high-speed class, else the feedforward (3.5).
 
     A kept drive of another speed is forgotten: the commanded speed of that direction has changed.
     """

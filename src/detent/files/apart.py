@@ -81,9 +81,9 @@ def read_apart(
     if isinstance(told, DetentError):
         raise told
     if isinstance(told, str):
-        got = f"a file whose reading took more than {limits.seconds:.3g} s" if late else told
+        got = f"a file that took longer to read than {limits.seconds:.3g} s" if late else told
         if got == _MEMORY:
-            got = f"a file whose reading wanted more than {limits.memory / 1e9:.3g} GB"
+            got = f"a file that needed more memory to read than {limits.memory / 1e9:.3g} GB"
         within = f"{allowed}, read in {limits.seconds:.3g} s and {limits.memory / 1e9:.3g} GB"
         remedy = f"save it again, or as CSV; if it is whole, set {RAISE}={4 * limits.factor:g} in the environment"
         raise InputError.of_file(str(path), got, within, f"{remedy}: both limits times {4 * limits.factor:g}")
@@ -112,7 +112,7 @@ def _ask(process: "subprocess.Popen[bytes]", request: bytes, seconds: float) -> 
 
     watch = threading.Timer(seconds, expire)
     watch.daemon = True
-    told: Any = ""  # no answer
+    told: Any = ""  # no result
     try:
         watch.start()
         requests.write(request)
@@ -137,11 +137,11 @@ def _ask(process: "subprocess.Popen[bytes]", request: bytes, seconds: float) -> 
 def _why_ended(told: str, status: int | None) -> str:
     """Why a process ended without an answer."""
     if told:
-        return f"a file over which its reader broke down ({told})"
+        return f"a file that crashed its reader ({told})"
     if status is not None and -status in {signal.SIGKILL, getattr(signal, "SIGXCPU", 0)}:
-        return "a file whose reading the system ended: it wanted too much memory or time"
+        return "a file whose reader was killed by the system: it used too much memory or time"
     name = signal.Signals(-status).name if status is not None and status < 0 else f"status {status}"
-    return f"a file over which its reader broke down ({name})"
+    return f"a file that crashed its reader ({name})"
 
 
 class _Answer(pickle.Unpickler):
@@ -211,7 +211,7 @@ def serve() -> None:
     """Read files until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches who asked, and that one ends this process
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is no answer
+    os.dup2(2, 1)  # what libraries print is no result
     while True:
         try:
             folder, limits, request = pickle.load(sys.stdin.buffer)  # noqa: S301 - from detent itself

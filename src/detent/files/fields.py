@@ -245,7 +245,7 @@ def _leaves_below(table: type[Table], prefix: tuple[str, ...]) -> Iterator[tuple
 
 
 def held_leaves(table: Table, prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], FieldInfo, object]]:
-    """Walk all values that a table holds, with the names the user gave; optional tables it lacks are passed over."""
+    """Walk all values that a table holds, with the names the user gave; optional tables it lacks are skipped."""
     for name, field in type(table).model_fields.items():
         path, value = (*prefix, file_key(name, field)), cast("object", getattr(table, name))
         if isinstance(value, Table):

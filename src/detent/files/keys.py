@@ -43,7 +43,7 @@ class KeyRow:
     default: str  # value that holds when the key is left out; empty when it must be stated
     required: bool  # True when it must be stated (in its table, if that is given at all)
     doc: str  # meaning
-    allowed: str  # what it may be
+    allowed: str  # allowed values
     example: str  # a value as TOML text, for keys that must be stated
 
     def holds(self, word: str) -> bool:

@@ -53,7 +53,7 @@ class Analysed(OnScreen):
         found = next((one for one in self.answers if one.name == name), None)
         if found is None:
             asked = ", ".join(one.name for one in self.answers)
-            raise DetentError(f"{self.log.name}: {name} was not asked for, only {asked}; name it in what")
+            raise DetentError(f"{self.log.name}: {name} was not requested, only {asked}; name it in what")
         return found
 
     @property

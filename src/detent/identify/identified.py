@@ -32,9 +32,9 @@ _STAGES = {
     "ladder": (0.1, 0.4, "fitting models to parts of the log"),
     "output error": (0.4, 0.65, "fitting the simulation to the log"),
     "output error on the first part": (0.65, 0.85, "fitting the simulation to the first part"),
-    "simulation": (0.85, 0.95, "simulating the part not seen"),
+    "simulation": (0.85, 0.95, "simulating the held-out part"),
 }
-"""Shares of the whole at which the parts of an identification begin and end, and what is said meanwhile."""
+"""Shares of the total at which the parts of an identification begin and end, with their texts."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,10 +91,10 @@ class Identified(OnScreen):
             scale = 1e3 if one.unit == "s" else 1.0
             limits = f"{one.low * scale:.5g} to {one.high * scale:.5g}" if known else ""
             trust = "yes" if one in self.found.trusted else "no"
-            value = f"{text.value} ± {text.half}" if known else "not told by the data"
+            value = f"{text.value} ± {text.half}" if known else "not determined by the data"
             rows.append((one.name, value, limits, text.unit, trust))
         by = self.found.estimates[0].method if rows else ""
-        title = f"Constants, by {by}" if self.trusted else f"What came out by {by}; nothing of it is trusted"
+        title = f"Constants, by {by}" if self.trusted else f"Results by {by}; none of them is trusted"
         return TextTable(title, ("", "value", "95 % interval", "unit", "trusted"), rows)
 
     def screen(self) -> Screen:

@@ -26,13 +26,13 @@ def early(constants: Mapping[str, Estimate]) -> Iterator[str]:
     if delay is None or delay.value >= 0.0:
         return
     if delay.high >= 0.0:
-        yield f"delay {written(delay)}: none, within its limits"
+        yield f"delay {written(delay)}: not significantly different from 0"
         return
     yield (
-        f"delay {written(delay)}: below 0, which no drive has: effort and position are not stamped at the same moment, "
-        "the position was filtered, or the model lacks what acts like it (a compliant coupling, friction at low "
-        "speed); an axis file gets 0; try: record both by one clock, or take the delay from a frequency response "
-        "(detent analyse --what frequency)"
+        f"delay {written(delay)}: negative, which is not causal: effort and position have inconsistent time stamps, "
+        "the position was filtered, or the model lacks something that looks like a delay (a compliant coupling, "
+        "low-speed friction); 0 is written to axis files; try: record both with the same clock, or take the "
+        "delay from a frequency response (detent analyse --what frequency)"
     )
 
 
@@ -49,10 +49,10 @@ def friction_remarks(log: Log, effort: str, constants: Mapping[str, Estimate]) -
         speeds = [abs(stretch.speed) for stretch in line.stretches]
         unit = f"{log.units['position']}/s" if "position" in log.units else log.units.get("velocity", "")
         yield (
-            f"viscous friction in {line.direction} direction: {written(whole)} by all of the motion (detent identify), "
-            f"{written(line.slope)} by the steady speeds from {min(speeds):.3g} to {max(speeds):.3g} {unit} alone "
-            "(detent analyse): friction is no straight line over the speed, and each fits its own range; take the "
-            "first for a simulation of all speeds, the second between these speeds"
+            f"viscous friction in {line.direction} direction: {written(whole)} from all motion (detent identify), "
+            f"{written(line.slope)} from the constant speeds from {min(speeds):.3g} to {max(speeds):.3g} {unit} alone "
+            "(detent analyse): friction is not linear in speed, and each fits its own range; use the first to "
+            "simulate all speeds, the second between these speeds"
         )
 
 

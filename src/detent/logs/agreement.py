@@ -96,8 +96,8 @@ def _check_sign(draft: Draft, role: str, found: Likeness) -> None:
     if found.correlation > (OPPOSED if role != "reference" else -ALIKE):
         return
     draft.rescale(role, -1.0)
-    text = f"goes against {_SAID[role]} (correlation {found.correlation:.2f})"
-    advice = f"if the {role.replace('_', ' ')} was right, turn the position: position=-COLUMN, {role}=COLUMN"
+    text = f"contradicts the sign of {_SAID[role]} (correlation {found.correlation:.2f})"
+    advice = f"if the {role.replace('_', ' ')} was right, invert the position: position=-COLUMN, {role}=COLUMN"
     draft.note(Kind.WRONG_SIGN, role, [], text, Action.TURNED, advice, Severity.ERROR)
 
 
@@ -118,7 +118,7 @@ def _check_factor(draft: Draft, role: str, found: Likeness) -> None:
         text = f"{said}: {meaning}"
         draft.note(Kind.WRONG_UNIT, role, [], text, Action.CONVERTED, advice, Severity.ERROR)
     elif known is not None:
-        advice = f"state the units of {role}, {_other(role)} and time: which of them is wrong cannot be told"
+        advice = f"state the units of {role}, {_other(role)} and time: which of them is wrong cannot be determined"
         draft.note(Kind.WRONG_UNIT, role, [], f"{said}: {known[1]}", Action.LEFT, advice, Severity.ERROR)
     elif abs(factor - 1) > TOLERATED and role != "reference":
         advice = f"state the units of {role} and {_other(role)}, or the ratio between them as factor"

@@ -78,7 +78,7 @@ def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
             best = min(ranks, key=lambda name: ranks[name])
             chosen[role] = best
             others = [short(name) for name in ranks if name != best and ranks[name] == ranks[best]]
-            alike = f"; {tell(others)} would fit as well" if others else ""
+            alike = f"; alternatives: {tell(others)}" if others else ""
             table.notes.append(f'{role}: column "{short(best)}", by its name{alike}')
     for role in _BY_UNIT:
         fitting = [name for name in _free(table, chosen) if _fits_unit(table.units[name], role)]
@@ -87,7 +87,7 @@ def _guess(table: RawTable, chosen: Chosen, silent: set[str]) -> None:
             table.notes.append(f'{role}: column "{short(fitting[0])}", by its unit {table.units[fitting[0]]}')
     rest = [short(name) for name in _free(table, chosen)]
     if rest:
-        table.notes.append(f"columns not read: {tell(rest)}")
+        table.notes.append(f"columns not used: {tell(rest)}")
 
 
 def _free(table: RawTable, chosen: Chosen) -> list[str]:

@@ -26,7 +26,7 @@ BETTER = 0.5  # disagreement left without the shift, as a share, at most: that o
 ALIKE = 0.9
 _AS_GOOD = 0.02
 _FEWEST_SHIFTED = 200
-_BESIDE = {"reference": "comes after the position that follows it", "position_load": "is beside the position"}
+_BESIDE = {"reference": "lags the position that follows it", "position_load": "is shifted against the position"}
 
 
 class Motion(NamedTuple):
@@ -86,8 +86,8 @@ def _find_wrong_sign(draft: Draft, role: str, effort: Values, motion: Motion) ->
     if explained < EXPLAINED or inertia + friction > AGAINST or max(inertia, friction) > _HELPS:
         return
     shares = f"shares of inertia {inertia:.2f}, of friction {friction:.2f}"
-    text = f"works against the motion: {shares}; neither can be negative"
-    advice = f"turn one of the two: {role}=-COLUMN if its plus drives towards minus, otherwise position=-COLUMN"
+    text = f"opposes the motion: {shares}; neither can be negative"
+    advice = f"invert one of the two: {role}=-COLUMN if its plus drives towards minus, otherwise position=-COLUMN"
     draft.note(Kind.WRONG_SIGN, role, [], text, Action.LEFT, advice, Severity.ERROR)
 
 
@@ -99,8 +99,8 @@ def _find_lost_sign(draft: Draft, role: str, effort: Values, motion: Motion) -> 
     by_velocity = float(np.corrcoef(effort, motion.v)[0, 1])
     if by_speed < _LOSES or by_speed < abs(by_velocity) + 0.3:
         return False
-    text = f"never negative, though the axis goes both ways, and grows with the speed (correlation {by_speed:.2f})"
-    advice = "record it with its direction, or fit only rows of one direction"
+    text = f"never negative, although the axis moves both ways, and grows with speed (correlation {by_speed:.2f})"
+    advice = "record it with its sign, or fit only rows of one direction"
     draft.note(Kind.LOST_SIGN, role, [], text, Action.LEFT, advice, Severity.ERROR)
     return True
 
@@ -128,7 +128,7 @@ def find_shifts(draft: Draft) -> None:
         signal = smoothed(draft.values[role], draft, motion)
         if role in {"force", "torque", "current"}:
             lag = float(_late_effort(signal, motion))
-            text = f"comes {lag:.0f} rows after the acceleration that it makes"
+            text = f"lags the acceleration that it causes by {lag:.0f} rows"
         else:
             lag = find_lag(signal, position, prefers_earlier=role == "reference")
             text = f"{_BESIDE[role]} by {abs(lag):.1f} rows"
@@ -163,7 +163,7 @@ def _move_velocity(draft: Draft, motion: Motion) -> None:
     if abs(lag) < SMALLEST:
         return
     text = f"comes {abs(lag):.1f} rows {'after' if lag > 0 else 'before'} the derivative of the position"
-    draft.note(Kind.SHIFTED, "velocity", [], f"{text}; moved by {abs(rows)} rows", Action.MOVED)
+    draft.note(Kind.SHIFTED, "velocity", [], f"{text}; shifted by {abs(rows)} rows", Action.MOVED)
     draft.values["velocity"] = np.roll(draft.values["velocity"], -rows)
     inside = np.ones(len(draft), dtype=np.bool_)
     inside[slice(-rows, None) if rows > 0 else slice(0, -rows)] = False

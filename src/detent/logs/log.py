@@ -45,14 +45,14 @@ class Action(StrEnum):
     """What the import did about a finding."""
 
     REMOVED = "removed"
-    REORDERED = "put in order"
+    REORDERED = "reordered"
     INTERPOLATED = "interpolated"
     UNWRAPPED = "unwrapped"
     CONVERTED = "converted"
-    TURNED = "turned round"
+    TURNED = "inverted"
     MOVED = "moved"
     LEFT = "left"
-    LEFT_OUT = "left out"
+    LEFT_OUT = "omitted"
 
 
 class Severity(StrEnum):
@@ -112,7 +112,7 @@ class Log(OnScreen):
     columns: dict[str, Source]  # from a role, ``time`` too, to the column it came from
     rows: Rows  # row of the file that each sample came from, from 1 below the header, shape (n,)
     findings: tuple[Finding, ...] = ()  # what was wrong, and what was done
-    guesses: tuple[str, ...] = ()  # what was not stated and had to be guessed, and what was passed over
+    guesses: tuple[str, ...] = ()  # what was not stated and had to be guessed, and what was skipped
     # single numbers and texts that the file holds beside its columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
 

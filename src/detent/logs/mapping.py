@@ -2,7 +2,7 @@
 
 A mapping file is TOML::
 
-    [log]                       # how the file is laid out; each key only where the guess is wrong
+    [log]                       # file layout; each key only where the guess is wrong
     separator = "semicolon"     # comma, semicolon, tab, space, bar
     decimal = "comma"           # point, comma
     header = 3                  # line of the header; 0 for none
@@ -83,7 +83,7 @@ def _read_factor(value: object) -> float | str:
 def _check_sign(sign: int) -> int:
     if abs(sign) == 1:
         return sign
-    raise _refused("write sign = -1 to turn the signal round")
+    raise _refused("write sign = -1 to invert the signal")
 
 
 def _check_unit(role: str, unit: str) -> str:
@@ -100,7 +100,7 @@ class FileOptions(Table, frozen=True):
     """How the file is laid out, whatever its kind; each key only where the guess is wrong."""
 
     separator: Annotated[str, PlainValidator(partial(_word_of, SEPARATORS))] = optional(
-        "what stands between cells", "", allowed=", ".join(SEPARATORS)
+        "cell separator", "", allowed=", ".join(SEPARATORS)
     )
     decimal: Annotated[str, PlainValidator(partial(_word_of, _DECIMALS))] = optional(
         "decimal sign", "", allowed=", ".join(_DECIMALS)
@@ -109,7 +109,7 @@ class FileOptions(Table, frozen=True):
     table: str = optional("group, structure or list of a file that holds several", "")
     period: Time | None = optional("time between two rows of a file without a column for the time", None, gt=0)
     incomplete: Annotated[bool, PlainValidator(_yes)] = optional(
-        "a trace of a run that broke off is taken as far as it goes", default=False, allowed="true or yes, false or no"
+        "the trace of an aborted run is taken as far as it goes", default=False, allowed="true or yes, false or no"
     )
 
 
@@ -121,11 +121,11 @@ class Choice(Table, frozen=True):
     )
     unit: str = optional("unit of the column", "")
     factor: Annotated[float | str, PlainValidator(_read_factor)] = optional(
-        "what the numbers are multiplied with", 1.0, allowed="a number other than 0, or the name of a constant"
+        "factor on the numbers", 1.0, allowed="a number other than 0, or the name of a constant"
     )
-    offset: float = optional("what is added then, in the unit", 0.0)
+    offset: float = optional("offset added then, in the unit", 0.0)
     sign: Annotated[int, AfterValidator(_check_sign)] = optional("direction", 1, allowed="1 or -1")
-    bits: int | None = optional("width of the counter behind the numbers", None, ge=2, le=_MOST_BITS)
+    bits: int | None = optional("width of the counter, in bits", None, ge=2, le=_MOST_BITS)
     delay: Time = optional("by how much the signal was recorded too late", 0.0)
 
     @model_validator(mode="before")
@@ -146,7 +146,7 @@ class ColumnMapping:
 
     # from a role of `roles.ROLES` to the choice of its column; one without a name is not to be read
     columns: dict[str, Choice] = field(default_factory=dict[str, Choice])
-    file: FileOptions = field(default_factory=FileOptions)  # how the file is laid out
+    file: FileOptions = field(default_factory=FileOptions)  # file layout
     constants: dict[str, float] = field(default_factory=dict[str, float])  # numbers by names, for `Choice.factor`
 
     def overridden(self, other: "ColumnMapping") -> "ColumnMapping":
@@ -165,7 +165,7 @@ def mapping_model() -> type[Table]:
         column: Any = create_model(f"{name}_column", __base__=Choice, unit=unit)
         columns[name] = (column | None, optional(role.meaning, None))
     tables: dict[str, Any] = {
-        "log": (FileOptions, optional("how the file is laid out", FileOptions())),
+        "log": (FileOptions, optional("file layout", FileOptions())),
         "columns": (model := create_model("Columns", __base__=Table, **columns), optional("signals", model())),
         "constants": (dict[str, float], optional("constants", {}, allowed="a number, by name")),
     }

@@ -51,7 +51,7 @@ class RawTable:
     units: dict[str, str] = field(default_factory=dict[str, str])
     # single numbers and texts beside the columns
     constants: dict[str, float | str] = field(default_factory=dict[str, float | str])
-    # what had to be guessed about the file, and what was passed over
+    # what had to be guessed about the file, and what was skipped
     notes: list[str] = field(default_factory=list[str])
     broken: list[BrokenRow] = field(default_factory=list[BrokenRow])  # rows that are not among the columns
     findings: list[Finding] = field(default_factory=list[Finding])  # what was found and done so far
@@ -133,7 +133,7 @@ def table_of(file: str, items: Iterable[Item], allowed: str) -> RawTable:
         remedy = "name another file, or another table of it with table=NAME"
         raise InputError.of_file(file, "no columns of numbers", allowed, remedy)
     if passed:
-        table.notes.append(f"passed over: {tell(passed)}")
+        table.notes.append(f"skipped: {tell(passed)}")
     table.rows = np.arange(1, length + 1, dtype=np.int64)
     return table
 
@@ -160,7 +160,7 @@ def check_size(file: str, rows: int, columns: int) -> None:
     """Refuse what would fill the memory."""
     if rows * columns > MAX_CELLS or columns > MAX_COLUMNS:
         allowed = f"up to {MAX_COLUMNS} columns and {MAX_CELLS // 1_000_000} million numbers"
-        remedy = "cut the recording into pieces, or save only the columns needed"
+        remedy = "split the recording, or save only the columns needed"
         raise InputError.of_file(file, f"{columns} columns of {rows} rows", allowed, remedy)
 
 

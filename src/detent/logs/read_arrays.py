@@ -36,7 +36,7 @@ def read_mat(path: Path, options: FileOptions) -> raw_table.RawTable:
             cells = sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy("io").whosmat(path))
             if cells > raw_table.MAX_CELLS:
                 most = f"{ALLOWED_MAT}, up to {raw_table.MAX_CELLS} numbers"
-                raise InputError.of_file(str(path), f"{cells} numbers", most, "cut the recording into pieces")
+                raise InputError.of_file(str(path), f"{cells} numbers", most, "split the recording")
             found: dict[str, Any] = scipy("io").loadmat(path, squeeze_me=True, struct_as_record=True)
         except NotImplementedError:
             return read_hdf5(path, options)
@@ -58,7 +58,7 @@ def read_npz(path: Path, options: FileOptions) -> raw_table.RawTable:
             if size > 8 * raw_table.MAX_CELLS:
                 most = f"up to {8 * raw_table.MAX_CELLS // 1_000_000} MB unpacked"
                 got = f"{size // 1_000_000} MB unpacked"
-                raise InputError.of_file(str(path), got, most, "cut the recording into pieces")
+                raise InputError.of_file(str(path), got, most, "split the recording")
             with np.load(path, allow_pickle=False) as arrays:
                 for name in arrays.files:
                     items += _fields(name, _load_member(arrays, name), 0)
@@ -93,7 +93,7 @@ def _broke_off(path: Path, told: Mapping[str, Any], options: FileOptions) -> lis
         return []
     if not options.incomplete:
         raise InputError.of_file(str(path), *BROKEN_OFF, "record again, or state incomplete=yes with its columns")
-    return ["the run broke off: the trace is taken as far as it goes"]
+    return ["the run was aborted: the trace is used as far as it goes"]
 
 
 def _column(field: Any, column: Any) -> raw_table.Item:
@@ -184,7 +184,7 @@ def _read_file(path: str, file: Any, wanted: str) -> tuple[list[raw_table.Item],
     cells = sum(int(dataset.size) * max(1, dataset.dtype.itemsize // 8) for dataset in taken if _is_vector(dataset))
     if cells > raw_table.MAX_CELLS or len(taken) > raw_table.MAX_COLUMNS:
         got = f"{len(taken)} datasets of {cells} numbers"
-        remedy = "state one group as table=, or cut the recording into pieces"
+        remedy = "state one group as table=, or split the recording"
         raise InputError.of_file(
             path, got, f"up to {raw_table.MAX_COLUMNS} datasets, {raw_table.MAX_CELLS} numbers", remedy
         )

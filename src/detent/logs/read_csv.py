@@ -63,7 +63,7 @@ def read_csv(path: Path, options: FileOptions) -> RawTable:
         check_size(table.file, len(numbers), len(layout.names))
         _read_rows(table, layout, lines, numbers)
     except csv.Error as error:
-        got = f"cells that cannot be told apart ({error})"
+        got = f"ambiguous cells ({error})"
         raise InputError.of_file(table.file, got, ALLOWED, "remove the quotation marks, or state separator=") from None
     if len(table.broken) > _MOST_BROKEN * len(numbers) and len(table.broken) > 2:
         worst = table.broken[0]
@@ -118,7 +118,7 @@ def _read_rows(table: RawTable, layout: CsvLayout, lines: list[str], numbers: li
         table.add(Item(layout.names[index], np.concatenate(pieces[index]), layout.units[index]))
     table.broken.sort()
     words = [short(layout.names[index]) for index in sorted(layout.text_columns)]
-    table.notes += [f"columns of words passed over: {', '.join(words)}"] if words else []
+    table.notes += [f"text columns skipped: {', '.join(words)}"] if words else []
 
 
 def _sort_out(table: RawTable, layout: CsvLayout, block: list[list[str]], first: int) -> list[int]:
@@ -295,11 +295,11 @@ def _read_header(table: RawTable, lines: Sequence[str], layout: CsvLayout, state
     names = rows[-1] if rows and (stated or len(rows[-1]) >= max(1, (width + 1) // 2)) else []
     passed = len(rows) - bool(names)
     if passed:
-        table.notes.append(f"{tell_count(passed, 'line')} above the header passed over")
+        table.notes.append(f"{tell_count(passed, 'line')} above the header skipped")
     if names and len(names) < width:
-        table.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last have no name")
+        table.notes.append(f"the header names {len(names)} columns, the rows have {width}: the last ones have no name")
     if not names:
-        table.notes.append("no header: columns are called by their numbers")
+        table.notes.append("no header: columns are named by their numbers")
     for index in range(max(len(names), width)):
         name = names[index] if index < len(names) else ""
         layout.names.append(name or f"column {index + 1}")

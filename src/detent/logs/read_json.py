@@ -119,13 +119,13 @@ def _from_records(file: str, records: list[Any], constants: Record) -> RawTable:
     table.broken += [BrokenRow(int(rows[place]), (), f'"{short(cell)}" is no number') for place, cell in wrong.items()]
     table.broken.sort()
     if len(table.broken) > max(2, _MOST_BROKEN * len(records)) or not columns or not keep.any():
-        some = f"{len(table.broken)} of {len(records)} records that are none"
+        some = f"{len(table.broken)} invalid records of {len(records)}"
         got = some if table.broken else "no records of numbers"
         raise InputError.of_file(file, got, ALLOWED, "name another file, or another list of it with table=NAME")
     table.rows = rows[keep]
     for name, values in columns.items():
         table.add(Item(name, values[keep], split_heading(name)[1]))
-    table.notes += [f"passed over: {tell(passed)}"] if passed else []
+    table.notes += [f"skipped: {tell(passed)}"] if passed else []
     return table
 
 

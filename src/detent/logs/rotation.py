@@ -47,13 +47,13 @@ def mend_rotation(table: RawTable, time: str) -> None:
     shift, where = found
     head = _head(table, matrix, names.index(time), shift) if where.mean() > _WHOLE else None
     column, unit = names[(names.index(time) + shift) % len(names)], tell_count(shift, "column")
-    text = f'the clock runs in "{short(column)}", not in "{short(time)}": cells stand {unit} too far right'
+    text = f'the clock runs in "{short(column)}", not in "{short(time)}": cells are shifted {unit} to the right'
     if head is None:
         matrix[where] = np.roll(matrix[where], -shift, axis=1)
         rows = table.rows[where]
     else:
         matrix = _reflow(table, matrix, shift, head)
-        rows, text = table.rows, f"{text}; lines are broken in the wrong places"
+        rows, text = table.rows, f"{text}; line breaks are misplaced"
     table.columns = {name: matrix[:, index] for index, name in enumerate(names)}
     table.findings.append(Finding(Kind.ROTATED_COLUMNS, "", row_ranges(rows), text, Action.REORDERED))
 

@@ -66,7 +66,7 @@ def _remove_twins(draft: Draft) -> None:
         _, first = np.unique(np.column_stack([draft.t[alike], *columns]), axis=0, return_index=True)
         again[np.delete(alike, first)] = True
     if again.any():
-        text = f"{tell_count(int(again.sum()), 'row')} as an earlier one, stamp and all"
+        text = f"{tell_count(int(again.sum()), 'row')} identical to an earlier one, including the time stamp"
         draft.note(Kind.DUPLICATED_ROWS, "", again, text, Action.REMOVED)
         draft.keep(~again)
 
@@ -87,7 +87,7 @@ def _keep_longest(draft: Draft) -> None:
     away = np.ones(len(t), dtype=np.bool_)
     away[bounds[longest] : bounds[longest + 1]] = False
     begins = ", ".join(str(int(draft.rows[first])) for first in firsts[1:6])
-    text = f"the clock starts again at row {begins}: {len(firsts)} recordings in one file; the longest is read"
+    text = f"the clock restarts at row {begins}: {len(firsts)} recordings in one file; the longest is read"
     advice = "cut the file at these rows to read the others"
     draft.note(Kind.TIME_BACKWARDS, "time", away, text, Action.REMOVED, advice, Severity.ERROR)
     draft.keep(~away)
@@ -110,10 +110,10 @@ def _order_rows(draft: Draft) -> None:
     fits = near & inside & hole
     moved, lost = out[fits], out[~fits]
     if len(moved):
-        text = f"{tell_count(len(moved), 'row')} written later than their neighbours"
+        text = f"{tell_count(len(moved), 'row')} written out of order"
         draft.note(Kind.TIME_BACKWARDS, "time", moved, text, Action.REORDERED)
     if len(lost):
-        text = f"{tell_count(len(lost), 'row')} with a stamp that fits nowhere"
+        text = f"{tell_count(len(lost), 'row')} with an inconsistent time stamp"
         draft.note(Kind.TIME_BACKWARDS, "time", lost, text, Action.REMOVED)
     draft.keep(np.setdiff1d(np.arange(len(draft)), lost))
     draft.keep(np.argsort(draft.t, kind="stable"))
@@ -147,11 +147,14 @@ def _spread_stamps(draft: Draft) -> None:
         return
     share = again.mean()
     if share < COARSE:
-        text = f"{tell_count(int(again.sum()), 'row')} with the stamp of the row before and other numbers"
+        text = f"{tell_count(int(again.sum()), 'row')} with the time stamp of the previous row but different numbers"
         draft.note(Kind.REPEATED_STAMPS, "time", again, text, Action.REMOVED)
         draft.keep(~again)
         return
-    text = f"stamps are coarser than the rows: {share:.0%} repeat the one before; rows spread out between them"
+    text = (
+        f"time stamps are coarser than the rows: {share:.0%} repeat the previous one; rows are spread evenly between "
+        "them"
+    )
     draft.note(Kind.REPEATED_STAMPS, "time", again, text, Action.INTERPOLATED)
     firsts = np.flatnonzero(~again)
     sizes = np.diff(np.r_[firsts, len(draft)])
@@ -182,7 +185,7 @@ def look_at_clock(draft: Draft) -> None:
     if is_uneven:
         low, high = np.percentile(ratio, [1, 99])
         step = f"the usual {usual * 1e3:.4g} ms"
-        text = f"steps from {low:.2f} to {high:.2f} of {step} (1 of 100 beyond); stamps are used"
+        text = f"steps from {low:.2f} to {high:.2f} of {step} (1 in 100 outside); time stamps are used"
         draft.note(Kind.IRREGULAR_TIME, "time", [], text, Action.LEFT, "", Severity.NOTE)
     else:
         odd = np.flatnonzero((deviation > _ODD) & (ratio < 1.5))
@@ -301,5 +304,7 @@ def _mend_unsigned(draft: Draft, role: str) -> None:
         return
     draft.values[role] = np.where(negative, values - modulus, values)
     low, high = draft.values[role].min(), draft.values[role].max()
-    text = f"{tell_count(int(negative.sum()), 'number')} above {modulus / 2 - 1:.0f} are negative ones of {bits} bits"
+    text = (
+        f"{tell_count(int(negative.sum()), 'number')} above {modulus / 2 - 1:.0f} are negative numbers of {bits} bits"
+    )
     draft.note(Kind.UNSIGNED, role, negative, f"{text}: it goes from {low:g} to {high:g}", Action.UNWRAPPED)

@@ -144,7 +144,9 @@ def _find_constant(draft: Draft, role: str) -> None:
     text = f"{values[0]:g} {draft.units[role]}".rstrip() + f" in each of {len(draft)} rows"
     if role == "position":
         advice = "record a run in which the axis moves"
-        draft.note(Kind.STUCK, role, [], f"{text}: the axis or its sensor stands", Action.LEFT, advice, Severity.ERROR)
+        draft.note(
+            Kind.STUCK, role, [], f"{text}: the axis or its sensor does not move", Action.LEFT, advice, Severity.ERROR
+        )
     else:
         draft.note(Kind.STUCK, role, [], f"{text}: it was not recorded", Action.LEFT_OUT)
         del draft.values[role]
@@ -164,7 +166,7 @@ def _find_against_twins(draft: Draft, role: str) -> None:
     if stuck:
         names = " and ".join(sorted(set(stuck.values())))
         most = max(last - first for first, last in stuck)
-        _tell(draft, role, sorted(stuck), f"stays the same for up to {most} rows while {names} goes on")
+        _tell(draft, role, sorted(stuck), f"is constant for up to {most} rows while {names} changes")
 
 
 def _grows(rest: Values, first: int, last: int, runs: NDArray[np.int64], floor: float) -> bool:
@@ -207,7 +209,7 @@ def _find_by_chance(draft: Draft, role: str) -> None:
 def _tell(draft: Draft, role: str, runs: list[tuple[int, int]], text: str) -> None:
     """Note runs of equal numbers."""
     rows = np.concatenate([np.arange(first, last, dtype=np.intp) for first, last in runs])
-    draft.note(Kind.STUCK, role, rows, text, Action.LEFT, "leave these rows out of a fit")
+    draft.note(Kind.STUCK, role, rows, text, Action.LEFT, "exclude these rows from a fit")
 
 
 def _is_unlikely(values: Values, first: int, last: int, moving: int) -> bool:
@@ -247,8 +249,8 @@ def _find_plateau(draft: Draft, role: str, side: float) -> None:
         is_symmetric = bool(np.isclose(values.max(), -values.min(), rtol=1e-3))
         is_full = any(np.isclose(abs(end) / factor, scale, rtol=1e-9) for scale in _FULL_SCALES)
         severity = Severity.WARNING if is_symmetric or is_full else Severity.NOTE
-        why = "as far as the other end" if is_symmetric else "a full scale" if is_full else "cut off, or commanded so"
+        why = "as far as the other end" if is_symmetric else "a full scale" if is_full else "clipped, or commanded so"
         shown = f"{end:.4g} {draft.units[role]}".rstrip()
         text = f"stays at {shown} ({why}) in {tell_count(len(where), 'row')}"
-        advice = "leave these rows out of a fit of the loop; a fit of the axis may keep them"
+        advice = "exclude these rows from a fit of the loop; a fit of the axis may keep them"
         draft.note(Kind.SATURATED, role, where, text, Action.LEFT, advice, severity)

@@ -1,4 +1,4 @@
-"""What `detent check` shows: every value in effect, what follows from them, and what looks wrong.
+"""What `detent check` shows: effective values, what follows from them, and what looks wrong.
 
 Data only; the command line prints it.
 """
@@ -33,7 +33,7 @@ class CheckReport(OnScreen):
     file: str  #: the file as the user named it
     name: str  #: name of the axis
     method: str  #: its control method
-    rows: tuple[EffectiveRow, ...]  #: every value in effect, in the order of the schema
+    rows: tuple[EffectiveRow, ...]  #: effective values, in the order of the schema
     derived: tuple[Derived, ...]  #: what follows from them
     warnings: tuple[Caution, ...]  #: what looks wrong; empty for a sound axis
 
@@ -46,7 +46,7 @@ class CheckReport(OnScreen):
         values = [(row.key, row.value, row.origin) for row in self.rows]
         blocks = [
             Block("What follows from its values", ("figure", "value", "from"), figures, 24, ".derived has all"),
-            Block("Every value in effect", ("key", "value", "origin"), values, 0),
+            Block("Every effective value", ("key", "value", "origin"), values, 0),
         ]
         return Screen(title, blocks, f"{len(values)} values in effect: .rows")
 
@@ -64,7 +64,7 @@ def check_spec(axis: AxisFile) -> CheckReport:
 
 
 def _rows(axis: AxisFile) -> Iterator[EffectiveRow]:
-    """Every value in effect."""
+    """Every effective value."""
     for path, field, held in held_leaves(axis.spec):
         key = dotted(path)
         origin = axis.origins.get(key, "default")

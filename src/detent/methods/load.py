@@ -216,7 +216,7 @@ def _validated(layers: _Layers, reporter: Reporter, method: Method[Any], *, is_w
     """Validate all layers together; what is wrong joins ``layers.problems``."""
     tables = layers.tables
     # Rules between keys need a whole specification: keys with problems are replaced by ones that are allowed, and the
-    # rules that look at them are passed over. Each round can uncover keys below a table that was replaced.
+    # rules that look at them are skipped. Each round can uncover keys below a table that was replaced.
     for round_number in range(8):
         try:
             spec = method.fill(method.spec.model_validate(tables))

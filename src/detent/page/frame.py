@@ -137,7 +137,9 @@ class TableComparison(ComparisonOnScreen):
 
 def comparison_section(found: Sequence[Comparison]) -> Section:
     """Figures of comparisons, as the page of a run shows them."""
-    return Section("What the method is worth on this axis", [figure for one in found for figure in one.figures()])
+    return Section(
+        "Comparison with the alternatives on this axis", [figure for one in found for figure in one.figures()]
+    )
 
 
 def comparison_page(axis_name: str, found: Sequence[Comparison], settings: Mapping[str, str] | None = None) -> Page:
@@ -154,8 +156,8 @@ def comparison_page(axis_name: str, found: Sequence[Comparison], settings: Mappi
             level="good",
             verdict="Compared",
             name=axis_name,
-            kicker="The method of an axis beside its alternatives",
-            lead=f"{count(len(found), 'comparison')}, simulated on this very axis.",
+            kicker="The method of an axis compared with its alternatives",
+            lead=f"{count(len(found), 'comparison')}, simulated on this axis.",
         ),
         sections=sections,
         settings=settings or {},

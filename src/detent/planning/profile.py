@@ -90,7 +90,7 @@ def profile_of_recording(
 
     Positions between the samples, and the derivatives that were not recorded, come from the cubic spline through them.
     Steps of a coarse encoder become peaks of the acceleration: filter such a recording first, or leave the
-    feed-forward of the acceleration out.
+    feedforward of the acceleration out.
     """
     _check_recording(t, position, velocity, acceleration)
     # A rounded time of the last sample must not lose it.

@@ -39,8 +39,8 @@ class Friction(Registers):
 
     coulomb_right: f8 = register("Coulomb friction moving right", unit="N")
     coulomb_left: f8 = register("Coulomb friction moving left", unit="N")
-    static_right: f8 = register("force that breaks loose to the right", unit="N")
-    static_left: f8 = register("force that breaks loose to the left", unit="N")
+    static_right: f8 = register("breakaway force to the right", unit="N")
+    static_left: f8 = register("breakaway force to the left", unit="N")
     viscous_right: f8 = register("viscous friction moving right", unit="N.s/m")
     viscous_left: f8 = register("viscous friction moving left", unit="N.s/m")
 
@@ -52,7 +52,7 @@ class DriveTrainParams(Registers):
     inductance: f8 = register("winding; 0: the current follows voltage and velocity at once", unit="H")
     force_constant: f8 = register("belt force per ampere", unit="N/A")
     emf_constant: f8 = register("back-EMF per belt velocity", unit="V.s/m")
-    mass: f8 = register("all that moves, at the carriage", unit="kg")
+    mass: f8 = register("the total moving mass, at the carriage", unit="kg")
     friction: Friction = block("friction of the guide")
     left_end: f8 = register("contact with the left frame or an obstacle", unit="m")
     right_end: f8 = register("contact with the right frame or an obstacle", unit="m")

@@ -21,7 +21,7 @@ class DirectionFriction(Registers):
     """Friction moving in one direction; all values are magnitudes."""
 
     coulomb: f8 = register("Coulomb friction", unit="N")
-    static: f8 = register("force that breaks loose; no more than the Coulomb friction: that", unit="N")
+    static: f8 = register("breakaway force; no more than the Coulomb friction: that", unit="N")
     stribeck: f8 = register(
         "velocity at which 1/e of their difference is left; 0: it ends as motion begins", unit="m/s"
     )

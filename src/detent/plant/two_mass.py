@@ -27,7 +27,7 @@ State = tuple[float, float, float, float, float]  # current [A], position [m], v
 class MassParams(Registers):
     """One of the two masses."""
 
-    mass: f8 = register("all that moves at this end of the coupling", unit="kg")
+    mass: f8 = register("the total moving mass at this end of the coupling", unit="kg")
     friction: StribeckFriction = block("its friction")
 
 

@@ -72,7 +72,7 @@ class Kept:
         content = base64.b64decode(self.base64) if self.base64 else self.text.encode()
         if digest(content) != self.sha256:
             raise InputError.of_file(
-                self.name, "a text that is not the one of its hash", "the evidence as it was written",
+                self.name, "a text that does not match its hash", "the evidence unchanged",
                 "take the report or the trace as detent wrote it; a job above 20 MB is not carried along",
             )  # fmt: skip
         return content
@@ -87,7 +87,7 @@ class RunEvidence:
     axis: Kept
     overrides: Sequence[str]
     changes: Mapping[str, Any]  # values of a program over those of the file, by table and key
-    effective: Mapping[str, str]  # every value in effect, by its key
+    effective: Mapping[str, str]  # every effective value, by its key
     job: Kept | None  # None for a job that came from no file, or a recording
     seed: int
     signals: Sequence[str]  # that were recorded
@@ -109,7 +109,7 @@ def hash_figures(figures: Mapping[str, Any]) -> dict[str, str]:
 def first_difference(before: RunEvidence, after: RunEvidence) -> str:
     """What of a run came out otherwise than in the one before; empty if nothing did."""
     for kind, old, new in (
-        ("the values in effect", before.effective, after.effective),
+        ("the effective values", before.effective, after.effective),
         ("the figures", before.figures, after.figures),
         ("the columns of the trace", before.trace, after.trace),
     ):
@@ -128,12 +128,12 @@ def _check_types(made: RunEvidence) -> None:
     every: Any = made.every
     plain = isinstance(made.changes, dict) and all(isinstance(text, str) for text in texts)
     if not plain or not isinstance(every, int) or every < 0:
-        raise TypeError("not what a run leaves")
+        raise TypeError("not the output of a run")
 
 
 def read_evidence(path: Path) -> RunEvidence:
     """Evidence in a report or an HDF5 trace."""
-    allowed, remedy = "a report (.html) or a trace (.h5) that detent wrote", "name one that a run left"
+    allowed, remedy = "a report (.html) or a trace (.h5) that detent wrote", "name the output of a run"
     if not path.is_file():
         raise InputError.of_file(str(path), "no such file", allowed, remedy)
     if path.suffix.lower() in {".h5", ".hdf5"}:

@@ -87,7 +87,7 @@ class Evidence:
         if seen.turns >= TURNS and counts >= LEAST_SWING and swing > max(SWING * 2 * self.window, self.swing):
             self.swing = swing
             self.worst = (
-                f"at rest {whose} the axis swung to and fro over {format_quantity(swing, self.unit, 3)}, "
+                f"at rest {whose} the axis oscillated over {format_quantity(swing, self.unit, 3)}, "
                 f"{seen.turns} turns in {spent}"
             )
         elif seen.limited > MOST_LIMITED_AT_REST * seen.looks and not self.worst:
@@ -104,19 +104,19 @@ class Evidence:
         if self.limited > MOST_LIMITED * self.looks:
             limited, spent = (format_quantity(looks * self.look, "s", 3) for looks in (self.limited, self.looks))
             found.append(
-                f"the command was at its limit for {limited} of {spent}; nothing is left against a load, or the loop "
-                "is unstable and its swing fills the limits; lower the gains that `detent check` warns of, ask for "
-                "less acceleration, or raise the limit of the effort"
+                f"the command was at its limit for {limited} of {spent}; there is no reserve for a load, or the loop "
+                "is unstable and oscillates between the limits; lower the gains that `detent check` warns about, "
+                "reduce the acceleration, or raise the effort limit"
             )
         if self.worst:
             found.append(
-                f"{self.worst}; a loop that settles comes to rest; lower its gains, or look for backlash and friction "
+                f"{self.worst}; a stable loop comes to rest; lower its gains, or check for backlash and friction "
                 "inside it"
             )
         share, whose = self.edge
         if EDGE < share <= 1.0:
             found.append(
-                f"{whose} ended at {100 * share:.3g} % of its window from the target; the next machine of this kind "
-                "ends outside; widen the window, or look for what holds the axis off"
+                f"{whose} ended at {100 * share:.3g} % of its window from the target; another machine of this type may "
+                "end outside; widen the window, or find what holds the axis off"
             )
         return found

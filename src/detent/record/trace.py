@@ -20,7 +20,7 @@ Column = NDArray[Any]  # one column: a one-dimensional array of integers, floats
 Attribute = str | float | int  # what is known about a trace as a whole: the axis, the job, the seed
 TIME = "t"
 # Of a trace that a run left which broke off: what it got, and what it expected.
-BROKEN_OFF = ("a trace of a run that broke off", "a trace of a run that came to its end")
+BROKEN_OFF = ("the trace of an aborted run", "the trace of a completed run")
 
 
 def broke_off(attributes: Mapping[str, Any]) -> bool:

@@ -301,7 +301,7 @@ def _write_table_csv(table: _Table, path: Path, *, force: bool) -> None:
     if broke_off(table.attributes):
         raise DetentError(
             f"{path}: got {BROKEN_OFF[0]}, which CSV cannot say; expected: {BROKEN_OFF[1]}; save it as .h5 or "
-            '.parquet, or take the mark off it: attributes["complete"] = 1'
+            '.parquet, or mark it as complete: attributes["complete"] = 1'
         )
     units = table.units
     labels = {name: f"{name} [{units[name]}]" if units.get(name) else name for name in table.columns}

@@ -1,4 +1,4 @@
-"""Induction noise on pulse lines: pulses put in or taken away, samples lost or corrupted.
+"""Induction noise on pulse lines: pulses inserted or taken away, samples lost or corrupted.
 
 By rate (each kind at random moments, a mean number per second) or at chosen ticks from a list. Everything follows from
 the seed and the list, so a run repeats to the byte. The next moment of all kinds is one number, so that a quiet tick
@@ -10,7 +10,7 @@ from detent.kernel.registers import Registers, block, f8_array, i8, i8_array, re
 from detent.kernel.step import step
 
 INSERT_PLUS, INSERT_MINUS, REMOVE, LOSE_SAMPLE, CORRUPT, INSERT = 0, 1, 2, 3, 4, 5
-RATES = 4  # kinds that come at random: `REMOVE`, `LOSE_SAMPLE`, `CORRUPT` and `INSERT`, a pulse put in of either sign
+RATES = 4  # kinds that come at random: `REMOVE`, `LOSE_SAMPLE`, `CORRUPT` and `INSERT`, a pulse inserted of either sign
 ENTRIES = 64
 NEVER = 1 << 62
 
@@ -19,7 +19,7 @@ class InterferenceParams(Registers):
     """What disturbs the lines, and when."""
 
     mean_ticks: f8_array = register(
-        "mean ticks between events: pulses removed, samples lost, samples corrupted, pulses put in; 0 never",
+        "mean ticks between events: pulses removed, samples lost, samples corrupted, pulses inserted; 0 never",
         unit="tick",
         length=RATES,
     )
@@ -34,13 +34,13 @@ class Interference(Registers):
     next_tick: i8 = register("first tick at which something happens", unit="tick")
     next_random: i8_array = register("next tick of each random kind", unit="tick", length=RATES)
     next_entry: i8 = register("first entry of the list still to come", unit="count")
-    plus: i8 = register("pulses put in at this tick, forward", unit="count")
-    minus: i8 = register("pulses put in at this tick, backward", unit="count")
+    plus: i8 = register("pulses inserted at this tick, forward", unit="count")
+    minus: i8 = register("pulses inserted at this tick, backward", unit="count")
     remove: i8 = register("pulses still to be taken away", unit="count")
     lose_sample: i8 = register("samples still to be lost", unit="count")
     corrupt: i8 = register("1 when the sample of this tick is inverted", unit="count")
-    inserted: i8 = register("pulses put in so far", unit="count")
-    removed: i8 = register("pulses taken away so far", unit="count")
+    inserted: i8 = register("pulses inserted so far", unit="count")
+    removed: i8 = register("pulses removed so far", unit="count")
     lost: i8 = register("samples lost so far", unit="count")
     corrupted: i8 = register("samples inverted so far", unit="count")
     noise: NoiseSource = block("moments and signs")

@@ -1,7 +1,7 @@
 """Evaluation of an encoder that is read once per sample: its position, some samples late, and the velocity of those.
 
 The velocity is the difference over some samples, through a first-order filter or not. Over one sample of period T a
-count is a velocity of one count per T: the span and the filter trade this noise for delay, span T / 2 and the time
+count is a velocity resolution per T: the span and the filter trade this noise for delay, span T / 2 and the time
 constant of the filter.
 """
 
@@ -24,7 +24,7 @@ class PositionSensorParams(Registers):
     period: f8 = register("time between two samples", unit="s")
     resolution: f8 = register("travel per count; 0: the encoder is an ideal one", unit="m")
     delay: i8 = register("samples until a position is read", unit="count")
-    span: i8 = register("samples that the velocity is a difference over, 1 or more", unit="count")
+    span: i8 = register("number of samples of the velocity difference, 1 or more", unit="count")
     smoothing: f8 = register("part of a new velocity that is taken over at a sample; 1: no filter", unit="1")
 
 

@@ -57,7 +57,7 @@ def test_the_effort_that_must_move_the_axis_follows_its_friction(static, share):
 def test_a_text_names_the_limit():
     table = MotionProtectionTable()
     assert "0.5 mm" in describe_fault(Guard(code=FOLLOWING), table, following="0.5 mm")
-    assert "upper end of its way, 2 m" in describe_fault(Guard(code=TRAVEL, side=1), table, lower="0 m", upper="2 m")
+    assert "upper end of travel, 2 m" in describe_fault(Guard(code=TRAVEL, side=1), table, lower="0 m", upper="2 m")
 
 
 def test_an_axis_whose_counts_noise_may_change_watches_no_speed():

@@ -95,5 +95,5 @@ def test_a_log_without_a_position_is_told_for_each_question(tmp_path: Path):
     )
     status, text = call(path, "--column", "current=i [A]")
     assert status == 1
-    assert text.count("no answer") == 6
+    assert text.count("no result") == 6
     assert "position=COLUMN" in text

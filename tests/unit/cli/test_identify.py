@@ -89,7 +89,7 @@ def test_stated_constants_are_held_against_the_log_and_replaced() -> None:
     Path(axis).write_text(text, encoding="utf-8")
     answer = call("identify", write_log(Path("log.csv")), "--axis", axis, "--write", axis)
     assert answer.status == 0, answer.err
-    assert "not as the axis file: mass: the file says 4.4 kg, the log " in answer.out
+    assert "differs from the axis file: mass: the file states 4.4 kg, the log " in answer.out
     assert "# weighed; identified, 4.4 kg before: 95 %: " in Path(axis).read_text("utf-8")
     assert call("identify", "log.csv", "--axis", axis, "--json").data["outside"] == []
 
@@ -189,7 +189,7 @@ def test_a_log_that_is_none_is_status_2(name: str, content: bytes | None, words:
         (("--write", "axis.txt"), "use one of .toml"),
         (("--report", "report.toml"), "use one of .html"),
         (("--job", "absent/job.toml"), "no folder absent"),
-        (("--write", "same.toml", "--job", "same.toml"), "a file of its own"),
+        (("--write", "same.toml", "--job", "same.toml"), "a different file"),
     ],
 )
 def test_a_wrong_option_is_status_2(options: tuple[str, ...], words: str) -> None:

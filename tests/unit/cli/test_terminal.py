@@ -76,7 +76,7 @@ def test_what_is_whole_is_named(tmp_path: Path) -> None:
     code = AT_WRITING.format(
         kind="writing(Path('b'))", number=int(signal.SIGINT), before='write_text("a\\x1b", "whole")'
     )
-    assert python(code, tmp_path) == (130, "Interrupted; written, each whole: a\\x1b.\n")
+    assert python(code, tmp_path) == (130, "Interrupted; written completely: a\\x1b.\n")
     assert [file.name for file in tmp_path.iterdir()] == ["a\x1b"]
 
 

@@ -8,7 +8,7 @@ T = 1e-3
 
 
 def law(**changes: float) -> CascadeLawParams:
-    """Cascade of 20 1/s over 300 V.s/m; names of gains and of the feed-forward are unique."""
+    """Cascade of 20 1/s over 300 V.s/m; names of gains and of the feedforward are unique."""
     p = CascadeLawParams(period=T, max_command=math.inf)
     p.cascade.position_gain, p.cascade.velocity_gain, p.cascade.max_velocity = 20.0, 300.0, math.inf
     p.pid.smoothing = 1.0
@@ -83,7 +83,7 @@ def test_the_derivative_filter_is_of_first_order():
 
 
 def fed(ref: CascadeReference, **constants: float) -> float:
-    """Feed-forward on its own: reference and measurement agree."""
+    """Feedforward on its own: reference and measurement agree."""
     p, r = law(**{"feed_forward__" + name: value for name, value in constants.items()}), CascadeLaw()
     p.cascade.velocity_gain = 0.0
     control(p, r, ref, ref.position, ref.velocity)

@@ -1,4 +1,4 @@
-"""Feed-forward in integers: worked numbers of the specification, rounding, limits."""
+"""Feedforward in integers: worked numbers of the specification, rounding, limits."""
 
 import math
 

@@ -51,7 +51,7 @@ def test_a_reading_without_end_is_ended(path, monkeypatch, reader):
     monkeypatch.setattr(apart, "SECONDS", 0.2)
     before, _ = apart.read_apart(readers.whoami, path, "a log")
     problem = refusal(reader, path)
-    assert problem.got == "a file whose reading took more than 0.2 s"
+    assert problem.got == "a file that took longer to read than 0.2 s"
     assert problem.allowed == "a log, read in 0.2 s and 4 GB"
     assert problem.remedy.endswith("set DETENT_READ_LIMITS=4 in the environment: both limits times 4")
     with pytest.raises(ChildProcessError):  # it is gone, and no zombie
@@ -62,7 +62,7 @@ def test_a_reading_without_end_is_ended(path, monkeypatch, reader):
 
 @LINUX
 def test_a_reading_that_wants_all_memory_is_ended(path):
-    assert refusal(readers.takes_all, path).got == "a file whose reading wanted more than 4 GB"
+    assert refusal(readers.takes_all, path).got == "a file that needed more memory to read than 4 GB"
 
 
 @LINUX
@@ -70,7 +70,7 @@ def test_the_limits_grow_with_the_file_and_by_the_environment(path, monkeypatch)
     monkeypatch.setattr(apart, "MEMORY", 50_000_000)
     size = 100_000_000
     problem = refusal(readers.takes, path, size)
-    assert "wanted more than 0.05 GB" in problem.got
+    assert "needed more memory to read than 0.05 GB" in problem.got
     monkeypatch.setenv("DETENT_READ_LIMITS", "4")
     assert apart.read_apart(readers.takes, path, "a log", size) == size
     assert "DETENT_READ_LIMITS=16" in refusal(readers.takes, path, 3 * size).remedy
@@ -92,7 +92,7 @@ def test_an_environment_that_states_no_number_is_told(path, monkeypatch, stated)
     [(readers.crashes, "SIGSEGV"), (readers.leaves, "status 3"), (readers.stumbles, "KeyError: 'log.bin'")],
 )
 def test_a_reader_that_breaks_down(path, reader, said):
-    assert refusal(reader, path).got == f"a file over which its reader broke down ({said})"
+    assert refusal(reader, path).got == f"a file that crashed its reader ({said})"
 
 
 def test_a_refusal_comes_back_as_it_is(path):
@@ -100,7 +100,7 @@ def test_a_refusal_comes_back_as_it_is(path):
 
 
 def test_nothing_but_plain_values_comes_back(path):
-    assert refusal(readers.answers_evil, path).got.endswith("broke down (posix.system is no plain value)")
+    assert refusal(readers.answers_evil, path).got.endswith("crashed its reader (posix.system is no plain value)")
 
 
 def test_an_absent_file_is_the_readers_affair(tmp_path):

@@ -50,7 +50,7 @@ def test_every_question_has_a_recommendation_or_what_to_record(moves: Log, tmp_p
     found = detent.analyse(moves)
     assert list(found.recommendations) == [one.name for one in found.answers]
     for one in found.answers:
-        assert one.advice.startswith("no answer: ") == (not one.estimates)
+        assert one.advice.startswith("no result: ") == (not one.estimates)
     assert found["sensors"].advice == "state encoder.resolution = 1 um"
     page = found.report(tmp_path / "report.html").read_text(encoding="utf-8")
     assert "State encoder.resolution = 1 um." in page
@@ -65,7 +65,7 @@ def test_it_is_done_when_what_was_named_has_an_answer_or_else_when_anything_has(
     assert not detent.analyse(moves, ["steps", "winding"]).done
     still = make_log(np.arange(4000) * STEP, position=np.zeros(4000))
     assert not detent.analyse(still).done
-    with pytest.raises(DetentError, match="winding was not asked for, only steps; name it in what"):
+    with pytest.raises(DetentError, match="winding was not requested, only steps; name it in what"):
         detent.analyse(moves, "steps")["winding"]
 
 
@@ -91,7 +91,7 @@ def test_a_motion_before_its_effort_is_no_dead_time() -> None:
     early = make_log(t[:-6], position=position[6:], force=force[:-6])
     answer = detent.analyse(early, "sensors")["sensors"]
     assert "delay" not in {one.name for one in answer.estimates}
-    assert any(note.startswith("dead time: no answer: ") for note in answer.notes)
+    assert any(note.startswith("dead time: no result: ") for note in answer.notes)
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings are not at hand")
@@ -100,7 +100,7 @@ def test_a_resonance_says_how_fast_a_loop_may_be() -> None:
     found = detent.analyse(path, "frequency", columns=["voltage=-input_V [V]"])
     assert found.done
     told = found.recommendations["frequency"]
-    assert told.startswith("resonance 13.6 Hz: keep the bandwidth of the velocity loop below 5.9 Hz")
+    assert told.startswith("resonance 13.6 Hz: keep the velocity-loop bandwidth below 5.9 Hz")
     assert found["frequency"].shown is not None
 
 
@@ -110,12 +110,12 @@ def test_two_commands_that_differ_on_one_log_say_why() -> None:
     analysed = detent.analyse(path, "two-speeds", columns=columns)
     identified = detent.identify_axis(path, columns=columns)
     (remark,) = analysed.remarks
-    assert remark.startswith("viscous friction in positive direction: 166.3 ± 4.6 N s/m by all of the motion")
-    assert "149.6 ± 6.1 N s/m by the steady speeds from 0.0421 to 0.125 m/s alone" in remark
+    assert remark.startswith("viscous friction in positive direction: 166.3 ± 4.6 N s/m from all motion")
+    assert "149.6 ± 6.1 N s/m from the constant speeds from 0.0421 to 0.125 m/s alone" in remark
     assert remark in identified.remarks
     (delay,) = [one for one in identified.remarks if one.startswith("delay")]
-    assert "below 0, which no drive has" in delay
-    assert all(one in repr(identified).replace("\n  ", " ") for one in ("below 0", "by all of the motion"))
+    assert "negative, which is not causal" in delay
+    assert all(one in repr(identified).replace("\n  ", " ") for one in ("negative, which", "from all motion"))
     assert identified.to_dict()["remarks"] == list(identified.remarks)
 
 

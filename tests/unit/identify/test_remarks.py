@@ -13,8 +13,8 @@ from detent.identify.remarks import early, friction_remarks
     [
         (2e-4, 1e-4, None),
         (0.0, 1e-4, None),
-        (-1e-4, 2e-4, "none, within its limits"),
-        (-7e-4, 1e-4, "below 0, which no"),
+        (-1e-4, 2e-4, "not significantly different from 0"),
+        (-7e-4, 1e-4, "negative, which is not causal"),
     ],
 )
 def test_a_delay_below_zero_is_said(value: float, error: float, told: str | None) -> None:

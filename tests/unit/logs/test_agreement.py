@@ -51,7 +51,7 @@ def test_wrong_signs_are_turned(tmp_path, role):
 def test_a_position_of_the_wrong_sign_turns_all_others(tmp_path):
     log = recording(position=np.negative).read(tmp_path)
     assert kinds(log) == [("wrong sign", role) for role in ("velocity", "acceleration", "reference", "position_load")]
-    assert "if the velocity was right, turn the position: position=-COLUMN" in log.findings[0].advice
+    assert "if the velocity was right, invert the position: position=-COLUMN" in log.findings[0].advice
 
 
 @pytest.mark.parametrize(

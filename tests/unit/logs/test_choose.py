@@ -46,7 +46,7 @@ def test_guesses_are_told():
         'time: column "time(ms)", by its name',
         'position: column "enconder(steps)", by its name',
         'command: column "inputSignal(8bits)", by its name',
-        "columns not read: remark",
+        "columns not used: remark",
     ]
 
 
@@ -59,13 +59,13 @@ def test_a_column_whose_unit_does_not_fit_is_something_else():
 def test_two_columns_alike():
     found, guesses = chosen(table_of("t", "a.position", "b.position"))
     assert found["position"] == "a.position"
-    assert 'position: column "a.position", by its name; b.position would fit as well' in guesses
+    assert 'position: column "a.position", by its name; alternatives: b.position' in guesses
 
 
 def test_stated_columns_are_not_guessed_again():
     found, guesses = chosen(table_of("t", "x", "y", "force"), "position=y [mm]", "force=", "reference=x")
     assert found == {"position": "y", "reference": "x", "time": "t"}
-    assert guesses == ['time: column "t", by its name', "columns not read: force"]
+    assert guesses == ['time: column "t", by its name', "columns not used: force"]
 
 
 @pytest.mark.parametrize("wanted", ["x [mm]", "x", "X", "2", "X [um]"])

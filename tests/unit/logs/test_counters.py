@@ -99,7 +99,7 @@ def test_signed_read_as_unsigned(bits, size):
     assert (draft.values["command"] == true).all()
     (finding,) = draft.findings
     assert (finding.kind, finding.signal, finding.action) == (Kind.UNSIGNED, "command", Action.UNWRAPPED)
-    assert f"negative ones of {bits} bits" in finding.text
+    assert f"negative numbers of {bits} bits" in finding.text
     assert finding.rows == row_ranges(np.flatnonzero(true < 0) + 1)
 
 

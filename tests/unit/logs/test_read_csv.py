@@ -53,9 +53,9 @@ def refusal(path, options=FileOptions()):  # noqa: B008 - frozen
         ("﻿t [s],x [mm]\n5e-1,15.0E-1\n1.0D0,-2.25\n", []),
         (
             "# made by a logger\n# rate 2 Hz\n# t [s],x [mm]\n0.5,1.5\n# a remark\n\n1,-2.25\n",
-            ["2 lines above the header passed over"],
+            ["2 lines above the header skipped"],
         ),
-        ("Recorder 3000\nChannels,2\n\nt [s],x [mm]\n0.5,1.5\n1,-2.25\n", ["2 lines above the header passed over"]),
+        ("Recorder 3000\nChannels,2\n\nt [s],x [mm]\n0.5,1.5\n1,-2.25\n", ["2 lines above the header skipped"]),
     ],
 )  # fmt: skip
 def test_dialects(write, text, notes):
@@ -96,7 +96,7 @@ def test_packed(write):
 def test_no_header_gives_numbered_columns(write):
     table = read_csv(write("1,2,3\n2,3,4\n"), FileOptions())
     assert list(table.columns) == ["column 1", "column 2", "column 3"]
-    assert table.notes == ["no header: columns are called by their numbers"]
+    assert table.notes == ["no header: columns are named by their numbers"]
 
 
 def test_stated_layout_is_not_guessed(write):
@@ -140,7 +140,7 @@ def test_columns_of_words_and_of_moments(write):
     assert list(table.columns) == ["stamp", "x"]
     assert table.units["stamp"] == "ns"
     assert (np.diff(table.columns["stamp"]) * 1e-9).tolist() == [0.5, 0.25]
-    assert "columns of words passed over: state" in table.notes
+    assert "text columns skipped: state" in table.notes
 
 
 def test_nanoseconds_since_1970_stay_exact(write):
@@ -153,7 +153,7 @@ def test_nanoseconds_since_1970_stay_exact(write):
 def test_more_cells_than_headings(write):
     table = read_csv(write("t,x\n1,2,3\n2,3,4\n"), FileOptions())
     assert list(table.columns) == ["t", "x", "column 3"]
-    assert table.notes == ["the header names 2 columns, the rows have 3: the last have no name"]
+    assert table.notes == ["the header names 2 columns, the rows have 3: the last ones have no name"]
 
 
 def test_a_last_column_that_is_always_empty(write):

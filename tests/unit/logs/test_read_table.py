@@ -139,7 +139,7 @@ def test_json_of_nested_records_words_truth_values_and_moments(dump):
     assert table.units["at"] == "ns"
     assert table.columns["on"].tolist() == [0, 0, 1, 1]
     assert (np.diff(table.columns["at"]) == 1e9).all()
-    assert table.notes[-1] == "passed over: motor.state, tags"
+    assert table.notes[-1] == "skipped: motor.state, tags"
 
 
 def test_json_lists_without_names(dump):
@@ -156,7 +156,7 @@ def test_json_lists_without_names(dump):
         ("[]", "no records of numbers"),
         ('[{"x": "word"}]', "no records of numbers"),
         ("3", "no columns of numbers"),
-        ('[{"t": 1}, 2, 3, 4]', "3 of 4 records that are none"),
+        ('[{"t": 1}, 2, 3, 4]', "3 invalid records of 4"),
     ],
 )
 def test_json_that_holds_no_recording(dump, value, got):
@@ -179,7 +179,7 @@ def test_matlab(tmp_path, version, shape):
     table = read_table(path)
     assert columns(table) == EXPECTED
     assert table.constants == {"gain": 2.5}
-    assert table.notes == ["passed over: other (3 rows)"]
+    assert table.notes == ["skipped: other (3 rows)"]
 
 
 def test_matlab_structures_matrices_and_whole_numbers(tmp_path):
@@ -223,7 +223,7 @@ def test_npz(tmp_path):
     table = read_table(path)
     assert columns(table) == EXPECTED
     assert table.constants == {"rate": 2.0, "note": "hello"}
-    assert table.notes == ["passed over: objects"]
+    assert table.notes == ["skipped: objects"]
 
 
 def test_npy_of_a_table_and_of_a_matrix(tmp_path):
@@ -348,7 +348,7 @@ def test_parquet(tmp_path):
     assert (table.units["stamp"], table.units["x [mm]"]) == ("ns", "mm")
     assert np.isnan(table.columns["on"]).tolist() == [False, True, False, False, False]
     assert table.columns["n"].tolist() == [0, 1, 2, 3, 4]
-    assert table.notes == ["passed over: word"]
+    assert table.notes == ["skipped: word"]
 
 
 def test_parquet_too_large(tmp_path, monkeypatch):

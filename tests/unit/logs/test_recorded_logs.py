@@ -55,7 +55,7 @@ def test_emps_is_clean(tmp_path):
 def test_emps_by_its_names_alone():
     log = read_log(DATA / "emps/DATA_EMPS.mat")
     assert set(log.signals) == {"position", "reference"}
-    assert "columns not read: vir" in log.guesses
+    assert "columns not used: vir" in log.guesses
     assert serious(log) == []
 
 
@@ -74,7 +74,7 @@ def test_arduino_lines_broken_in_the_wrong_places(name, rows):
     log = arduino(name)
     (finding,) = found(log, Kind.ROTATED_COLUMNS)
     assert (finding.rows, finding.action) == (((1, rows),), Action.REORDERED)
-    assert "lines are broken in the wrong places" in finding.text
+    assert "line breaks are misplaced" in finding.text
     assert found(log, Kind.BROKEN_ROWS) == []
     assert np.diff(log.t) == pytest.approx(np.full(rows - 1, 0.1))
     assert (log.signals["command"].min(), log.signals["command"].max()) == (0.0, 255.0)

@@ -39,7 +39,7 @@ def test_all_rows_rotated(shift):
     assert (matrix == MATRIX).all()
     (finding,) = table.findings
     assert (finding.kind, finding.action, finding.rows) == (Kind.ROTATED_COLUMNS, Action.REORDERED, ((1, N),))
-    assert f'the clock runs in "{NAMES[shift]}", not in "t": cells stand {shift} column' in finding.text
+    assert f'the clock runs in "{NAMES[shift]}", not in "t": cells are shifted {shift} column' in finding.text
 
 
 @pytest.mark.parametrize(("first", "last"), [(50, 120), (0, 15), (180, 200), (100, 200)])
@@ -87,7 +87,7 @@ def test_lines_broken_in_the_wrong_places(shift):
     assert (matrix == MATRIX).all()
     assert table.rows.tolist() == list(range(1, N + 1))
     assert table.broken == []
-    assert "lines are broken in the wrong places" in table.findings[0].text
+    assert "line breaks are misplaced" in table.findings[0].text
 
 
 def test_the_last_line_may_be_cut_off():

@@ -37,8 +37,8 @@ def test_both_ends(limit):
         (np.minimum(WAVE, 255), 1.0, Severity.WARNING, "a full scale"),
         (np.minimum(WAVE, 100), 1.0, Severity.WARNING, "a full scale"),
         (np.minimum(WAVE, 255) * 0.1, 0.1, Severity.WARNING, "a full scale"),
-        (np.minimum(WAVE, 251.5), 1.0, Severity.NOTE, "cut off, or commanded so"),
-        (np.maximum(WAVE, -123), 1.0, Severity.NOTE, "cut off, or commanded so"),
+        (np.minimum(WAVE, 251.5), 1.0, Severity.NOTE, "clipped, or commanded so"),
+        (np.maximum(WAVE, -123), 1.0, Severity.NOTE, "clipped, or commanded so"),
     ],
 )
 def test_one_end(values, factor, severity, why):

@@ -82,7 +82,7 @@ def test_a_clock_that_starts_again():
         ((1, 40), (111, 160)),
         Severity.ERROR,
     )
-    assert "starts again at row 41, 111: 3 recordings" in finding.text
+    assert "restarts at row 41, 111: 3 recordings" in finding.text
     assert draft.t.tolist() == EVEN[:70].tolist()
 
 

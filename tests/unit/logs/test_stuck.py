@@ -38,7 +38,7 @@ def test_stuck_for_a_while(tmp_path, role, first, last):
     log = stuck_rows(swing(), role, first, last).read(tmp_path)
     (finding,) = found(log, role)
     assert (finding.action, finding.rows) == (Action.LEFT, ((first + 1, last),))
-    assert "leave these rows out" in finding.advice
+    assert "exclude these rows" in finding.advice
     assert log.mask(Kind.STUCK).sum() == last - first
 
 

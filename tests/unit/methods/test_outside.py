@@ -120,7 +120,7 @@ def test_a_run_has_a_report_with_a_section_of_its_own_and_a_trace(made):
     assert all(abs(move["error"]) <= found["tolerance"] for move in found["moves"])
     text = (folder / "report.html").read_text(encoding="utf-8")
     words = " ".join(Reader(text).words)
-    assert "How the axis did it" in words
+    assert "How the axis performed" in words
     assert "Braking ahead of the target" in words
     assert all(f'"{chart}"' in text for chart in ("job", "move-speed", "move-drive", "approach-place"))
     heads = (folder / "trace.csv").read_text(encoding="utf-8")

@@ -61,7 +61,9 @@ def loops() -> Chart:
     x = np.array([0.0, 1.0, 2.0])
     panel = Panel(name="loops", label="speed [mm/s]", curves=[Curve(label="rings", colour="ink", rings=6, y=x)])
     turn = np.linspace(0.0, 2 * np.pi, 30)
-    return loop_chart(panel, x, "way [mm]", [Loop(label="loop", colour="right", x=1 + np.cos(turn), y=np.sin(turn))])
+    return loop_chart(
+        panel, x, "distance [mm]", [Loop(label="loop", colour="right", x=1 + np.cos(turn), y=np.sin(turn))]
+    )
 
 
 def plain_chart(name: str) -> Chart:

@@ -47,7 +47,7 @@ def test_of_a_report_no_more_is_read_than_one_has(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_text_that_was_changed_is_refused(evidence: RunEvidence) -> None:
-    with pytest.raises(InputError, match="not the one of its hash"):
+    with pytest.raises(InputError, match="does not match its hash"):
         _ = replace(evidence.axis, text="x = 2\n").content
 
 
@@ -66,7 +66,7 @@ def test_the_first_difference_is_named(evidence: RunEvidence) -> None:
     other = replace(evidence, figures=hash_figures({"moves": [1.6]}), trace={"t": "11", "a": "23"}, date="2027-01-01")
     assert first_difference(evidence, other) == "moves, of the figures"
     assert first_difference(evidence, replace(other, figures=evidence.figures)) == "a, of the columns of the trace"
-    assert first_difference(evidence, replace(evidence, effective={})) == "x, of the values in effect"
+    assert first_difference(evidence, replace(evidence, effective={})) == "x, of the effective values"
     assert first_difference(evidence, replace(evidence, date="2027-01-01")) == ""
 
 

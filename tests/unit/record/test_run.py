@@ -59,7 +59,7 @@ def test_an_axis_that_goes_to_and_fro_does_not_stand() -> None:
     see(made, *[20, -20] * 2)
     made.take("after move 4", rest=True)  # a few turns are the end of a move
     (text,) = made.warnings()
-    assert text.startswith("at rest after move 3 the axis swung to and fro over 12 um, 19 turns in 20 ms; ")
+    assert text.startswith("at rest after move 3 the axis oscillated over 12 um, 19 turns in 20 ms; ")
 
 
 def test_a_standing_axis_needs_no_command_at_its_limit() -> None:

@@ -239,7 +239,7 @@ def test_a_run_that_breaks_off_leaves_what_it_recorded(tmp_path: Path) -> None:
 def test_csv_cannot_say_that_a_run_broke_off(tmp_path: Path) -> None:
     trace = Trace(columns=make_trace().columns, attributes={"complete": 0})
     save_trace(trace, tmp_path / "run.h5")
-    told = r"run\.csv: got a trace of a run that broke off, which CSV cannot say; .*; save it as \.h5 or \.parquet"
+    told = r"run\.csv: got the trace of an aborted run, which CSV cannot say; .*; save it as \.h5 or \.parquet"
     with pytest.raises(DetentError, match=told):
         save_trace(trace, tmp_path / "run.csv")
     with pytest.raises(DetentError, match=told):

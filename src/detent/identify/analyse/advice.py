@@ -15,7 +15,7 @@ Found = Mapping[str, Estimate]
 def advise(name: str, estimates: tuple[Estimate, ...], reason: str, details: Mapping[str, Any]) -> str:
     """What to do with an answer."""
     if reason:
-        return f"{'nothing to be used' if estimates else 'no answer'}: {reason}"
+        return f"{'nothing usable' if estimates else 'no result'}: {reason}"
     return _ADVICE[name]({one.name: one for one in estimates}, details)
 
 
@@ -31,19 +31,19 @@ def _two_speeds(found: Found, details: Mapping[str, Any]) -> str:
             slope, coulomb = found[f"slope.{way}"], found[f"coulomb.{way}"]
             between = f"{min(speeds):.3g} to {max(speeds):.3g}"
             ways.append(f"{way} {_value(coulomb)} and {slope.value:.4g} {slope.unit} ({between} in SI units of speed)")
-    return f"friction: use {'; '.join(ways)}; not for standstill, which no steady speed shows"
+    return f"friction: use {'; '.join(ways)}; not for standstill, which steady speeds do not show"
 
 
 def _friction_map(found: Found, details: Mapping[str, Any]) -> str:
     dips = [dip for dip in details["dips"] if dip["is_found"]]
     if len(found) < FEWEST:
-        few = "too few to tell a dip at low speed: record slower passes too"
+        few = "too few to show a dip at low speed: record slower passes too"
         return f"friction: use it at these {len(found)} speeds; {few}"
     if not dips:
-        return f"friction: no dip at low speed shows in {len(found)} speeds; Coulomb and viscous friction will do"
+        return f"friction: no dip at low speed in {len(found)} speeds; Coulomb and viscous friction are sufficient"
     speeds = " and ".join(f"{dip['direction']} up to {abs(dip['speed']):.3g}" for dip in dips)
     unit = details["speed_unit"]
-    return f"friction falls with the speed ({speeds} {unit}): state static friction and stribeck, or it will stick-slip"
+    return f"friction decreases with speed ({speeds} {unit}): state static friction and stribeck, as it can stick-slip"
 
 
 def _winding(found: Found, details: Mapping[str, Any]) -> str:
@@ -54,13 +54,13 @@ def _winding(found: Found, details: Mapping[str, Any]) -> str:
 def _frequency(found: Found, details: Mapping[str, Any]) -> str:
     del details
     if "resonance" not in found:
-        return "no resonance shows in this band: a rigid axis will do up to its end"
+        return "no resonance in this band: the axis can be treated as rigid up to its upper limit"
     resonance, lowest = found["resonance"], found.get("antiresonance", found["resonance"])
     which = "anti-resonance" if "antiresonance" in found else "resonance"
     limit = format_quantity(BELOW * lowest.value, "Hz", 2)
     return (
-        f"resonance {_value(resonance, 3)}: keep the bandwidth of the velocity loop below {limit}, half of the {which} "
-        f"{_value(lowest, 3)}, or state both masses and the stiffness, and look at the margins of detent check"
+        f"resonance {_value(resonance, 3)}: keep the velocity-loop bandwidth below {limit}, half the {which} "
+        f"{_value(lowest, 3)}, or state both masses and the stiffness and check the margins with detent check"
     )
 
 
@@ -71,9 +71,10 @@ def _steps(found: Found, details: Mapping[str, Any]) -> str:
     told = [f"{sum(move['times'] for move in moves)} moves of {len(moves)} kinds"]
     if any(move["is_profile"] for move in moves):
         told.append(
-            "the reference is a profile, so that rise and overshoot are those of the profile's end, not of a step"
+            "the reference is a profile, so rise time and overshoot describe the end of the profile, not a step "
+            "response"
         )
-    told.append(f"overshoot up to {worst:.1%} of the way" if worst > LARGE else "no overshoot to speak of")
+    told.append(f"overshoot up to {worst:.1%} of the distance" if worst > LARGE else "no significant overshoot")
     told.append(f"at rest up to {format_quantity(*rest, 3)} from the reference")
     if worst > LARGE:
         told.append("lower the outer gain, or record the frequency response")

@@ -64,11 +64,11 @@ def _two_speeds(log: Log, effort: str, _: float) -> Found:
 def _impossible(estimates: Sequence[Estimate]) -> str:
     """Why friction cannot be so: of both directions together, as one alone may hold a constant force; else empty."""
     named = {one.name: one.value for one in estimates}
-    advice = "the stretches are few, or not as steady as they look; record more steady speeds, each for longer"
+    advice = "the segments are few, or not as steady as they look; record more constant speeds, each for longer"
     if len(named) == 4 and named["coulomb.positive"] + named["coulomb.negative"] < 0.0:
-        return f"the friction of both directions together comes out below 0, and would drive the axis: {advice}"
+        return f"the sum of friction in both directions is negative and would drive the axis: {advice}"
     falling = [name for name, value in named.items() if name.startswith("slope") and value < 0.0]
-    return f"the effort falls with the speed ({' and '.join(falling)} below 0): {advice}" if falling else ""
+    return f"the effort decreases with speed ({' and '.join(falling)} below 0): {advice}" if falling else ""
 
 
 def _friction_map(log: Log, effort: str, mass: float) -> Found:
@@ -79,7 +79,7 @@ def _friction_map(log: Log, effort: str, mass: float) -> Found:
         for speed, friction, error, windows in zip(*(column.tolist() for column in columns), strict=True)
     )
     dips = tuple(
-        f"{dip.direction}: friction falls by {dip.depth.value:.3g} {found.unit} from the lowest speed "
+        f"{dip.direction}: friction drops by {dip.depth.value:.3g} {found.unit} from the lowest speed "
         f"to {dip.speed:.3g} {found.speed_unit}"
         for dip in found.dips
         if dip.is_found and dip.depth is not None
@@ -172,20 +172,20 @@ def _sensors(log: Log, effort: str, _: float) -> Found:
         dead = find_dead_time(log.t, log.signals[log.effort(effort)], log.signals["position"])
         # A dead time that is not to be trusted is none: it would be put into a file all the same.
         told += [] if dead.reason else [dead.estimate]
-        notes += [f"dead time: no answer: {dead.reason}"] if dead.reason else []
+        notes += [f"dead time: no result: {dead.reason}"] if dead.reason else []
         details["dead_time"] = dead.to_dict()
     return Found(tuple(told), "" if told else notes[0], tuple(notes), details)
 
 
 ANALYSES: dict[str, tuple[str, Callable[[Log, str, float], Found]]] = {
-    "two-speeds": ("slope and friction from steady speeds", _two_speeds),
-    "friction-map": ("friction over the speed", _friction_map),
+    "two-speeds": ("slope and friction from constant speeds", _two_speeds),
+    "friction-map": ("friction versus speed", _friction_map),
     "winding": ("resistance, inductance and constants of the winding", _winding),
-    "frequency": ("frequency response, resonances and two masses", _frequency),
-    "steps": ("answers to steps of the reference", _steps),
-    "sensors": ("step of the encoder, dead time of the drive", _sensors),
+    "frequency": ("frequency response, resonances and two-mass model", _frequency),
+    "steps": ("response to reference steps", _steps),
+    "sensors": ("encoder resolution, dead time of the drive", _sensors),
 }
-"""Every analysis by the word it is asked for by: what it finds, and what finds it."""
+"""Every analysis by its name: what it finds, and the function that finds it."""
 
 
 def check_names(names: Sequence[str]) -> None:
@@ -202,7 +202,7 @@ def analyse(log: Log, name: str, effort: str = "", mass: float = 0.0) -> Analysi
     try:
         found = method(log, effort, mass)
     except DetentError as error:
-        return Analysis(name, title, log.name, (), str(error), (), {}, f"no answer: {error}")
+        return Analysis(name, title, log.name, (), str(error), (), {}, f"no result: {error}")
     advice = advise(name, found.estimates, found.reason, found.details)
     return Analysis(
         name, title, log.name, found.estimates, found.reason, found.notes, found.details, advice, found.shown

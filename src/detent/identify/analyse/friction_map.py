@@ -1,4 +1,4 @@
-"""Friction over the speed: effort less its inertia part, averaged per bin of speed and direction.
+"""Friction versus speed: effort less its inertia part, averaged per bin of speed and direction.
 
 What remains of the effort of an axis when ``mass * acceleration`` is taken away is friction, whatever its law, with any
 constant force. It is averaged in bins of speed, finer towards rest, where friction changes most. Without a mass only
@@ -42,7 +42,7 @@ class Dip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionMap:
-    """Friction over the speed; arrays of shape (k,), one entry per bin that was accepted, by rising velocity."""
+    """Friction versus speed; arrays of shape (k,), one entry per bin that was accepted, by rising velocity."""
 
     effort: str  # and unit, speed_unit: role and unit of what drives, unit of the speed
     unit: str
@@ -63,28 +63,30 @@ class FrictionMap:
 def map_friction(log: Log, effort: str = "", mass: float = 0.0, bins: int = 10) -> FrictionMap:
     """Average the friction of a recording per bin of speed and direction; without `mass`, of steady stretches only."""
     if not mass >= 0 or not np.isfinite(mass):
-        raise DetentError(f"friction map: got a mass of {mass:g}; expected: 0 or above; 0 takes steady stretches only")
+        raise DetentError(
+            f"friction map: got a mass of {mass:g}; expected: 0 or above; 0 uses constant-speed segments only"
+        )
     if bins < 1:
-        raise DetentError(f"friction map: got {bins} bins; expected: at least 1; ten are usual")
+        raise DetentError(f"friction map: got {bins} bins; expected: at least 1; ten are typical")
     role = log.effort(effort)
     _, speed_unit, _ = find_velocity(log)
     moving = _driven(log, role, mass) if mass > 0 else _steady(log, role)
     none = np.empty(0)
     nothing = FrictionMap(role, log.units[role], speed_unit, mass, none, none, none, none, none, none, none)
     if not len(moving.place):
-        steady = "no steady speed in this log; record passes at steady speeds, or state the mass"
-        driven = "the axis does not move in this log; record moves to and fro at several speeds"
+        steady = "no constant speed in this log; record passes at constant speeds, or state the mass"
+        driven = "the axis does not move in this log; record back-and-forth moves at several speeds"
         return replace(nothing, reason=driven if mass > 0 else steady)
     averages = _averages(moving, bins)
     found = [one for one in averages if one.windows >= FEWEST_WINDOWS]
     refused = tuple(
         f"about {one.speed:.3g} {speed_unit}: {one.samples} samples are worth {one.windows:.1f} independent "
-        f"windows, not {FEWEST_WINDOWS:.0f}; record this speed longer or more often"
+        f"windows, not {FEWEST_WINDOWS:.0f}; record this speed for longer or more often"
         for one in averages
         if one.windows < FEWEST_WINDOWS
     )
     if not found:
-        reason = "no speed was held long enough for an interval; record longer, or each speed more often"
+        reason = "no speed was held long enough for a confidence interval; record longer, or each speed more often"
         return replace(nothing, refused=refused, reason=reason)
     speed, friction, error, windows, samples = np.array(found, dtype=np.float64).T
     reach = error * np.array([quantile(one.windows - 1.0) for one in found])

@@ -32,7 +32,7 @@ _FEWEST_LINES = 8
 _FREEDOM = 40
 _LEAST_NOISE = 1e-20
 LIKENESS = 0.9  # correlation of an excitation with itself a period later, from which it is taken for periodic
-INTERPOLATED = ", put on an even grid by straight lines"
+INTERPOLATED = ", resampled to an even grid by linear interpolation"
 FEWEST = 3  # periods that a recording must hold to be called periodic: one to settle, two to compare
 _APART = 0.5
 _AS_GOOD = 0.02
@@ -113,7 +113,7 @@ def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) ->
     mean = float(t[-1] - t[0]) / (len(t) - 1)
     even, said = count_samples(t)
     # By counting the samples, and by their stamps where these are uneven.
-    clocks = [(even, f"{said}, taken for even"), (t, f"{said}{INTERPOLATED}")] if said else [(even, "")]
+    clocks = [(even, f"{said}, treated as even"), (t, f"{said}{INTERPOLATED}")] if said else [(even, "")]
     best: Periods | None = None
     for clock, grid in clocks:
         rows = find_period(np.interp(even, clock, excitation))
@@ -121,7 +121,7 @@ def cut_periods(t: Values, excitation: Values, others: Sequence[Values] = ()) ->
             continue
         whole = round(rows)
         # The samples as they are, and between them for a period with a fraction.
-        between = (mean * rows / whole, f"{rows:.4f} rows in a period, put on {whole} of them")
+        between = (mean * rows / whole, f"{rows:.4f} rows per period, resampled to {whole}")
         for step, text in ((mean, ""), between):
             periods = int((len(clock) - 1 + 1e-6) * mean / step + 1) // whole
             if periods < 2:
@@ -221,8 +221,7 @@ def _excited_lines(excitation: Complex, size: int) -> NDArray[np.intp]:
             chosen = np.flatnonzero(clear & (strength >= falling[widest + _FEWEST_LINES - 1]))
     if not len(chosen):
         raise DetentError(
-            "identify: got an excitation without a line that comes back in each period; expected: a multisine or a "
-            "chirp that repeats; record one"
+            "identify: got an excitation that does not repeat; expected: a periodic multisine or chirp; record one"
         )
     return chosen
 

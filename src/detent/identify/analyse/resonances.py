@@ -137,10 +137,10 @@ def _is_no_better(fit: response_fit.Fit, rigid: response_fit.Fit, lines: respons
     if float(scipy("stats").f.sf(ratio, more, fit.freedom)) > NO_BETTER:
         rigid_too = f"one rigid mass explains the response as well as two (F = {ratio:.2g})"
         band = f"{lines.frequency[0]:.4g} to {lines.frequency[-1]:.4g} Hz"
-        advice = "excite higher frequencies, or take the axis for rigid"
-        return f"{rigid_too}: no resonance from {band} stands out; {advice}"
+        advice = "excite higher frequencies, or treat the axis as rigid"
+        return f"{rigid_too}: no resonance from {band} is significant; {advice}"
     if not np.isfinite(fit.covariance).all() or "resonance" not in fit.model.tell(fit.parameters):
-        return "the damping found leaves no resonance; take the axis for rigid"
+        return "the damping found leaves no resonance; treat the axis as rigid"
     return ""
 
 
@@ -164,7 +164,7 @@ def _doubts_of(
     low, high = float(responses[0].frequency[0]), float(responses[0].frequency[-1])
     if not low < value < high:
         outside = f"the {name} of {value:.4g} Hz lies outside the excited {low:.4g} to {high:.4g} Hz"
-        return [f"{outside}: it is a guess from the slope; excite {0.5 * value:.3g} to {2 * value:.3g} Hz"]
+        return [f"{outside}: it is extrapolated from the slope; excite {0.5 * value:.3g} to {2 * value:.3g} Hz"]
     doubts: list[str] = []
     near: list[float] = []
     for response in responses:
@@ -180,7 +180,7 @@ def _doubts_of(
         above = f"a standard error of {error:.2g} Hz, above {SHARP:.0%} of it"
         doubts.append(f"the {name} is {value:.4g} Hz with {above}; {advice}")
     if resolution > 0 and 2 * width < NARROW * resolution:
-        wide = f"is {2 * width:.2g} Hz wide, the windows see {resolution:.2g} Hz: its damping comes out too large"
+        wide = f"is {2 * width:.2g} Hz wide, the windows resolve {resolution:.2g} Hz: its damping is overestimated"
         doubts.append(f"the {name} of {value:.4g} Hz {wide}; record a periodic multisine, or a longer chirp")
     return doubts
 

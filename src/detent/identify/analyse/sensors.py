@@ -85,7 +85,7 @@ def estimate_resolution(position: Values) -> Resolution:
     grids = [_grid(position, _fit(differences, start)) for start in _candidates(differences)]
     found = [grid for grid in grids if grid.share >= SHARE]
     if not found:
-        return Resolution(np.nan, 0, 0.0, "the positions lie on no grid: they are computed, filtered or noisy")
+        return Resolution(np.nan, 0, 0.0, "the positions lie on no grid: they are calculated, filtered or noisy")
     exact = _AS_EXACT * min(grid.error for grid in found)
     best = max((grid for grid in found if _is_believed(position, grid, exact)), key=lambda grid: grid.step)
     return Resolution(best.step, round(span / best.step), best.share)
@@ -177,15 +177,15 @@ def find_dead_time(t: Values, effort: Values, position: Values, *, hold: float |
     parts = [_best_shift(columns[first:last], smooth[first:last])[0] for first, last in pairwise(cuts)]
     error = step * float(np.hypot(np.std(parts, ddof=1) / np.sqrt(BLOCKS), _PARABOLA))
     value = step * shift - 0.5 * (step if hold is None else hold)
-    found = estimate("delay", value, "s", error, "shift of the effort that the motion explains best", BLOCKS - 1)
+    found = estimate("delay", value, "s", error, "shift of the effort that best explains the motion", BLOCKS - 1)
     doubt = ""
     if explained < EXPLAINED:
         advice = "record a run with more acceleration, or take the delay from a frequency response"
         doubt = f"the motion explains {explained:.0%} of the effort at best, less than {EXPLAINED:.0%}; {advice}"
     elif found.high < 0.0:
         late = f"{-1e3 * value:.3g} ms"
-        advice = "the effort is stamped later than it acts, or the position earlier; record both by one clock"
-        doubt = f"the motion comes {late} before its effort, which no drive does: {advice}"
+        advice = "the effort is time-stamped late, or the position early; record both with the same clock"
+        doubt = f"the motion comes {late} before its effort, which is not causal: {advice}"
     elif not -0.5 < shift < LONGEST - 0.5:
         advice = "check the sign and the clock of the effort"
         doubt = f"no dead time from 0 to {LONGEST} samples explains the motion; {advice}"
@@ -196,7 +196,7 @@ def _columns(position: Values, step: float, rows: int) -> Values:
     """What the effort is explained by: acceleration, velocity, its sign, position, one; shape (n - 2 rows + 2, 5)."""
     x, v, a = parabolas(position, step, rows)
     columns = terms(Motion(x, v, a, rows))
-    # The effort is smoothed, and friction with it; where that is not 1 or -1 the axis turned round, or stood.
+    # The effort is smoothed, and friction with it; where that is not 1 or -1 the axis inverted, or stood.
     friction = parabolas(columns[:, 2], step, rows)[0]
     columns = columns[rows // 2 : -(rows // 2)]
     columns[:, 2] = friction

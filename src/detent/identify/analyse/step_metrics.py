@@ -24,7 +24,7 @@ from detent.logs.log import Log, Values
 STILL = 1e-4  # change of the reference from sample to sample, as a part of its range, up to which it rests
 CREEP = 0.01  # the same as a part of the largest such change
 PAUSE = 10  # samples of a rest of the reference, at least; a shorter one is part of the step
-SMALL = 0.05  # steps smaller than this part of the largest are passed over
+SMALL = 0.05  # steps smaller than this part of the largest are skipped
 LAST = 0.25  # part of a rest of the reference, its last, in which the position is taken to rest
 FEWEST = 20  # samples of the answer to a step, at least
 CREST = 0.2  # part of the overshoot, its highest, that the polynomial of the peak is fitted to
@@ -124,7 +124,7 @@ class StepResponse:
     unit: str  # unit of positions
     steps: tuple[StepMetrics, ...] = ()  # in order of time
     reason: str = ""  # why there is none; empty where there is one
-    notes: tuple[str, ...] = ()  # what was passed over
+    notes: tuple[str, ...] = ()  # what was skipped
 
 
 def measure_steps(log: Log) -> StepResponse:
@@ -138,16 +138,16 @@ def measure_steps(log: Log) -> StepResponse:
         )
     moves = find_steps(log.signals["reference"])
     if not moves:
-        return StepResponse(unit, reason="the reference takes no step between two rests; record a step and its answer")
+        return StepResponse(unit, reason="the reference has no step between two rests; record a step and its response")
     least = SMALL * max(abs(move.target - move.start) for move in moves)
     large = [move for move in moves if abs(move.target - move.start) >= least]
     long = [move for move in large if move.stop - move.first >= FEWEST]
     passed = {
         f"steps below {SMALL:.0%} of the largest": len(moves) - len(large),
-        f"steps with an answer of fewer than {FEWEST} samples": len(large) - len(long),
+        f"steps with a response of fewer than {FEWEST} samples": len(large) - len(long),
     }
-    notes = tuple(f"{number} {which} passed over" for which, number in passed.items() if number)
-    reason = "" if long else "no step is followed by a rest; record longer after the step"
+    notes = tuple(f"{number} {which} skipped" for which, number in passed.items() if number)
+    reason = "" if long else "no step is followed by rest; record longer after the step"
     return StepResponse(unit, tuple(_measure(log, move, unit) for move in long), reason, notes)
 
 
@@ -216,7 +216,7 @@ def _measure(log: Log, move: Move, unit: str) -> StepMetrics:
     settling_2, settling_5 = (_settling(since, y - rest.value, share * abs(size)) for share in (0.02, 0.05))
     rise, off = _rise(since, y, (home, rest), noise), move.target - rest.value
     rest_error = estimate("rest_error", off, unit, rest.error, "mean of the last quarter", rest.degrees)
-    note = "not settled within 2 % when the record of the step ends: rest and rest error are means"
+    note = "not settled within 2 % when the record of the step ends: final value and error at rest are means"
     notes = (note,) if np.isinf(settling_2) else ()
     begin, duration = float(t[move.first]), float(t[move.arrived] - t[move.first])
     found = (rise, overshoot, peak_time, settling_2, settling_5, rest_error, ringing, notes)
@@ -285,7 +285,9 @@ def _rise(t: Values, y: Values, rests: tuple[_Level, _Level], noise: _Noise) -> 
     by_home = (0.1 / high.slope - 0.9 / low.slope) * home.error / way
     by_rest = (0.9 / high.slope - 0.1 / low.slope) * rest.error / way
     error = float(np.linalg.norm([low.error, high.error, by_home, by_rest]))
-    return estimate("rise_time", high.value - low.value, "s", error, "10 to 90 % of the way between rests", low.degrees)
+    return estimate(
+        "rise_time", high.value - low.value, "s", error, "10 to 90 % of the distance between rests", low.degrees
+    )
 
 
 def _crossing(t: Values, share: Values, level: float, noise: _Noise) -> _Level | None:

@@ -8,7 +8,7 @@ speed. Two speeds of a direction give both, the claim of the print head (US 4,77
 More speeds give the line through all stretches, each weighted by its length. What the slope is depends on the effort:
 viscous friction of a force or torque; of a current, that over the torque constant; of a voltage or a duty cycle, the
 back-EMF constant and the resistance's share of viscous friction. The friction of a direction holds any constant force
-in it. The error of each stretch is that of its mean with coloured residuals; where more than two stretches scatter
+in it. The error of each stretch is that of its mean with coloured residuals; where more than two segments scatter
 about the line by more than that, the scatter between stretches is added, and said.
 """
 
@@ -230,11 +230,11 @@ def _fit_direction(
     unit, unit_of_slope, speed_unit = units
     measured = tuple(measure_stretch(*series, part, 0.0) for part in parts)
     speeds = [abs(stretch.speed) for stretch in measured]
-    advice = "record passes at two steady speeds that differ by half or more"
+    advice = "record passes at two constant speeds that differ by half or more"
     if not measured:
-        return SpeedLine(name, measured, reason=f"no steady speed in {name} direction; {advice}")
+        return SpeedLine(name, measured, reason=f"no constant speed in the {name} direction; {advice}")
     if max(speeds) - min(speeds) < APART * max(speeds):
-        only = f"only one steady speed in {name} direction ({max(speeds):.4g} {speed_unit}); {advice}"
+        only = f"only one constant speed in the {name} direction ({max(speeds):.4g} {speed_unit}); {advice}"
         return SpeedLine(name, measured, reason=only)
     line, errors, degrees, between = _weighted_line(measured)
     for _ in range(ROUNDS):
@@ -242,8 +242,8 @@ def _fit_direction(
         line, errors, degrees, between = _weighted_line(measured)
     notes = [f"holds from {min(speeds):.4g} to {max(speeds):.4g} {speed_unit}; friction at rest is not measured"]
     if between > 0:
-        text = "position-dependent friction, or friction that is no line over the speed"
-        notes.append(f"stretches scatter about the line by {between:.3g} {unit} beside their errors: {text}")
+        text = "position-dependent friction, or friction that is not linear in speed"
+        notes.append(f"segments scatter about the line by {between:.3g} {unit} beyond their errors: {text}")
     method = f"two-speed method, {len(measured)} stretches"
     slope = estimate(f"slope.{name}", line[0], unit_of_slope, errors[0], method, degrees[0])
     coulomb = estimate(f"coulomb.{name}", DIRECTIONS[name] * line[1], unit, errors[1], method, degrees[1])

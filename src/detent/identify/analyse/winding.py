@@ -230,8 +230,8 @@ def _refusal(log: Log) -> str:
     """Why a log says nothing about a winding; empty where it may."""
     if not {"velocity", "position"} & set(log.signals):
         return (
-            "neither speed nor position is recorded: back-EMF and resistance cannot be told apart; "
-            "record one of them, with a locked rotor too"
+            "neither speed nor position is recorded: back-EMF and resistance cannot be separated; record "
+            "one of them, also with a locked rotor"
         )
     if max(part.stop - part.start for part in stretches(log.t)) < FEWEST:
         return f"no {FEWEST} samples without a gap; record longer"
@@ -240,7 +240,7 @@ def _refusal(log: Log) -> str:
             return f"the {role} is constant; record steps or noise of the voltage"
     steps = np.concatenate([np.diff(log.t[part]) for part in stretches(log.t)])
     if float(np.abs(steps - steps.mean()).max()) > EVEN * float(steps.mean()):
-        return f"time steps go from {steps.min():.3g} to {steps.max():.3g} s; sample evenly"
+        return f"time steps range from {steps.min():.3g} to {steps.max():.3g} s; sample evenly"
     return ""
 
 
@@ -253,15 +253,15 @@ def _told(pieces: list[Piece], fit: WindingFit | None, unit: str) -> Winding:
     if told.reason or fit is None:
         return told
     if fit.is_vague(3):
-        return replace(told, notes=(*told.notes, "the speed is too low to show a back-EMF; record higher speeds"))
+        return replace(told, notes=(*told.notes, "the speed is too low to show back-EMF; record higher speeds"))
     if fit.values[3] < 0:
-        reason = "the back-EMF constant comes out negative: speed and voltage have opposite signs; turn one"
+        reason = "the back-EMF constant is negative: speed and voltage have opposite signs; invert one"
         return Winding(reason=reason)
     return replace(told, back_emf_constant=fit.estimate(3, "back_emf_constant", unit))
 
 
 def _partner(pieces: list[Piece], found: WindingFit | None) -> str:
-    """What the back-EMF constant cannot be told apart from: ``resistance``, ``offset``, or nothing."""
+    """What the back-EMF constant cannot be separated from: ``resistance``, ``offset``, or nothing."""
     if found is not None:
         is_possible = found.pole[0] < 1.0 and found.values[0] > 0 and found.values[3] > 0
         if is_possible and not found.is_vague(3):
@@ -286,11 +286,11 @@ def _without_speed(pieces: list[Piece], partner: str) -> Winding:
     if found.reason:
         return found
     if partner == "offset":
-        note = "the speed is constant: back-EMF and voltage offset cannot be told apart; record several speeds"
+        note = "the speed is constant: back-EMF and voltage offset cannot be separated; record several speeds"
         return replace(found, offset=None, notes=(*found.notes, note))
     note = (
-        "speed and current are proportional: back-EMF constant and resistance cannot be told apart, and the apparent "
-        "resistance is R + ke v/i; record accelerations, or the rotor locked"
+        "speed and current are proportional: back-EMF constant and resistance cannot be separated, and the apparent "
+        "resistance is R + ke v/i; record accelerations, or a locked rotor"
     )
     apparent = replace(found.resistance, name="resistance.apparent") if found.resistance else None
     return replace(found, resistance=None, apparent_resistance=apparent, notes=(*found.notes, note))
@@ -299,20 +299,20 @@ def _without_speed(pieces: list[Piece], partner: str) -> Winding:
 def _still(pieces: list[Piece], found: WindingFit | None) -> Winding:
     """Resistance, inductance and offset of a fit."""
     if found is None:
-        reason = "the current does not follow the voltage as that of a winding does; check columns, units and signs"
+        reason = "the current does not respond to the voltage like a winding; check columns, units and signs"
         return Winding(reason=reason)
     notes: list[str] = []
     if found.values[0] < 0 and not found.is_vague(0):
-        return Winding(reason="the resistance comes out negative: voltage and current have opposite signs; turn one")
+        return Winding(reason="the resistance is negative: voltage and current have opposite signs; invert one")
     if found.is_vague(0):
-        return Winding(reason="the resistance drowns in noise; record larger steps of the voltage, each for longer")
+        return Winding(reason="the resistance is lost in noise; record larger and longer voltage steps")
     inductance: Estimate | None = found.estimate(1, "inductance", "H")
     if found.pole[0] <= POLES[0]:
         limit = float(found.values[0]) * pieces[0].step / -float(np.log(np.clip(found.pole[1], *POLES)))
         notes.append(f"the current settles within a sample: inductance below {limit:.2g} H; sample faster")
         inductance = None
     elif found.pole[1] >= 1.0 or found.is_vague(1):
-        notes.append("the inductance drowns in noise; record faster steps of the voltage")
+        notes.append("the inductance is lost in noise; record faster voltage steps")
         inductance = None
     error = float(found.residual.std() / np.concatenate([piece.i for piece in pieces]).std())
     resistance, offset = found.estimate(0, "resistance", "ohm"), found.estimate(2, "voltage_offset", "V")

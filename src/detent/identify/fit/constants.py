@@ -1,6 +1,6 @@
 """Constants of an axis, each direction its own, from a fitted model and from those that explain the log nearly as well.
 
-Which model was chosen is itself uncertain. Where another rung predicts the held-out stretches as well within their
+Model selection was chosen is itself uncertain. Where another rung predicts the held-out stretches as well within their
 scatter, the difference between its constants and those of the chosen one is an error that no residual shows; its mean
 square adds to the variance (S. T. Buckland, K. P. Burnham, N. H. Augustin, "Model selection: an integral part of
 inference", Biometrics 53 (1997)).

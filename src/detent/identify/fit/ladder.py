@@ -58,7 +58,7 @@ RUNGS = (
         ("mass", *_EACH, "excess.positive", "excess.negative"),
     ),
 )
-"""Models from the simplest up."""
+"""Models, simplest first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """The loops that drove an axis, from its log: what the recorded effort is of the recorded reference and position.
 
-A position loop P over a velocity loop P or PI, its feed-forward included, says exactly what it puts out:
+A position loop P over a velocity loop P or PI, its feedforward included, says exactly what it puts out:
 
     u = Kv d + Ki int d + A a_ref + B v_ref + C sign(v_ref) + const,    d = Kp (r - q) + s v_ref - v
 
@@ -26,7 +26,7 @@ from detent.logs.log import Values
 SPANS = (1, 2, 3, 4, 6, 8, 12)  # samples that the velocity may be a difference over
 SEEN = 0.7  # part of the log that is fitted; the rest tests
 WORST = 0.1  # error of the effort over the effort in the rest, at most
-SLIGHT = 0.01  # share of the effort below which a feed-forward is none
+SLIGHT = 0.01  # share of the effort below which a feedforward is none
 REACH = 0.01  # to each side, in natural logarithms: between these errors the gain with the least of them is worked out
 GAINS = (0.5, 2000.0)  # position gains looked at [1/s]
 
@@ -38,8 +38,8 @@ class Loops:
     position: float  # gain of the position loop [1/s]
     velocity: float  # and integral: gains of the velocity loop: effort per velocity, and per position
     integral: float
-    span: int  # samples that the velocity is a difference over
-    # share of the reference's velocity in the demand; without an integral it holds viscous feed-forward too
+    span: int  # number of samples of the velocity difference
+    # share of the reference's velocity in the demand; without an integral it holds viscous feedforward too
     feed_velocity: float
     # feed_acceleration, feed_viscous, feed_coulomb: effort per acceleration and per velocity of the reference, and for
     # its direction
@@ -69,7 +69,7 @@ def _trials(run: Run, reference: Values) -> Iterator["_Trial"]:
     for span in SPANS:
         moved = np.zeros(count)
         moved[span:] = (run.position[span:] - run.position[:-span]) / (span * step)
-        # Without an integral a share of the velocity and a viscous feed-forward are one and the same.
+        # Without an integral a share of the velocity and a viscous feedforward are one and the same.
         for share, loops in ((0.0, 1), (0.0, 2), (1.0, 2)):
             pair = [reference - run.position, share * velocity - moved]
             integrals = [np.cumsum(signal) * step for signal in pair] if loops == 2 else []
@@ -96,7 +96,7 @@ class _Trial:
         return mixed
 
     def solve(self, feeds: tuple[int, ...] = (0, 1, 2)) -> Loops | None:
-        """The best gains, without feed-forward that is slight or against the motion; None where they hold no axis."""
+        """The best gains, without feedforward that is slight or against the motion; None where they hold no axis."""
         effort, first = self.effort, self.loops
         cut = round(SEEN * len(effort))
         parts = np.ascontiguousarray(self.signals[:, [*range(2 * first), *(2 * first + f for f in feeds), -1]])

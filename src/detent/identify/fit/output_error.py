@@ -37,7 +37,7 @@ MOST_LOST = 0.95  # share of the effort that a transmission may lose, at most
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Part of a run that is simulated in one piece: first sample, samples, and the velocity at its begin."""
+    """Part of a run that is simulated without restarts: first sample, samples, and the velocity at its begin."""
 
     run: Run
     begin: int

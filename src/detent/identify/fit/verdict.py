@@ -30,7 +30,7 @@ _WAYS = ("positive", "negative")
 _FRICTIONS = tuple(f"{kind}.{way}" for kind in ("coulomb", "viscous", "static") for way in _WAYS)
 FORCES = (*_FRICTIONS, "pendulum", "pendulum.across")
 _DIRT: dict[Kind, tuple[str, str]] = {
-    Kind.WRONG_SIGN: ("wrong sign", "turn the signal round in the mapping, as in force=-COLUMN"),
+    Kind.WRONG_SIGN: ("wrong sign", "invert the signal in the mapping, as in force=-COLUMN"),
     Kind.WRONG_UNIT: ("wrong unit", "state the unit of the column in the mapping"),
     Kind.LOST_SIGN: ("lost sign", "record the signal with its sign"),
 }
@@ -49,7 +49,7 @@ class Refusal:
     record : str
         What to record, or to do, instead.
     constants : tuple of str
-        Constants that are not trusted for it; empty for all.
+        Constants that are constants affected; empty for all.
     """
 
     subject: str
@@ -76,12 +76,12 @@ def look_at_log(log: Log, run: Run) -> Iterator[Refusal]:
     told = {"position", run.effort_name}
     stuck = float(log.mask(Kind.STUCK, signals=told).mean())
     if stuck > MOST_STUCK:
-        text = f"{log.name}: stands still in {stuck:.0%} of the rows"
-        yield Refusal("stuck signal", text, "look at the sensor and its cable, and record again")
+        text = f"{log.name}: is at standstill in {stuck:.0%} of the rows"
+        yield Refusal("stuck signal", text, "check the sensor and its cable, and record again")
     behind = _share_left_behind(run)
     if behind > MOST_LEFT_BEHIND:
-        text = f"{log.name}: the reference makes {behind:.0%} of its way while the position stands still"
-        yield Refusal("stuck signal", text, "look at the encoder, its cable and the drive's enable, and record again")
+        text = f"{log.name}: the reference covers {behind:.0%} of its travel while the position does not change"
+        yield Refusal("stuck signal", text, "check the encoder, its cable and the drive enable, and record again")
     top, bottom = run.effort.max(), run.effort.min()
     at_ends = np.count_nonzero((run.effort == top) | (run.effort == bottom)) / len(run.effort)
     saturated = max(float(log.mask(Kind.SATURATED, signals=told).mean()), at_ends)
@@ -110,12 +110,12 @@ def look_at_motion(runs: Sequence[Run], parts: Sequence[Prepared]) -> Iterator[R
     total = right + left
     if total < LEAST_MOTION:
         seconds = sum(float(run.t[-1]) for run in runs)
-        text = f"in {seconds:.3g} s the axis moves clear of standstill for {total:.2g} s"
-        yield Refusal("too short", text, f"record {max(10.0, 5 * LEAST_MOTION):g} s or more of moves to and fro")
+        text = f"in {seconds:.3g} s the axis moves clearly for {total:.2g} s"
+        yield Refusal("too short", text, f"record {max(10.0, 5 * LEAST_MOTION):g} s or more of back-and-forth moves")
     elif min(right, left) < LEAST_EACH_WAY * total:
         way = "larger" if right > left else "smaller"
-        most = f"it moves to {way} positions in {max(right, left) / total:.0%} of the time"
-        text = f"{most}, so friction and a constant force cannot be told apart"
+        most = f"it moves towards {way} positions in {max(right, left) / total:.0%} of the time"
+        text = f"{most}, so friction and a constant force cannot be separated"
         yield Refusal("no reversal", text, "record moves in both directions, at two speeds or more")
 
 
@@ -135,22 +135,22 @@ def _not_told(run: Run, by_name: dict[str, Estimate], effort: float, top: float)
     """Constants that are not known well enough."""
     mass, delay = by_name["mass"], by_name.get("delay")
     if mass.high <= 0.0:
-        text = f"the mass comes out as {mass.value:.4g} {mass.unit}: effort and motion point apart"
-        yield Refusal("wrong sign", text, "turn the effort or the position round in the mapping")
+        text = f"the mass is {mass.value:.4g} {mass.unit}: effort and motion have opposite signs"
+        yield Refusal("wrong sign", text, "invert the effort or the position in the mapping")
     elif not mass.half < WIDEST_MASS * mass.value:
-        text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, as there is hardly any acceleration"
+        text = f"mass {mass.value:.4g} +- {mass.half:.2g} {mass.unit}, because there is hardly any acceleration"
         yield Refusal("little acceleration", text, "record moves with short ramps", ("mass",))
     for e in (by_name[name] for name in FORCES if name in by_name):
         is_viscous = e.name.startswith("viscous")
         scale = top if is_viscous else 1.0
         if not e.half * scale < WIDEST_FORCE * effort:
             is_known = e.half < 100.0 * (effort / max(scale, 1e-300))
-            text = f"{e.name} {f'{e.value:.4g} +- {e.half:.2g} {e.unit}' if is_known else 'not known at all'}"
+            text = f"{e.name} {f'{e.value:.4g} +- {e.half:.2g} {e.unit}' if is_known else 'not determined at all'}"
             record = "steady moves at several speeds" if is_viscous else "slow moves in both directions"
-            yield Refusal("not told by the data", text, f"record {record}", (e.name,))
+            yield Refusal("not determined by the data", text, f"record {record}", (e.name,))
     if delay is not None and delay.half > WIDEST_DELAY * run.step:
         text = f"delay {1e3 * delay.value:.3g} +- {1e3 * delay.half:.2g} ms"
-        yield Refusal("not told by the data", text, "record moves with short ramps, sampled faster", ("delay",))
+        yield Refusal("not determined by the data", text, "record moves with short ramps, sampled faster", ("delay",))
 
 
 def _one_speed(run: Run, velocity: Values, names: Collection[str]) -> Iterator[Refusal]:
@@ -162,7 +162,7 @@ def _one_speed(run: Run, velocity: Values, names: Collection[str]) -> Iterator[R
         low, high = (float(np.quantile(speed, share)) for share in (0.1, 0.9))
         if low > SAME_SPEED * high:
             speeds = f"{low:.3g} to {high:.3g} {run.position_unit}/s nearly all the time"
-            text = f"in {way} direction it moves at {speeds}: Coulomb and viscous friction cannot be told apart"
+            text = f"in {way} direction it moves at {speeds}: Coulomb and viscous friction cannot be separated"
             yield Refusal("one speed", text, "record moves at two speeds or more in each direction", concerned)
 
 
@@ -173,13 +173,13 @@ def _impossible(by_name: dict[str, Estimate], effort: float, top: float) -> Iter
         total, reach = sum(e.value for e in coulomb), math.hypot(*(e.error for e in coulomb)) * 3.0
         if total < -max(reach, 0.02 * effort):
             text = f"Coulomb friction of both directions is {total:.3g} {coulomb[0].unit}, which would drive the axis"
-            record = "look at the sign of the effort and at the delay between the signals"
+            record = "check the sign of the effort and the delay between the signals"
             yield Refusal("friction below 0", text, record)
     for way in _WAYS:
         e = by_name.get(f"viscous.{way}")
         if e is not None and e.high < 0.0 and e.value * top < -0.05 * effort:
-            text = f"viscous.{way} is {e.value:.3g} {e.unit}: friction falls with speed"
-            record = "record several speeds; look for a limit or a delay of the effort"
+            text = f"viscous.{way} is {e.value:.3g} {e.unit}: friction decreases with speed"
+            record = "record several speeds; check the effort for saturation or delay"
             yield Refusal("friction below 0", text, record, (e.name,))
 
 
@@ -189,13 +189,13 @@ def look_at_prediction(
     """Whether the model explains what it did not see; without a mass that is known it cannot be simulated."""
     chosen = next(c for c in reversed(climbs) if c.taken)
     if not chosen.error < WORST_PREDICTION:
-        text = f"the effort of stretches not seen is predicted with an error of {chosen.error:.0%}"
-        record = "look whether the effort is what drives this axis, and at its sign, unit and delay"
+        text = f"the effort on held-out segments is predicted with an error of {chosen.error:.0%}"
+        record = "check that the effort is what drives this axis, and its sign, unit and delay"
         yield Refusal("model does not explain the log", text, record)
     tested = [h for h in horizons if h.name in {"0.1 s", "0.5 s"}]
     if not tested or any("mass" in refusal.constants for refusal in refused):
         return
     if not min(h.rms / max(h.naive, 1e-300) for h in tested) < WORST_SIMULATION:
         h = tested[-1]
-        text = f"simulated over {h.name} it errs by {h.rms:.3g}, going on with the velocity by {h.naive:.3g}"
-        yield Refusal("model does not explain the log", text, "record with more acceleration, or look at units")
+        text = f"simulated over {h.name} its error is {h.rms:.3g}, constant velocity gives {h.naive:.3g}"
+        yield Refusal("model does not explain the log", text, "record with more acceleration, or check the units")

@@ -25,7 +25,7 @@ def analysed_page(found: "Analysed") -> Page:
 
     log = found.log
     answered = [one for one in found.answers if one.estimates]
-    sections = [Section("What was recorded", [Figure(title="Over time", charts=recorded_charts(log))])]
+    sections = [Section("Recorded signals", [Figure(title="Time plots", charts=recorded_charts(log))])]
     for one in found.answers:
         about = f"{words.sentence(one.advice)}."
         table = table_of(one).on_page if one.estimates else None
@@ -40,9 +40,9 @@ def analysed_page(found: "Analysed") -> Page:
         title=f"{log.name}: analysed",
         headline=Headline(
             level="good" if found.done else "warn",
-            verdict="Answered" if found.done else "Not answered",
+            verdict="Answered" if found.done else "No result",
             name=log.name,
-            kicker="Single questions to a recording",
+            kicker="Analysis of a recording",
             lead=f"{told}; {count(len(log), 'sample')} over {duration(float(log.t[-1] - log.t[0]))}.",
         ),
         notes=[

@@ -80,21 +80,21 @@ def simulated_figures(found: Identification, held: Sequence[HeldOut], shown: int
     if len(held) > 1:
         worst = f"Of {count(len(held), 'recording')} the one with the largest errors, {found.logs[shown].name}. "
     caption = Markup(
-        "{}A simulated axis with constants from the first three quarters of the recording, along its last quarter. It "
-        "gets the recorded effort and nothing else; no controller holds it, so every error adds up. <b>Restarted every "
-        "{}\u202fs it is {} off on average (rms), in one piece {}.</b> Where the curves lie on one another the model "
-        "does what the axis did."
+        "{}The axis simulated over the last quarter of the recording, with constants from the first three quarters. It "
+        "is driven by the recorded effort only, without a controller, so all errors accumulate. "
+        "<b>Restarted every {}\u202fs its error is {} (rms), without restarts {}.</b> Where the curves coincide the "
+        "model reproduces the axis."
     ).format(worst, f"{one.restart:.3g}", ways.error(one.rms_restarted), ways.error(rms(one.free - one.measured)))
-    title = "On the part that the fit did not see"
+    title = "On held-out data"
     return [Figure(title=title, caption=caption, charts=held_charts(one, ways)), *horizons]
 
 
 def held_charts(held: HeldOut, ways: Ways) -> list[chart.Chart]:
     """Draw the held-out part: recorded and simulated position, and both differences."""
-    place, again = ways.place, f"simulated, from the recording again every {held.restart:.3g} s"
+    place, again = ways.place, f"simulated, restarted from the recording every {held.restart:.3g} s"
     curves = [
         scaled(again, "speed", held.restarted, place, width=2.5),
-        scaled("simulated in one piece", "drive", held.free, place),
+        scaled("simulated without restarts", "drive", held.free, place),
         scaled("recorded", "left", held.measured, place, dash=(5, 4)),
     ]
     label = label_of("position", place.name)
@@ -106,26 +106,26 @@ def held_charts(held: HeldOut, ways: Ways) -> list[chart.Chart]:
     return chart.time_charts(chart.Timeline(name="held", t=held.t, label=SINCE, unit="s"), [
         chart.Panel(name="held-position", label=label, curves=curves, span=span),
         _off_panel("held-restarted", again, "speed", held.measured - held.restarted, ways),
-        _off_panel("held-free", "simulated in one piece", "drive", held.measured - held.free, ways),
+        _off_panel("held-free", "simulated without restarts", "drive", held.measured - held.free, ways),
     ])  # fmt: skip
 
 
 def _off_panel(name: str, label: str, colour: str, off: Numbers, ways: Ways) -> chart.Panel:
     scale = ways.small(peak_of(off))
-    curve = scaled(f"recorded less {label}", colour, off, scale)
+    curve = scaled(f"recorded minus {label}", colour, off, scale)
     return chart.Panel(name=name, label=label_of("difference", scale.name), height=150, zero=True, curves=[curve])
 
 
 def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
     heads = [
         ("simulated for", False), ("starts", True), ("simulated, rms", True), ("largest", True),
-        ("without a model, rms", True), ("simulated over without a model", False), ("way of the axis, rms", True),
+        ("without a model, rms", True), ("simulated, relative to no model", False), ("travel of the axis, rms", True),
     ]  # fmt: skip
     caption = Markup(
-        "How far off the axis is at the end of a simulated stretch that starts where the recording says it was. "
-        "<b>Without a model</b> it would go on with the velocity it started with: a model that is worth something is "
-        "far below 100\u202f%. One step shows little but the noise of the encoder; the free run is one stretch, and "
-        "its errors are over all of it."
+        "Error at the end of a simulated segment that starts from the recorded state. "
+        "<b>Without a model</b> it would continue at its initial velocity: a useful model is far below 100\u202f%. One "
+        "step shows little more than encoder noise; the free run is a single segment, and its error is taken "
+        "over all of it."
     )
     rows: list[list[str]] = []
     for h in horizons:
@@ -134,7 +134,7 @@ def _horizon_figure(horizons: Sequence[Horizon], ways: Ways) -> Figure:
         bar = long_bar(share / 1.5, percent(share), chosen=share < 1.0)
         errors = [ways.error(value) for value in (h.rms, h.largest, h.naive)]
         rows.append([name, count(h.starts), *errors, bar, ways.error(h.moved)])
-    return Figure(title="How far it can be foretold", caption=caption, table=Table(heads=heads, rows=rows))
+    return Figure(title="Prediction error versus horizon", caption=caption, table=Table(heads=heads, rows=rows))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,19 +193,19 @@ def effort_figures(found: Identification, windows: Sequence[Windows], shown: int
         return []
     run, one = found.runs[shown], windows[shown]
     caption = Markup(
-        "The model's effort beside the recorded one, both averaged over windows of {}\u202fms; windows with "
+        "Modelled and recorded effort, both averaged over windows of {}\u202fms; windows with "
         "standstill, a reversal or missing samples are left out. <b>{} of the effort (rms) stays "
-        "unexplained.</b> What repeats in the residual is what the model lacks: a force that depends on the "
-        "position, cogging, another friction."
+        "unexplained.</b> A pattern in the residual is what the model lacks: a position-dependent force, cogging, "
+        "another friction."
     ).format(number(one.width * 1e3), percent(rms(fit.residual) / rms(fit.effort)))
     told = (
-        "Left: one hump around 0 is as it should be; the outermost bars hold all that is larger. Right: beyond the "
-        "overlap of the windows bars within the dashed lines are noise; bars that stay outside tell of something that "
-        "the model lacks. The limits of the constants count with that."
+        "Left: expect a single peak around 0; the outermost bars collect all larger values. Right: beyond the "
+        "overlap of the windows bars within the dashed lines are noise; bars outside them indicate something that the "
+        "model lacks. The limits of the constants account for that."
     )
     residuals = [residual_chart(windows, run.effort_unit), memory_chart(windows)]
     return [
-        Figure(title="Over time", caption=caption, charts=effort_charts(one, run)),
+        Figure(title="Time plots", caption=caption, charts=effort_charts(one, run)),
         Figure(title="Residuals", caption=told, charts=residuals, beside=True),
     ]
 
@@ -226,7 +226,7 @@ def effort_charts(windows: Windows, run: Run) -> list[chart.Chart]:
         scaled("by the model", "speed", fitted, scale, width=2.5, thin=len(t)),
         scaled("recorded", "left", effort, scale, dash=(5, 4), thin=len(t)),
     ]
-    left = scaled("recorded less model", "current", residual, scale, thin=len(t))
+    left = scaled("recorded minus model", "current", residual, scale, thin=len(t))
     return chart.time_charts(chart.Timeline(name="effort", t=t, label=SINCE, unit="s"), [
         chart.Panel(name="effort-both", label=label_of(run.effort_name, scale.name), curves=curves, zero=True),
         chart.Panel(name="effort-left", label=label_of("residual", scale.name), curves=[left], zero=True, height=150),
@@ -241,9 +241,9 @@ def residual_chart(windows: Sequence[Windows], unit: str) -> chart.Chart:
     scale = effort_scale(unit, reach)
     at = np.clip(residual, -reach, reach) * scale.factor
     heap = chart.Heap(label="windows", colour="speed", at=at, counts=np.ones(len(at)))
-    labels = (label_of("recorded less model", scale.name), "windows")
+    labels = (label_of("recorded minus model", scale.name), "windows")
     drawn = chart.histogram_chart("residual-sizes", [heap], labels, finest=1e-3 * reach * scale.factor)
-    return drawn | {"title": "How large residuals are"}
+    return drawn | {"title": "Distribution of the residuals"}
 
 
 def memory_chart(windows: Sequence[Windows]) -> chart.Chart:
@@ -253,12 +253,12 @@ def memory_chart(windows: Sequence[Windows]) -> chart.Chart:
     lag = np.arange(len(correlation)) * one.hop * 1e3
     bound = 1.96 / math.sqrt(max(pairs[0], 1.0))
     panel = chart.Panel(
-        name="residual-memory", label="correlation", title="How much they resemble earlier ones", height=260, zero=True,
+        name="residual-memory", label="correlation", title="Autocorrelation of the residuals", height=260, zero=True,
         span=(min(-0.4, float(np.nanmin(correlation)) - 0.05), 1.05),
-        curves=[chart.Curve(label="with the residual so much earlier", colour="speed", y=correlation)],
+        curves=[chart.Curve(label="correlation with the residual at this lag", colour="speed", y=correlation)],
         levels=[(bound, "95 % of white noise"), (-bound, "")],
     )  # fmt: skip
-    drawn = chart.line_chart(panel, lag, "earlier by [ms]")
+    drawn = chart.line_chart(panel, lag, "lag [ms]")
     drawn["series"][0]["bars"] = 0
     overlap = {"spans": [[0.0, round(one.width * 1e3, 3)]], "colour": "brake", "label": "windows overlap"}
     return drawn | {"bands": [overlap]}
@@ -270,14 +270,14 @@ def friction_figures(
     """The friction map; nothing without a model."""
     if constants is None or not windows:
         return []
-    weight = " and lifts its weight" if "pendulum" in constants.names else ""
+    weight = " and minus its weight" if "pendulum" in constants.names else ""
     caption = (
-        f"Each ring is a window of the recording: its effort less what accelerates the axis{weight}. The line is the "
-        "friction of the model, with its 95\u202f% interval. Rings that leave the line together, at low speeds above "
-        "all, tell of a friction that the model lacks."
+        f"Each ring is a window of the recording: its effort minus the acceleration force{weight}. The line is the "
+        "friction of the model, with its 95\u202f% interval. Rings that deviate from the line together, especially at "
+        "low speed, indicate friction that the model lacks."
     )
     charts = [friction_chart(constants, windows, effort_unit, ways)]
-    return [Figure(title="Measured and by the model", caption=caption, charts=charts)]
+    return [Figure(title="Measured and modelled", caption=caption, charts=charts)]
 
 
 def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit: str, ways: Ways) -> chart.Chart:
@@ -297,7 +297,7 @@ def friction_chart(constants: Constants, windows: Sequence[Windows], effort_unit
     half = friction_limits(constants, x)
     half = np.where(half < 2.0 * peak_of(friction), half, np.nan)
     scale, speed = effort_scale(effort_unit, peak_of(friction)), ways.speed
-    rings = chart.Curve(label="measured, window by window", colour="left", y=dots * scale.factor, rings=5)
+    rings = chart.Curve(label="measured, per window", colour="left", y=dots * scale.factor, rings=5)
     curves = [
         replace(rings, digits=digits_for(peak_of(rings.y))),
         scaled("by the model", "speed", curve, scale, width=2.0),

@@ -33,11 +33,11 @@ def constant_figures(found: Identification) -> list[Figure]:
         ("constant", False), ("value and 95 % limits", True), (f"interval, scale ±{percent(reach)}", False),
         ("", True), ("trusted", False),
     ]  # fmt: skip
-    warning = "<b>For diagnosis only: none of these is to be used.</b> " if found.verdict == "refused" else ""
+    warning = "<b>For diagnosis only: do not use any of these.</b> " if found.verdict == "refused" else ""
     caption = Markup(warning) + (  # noqa: S704 - our own
-        "With a chance of 95\u202f% the true value lies within the limits. They allow for residuals that depend on "
-        "one another, and for other models that explain the recording as well. The bar is the interval over the value: "
-        "short is good, arrows mean wider than the scale."
+        "The limits are 95\u202f% confidence limits. They account for correlated residuals, and for other models that "
+        "explain the recording equally well. The bar shows the interval relative to the value: short is good, "
+        "arrows mean wider than the scale."
     )
     rows = [_constant_row(found, e, reach) for e in found.estimates]
     model = found.rung.text if found.rung else "none"
@@ -75,7 +75,7 @@ def reach_of(estimates: Sequence[Estimate]) -> float:
 def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> Markup:
     """Draw an interval about its value, on a scale that all constants of a table share."""
     if not words.is_known(found):
-        return Markup('<span style="color:var(--bad)">from nothing to anything</span>')
+        return Markup('<span style="color:var(--bad)">undetermined</span>')
     half = words.relative_half(found) / reach
     colour = "good" if trusted else "bad"
     middle, room = WIDTH / 2, WIDTH / 2 - 8
@@ -94,7 +94,7 @@ def interval_bar(found: Estimate, reach: float, *, trusted: bool) -> Markup:
 
 
 def ladder_figures(found: Identification) -> list[Figure]:
-    """Models from the simplest up, and which was chosen."""
+    """Models, simplest first, and which was chosen."""
     if not found.climbs:
         return []
     longest = max(c.error for c in found.climbs)
@@ -104,18 +104,18 @@ def ladder_figures(found: Identification) -> list[Figure]:
         bar = words.long_bar(climb.error / longest, percent(climb.error), chosen=chosen)
         rows.append([words.sentence(climb.rung.text), bar, _step_text(climb, chosen=chosen)])
     caption = (
-        "Each model is fitted to all of the recording but one stretch and foretells that one, stretch by stretch. A "
-        "larger model is taken only if it foretells better; a better fit alone would not do."
+        "Cross-validation: each model is fitted to all of the recording except one segment and predicts that segment, "
+        "in turn. A larger model is chosen only if it predicts better; a better fit alone is not enough."
     )
-    heads = [("model", False), ("error on stretches it did not see, over the effort", False), ("", False)]
-    return [Figure(title="Models from the simplest up", caption=caption, table=Table(heads=heads, rows=rows))]
+    heads = [("model", False), ("error on held-out segments, relative to the effort", False), ("", False)]
+    return [Figure(title="Models, simplest first", caption=caption, table=Table(heads=heads, rows=rows))]
 
 
 def _step_text(climb: Climb, *, chosen: bool) -> str:
     if chosen:
         return Markup('<span style="color:var(--good)"><b>✔ chosen</b></span>')
     if not climb.possible:
-        return "its friction would fall towards standstill: not physical"
+        return "its friction would decrease towards standstill: not physical"
     better = f"better than the one before by {number(climb.gain, 2)} standard errors"
     return "the simplest" if math.isnan(climb.gain) else better if climb.gain > 0.0 else "no better"
 
@@ -131,8 +131,8 @@ def correlation_figures(constants: Constants | None, estimates: Sequence[Estimat
     names = [words.constant_name(constants.names[k], units[constants.names[k]]) for k in kept]
     r = constants.correlation[np.ix_(kept, kept)]
     caption = (
-        "Errors of two constants with a correlation near 1 or \u22121 go together: the recording tells their sum or "
-        "difference better than each of them. Their limits allow for that."
+        "With a correlation near 1 or \u22121 the errors of two constants are coupled: the recording determines their "
+        "sum or difference better than each of them. Their limits account for that."
     )
     told, table = _pairs_told(names, r), heat_map(names, r, limit=ALIKE)
     return [Figure(title="Correlation of the constants", caption=caption, drawing=told, table=table)]
@@ -142,7 +142,7 @@ def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
     """Which constants the recording hardly separates, the closest first."""
     pairs = [(i, j) for i in range(len(r)) for j in range(i + 1, len(r)) if abs(r[i, j]) > ALIKE]
     if not pairs:
-        return Markup("<p><b>None above {}: the recording tells all constants apart.</b></p>").format(ALIKE)
+        return Markup("<p><b>None above {}: the recording separates all constants.</b></p>").format(ALIKE)
     pairs.sort(key=lambda pair: -abs(float(r[pair])))
     texts: list[str] = []
     for i, j in pairs[:MOST_PAIRS]:
@@ -152,7 +152,7 @@ def _pairs_told(names: Sequence[str], r: Numbers) -> Markup:
         texts.append(f"{further(len(pairs) - MOST_PAIRS, 'pair')} framed below.")
     items = Markup().join(Markup("<li>{}</li>").format(text) for text in texts)
     return Markup(
-        "<p><b>Hardly separated, above {}:</b></p><ul>{}</ul><p>More different speeds, slow ones too, separate the "
+        "<p><b>Poorly separated, above {}:</b></p><ul>{}</ul><p>More different speeds, slow ones too, separate the "
         "parts of friction; short ramps separate mass and delay.</p>"
     ).format(ALIKE, items)
 

@@ -52,16 +52,16 @@ def identify_page(found: Identification, remarks: Sequence[str] = ()) -> Page:
         ],
         sections=[
             Section("Constants", constant_figures(found)),
-            Section("What was found in the log", recording_figures(found, shown, simulated=bool(held))),
+            Section("Findings in the log", recording_figures(found, shown, simulated=bool(held))),
             Section("What to record instead", refused_figures(found)),
             Section("Measured and simulated", simulated_figures(found, held, shown)),
             Section(
                 f"{words.sentence(found.runs[0].effort_name)}, measured and fitted",
                 effort_figures(found, windows, shown),
             ),
-            Section("Friction over the speed", friction_figures(found.constants, windows, effort_unit, ways)),
-            Section("Which model", ladder_figures(found)),
-            Section("What the recording separates", correlation_figures(found.constants, found.estimates)),
+            Section("Friction versus speed", friction_figures(found.constants, windows, effort_unit, ways)),
+            Section("Model selection", ladder_figures(found)),
+            Section("Correlation of the constants", correlation_figures(found.constants, found.estimates)),
             Section("Frequency response", response_figures(found, shown)),
         ],
         settings=_settings(found),
@@ -78,13 +78,13 @@ def _lead(found: Identification, ways: words.Ways) -> str:
     if found.verdict == "refused":
         general = [r for r in found.refusals if not r.constants]
         subjects = dict.fromkeys(r.subject for r in general or found.refusals)
-        return f"No constant of this log can be trusted: {'; '.join(subjects)}. Below stands what to record instead."
+        return f"No constant of this log can be trusted: {'; '.join(subjects)}. What to record instead is listed below."
     good = f"{count(len(found.trusted), 'constant')} can be trusted"
     first = f"All {good}." if found.verdict == "trusted" else f"{good}; not {_listed(_missing(found))}."
     if not (h := _telling(found.horizons)):
         return first
     return (
-        f"{first} Tested on the last quarter of the recording, which the fit had not seen: simulated for {h.name}, the "
+        f"{first} Validated on the last quarter of the recording, held out from the fit: simulated for {h.name}, the "
         f"axis ends {ways.error(h.rms)} from where it was; without a model it would be {ways.error(h.naive)}."
     )
 
@@ -154,7 +154,7 @@ def recording_figures(found: Identification, shown: int, *, simulated: bool) -> 
     caption = f"{log.name}: {duration(float(run.t[-1]))} at {1.0 / run.step:.4g} Hz. {used}"
     listed = [_log_figure(found.logs, shown, simulated=simulated)] if len(found.logs) > 1 else []
     return [
-        Figure(title="What was recorded", caption=caption, charts=recorded_charts(run)),
+        Figure(title="Recorded signals", caption=caption, charts=recorded_charts(run)),
         _fault_figure(found),
         *listed,
         _column_figure(log),
@@ -186,14 +186,16 @@ def _fault_figure(found: Identification) -> Figure:
     told = [(log, finding) for severity in _COLOURS for log in found.logs for finding in log.findings
             if finding.severity is severity]  # fmt: skip
     if not told:
-        more = "what the motion itself tells stands below" if found.refusals else "no gaps, jumps, wrong signs or units"
+        more = (
+            "what the motion itself shows is listed below" if found.refusals else "no gaps, jumps, wrong signs or units"
+        )
         return Figure(title="Faults", drawing=Markup("<p>None found in the file: {}.</p>").format(more))
     heads = [("", False), ("rows", False), ("signal", False), ("what", False), ("what was done", False), ("do", False)]
     rows: list[list[str]] = []
     for log, finding in told[:MOST_FINDINGS]:
         look = Markup('<b style="color:var(--{})">{}</b>').format(_COLOURS[finding.severity], finding.severity.value)
         what = Markup("<b>{}</b>: {}").format(finding.kind.value, finding.text)
-        done = "left as it is" if finding.action is Action.LEFT else finding.action.value
+        done = "unchanged" if finding.action is Action.LEFT else finding.action.value
         where = f"{log.name}: {tell_rows(finding.rows)}" if several else tell_rows(finding.rows)
         rows.append([look, where, finding.signal or "all", what, done, finding.advice or "nothing"])
     caption = "Rows are counted from 1 below the header of the file."
@@ -212,7 +214,7 @@ def _log_figure(logs: Sequence[Log], shown: int, *, simulated: bool) -> Figure:
         [log.name, count(len(log)), duration(float(log.t[-1] - log.t[0])), count(len(log.findings))]
         for log in logs[:MOST_LOGS]
     ]
-    worst = ", whose last quarter is simulated worst" if simulated else ""
+    worst = ", whose last quarter has the largest simulation error" if simulated else ""
     caption = f"All are fitted together. Figures over time show {logs[shown].name}{worst}."
     return _listing("Recordings", caption, heads, rows, (len(logs), "recording"))
 
@@ -227,8 +229,8 @@ def _column_figure(log: Log) -> Figure:
     guessed = Markup().join(Markup("<li>{}</li>").format(text) for text in log.guesses)
     return Figure(
         title="Columns",
-        caption="What was read, and what had to be guessed because the file does not say it. State it if a guess is "
-        "wrong.",
+        caption="What was read, and what had to be guessed because the file does not state it. Correct any wrong "
+        "guess.",
         drawing=Markup("<ul>{}</ul>").format(guessed) if guessed else None,
         table=Table(heads=heads, rows=rows),
     )
@@ -239,13 +241,14 @@ def refused_figures(found: Identification) -> list[Figure]:
     if not found.refusals:
         return []
     units = {e.name: e.unit for e in found.estimates}
-    heads = [("what is wrong", False), ("what was found", False), ("do instead", False), ("not trusted for it", False)]
+    heads = [("problem", False), ("what was found", False), ("what to do", False), ("constants affected", False)]
     bold = Markup("<b>{}</b>")
     rows: list[list[str]] = []
     for r in found.refusals:
         lost = "; ".join(words.constant_name(name, units.get(name, "")) for name in r.constants)
         rows.append([bold.format(r.subject), r.text, bold.format(r.record), lost or "all constants"])
     caption = (
-        "A constant that the recording does not tell is refused rather than guessed. Each row says what would tell it."
+        "A constant that the recording does not determine is refused rather than guessed. Each row says what to "
+        "record to determine it."
     )
     return [Figure(title="Refused", caption=caption, table=Table(heads=heads, rows=rows))]

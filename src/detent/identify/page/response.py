@@ -27,8 +27,8 @@ def response_figures(found: Identification, shown: int) -> list[Figure]:
     response = told_response(found, shown)
     if response is not None:
         caption = Markup(
-            "How far the position answers to the effort at each frequency. Where it rises above the dashed line of the "
-            "identified mass and viscous friction there is a resonance; at low frequencies dry friction holds it "
+            "Response of the position to the effort versus frequency. Where it rises above the dashed line of the "
+            "identified mass and viscous friction there is a resonance; at low frequencies dry friction keeps it "
             "below. <b>Coherence</b> is the share of the position that the effort explains: below {} the curves above "
             "it are noise. Method: {}."
         ).format(COHERENT, response.method)
@@ -36,8 +36,8 @@ def response_figures(found: Identification, shown: int) -> list[Figure]:
     if found.verdict == "refused":
         return []
     missing = Markup(
-        "<p>None: this recording does not excite a whole band of frequencies evenly, or a controller answers to noise "
-        "there. A recording with a multisine or a chirp, repeated three times or more, would tell resonances.</p>"
+        "<p>None: this recording does not excite a continuous frequency band, or a controller responds to noise there. "
+        "A multisine or chirp, repeated three times or more, would show resonances.</p>"
     )
     return [Figure(title="Bode plot", drawing=missing)]
 

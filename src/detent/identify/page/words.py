@@ -22,14 +22,14 @@ _CONSTANTS = {
     "coulomb": ("Coulomb friction", "at any speed; constant forces are part of it"),
     "viscous": ("viscous friction", "grows with speed"),
     "static": ("static friction", "just before standstill"),
-    "stribeck": ("Stribeck velocity", "below it friction rises to the static one"),
+    "stribeck": ("Stribeck velocity", "below it friction rises to static friction"),
     "pendulum": ("weight", "times the sine of the angle"),
     "pendulum.across": ("weight, across", "times the cosine of the angle"),
-    "spring": ("spring", "effort per way from position 0"),
+    "spring": ("spring", "effort per distance from position 0"),
     "loss": ("share lost in the transmission", ""),
     "delay": ("delay of the effort", "how much later it acts than it was recorded"),
 }
-"""Names of constants, and what they say."""
+"""Names of constants, and what they mean."""
 
 _WAYS = {"positive": "in positive direction", "negative": "in negative direction"}
 SINCE = "time since the recording began"

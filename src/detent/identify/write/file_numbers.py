@@ -1,6 +1,6 @@
 """What logs say in numbers of an axis file: identified constants, each with its interval, and the limits they show.
 
-An axis file knows forces, masses, and friction of two masses; a log knows what its effort did to all that moves. So
+An axis file has forces, masses, and friction of two masses; a log shows what its effort did to the moving mass. So
 the effort is converted to a force by what the file says of its drive, and what the file states beside a number, such as
 the friction of the load, is taken off it.
 """
@@ -142,7 +142,7 @@ class Contrast:
         """Give it as one line."""
         unit = self.found.unit
         limits = f"{format_quantity(self.found.low, unit)} to {format_quantity(self.found.high, unit)}"
-        return f"{self.name}: the file says {format_quantity(self.stated, unit)}, the log {limits}"
+        return f"{self.name}: the file states {format_quantity(self.stated, unit)}, the log {limits}"
 
 
 def contrasts(found: Identification, spec: CascadeSpec) -> list[Contrast]:
@@ -212,7 +212,7 @@ class FileNumbers:
         if total <= rest and "mass" in self._trusted:
             unit = self._unit("kg")
             raise DetentError(
-                f"{base.axis.name}: got {format_quantity(total, unit)} for all that moves; expected: more than "
+                f"{base.axis.name}: got {format_quantity(total, unit)} for the total moving mass; expected: more than "
                 f"{format_quantity(rest, unit)}, which the axis file states without {key}; correct the axis file"
             )
         text = f"with the other {format_quantity(rest, self._unit('kg'))} of this file; " if rest else ""
@@ -234,7 +234,10 @@ class FileNumbers:
             offset = stated
         if base is None or offset != base.mechanics.friction.offset:
             trusted = {"coulomb.positive", "coulomb.negative"} <= self._trusted
-            text = "half of what the directions differ by: in motion nothing tells it from an uneven friction"
+            text = (
+                "half of the difference between directions: in motion it cannot be separated from "
+                "direction-dependent friction"
+            )
             yield Number("mechanics.friction.offset", offset, self._unit("N"), text, trusted)
         for way, sign in zip(_WAYS, (1.0, -1.0), strict=True):
             yield from self._one_way(way, sign * offset, max(needs[way] - sign * offset, 0.0), _direction(load, way))
@@ -250,7 +253,7 @@ class FileNumbers:
         yield from self._low_speed(way, offset, coulomb, load)
         if f"viscous.{way}" in self._known:
             value = self._value(f"viscous.{way}") - load.viscous
-            text = "came out below 0; " if value < 0 else ""
+            text = "negative; " if value < 0 else ""
             yield self._make(f"{table}.viscous", max(value, 0.0), "N*s/m", f"viscous.{way}", text)
 
     def _low_speed(self, way: str, offset: float, coulomb: float, load: DirectionTable) -> Iterator[Number]:
@@ -259,7 +262,7 @@ class FileNumbers:
         if name not in self._known:
             # The log shows none of its own: never below Coulomb friction.
             if base is None or _direction(base.mechanics.friction, way).static < coulomb:
-                note, trusted = "none above Coulomb friction shows in the log", f"coulomb.{way}" in self._trusted
+                note, trusted = "none above Coulomb friction is visible in the log", f"coulomb.{way}" in self._trusted
                 yield Number(f"{table}.static", coulomb, self._unit("N"), note, trusted)
             return
         on_load = load.static - load.coulomb if load.stribeck else 0.0

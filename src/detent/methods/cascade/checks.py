@@ -55,12 +55,12 @@ def _masses(spec: CascadeSpec) -> Iterator[Contradiction]:
         otherwise = ", or leave [mechanics.coupling] out"
     for side, mass in masses.items():
         if mass < LEAST_MASS:
-            key, what = f"mechanics.{side}_mass", f"what moves on the {side}'s side of the coupling"
-            what = what if mechanics.coupling else "all that moves"
-            allowed = f"such that {what} comes to at least {LEAST_MASS:g} {spec.unit('kg')}"
+            key, what = f"mechanics.{side}_mass", f"the mass on the {side} side of the coupling"
+            what = what if mechanics.coupling else "the total moving mass"
+            allowed = f"such that {what} is at least {LEAST_MASS:g} {spec.unit('kg')}"
             yield wrong(f"{key} mechanics.coupling.stiffness", allowed, f"state {key}{otherwise}")
     if mechanics.pendulum > 0 and spec.axis.motion == "linear":
-        here = "a load hangs from an axis that turns; a weight is mechanics.weight"
+        here = "only a rotary axis can have a pendulum load; use mechanics.weight"
         allowed = f"0 N*m where axis.motion is linear: {here}"
         yield wrong("mechanics.pendulum axis.motion", allowed, put("mechanics.pendulum", '"0 N*m"'))
 
@@ -80,10 +80,10 @@ def _to_begin_with(spec: CascadeSpec, name: str) -> str:
         return ""
     bandwidth = min(QUICK / dead_time(spec), 2 * math.pi * 20)
     if name == "position_gain":
-        return f", such as {bandwidth / 4:.2g} to begin with"
+        return f", such as {bandwidth / 4:.2g} to start with"
     unit, power = ("V*s/m", 1) if name == "velocity_gain" else ("V/m", 2)
     gain = bandwidth**power * spec.mass / spec.effort_per_command / 2 ** (2 * (power - 1))
-    return f", such as {at_most(gain, spec.unit(unit), 2)} to begin with"
+    return f", such as {at_most(gain, spec.unit(unit), 2)} to start with"
 
 
 def _is_solid(spec: CascadeSpec) -> bool:
@@ -108,7 +108,7 @@ def _encoders(spec: CascadeSpec) -> Iterator[Contradiction]:
             yield wrong(f"{name}.velocity_span {name}.delay", allowed, fewer)
     for name, table in tables.items():
         if 0 < table.resolution < finest:
-            allowed = f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be told apart"
+            allowed = f"0 {unit}, or at least {text(finest, unit)}: more counts cannot be distinguished"
             coarser = remedy_of(spec).least(f"{name}.resolution", finest)
             yield wrong(f"{name}.resolution limits.travel", allowed, coarser)
 
@@ -118,7 +118,10 @@ def _places(spec: CascadeSpec) -> Iterator[Contradiction]:
     start, low, high, unit = spec.mechanics.start_position, spec.limits.lowest, spec.highest, spec.unit("m")
     yield from common.static_friction(directions(spec), spec.unit("N"))
     if not low <= start <= high:
-        key, allowed = "mechanics.start_position", f"from {text(low, unit)} to {text(high, unit)}, the way of the axis"
+        key, allowed = (
+            "mechanics.start_position",
+            f"from {text(low, unit)} to {text(high, unit)}, the travel of the axis",
+        )
         nearest = put(key, f'"{low if start < low else high!r} {unit}"')
         yield wrong(f"{key} limits.travel limits.lowest", allowed, nearest)
 
@@ -183,7 +186,7 @@ def _drive(spec: CascadeSpec) -> Iterator[Contradiction]:
     limits, largest, remedy = spec.limits, spec.largest_command, remedy_of(spec)
     moved = 0.5 * limits.effort / min(_ends(spec)) * spec.method.sample_period**2
     if moved > limits.travel:
-        here = f"here {text(moved, spec.unit('m'))}: no loop stands that"
+        here = f"here {text(moved, spec.unit('m'))}: no loop tolerates that"
         keys = "limits.effort mechanics.load_mass mechanics.motor_mass method.sample_period"
         allowed = f"such that it moves the lightest mass by up to limits.travel in a sample, {here}"
         yield wrong(keys, allowed, remedy.most("limits.effort", limits.effort * limits.travel / moved))
@@ -197,7 +200,7 @@ def _supervision(spec: CascadeSpec) -> Iterator[Contradiction]:
     """Limits of the loops let a move pass and end."""
     method, speed, remedy = spec.method, spec.limits.speed, remedy_of(spec)
     if method.structure == "cascade" and method.velocity_limit < speed:
-        allowed = f"at least limits.speed, {text(speed, spec.unit('m/s'))}; left out it is 1.25 x limits.speed"
+        allowed = f"at least limits.speed, {text(speed, spec.unit('m/s'))}; its default is 1.25 x limits.speed"
         yield wrong("method.velocity_limit limits.speed", allowed, remedy.least("method.velocity_limit", speed))
     if method.following_error <= method.in_position:
         key, allowed = "method.following_error", f"above method.in_position, {text(method.in_position, spec.unit('m'))}"
@@ -207,7 +210,7 @@ def _supervision(spec: CascadeSpec) -> Iterator[Contradiction]:
 
 
 RULES = (_motor, _masses, _gains, _encoders, _places, _rate, _drive, _supervision)
-"""Contradictions are told in this order."""
+"""Contradictions are reported in this order."""
 
 
 # ---- cautions
@@ -226,10 +229,10 @@ def _loops(m: CascadeFigures) -> Iterator[Caution]:
     if margin < LEAST_GAIN_MARGIN:
         value = f"gain margin {margin:.3g}, spectral radius {loop.spectral_radius:.4f}"
         limit = f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1 the loops are unstable"
-        consequence = "the axis swings, and the swing grows until the command is limited"
-        remedy = "lower all gains, those of integrals and of the position first, or shorten the dead time"
+        consequence = "the axis oscillates with growing amplitude until the command saturates"
+        remedy = "lower all gains, starting with the integral and position gains, or shorten the dead time"
         if margin >= 1:
-            consequence = "a little more gain or less mass, and the axis swings"
+            consequence = "with slightly more gain or less mass the axis oscillates"
         if margin > 0:
             remedy = _lowered(m, margin / LEAST_GAIN_MARGIN * (1 - 1e-3))
         yield Caution("stability of the loops", value, limit, consequence, remedy)
@@ -241,7 +244,7 @@ def _loops(m: CascadeFigures) -> Iterator[Caution]:
         if inner.crossover > 0 and inner.phase < LEAST_PHASE_MARGIN:
             value, limit = text(inner.phase, "rad", 3), f"at least {text(LEAST_PHASE_MARGIN, 'rad')}"
             remedy = f"lower {gain}, or shorten the dead time of {text(dead_time(m.spec), 's', 3)}"
-            yield Caution(f"phase margin of the {name}", value, limit, "it rings after every change", remedy)
+            yield Caution(f"phase margin of the {name}", value, limit, "it rings after every setpoint change", remedy)
 
 
 def _lowered(m: CascadeFigures, share: float) -> str:
@@ -262,12 +265,12 @@ def _bandwidth(m: CascadeFigures) -> Iterator[Caution]:
     near = NEAR_RESONANCE * m.anti_resonance
     if 0 < inner < SLOWER * outer:
         limit = f"up to half that of the velocity loop, {text(inner / SLOWER, 'Hz')}"
-        consequence = "the velocity loop is too slow for it, and a move overshoots"
+        consequence = "the velocity loop is too slow for it, and moves overshoot"
         remedy = f"lower method.position_gain, {method.position_gain:.4g}, or raise method.velocity_gain"
         yield Caution("bandwidth of the position loop", text(outer, "Hz"), limit, consequence, remedy)
     if inner > near > 0 and method.feedback.velocity == "motor":
         limit = f"up to half the anti-resonance, {text(near, 'Hz')}"
-        consequence = "it holds the motor while the load swings on its coupling, hardly damped"
+        consequence = "it holds the motor while the load oscillates on its coupling with hardly any damping"
         remedy = _lowered(m, 0.99 / loop.velocity_level(near))
         yield Caution("bandwidth of the velocity loop", text(inner, "Hz"), limit, consequence, remedy)
 
@@ -277,12 +280,18 @@ def _position(m: CascadeFigures) -> Iterator[Caution]:
     spec, method, coupling, unit = m.spec, m.spec.method, m.spec.mechanics.coupling, m.spec.unit("m")
     count = spec.encoder_of("position").resolution
     if coupling is not None and coupling.backlash > 0 and method.feedback.position == "load" and m.integrates:
-        limit = "none, where the position is that of the load and there is an integral"
-        consequence, remedy = "at rest the motor hunts from flank to flank", put("method.feedback.position", '"motor"')
+        limit = "none, if the position loop uses the load encoder and has an integral"
+        consequence, remedy = (
+            "at rest the motor hunts across the backlash (limit cycle)",
+            put("method.feedback.position", '"motor"'),
+        )
         yield Caution("backlash in the position loop", text(coupling.backlash, unit), limit, consequence, remedy)
     if method.in_position < count:
         key, limit = "method.in_position", f"at least a count of the encoder, {text(count, unit)}"
-        consequence, remedy = "one count off, and the axis is not in position", remedy_of(spec).least(key, count)
+        consequence, remedy = (
+            "an error of one count already counts as out of position",
+            remedy_of(spec).least(key, count),
+        )
         yield Caution(key, text(method.in_position, unit), limit, consequence, remedy)
     table, most = spec.encoder_of("velocity"), LARGEST_JUMP * spec.largest_command
     name = "encoder" if spec.method.feedback.velocity == "motor" else "load_encoder"
@@ -292,7 +301,11 @@ def _position(m: CascadeFigures) -> Iterator[Caution]:
         limit = f"up to a tenth of the largest command, {text(most, 'V')}"
         remedy = put(f"{name}.velocity_span", span) if fits else f"state {name}.velocity_filter, or use a finer encoder"
         yield Caution(
-            "command of one count of velocity", text(m.jump, "V"), limit, "the drive is noisy even at rest", remedy
+            "command noise from velocity quantization",
+            text(m.jump, "V"),
+            limit,
+            "the drive is noisy even at rest",
+            remedy,
         )
 
 
@@ -304,18 +317,20 @@ def _force(m: CascadeFigures) -> Iterator[Caution]:
     most = available * MOST_COMMAND
     if loose >= strongest:
         limit = f"below the largest force, {text(strongest, unit)}"
-        consequence = "there are places where the axis never breaks loose"
+        consequence = "the axis cannot break away everywhere"
         remedy = "raise limits.effort, drive.command_limit or the amplifier's limit"
         yield Caution("friction and weight", text(loose, unit), limit, consequence, remedy)
     elif hold >= most:
-        limit = f"below what the drive has at that speed, {text(available, unit)}"
+        limit = f"below what the drive can deliver at that speed, {text(available, unit)}"
         remedy = "lower limits.speed, or raise drive.command_limit or limits.effort"
-        yield Caution("force at limits.speed", text(hold, unit), limit, "the following error grows without end", remedy)
+        yield Caution(
+            "force at limits.speed", text(hold, unit), limit, "the following error grows without bound", remedy
+        )
     elif needed > most:
-        limit = f"up to 95 % of what the drive has at limits.speed, {text(most, unit)}"
-        consequence = "the command is limited and the axis falls behind as it speeds up"
+        limit = f"up to 95 % of what the drive can deliver at limits.speed, {text(most, unit)}"
+        consequence = "the command saturates and the axis falls behind while accelerating"
         remedy = remedy_of(spec).most("limits.acceleration", (most - hold) / spec.mass)
-        yield Caution("force of an acceleration", text(needed, unit), limit, consequence, remedy)
+        yield Caution("acceleration force", text(needed, unit), limit, consequence, remedy)
 
 
 def _current(m: CascadeFigures) -> Iterator[Caution]:
@@ -339,17 +354,18 @@ def _following(m: CascadeFigures) -> Iterator[Caution]:
     integral = "state method.integral" if method.structure == "pid" else "state method.velocity_integral"
     if error >= method.following_error:
         limit = f"below method.following_error, {text(method.following_error, unit)}"
-        consequence = "the drive goes off on a move at full speed"
-        wider = remedy.least("method.following_error", 1.5 * error, "raise the feed-forward of velocity")
+        consequence = "the drive trips on a move at full speed"
+        wider = remedy.least("method.following_error", 1.5 * error, "raise the feedforward of velocity")
         yield Caution("following error at limits.speed", text(error, unit), limit, consequence, wider)
     if demand > method.velocity_limit:
         limit = f"up to method.velocity_limit, {text(method.velocity_limit, speed)}"
         consequence = (
-            "without an integral friction slows the axis below its reference, and the demand cannot make up for it"
+            "without an integral, friction slows the axis below its reference, and the velocity demand is too "
+            "limited to compensate"
         )
         wider = remedy.least("method.velocity_limit", demand, integral)
         yield Caution("velocity demand at limits.speed", text(demand, speed), limit, consequence, wider)
     if m.resting_error > method.in_position:
         limit = f"up to method.in_position, {text(method.in_position, unit)}"
-        consequence = "friction or weight may hold the axis outside, and a move then fails"
+        consequence = "friction or weight may hold the axis outside the window, and the move then fails"
         yield Caution("error at rest", text(m.resting_error, unit), limit, consequence, integral)

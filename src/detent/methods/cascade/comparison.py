@@ -1,6 +1,6 @@
-"""One move of a cascade axis in four ways: trapezoid or limited jerk, with feed-forward by the axis's constants or not.
+"""One move of a cascade axis in four variants: trapezoid or jerk-limited, with and without feedforward.
 
-A loop without feed-forward moves only as far as its error tells it to: the axis lags in proportion to the speed. A
+A loop without feedforward moves only as far as its error tells it to: the axis lags in proportion to the speed. A
 trapezoid demands a jump of the force, which makes a compliant coupling swing; a ramp of the force as long as one swing
 hardly does.
 """
@@ -31,7 +31,7 @@ WATCHED_TIME, SWINGS = 0.5, 4  # how long it is watched after the reference has 
 REST_TIME = 0.1  # time the axis stands before the move [s]
 SHOWN_SWINGS = 10  # swings of the coupling that are shown after the end of the reference
 
-SHAPES, FEEDS = ("trapezoid", "limited jerk"), ("no feed-forward", "feed-forward")
+SHAPES, FEEDS = ("trapezoid", "jerk-limited"), ("no feedforward", "feedforward")
 
 COLOURS = dict(zip(SHAPES, ("left", "speed"), strict=True))
 DASHES = dict(zip(FEEDS, ((5, 4), None), strict=True))
@@ -69,9 +69,9 @@ class ProfileComparison(ComparisonOnScreen):
     jerk: float  #: limit of its jerk
     stated: bool  #: the jerk is that of the axis file; else the one that `smooth_jerk` proposes
     frequency: float  #: of the load against a motor that is held [Hz]; NaN for a rigid axis
-    tolerance: float  #: error that counts as in position
+    tolerance: float  #: in-position window
     rotary: bool  #: lengths are angles
-    cases: tuple[ProfileCase, ...]  #: by shape, then by feed-forward
+    cases: tuple[ProfileCase, ...]  #: by shape, then by feedforward
 
     @property
     def units(self) -> Units:
@@ -88,7 +88,7 @@ class ProfileComparison(ComparisonOnScreen):
     @property
     def table(self) -> TextTable:
         """The figures of the four cases."""
-        heads = ("profile", "takes", "largest following error", "final approach", "twist in it", "peak command")
+        heads = ("profile", "takes", "largest following error", "final approach", "residual twist", "peak command")
         rows = [
             (
                 case.name,
@@ -100,7 +100,7 @@ class ProfileComparison(ComparisonOnScreen):
             )
             for case in self.cases
         ]
-        title = f"{self.move}, in four ways".replace(GAP, " ")
+        title = f"{self.move}, in four variants".replace(GAP, " ")
         return TextTable(title, heads, [tuple(cell.replace(GAP, " ") for cell in row) for row in rows])
 
     def figures(self) -> tuple[Figure, ...]:
@@ -119,11 +119,11 @@ class ProfileComparison(ComparisonOnScreen):
 
 def _move_figure(found: ProfileComparison) -> Figure:
     """Speed of both references, and the following error of the four cases."""
-    jerk = "the jerk of the axis file" if found.stated else "a jerk chosen for it, as the axis file states none"
+    jerk = "the jerk of the axis file" if found.stated else "a default jerk, as the axis file states none"
     caption = (
-        f"{found.move} in four ways: as a trapezoid of the speed and with {jerk}, each without feed-forward "
-        "(dashed) and with it. Look for: without feed-forward the axis lags in proportion to its speed, whatever the "
-        "profile; with it an error is left where the acceleration jumps."
+        f"{found.move} in four variants: with a trapezoidal velocity profile and with {jerk}, each without feedforward "
+        "(dashed) and with it. Without feedforward the following error is proportional to speed, whatever the "
+        "profile; with it an error remains where the acceleration steps."
     )
     t, scale = found.cases[-1].t, found.units.speed
     asked = {case.shape: np.interp(t, case.t, case.speed) * scale.factor for case in found.cases}
@@ -131,7 +131,7 @@ def _move_figure(found: ProfileComparison) -> Figure:
     speed = Panel(name="profile-speed", label=f"speed [{scale.name}]", height=150, zero=True, curves=speeds)
     following = [np.interp(t, case.t, case.following) for case in found.cases]
     lag = _case_panel(found, "profile-following", "following error", following)
-    title = "What profile and feed-forward are worth: the same move in four ways"
+    title = "Effect of profile and feedforward: the same move in four variants"
     charts = time_charts(Timeline(name="profiles", t=t, label="time since the move began"), [speed, lag])
     return Figure(title=title, caption=caption, charts=charts)
 
@@ -139,21 +139,21 @@ def _move_figure(found: ProfileComparison) -> Figure:
 def _twist_figure(found: ProfileComparison) -> Figure:
     """Twist of the coupling, each case from the end of its own reference on."""
     caption = (
-        f"How far the motor is ahead of the load once the reference has ended. Against a motor that its loop holds the "
-        f"load swings at {number(found.frequency)}{GAP}Hz. Look for: the swing that a jump of the acceleration leaves "
-        "behind, and what a ramp of about a swing's length makes of it. Without feed-forward (dashed) the axis still "
-        "brakes when its reference has ended."
+        f"Twist of the coupling after the reference has ended. With the motor held by its loop the load oscillates "
+        f"at {number(found.frequency)}{GAP}Hz. Look for: the oscillation left by a step in acceleration, and how a "
+        "ramp about one period long reduces it. Without feedforward (dashed) the axis is still braking when its "
+        "reference ends."
     )
     longest = min(float(case.t[-1]) - case.duration for case in found.cases)
     t = np.linspace(0.0, min(longest, SHOWN_SWINGS / found.frequency), 1200)
     twists = [np.interp(t + case.duration, case.t, case.twist) for case in found.cases]
     panel = _case_panel(found, "profile-twist", "twist", twists)
     charts = time_charts(Timeline(name="twist", t=t, label="time since the reference ended"), [panel])
-    return Figure(title="What is left swinging", caption=caption, charts=charts)
+    return Figure(title="Residual vibration", caption=caption, charts=charts)
 
 
 def _case_panel(found: ProfileComparison, name: str, label: str, values: list[Numbers]) -> Panel:
-    """One curve [m] for each case: colour by profile, dashes without feed-forward."""
+    """One curve [m] for each case: colour by profile, dashes without feedforward."""
     scale = found.units.small(max(float(np.abs(one).max(initial=0.0)) for one in values))
     curves = [
         Curve(label=case.name, colour=COLOURS[case.shape], dash=DASHES[case.feed], width=1.8, y=one * scale.factor,
@@ -170,8 +170,9 @@ def _table_figure(found: ProfileComparison) -> Figure:
         for case, (name, takes, error, *rest) in zip(found.cases, found.table.rows, strict=True)
     ]
     caption = (
-        "Settling counts from the end of the reference until the load stays within "
-        f"{found.units.error(found.tolerance)} of the target. Twist: of the coupling after that end, peak to peak."
+        "Settling time counts from the end of the reference until the load stays within "
+        f"{found.units.error(found.tolerance)} of the target. Residual twist: of the coupling after the end of "
+        "the reference, peak to peak."
     )
     return Figure(title="In figures", caption=caption, table=Table(heads=found.table.on_page.heads, rows=rows))
 
@@ -180,7 +181,7 @@ def _table_figure(found: ProfileComparison) -> Figure:
 
 
 def compare_profiles(spec: CascadeSpec, *, progress: Progress | None = None) -> ProfileComparison:
-    """Make one move in four ways on the axis of `spec`."""
+    """Make one move in four variants on the axis of `spec`."""
     limits = motion_limits(spec)
     jerk = limits.jerk if math.isfinite(limits.jerk) else smooth_jerk(spec)
     found: list[ProfileCase] = []

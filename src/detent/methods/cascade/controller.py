@@ -34,7 +34,7 @@ class LimitParams(Registers):
     highest: f8 = register("upper end of the travel, with the window", unit="m")
     place_on_load: u1 = register("ends of the travel: 0 encoder of the motor, 1 of the load")
     breaking: f8 = register("magnitude of the command that breaks the axis loose", unit="V")
-    window: f8 = register("position error that counts as in position", unit="m")
+    window: f8 = register("position in-position window", unit="m")
     arrival: i8 = register("samples in the window until the axis is in position", unit="count")
 
 

@@ -1,6 +1,6 @@
 """What follows from a cascade specification: masses, resonances, dead time, bandwidths, what the drive can do.
 
-Symbols: ``m`` all that moves, ``m1``, ``m2`` what moves at motor and load, ``k``, ``d`` stiffness and damping of the
+Symbols: ``m`` the moving mass, ``m1``, ``m2`` what moves at motor and load, ``k``, ``d`` stiffness and damping of the
 coupling, ``T`` sample period, ``Kp``, ``Kv`` gains of position and velocity loop, ``v``, ``a`` limits.
 """
 
@@ -81,7 +81,7 @@ class CascadeFigures:
         return max(self.spec.friction(1).static + weight, self.spec.friction(-1).static - weight) + pendulum
 
     def _left(self, sense: int) -> float:
-        """Command at limits.speed that feed-forward leaves to the loops, and an integral does not take over [V]."""
+        """Command at limits.speed that feedforward leaves to the loops, and an integral does not take over [V]."""
         if self.integrates:
             return 0.0
         spec, shares, friction = self.spec, self.spec.method.feed_forward, self.spec.friction(sense)
@@ -151,7 +151,7 @@ def _masses(m: CascadeFigures) -> Iterator[Derived]:
     rotor = "" if m.spec.motor is None else " + rotor / (travel per radian)^2"
     yield m.figure(f"moving {name} m", m.spec.mass, "kg", f"motor_mass + load_mass{rotor}")
     if m.spec.mechanics.coupling is not None:
-        yield m.figure(f"{name} on the motor's side m1", m.spec.motor_mass, "kg", f"motor_mass{rotor}")
+        yield m.figure(f"motor-side {name} m1", m.spec.motor_mass, "kg", f"motor_mass{rotor}")
 
 
 def _swings(m: CascadeFigures) -> Iterator[Derived]:
@@ -165,7 +165,7 @@ def _swings(m: CascadeFigures) -> Iterator[Derived]:
     yield m.figure("anti-resonance", m.anti_resonance, "Hz", "sqrt(k / m2) / 2 pi")
     yield m.figure("resonance", resonance / (2 * math.pi), "Hz", "sqrt(k (1/m1 + 1/m2)) / 2 pi")
     formula = "d (1/m1 + 1/m2) / (2 x 2 pi resonance)"
-    yield Derived("damping of the resonance", damping, "", f"{damping:.3g}", formula)
+    yield Derived("damping ratio of the resonance", damping, "", f"{damping:.3g}", formula)
 
 
 def _clocks(m: CascadeFigures) -> Iterator[Derived]:
@@ -173,7 +173,7 @@ def _clocks(m: CascadeFigures) -> Iterator[Derived]:
     formula = "T (1/2 + drive.delay + encoder's delay + velocity_span / 2) + velocity_filter"
     yield m.figure("dead time of the velocity loop", dead_time(m.spec), "s", formula)
     if m.spec.encoder_of("velocity").resolution > 0:
-        yield m.figure("velocity of one count", m.counted_velocity, "m/s", "resolution / (velocity_span x T)")
+        yield m.figure("velocity resolution", m.counted_velocity, "m/s", "resolution / (velocity_span x T)")
 
 
 def _drive(m: CascadeFigures) -> Iterator[Derived]:
@@ -181,43 +181,43 @@ def _drive(m: CascadeFigures) -> Iterator[Derived]:
     spec, speed, acceleration = m.spec, m.speed, m.spec.limits.acceleration
     if spec.motor is not None:
         yield m.figure("motor speed at limits.speed", speed / spec.radius, "rad/s", "v / travel per radian")
-    formula = "of converter, drive.max_current and limits.effort the least"
+    formula = "the smallest limit of converter, drive.max_current and limits.effort"
     yield m.figure("largest command", spec.largest_command, "V", formula)
     what = "torque" if spec.axis.motion == "rotary" else "force"
-    formula = "at standstill, by the largest command and current"
+    formula = "at standstill, from the largest command and current"
     yield m.figure(f"largest {what}", spec.largest_effort, "N", formula)
     hardest = m.needed(speed, acceleration)
-    yield m.figure(f"{what} of an acceleration", hardest, "N", "m a + friction at limits.speed + weight")
+    yield m.figure(f"acceleration {what}", hardest, "N", "m a + friction at limits.speed + weight")
     command = (hardest / (1.0 - spec.mechanics.transmission_loss) + spec.back_emf_drag * speed) / m.per_command
-    yield m.figure("command of an acceleration", command, "V", "that, and back-EMF")
+    yield m.figure("acceleration command", command, "V", "for this force, plus back-EMF")
     if spec.motor is not None and spec.drive.input == "current":
         voltage = spec.motor.resistance * (hardest / spec.force_constant) + spec.emf_constant * speed
-        formula = "R x current of an acceleration + back-EMF at limits.speed: the amplifier needs as much"
-        yield m.figure("voltage of the motor", voltage, "V", formula)
+        formula = "R x acceleration current + back-EMF at limits.speed: the supply must provide this"
+        yield m.figure("motor voltage", voltage, "V", formula)
     if spec.holding > 0:
         yield m.figure("command that holds the weight", spec.holding / m.per_command, "V", "at rest")
-    yield m.figure("time of an acceleration", speed / acceleration, "s", "v / a, jerk aside")
-    yield m.figure("way of an acceleration", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk aside")
+    yield m.figure("acceleration time", speed / acceleration, "s", "v / a, jerk neglected")
+    yield m.figure("acceleration distance", speed**2 / (2 * acceleration), "m", "v^2 / (2 a), jerk neglected")
 
 
 def _loops(m: CascadeFigures) -> Iterator[Derived]:
     """Bandwidths and margins of the exact linear model."""
     for name, margin in (("velocity loop", m.loop.velocity_loop), ("position loop", m.loop.position_loop)):
         if margin.crossover > 0:
-            formula = "the open loop's gain falls below 1; dead times, filters and resonance included"
+            formula = "gain crossover of the open loop; dead times, filters and resonance included"
             yield m.figure(f"bandwidth of the {name}", margin.crossover, "Hz", formula)
             text = format_quantity(margin.phase, "rad", 3)
-            yield Derived(f"phase margin of the {name}", margin.phase, "rad", text, "smallest over all crossings")
-    formula = "factor of the whole loop's gain at which a mode no longer decays"
+            yield Derived(f"phase margin of the {name}", margin.phase, "rad", text, "smallest over all gain crossovers")
+    formula = "factor on the overall loop gain at which a mode no longer decays"
     yield Derived("gain margin", m.loop.gain_margin, "", f"{m.loop.gain_margin:.3g}", formula)
 
 
 def _errors(m: CascadeFigures) -> Iterator[Derived]:
     """How the axis follows and how it rests."""
-    formula = "((1 - share) v + command left by feed-forward / Kv, unless there is an integral) / Kp"
+    formula = "((1 - share) v + command not fed forward / Kv, 0 with an integral) / Kp"
     if m.spec.method.structure == "pid":
-        formula = "(command left by feed-forward + Kd (1 - share) v) / proportional; 0 with an integral"
+        formula = "(command not fed forward + Kd (1 - share) v) / proportional; 0 with an integral"
     yield m.figure("following error at limits.speed", m.following_error, "m", formula)
     if not m.integrates:
-        formula = "up to: static friction and weight not fed forward / stiffness of the loop at rest"
+        formula = "at most: static friction and weight not fed forward / static loop stiffness"
         yield m.figure("error at rest", m.resting_error, "m", formula)

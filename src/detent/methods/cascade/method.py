@@ -19,9 +19,9 @@ class CascadeMethod(Method[CascadeSpec]):
     """Position over velocity loop, the usual servo of today."""
 
     name = "cascade"
-    title = "cascade: position over velocity loop, linear or rotary, as servo drives have it"
+    title = "cascade: position loop around a velocity loop, linear or rotary, as in standard servo drives"
     jobs = "a list of moves (.csv, .toml), or a recording to replay"
-    pace = "as its file has it, every sample"
+    pace = "from the axis file, every sample"
     spec = CascadeSpec
     rotary: type[CascadeSpec] | None = rotary_model(CascadeSpec)
     catalogue = DC_MOTORS
@@ -39,7 +39,7 @@ class CascadeMethod(Method[CascadeSpec]):
     takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
     linear_loops = "loop:linear_loops"
     leaves_out = (
-        "Left out: limits, counts, Coulomb and Stribeck friction; both masses move, the flanks of a backlash touch.",
+        "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"

@@ -65,7 +65,7 @@ def cascade_page(
             Section("The whole job", [job] if job else []),
             Section("One move in detail", _move_figures(spec, run, trace)),
             comparison_section(comparisons),
-            Section("Move by move", [_every_move(spec, run)] if run.moves else []),
+            Section("Moves", [_every_move(spec, run)] if run.moves else []),
         ],
         settings=settings or {},
     )
@@ -122,15 +122,12 @@ def _headline(spec: CascadeSpec, run: CascadeRun) -> Headline:
     error, asked = units_of(spec).error, count(run.job.count, "move")
     if not run.done:
         return run_headline(spec.axis.name, run, stopped_after(run, arrived(run), asked, began=bool(run.moves)))
-    lead = (
-        f"{asked} in {duration(run.seconds)}. "
-        f"On the way the axis was never more than {error(run.worst_following)} from where it should be"
-    )
+    lead = f"{asked} in {duration(run.seconds)}. The following error never exceeded {error(run.worst_following)}"
     doubt, rest = "", error(run.worst_error)
     if run.worst_error > run.tolerance:
-        doubt, lead = "Done, but beside its targets", f"{lead}."
+        doubt, lead = "Done, but off target", f"{lead}."
     else:
-        lead += f"; at the end of each move the load stood within {rest} of its target."
+        lead += f"; at the end of each move the load was within {rest} of its target."
     return run_headline(spec.axis.name, run, lead, doubt=doubt, words=("Every move in position", "Not done"))
 
 
@@ -146,7 +143,7 @@ def _cards(spec: CascadeSpec, run: CascadeRun) -> list[Card]:
         below = f"after the reference's end, within {error(run.tolerance)}; {_whose(one.of)}"
         shown.append(card("Longest final approach", milliseconds(one.value), below))
     if one := found.get("peak_following"):
-        below = f"{_whose(one.of)}; the drive goes off at {error(limit)}"
+        below = f"{_whose(one.of)}; the drive trips at {error(limit)}"
         shown.append(card("Largest following error", error(one.value), below, bad=one.value > limit))
     if one := found.get("rest"):
         below = f"of the load, {_whose(one.of)}"
@@ -171,9 +168,9 @@ def _job_figure(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> Figu
     return Figure(
         title="Position, following error and command",
         caption=(
-            "Above: where the axis should be (dashed) and where the load is. Below: the following error, reference "
-            "less what the position loop measures, and the command to the drive. Look for: peaks of the error, and "
-            "whether the command comes near its limit."
+            "Top: reference position (dashed) and load position. Below: the following error (reference minus measured "
+            "position) and the command to the drive. Check: peaks of the error, and whether the command comes "
+            "near its limit."
         ),
         charts=time_charts(timeline, [position, following, command]),
     )
@@ -182,10 +179,10 @@ def _job_figure(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> Figu
 def _panels(spec: CascadeSpec, run: CascadeRun, rows: Stretch, name: str) -> list[Panel]:
     """Position, velocity, following error, command."""
     units = units_of(spec)
-    levels = ((spec.method.following_error, "the drive goes off"), (run.tolerance, "in position"))
+    levels = ((spec.method.following_error, "the drive trips"), (run.tolerance, "in position"))
     places = ("reference", _while_on(run, rows, REFERENCE)), ("load", rows[LOAD])
     speeds = ("reference", _while_on(run, rows, REFERENCE_SPEED)), ("load", rows[LOAD_SPEED])
-    following = ("reference less measured position", _while_on(run, rows, FOLLOWING))
+    following = ("reference minus measured position", _while_on(run, rows, FOLLOWING))
     return [
         pair_panel(f"{name}-position", "position", units.place, *places),
         pair_panel(f"{name}-speed", "velocity", units.speed, *speeds),
@@ -210,16 +207,16 @@ def _move_figures(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> li
     if rows is None:
         return []
     moments = {
-        "the reference sets off": move.begin,
-        "the reference has come to the target": move.arrived,
+        "the reference starts": move.begin,
+        "the reference reaches the target": move.arrived,
         "the load is within the window for good": move.settled,
         "in position: the loop's error was within the window for its time": move.ready,
-        "the drive goes off": move.end if failed else math.nan,
+        "the drive trips": move.end if failed else math.nan,
     }
     events = happened({text: moment - move.begin for text, moment in moments.items()}, move.end - move.begin)
     caption = f"Shown is {'the move that failed' if failed else 'the fastest move'}."
     if run.done:
-        caption += " Look for: how soon the load is at rest once its reference is, and the command where it sets off."
+        caption += " Look for: how soon the load settles after its reference, and the command at the start of the move."
     timeline = Timeline(name="move", t=rows.t, label="time since the move began", events=events)
     charts = time_charts(timeline, _panels(spec, run, rows, "move"))
     shown = Figure(title=f"Move {count(move.number)}", caption=caption, charts=charts, events=events)
@@ -242,14 +239,14 @@ def _rest_figure(
     scale = units.small(min(float(np.abs(off).max()), 20 * window))
     reach = REST_WINDOWS * window * scale.factor
     asked, did = ("reference", _while_on(run, near, REFERENCE) - move.target), ("load", off)
-    panel = pair_panel("move-rest", "position less target", scale, asked, did)
+    panel = pair_panel("move-rest", "position minus target", scale, asked, did)
     panel = replace(panel, span=(-reach, reach), levels=both_sides(window * scale.factor, "in position"))
     caption = (
-        "The end of the same move, magnified: how far the load is from the target. Between the dashed lines, "
+        "The end of the same move, magnified: distance of the load from the target. Between the dashed lines, "
         f"±{units.error(window)}, it counts as in position."
     )
     timeline = Timeline(name="rest", t=near.t, label="time since the move began", events=seen)
-    return [Figure(title="Coming to rest", caption=caption, charts=time_charts(timeline, [panel]), events=seen)]
+    return [Figure(title="Settling", caption=caption, charts=time_charts(timeline, [panel]), events=seen)]
 
 
 # ---- plot areas
@@ -307,12 +304,12 @@ def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
 
     columns: dict[str, Callable[[CascadeMove], str | Cell]] = {
         "move": lambda move: count(move.number),
-        "begin [s]": lambda move: f"{move.begin - run.time_ready:.3f}",
+        "start [s]": lambda move: f"{move.begin - run.time_ready:.3f}",
         f"from [{place}]": lambda move: units.position(move.start),
         f"to [{place}]": lambda move: units.position(move.target),
         "reference [ms]": lambda move: number(round((move.arrived - move.begin) * 1e3, 6)),
         "settled after [ms]": lambda move: number(round(move.settling * 1e3, 6)),
-        "of it final approach [ms]": lambda move: number(round(move.approach * 1e3, 6)),
+        "final approach [ms]": lambda move: number(round(move.approach * 1e3, 6)),
         f"following error [{lag.name}]": following,
         f"overshoot [{off.name}]": lambda move: number(move.overshoot * off.factor, 2),
         f"error [{off.name}]": error,
@@ -322,7 +319,7 @@ def _every_move(spec: CascadeSpec, run: CascadeRun) -> Figure:
     heads = [(name, name != "in position") for name in columns]
     rows = [[cell(move) for cell in columns.values()] for move in run.moves]
     caption = (
-        "Settled is counted from the command; its final approach begins where the reference ends. Following error is "
-        "the largest of the move; error is target less position of the load at the end of the move."
+        "Settling time counts from the command; the final approach starts when the reference ends. Following error is "
+        "the largest of the move; error is target minus load position at the end of the move."
     )
     return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))

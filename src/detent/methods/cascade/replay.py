@@ -119,7 +119,7 @@ class Compared:
 
     @property
     def difference(self) -> Numbers:
-        """Recording less simulation."""
+        """Recording minus simulation."""
         return self.measured - self.simulated
 
     @property
@@ -206,7 +206,7 @@ def run_cascade_replay(
 def recorded_profile(t: Numbers, reference: Numbers, period: float) -> Profile:
     """A recorded reference at the samples of the loops, with its derivatives.
 
-    They are those of a spline, which rings by a hair where the reference stands: a feed-forward against Coulomb
+    They are those of a spline, which rings by a hair where the reference stands: a feedforward against Coulomb
     friction would jump to and fro. Where the recording stands for `STILL` samples on both sides they are 0.
     """
     found = profile_of_recording(t, reference, period)
@@ -281,8 +281,8 @@ def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) 
     if not result.done:
         first = int(np.argmin(finite)) * host.period
         result.failure = (
-            f"the simulated axis ran away {format_quantity(first, 's')} after the begin: its loops are unstable; "
-            "correct the gains, or the plant"
+            f"the simulated axis ran away {format_quantity(first, 's')} after the start: its loops are unstable; "
+            "correct the gains or the plant"
         )
         return
     at = job.t[0] + np.arange(len(seen)) * host.period
@@ -347,29 +347,29 @@ def _cautions(spec: CascadeSpec, result: ReplayRun, seen: Rows) -> list[str]:
         if result.peak_following > limit:
             first = int(np.argmax(errors > limit)) * result.period
             found.append(
-                f"the simulated following error went beyond {format_quantity(limit, way)}, method.following_error, "
-                f"{format_quantity(first, 's')} after the begin: in a run of moves the drive would have gone off"
+                f"the simulated following error exceeded {format_quantity(limit, way)}, method.following_error, "
+                f"{format_quantity(first, 's')} after the start: in a run of moves the drive would have tripped"
             )
     place, limits = seen["plant.machine.load.position"], spec.limits
     if place.min() < limits.lowest or place.max() > spec.highest:
         ends = f"{format_quantity(limits.lowest, way)} to {format_quantity(spec.highest, way)}"
-        found.append(f"the simulated load left the way of the axis, {ends}; widen limits.travel, or look at the log")
+        found.append(f"the simulated load left the travel of the axis, {ends}; widen limits.travel, or look at the log")
     if result.limited > 0:
         whose = f"the recorded {result.open_loop}" if result.open_loop else "the simulated command"
         found.append(
-            f"{whose} is cut off at the limit of this axis, {spec.largest_command:.4g} V of command, for "
+            f"{whose} is clipped at the limit of this axis, {spec.largest_command:.4g} V of command, for "
             f"{format_quantity(result.limited, 's')}; look at limits.effort and drive.command_limit"
         )
     have = {one.name for one in result.compared} | {result.open_loop}
     if not result.job.efforts:
         found.append(
-            "the log states no force, current, voltage or command that could be compared; if it holds one, name its "
-            "column and unit: --column 'voltage=COLUMN [V]'"
+            "the log has no force, current, voltage or command to compare; if there is one, name its column and "
+            "unit: --column 'voltage=COLUMN [V]'"
         )
     missing = [name for name in result.job.efforts if name not in have]
     if missing:
         found.append(
             f'{" and ".join(missing)}: recorded, but an axis with drive.input = "{spec.drive.input}" '
-            f"{'and no [motor] ' if spec.motor is None else ''}has no such figure; not compared"
+            f"{'and no [motor] ' if spec.motor is None else ''}has no such quantity; not compared"
         )
     return found

@@ -29,7 +29,7 @@ def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | No
             level="good" if run.done else "bad",
             verdict="Replayed" if run.done else "Not replayed",
             name=run.job.name,
-            kicker=f"A recording beside the simulated axis {spec.axis.name}",
+            kicker=f"Comparison of a recording with the simulated axis {spec.axis.name}",
             lead=_apart(spec, run) if run.done else f"{run.failure[:1].upper()}{run.failure[1:]}.",
         ),
         cards=[
@@ -52,10 +52,14 @@ def replay_page(spec: CascadeSpec, run: ReplayRun, settings: dict[str, str] | No
 def _apart(spec: CascadeSpec, run: ReplayRun) -> str:
     """How far both are apart, in two sentences."""
     place, error = run.compared[0], units_of(spec).error
-    how = f"gets the recorded {run.open_loop}, its loops open," if run.open_loop else "follows the recorded reference"
+    how = (
+        f"is driven by the recorded {run.open_loop}, with its loops open,"
+        if run.open_loop
+        else "follows the recorded reference"
+    )
     text = (
-        f"For {duration(run.job.seconds)} the simulated axis {how} and is {error(place.rms)} from the "
-        f"recorded position on average (rms), {error(place.peak)} at most."
+        f"For {duration(run.job.seconds)} the simulated axis {how} and deviates from the recorded "
+        f"position by {error(place.rms)} (rms), {error(place.peak)} at most."
     )
     # What drove both, where that can differ.
     moved = ("m", "rad")
@@ -80,13 +84,13 @@ def _curves(spec: CascadeSpec, run: ReplayRun) -> list[Figure]:
     t = run.job.t - run.job.t[0]
     begin, end = magnified(run)
     caption = (
-        "Dashed: the recording. Solid: the simulation, at the same instants. Where both lie on one another the model "
-        "does what the machine did; the difference shows what is left."
+        "Dashed: recording. Solid: simulation, at the same times. Where the curves coincide the model reproduces the "
+        "machine; the difference is plotted below."
     )
     near = (
-        f"The same from {number(begin)}{GAP}s to {number(end)}{GAP}s, where the positions differ most. Look for: "
-        "whether they part where the axis sets off or turns round (friction), where it accelerates (mass), or at speed "
-        "(viscous friction, delay)."
+        f"The same from {number(begin)}{GAP}s to {number(end)}{GAP}s, where the positions differ most. Check whether "
+        "they diverge when the axis starts or reverses (friction), while it accelerates (mass), or at constant "
+        "speed (viscous friction, delay)."
     )
     everything = slice(0, len(t))
     kept = slice(int(np.searchsorted(t, begin)), int(np.searchsorted(t, end, side="right")))
@@ -112,9 +116,9 @@ def _charts(name: str, spec: CascadeSpec, run: ReplayRun, rows: slice) -> list[C
         pair = pair_panel(f"{name}-{index}", one.name, units.of(one.unit), recorded, simulated)
         panels.append(replace(pair, about=f"{one.name}, recorded and simulated, over time"))
         if one.unit in {"m", "rad"}:
-            less = ("recorded less simulated", one.difference[rows])
+            less = ("recorded minus simulated", one.difference[rows])
             off = error_panel(f"{name}-{index}-off", "difference", less, units)
-            panels.append(replace(off, about=f"{one.name}, recorded less simulated, over time"))
+            panels.append(replace(off, about=f"{one.name}, recorded minus simulated, over time"))
     t = run.job.t[rows] - run.job.t[0]
     return time_charts(Timeline(name=name, t=t, label="time since the recording began", unit="s"), panels)
 
@@ -129,10 +133,10 @@ def _table(spec: CascadeSpec, run: ReplayRun) -> Figure:
     ]
     caption = (
         f"Over {count(len(run.job.t))} samples. Relative is the norm of the difference over the norm of the recording. "
-        "What was not recorded (a velocity, the acceleration) comes from both positions alike, low-passed at 100 Hz "
-        "forwards and backwards."
+        "Quantities that were not recorded (velocity, acceleration) are derived from both positions in the same way, "
+        "with a zero-phase low-pass at 100 Hz."
     )
-    return Figure(title="Recording less simulation", caption=caption, table=Table(heads=heads, rows=rows))
+    return Figure(title="Recording minus simulation", caption=caption, table=Table(heads=heads, rows=rows))
 
 
 # ---- for the terminal

@@ -80,7 +80,7 @@ class CascadeRun(RunRecord[MoveJob]):
 
     time_off: float = math.nan  #: when its drive went off; NaN if it did not
     moves: list[CascadeMove] = field(default_factory=list[CascadeMove])  #: in order; the last one may have failed
-    tolerance: float = 0.0  #: error that counts as in position
+    tolerance: float = 0.0  #: in-position window
     max_command: float = 0.0  #: limit of the command [V]
 
     told: ClassVar[tuple[str, ...]] = (
@@ -215,8 +215,8 @@ def _cause(host: CascadeHost) -> str:
         return (
             f"not in position within {format_quantity(method.timeout, 's')} of the end of the reference "
             f"(method.timeout): its error is {error}, method.in_position is {_text(spec, method.in_position)}; "
-            "the drive is off; give the velocity loop an integral or feed-forward against what holds the axis off, or "
-            "widen the window"
+            "the drive is off; add an integral or feedforward to the velocity loop, or widen the "
+            "window"
         )
     return describe_fault(
         guard,
@@ -239,9 +239,9 @@ def _unseen(spec: CascadeSpec, run: CascadeRun) -> list[str]:
         return []
     worst = max(off, key=lambda move: abs(move.error))
     said = (
-        f"{len(off)} of {len(run.moves)} moves were in position while the load stood beside its target, move "
-        f"{worst.number} by {_text(spec, abs(worst.error), 3)}: the encoder of the position loop does not see coupling "
-        "and backlash, or the velocity loop has no integral; "
+        f"{len(off)} of {len(run.moves)} moves were in position while the load was off target, move "
+        f"{worst.number} by {_text(spec, abs(worst.error), 3)}: the position loop's encoder does not see coupling and "
+        "backlash, or the velocity loop has no integral; "
         'state method.feedback.position = "load", or widen method.in_position'
     )
     return [said]

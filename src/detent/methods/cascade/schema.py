@@ -50,7 +50,7 @@ class CascadeAxisTable(AxisTable, frozen=True):
 
     method: Literal["cascade"] = required("control method", '"cascade"')
     motion: Literal["linear", "rotary"] = optional(
-        "whether the axis slides or turns; a rotary one has rad for m, N*m for N and kg*m^2 for kg in every key",
+        "linear or rotary; a rotary axis has rad for m, N*m for N and kg*m^2 for kg in every key",
         "linear",
     )
 
@@ -58,13 +58,15 @@ class CascadeAxisTable(AxisTable, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
-    travel: Length = required("free way between both ends", '"0.5 m"', turned='"360 deg"', gt=0.0, le=1e5)
+    travel: Length = required("free travel between both ends", '"0.5 m"', turned='"360 deg"', gt=0.0, le=1e5)
     lowest: Length = optional("position of the lower end", 0.0, ge=-1e5, le=1e5)
     speed: Velocity = required("largest speed ever commanded", '"0.5 m/s"', turned='"360 deg/s"', gt=0.0, le=1e4)
     acceleration: Acceleration = required(
         "largest acceleration ever commanded", '"5 m/s^2"', turned='"3600 deg/s^2"', gt=0.0, le=1e7
     )
-    jerk: Jerk | None = optional("largest jerk ever commanded; none: trapezoids of the speed", None, gt=0.0, le=1e10)
+    jerk: Jerk | None = optional(
+        "largest jerk ever commanded; none: trapezoidal velocity profile", None, gt=0.0, le=1e10
+    )
     effort: Force = required(
         "largest force (rotary: torque) of the drive on the axis", '"500 N"', turned='"0.9 N*m"', ge=1e-9, le=1e7
     )
@@ -73,14 +75,16 @@ class LimitsTable(Table, frozen=True):
 class CascadeMotorTable(MotorTable, frozen=True):
     """Constants of the DC motor, from a catalogue or stated; the winding's inductance may be neglected."""
 
-    inductance: Inductance = optional("winding; 0: the current follows voltage and speed at once", 0.0, ge=0.0, le=10.0)
+    inductance: Inductance = optional(
+        "winding; 0: the current follows voltage and speed instantly", 0.0, ge=0.0, le=10.0
+    )
 
 
 class DriveTable(Table, frozen=True):
     """Converter and amplifier."""
 
     input: Literal["force", "current", "voltage"] = optional(
-        "what the amplifier imposes: a force (rotary: a torque), the current of the motor, or its voltage",
+        "what the amplifier controls: force (rotary: torque), motor current, or motor voltage",
         "force",
         start='"current"',
     )
@@ -89,9 +93,9 @@ class DriveTable(Table, frozen=True):
         "input current: current per volt of command", 1.0, start='"0.4 A/V"', ge=1e-9, le=1e6
     )
     voltage_gain: float = optional("input voltage: volts at the motor per volt of command", 1.0, ge=1e-6, le=1e6)
-    command_limit: Voltage = optional("largest command that the converter puts out", 10.0, ge=1e-6, le=1e6)
+    command_limit: Voltage = optional("largest output of the converter", 10.0, ge=1e-6, le=1e6)
     command_step: Voltage = optional("step of the converter; 0: none", 0.0, ge=0.0, le=1e3)
-    delay: int = optional("samples until a command acts; 0: in the instant of its sample", 0, ge=0, le=MOST_SAMPLES)
+    delay: int = optional("samples until a command acts; 0: immediately at its sample", 0, ge=0, le=MOST_SAMPLES)
     max_current: Current | None = optional(
         "inputs current and voltage: limit of the amplifier; without it limits.effort decides", None, gt=0.0, le=1e6
     )
@@ -101,9 +105,9 @@ class DirectionTable(Table, frozen=True):
     """Friction in one direction of motion."""
 
     coulomb: Force = optional("friction while moving, at any speed", 0.0, ge=0.0, le=1e7)
-    static: Force = optional("force that breaks loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=2e7)
+    static: Force = optional("breakaway force", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=2e7)
     stribeck: Velocity = optional(
-        "velocity at which 1/e of the difference of both is left; 0: it ends as motion begins", 0.0, ge=0.0, le=1e3
+        "velocity at which 1/e of the difference of both remains; 0: it ends as motion starts", 0.0, ge=0.0, le=1e3
     )
     viscous: Viscosity = optional("friction per speed", 0.0, ge=0.0, le=1e8)
 
@@ -111,7 +115,9 @@ class DirectionTable(Table, frozen=True):
 class FrictionTable(Table, frozen=True):
     """Friction of one mass, each direction for itself."""
 
-    offset: Force = optional("force against the positive direction, whichever way it moves", 0.0, ge=-1e6, le=1e6)
+    offset: Force = optional(
+        "constant force against the positive direction, independent of motion", 0.0, ge=-1e6, le=1e6
+    )
     positive: DirectionTable = Field(default_factory=DirectionTable)
     negative: DirectionTable = Field(default_factory=DirectionTable)
 
@@ -121,7 +127,7 @@ class CouplingTable(Table, frozen=True):
 
     stiffness: Stiffness = required("force per twist", '"20 N/um"', gt=0.0, le=1e12)
     damping: Viscosity = optional("force per difference of the velocities", 0.0, ge=0.0, le=1e8)
-    backlash: Length = optional("free way between both flanks", 0.0, ge=0.0, le=1e3)
+    backlash: Length = optional("free travel between both flanks", 0.0, ge=0.0, le=1e3)
 
 
 class MechanicsTable(Table, frozen=True):
@@ -133,11 +139,11 @@ class MechanicsTable(Table, frozen=True):
         start='"10 mm"', turned='"360 deg"', ge=1e-6, le=1e3,
     )  # fmt: skip
     motor_mass: Mass = optional(
-        "what moves on the motor's side of the coupling, without [motor]'s rotor; rotary: moment of inertia",
+        "mass on the motor side of the coupling, without [motor]'s rotor; rotary: moment of inertia",
         0.0, ge=0.0, le=1e7,
     )  # fmt: skip
     load_mass: Mass = optional(
-        "what moves on the load's side of the coupling; rotary: moment of inertia",
+        "mass on the load side of the coupling; rotary: moment of inertia",
         0.0,
         start='"30 kg"',
         turned='"0.001 kg*m^2"',
@@ -150,7 +156,7 @@ class MechanicsTable(Table, frozen=True):
         "share of the motor's force lost as friction of the transmission, moving or at rest", 0.0, ge=0.0, le=0.95
     )
     start_position: Length = optional(
-        "where the axis stands at power-on", math.nan, derived="0, or the end of the way nearest to it",
+        "axis position at power-on", math.nan, derived="0, or the nearest end of the travel",
         ge=-1e5, le=1e5,
     )  # fmt: skip
     friction: FrictionTable = Field(default_factory=FrictionTable)
@@ -165,8 +171,8 @@ class EncoderTable(Table, frozen=True):
         "travel per count; 0: the position itself", '"1 um"', turned='"0.01 deg"', ge=0.0, le=1e3
     )
     delay: int = optional("samples until a position is read", 0, ge=0, le=MOST_SAMPLES - 1)
-    velocity_span: int = optional("samples that the velocity is a difference over", 1, ge=1, le=MOST_SAMPLES)
-    velocity_filter: Time = optional("time constant of the filter behind it; 0: none", 0.0, ge=0.0, le=10.0)
+    velocity_span: int = optional("number of samples of the velocity difference", 1, ge=1, le=MOST_SAMPLES)
+    velocity_filter: Time = optional("time constant of the velocity filter; 0: none", 0.0, ge=0.0, le=10.0)
 
 
 # What reads the position itself, in the place of an encoder that is not there.
@@ -226,15 +232,18 @@ class MethodTable(Table, frozen=True):
     derivative: VoltagePerVelocity = optional("PID: command per velocity error", 0.0, ge=0.0, le=1e9)
     derivative_filter: Time = optional("PID: time constant of the filter of that error; 0: none", 0.0, ge=0.0, le=10.0)
     in_position: Length = optional(
-        "error that counts as in position", math.nan,
+        "in-position window", math.nan,
         derived="1e-4 x limits.travel, but at least 2 encoder counts", gt=0.0, le=1e5,
     )  # fmt: skip
-    in_position_time: Time = optional("how long it must last", 50e-3, gt=0.0, le=10.0)
+    in_position_time: Time = optional("time in the window until the axis is in position", 50e-3, gt=0.0, le=10.0)
     timeout: Time = optional(
-        "time from the end of the reference until a move that is not in position has failed", 2.0, gt=0.0, le=1000.0
+        "time allowed after the end of the reference until in position; then the move has failed",
+        2.0,
+        gt=0.0,
+        le=1000.0,
     )
     following_error: Length = optional(
-        "position error beyond which the drive goes off", math.nan, derived="0.1 x limits.travel", gt=0.0, le=1e6
+        "position error beyond which the drive switches off", math.nan, derived="0.1 x limits.travel", gt=0.0, le=1e6
     )
     feedback: FeedbackTable = Field(default_factory=FeedbackTable)
     feed_forward: FeedForwardTable = Field(default_factory=FeedForwardTable)

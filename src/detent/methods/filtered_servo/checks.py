@@ -132,7 +132,7 @@ def _gain(spec: FilteredServoSpec) -> Iterator[Contradiction]:
         yield wrong(
             f"{key} method.sample_period encoder.cycles_per_revolution mechanics.moving_mass",
             f"such that a count of the drive word moves the slide by up to {LARGEST_MOVE:g} pulses in a sample, here "
-            f"{moved:.3g}: no servo stands that",
+            f"{moved:.3g}: no servo tolerates that",
             remedy.most(key, value * LARGEST_MOVE / moved),
         )
 
@@ -155,7 +155,7 @@ def _machine(spec: FilteredServoSpec) -> Iterator[Contradiction]:
     yield from common.burst(spec.disturbance.lines.burst, TICK)
 
 
-# Contradictions are told in this order.
+# Contradictions are reported in this order.
 RULES = (_arithmetic, _clocks, _counters, _command, _gain, _machine)
 
 
@@ -179,9 +179,10 @@ def _loop(m: FilteredFigures) -> Iterator[Caution]:
             "stability of the loop",
             f"gain margin {margin:.3g}, spectral radius {m.loop.spectral_radius():.4f}",
             f"a margin of at least {LEAST_GAIN_MARGIN:g}: below 1, and a radius of 1 or more, the loop is unstable",
-            "the following error swings and grows until the drive word is clipped"
+            "the following error oscillates with growing amplitude until the drive word saturates"
             if margin < 1
-            else "a little more gain, less load or a longer sample, and the following error swings and grows",
+            else "with slightly more gain, less load or a longer sample period the following error oscillates with "
+            "growing amplitude",
             f"lower {drive}, shorten method.sample_period, or raise mechanics.moving_mass",
         )
     lagging = m.coefficient < 1 and product < 4
@@ -190,9 +191,9 @@ def _loop(m: FilteredFigures) -> Iterator[Caution]:
             "damping of the loop",
             f"{damping:.3g}" + (f", with A B / K1 = {product:.3g}" if lagging else ""),
             f"at least {LEAST_DAMPING:g}" + (", A B / K1 at least 4" if lagging else ""),
-            "the filter lags as long as the loop itself, and a stop rings (trap 1)"
+            "the filter lag equals that of the loop itself, and stops ring (trap 1)"
             if lagging
-            else "the speed feedback is too weak for this gain, and a stop rings",
+            else "the speed feedback is too weak for this gain, and stops ring",
             f"raise method.{'coefficient or method.' if lagging else ''}scale, or lower {drive}",
         )
 
@@ -204,11 +205,11 @@ def _resolution(m: FilteredFigures) -> Iterator[Caution]:
     if counted < WELL_COUNTED:
         micros = math.ceil(WELL_COUNTED / m.rate * 1e6 * (1 - BARELY))
         value = f"{counted:.3g} pulses in a sample"
-        consequence = f"a count is uncertain by one, {100 / counted:.3g} % of the largest speed"
+        consequence = f"each count is uncertain by one, {100 / counted:.3g} % of the largest speed"
         advice = remedy.exactly("method.sample_period", micros * 1e-6, "use a finer encoder")
         yield Caution("count at limits.speed", value, f"at least {WELL_COUNTED}", consequence, advice)
     if jump > LARGEST_JUMP:
-        allowed, consequence = f"up to {LARGEST_JUMP:g} counts", "the uncertainty of a count makes the force lumpy"
+        allowed, consequence = f"up to {LARGEST_JUMP:g} counts", "quantization of the count makes the force uneven"
         advice = remedy.most("method.scale", LARGEST_JUMP / m.coefficient)
         yield Caution("jump of the drive word for one pulse", f"{jump:.4g} counts, A x B", allowed, consequence, advice)
     if method.filter == "fixed" and lost > SMALL_ERROR * 2**method.fraction_bits:
@@ -224,7 +225,7 @@ def _ramp(m: FilteredFigures) -> Iterator[Caution]:
     least, most = RATE_UNIT / TICK * spec.pulse, (1 << (method.position_bits - 1)) - 1
     if 0 < method.command_acceleration < FINE_RAMP * least * (1 - BARELY):
         value = f"{method.command_acceleration / least:.3g} millionths of a pulse per second in each tick"
-        consequence = "they are rounded down, and the command speeds up more slowly than stated"
+        consequence = "they are rounded down, and the command accelerates more slowly than stated"
         advice = remedy.least("method.command_acceleration", FINE_RAMP * least)
         yield Caution("method.command_acceleration", value, f"at least {FINE_RAMP} of them", consequence, advice)
     if method.command_acceleration == 0 or m.gain_margin < 1:
@@ -250,13 +251,14 @@ def _drive(m: FilteredFigures) -> Iterator[Caution]:
     if m.static >= force:
         allowed = f"below the largest force, {text(force, 'N')}"
         advice = "raise limits.effort or the drive, or lower mechanics.friction"
-        yield Caution("static friction", text(m.static, "N"), allowed, "the slide never breaks loose", advice)
+        yield Caution("static friction", text(m.static, "N"), allowed, "the slide never breaks away", advice)
     elif top < spec.limits.speed:
         yield Caution(
             "drive at limits.speed",
             f"{spec.holding_word(spec.limits.speed):.4g} counts",
             f"up to {spec.word_limit:.4g} counts",
-            f"the largest force holds {text(max(0.0, top), 'm/s')}, and the following error grows without end above it",
+            f"the largest force holds {text(max(0.0, top), 'm/s')}, and the following error grows without bound "
+            "above it",
             remedy.most("limits.speed", top, "raise drive.supply"),
         )
 
@@ -268,13 +270,13 @@ def _acceleration(m: FilteredFigures) -> Iterator[Caution]:
     if spec.method.command_acceleration > left > 0:
         value = text(spec.method.command_acceleration, "m/s^2")
         allowed = f"up to {text(left, 'm/s^2')}, what the drive gives at limits.speed"
-        consequence = "the drive is clipped and the following error grows while the command speeds up"
+        consequence = "the drive saturates and the following error grows while the command accelerates"
         advice = remedy.most("method.command_acceleration", left)
         yield Caution("force for method.command_acceleration", value, allowed, consequence, advice)
     error, window = m.resting_error, m.spec.method.in_position
     if error > window:
         allowed = f"up to method.in_position, {window}"
-        consequence = "the slide rests off its place, and moves end by method.timeout"
+        consequence = "the slide rests off its target, and moves end by method.timeout"
         advice = remedy.least("method.in_position", error, "raise method.position_gain or the drive")
         yield Caution("following error that friction holds", f"up to {error} pulses", allowed, consequence, advice)
 
@@ -290,11 +292,11 @@ def _amplifier(m: FilteredFigures) -> Iterator[Caution]:
         ticks = max(1, math.floor(window / 10 / TICK * (1 + BARELY)))
         value = text(1 / drive.pwm_frequency, "s")
         allowed = f"up to a tenth of the sample period, {text(window / 10, 's')}"
-        consequence = "the drive word waits for the PWM, a delay that the figures of the loop leave out"
+        consequence = "the drive word waits for the PWM, a delay that the loop figures neglect"
         yield Caution("PWM period", value, allowed, consequence, remedy.exactly("drive.pwm_frequency", 1e5 / ticks))
     if drive.amplifier == "voltage" and lag > window / 5:
         allowed = f"up to a fifth of the sample period, {text(window / 5, 's')}"
-        consequence = "the current lags behind the drive word, which the figures of the loop leave out"
+        consequence = "the current lags behind the drive word, which the loop figures neglect"
         advice = remedy.most("motor.inductance", resistance * window / 5)
         yield Caution("electrical time constant", text(lag, "s"), allowed, consequence, advice)
     most = spec.motor.max_current

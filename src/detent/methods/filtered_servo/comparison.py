@@ -92,10 +92,10 @@ class FeedbackComparison(ComparisonOnScreen):
         """Words at constant speed, and all cases as a table."""
         words = "Drive at constant speed, with and without the filter"
         caption = (
-            "The ways to quieten a counted speed, all on this axis. A longer window delays and may not be stable; a "
-            "smaller multiplier takes the damping. KV is speed over following error; the last column says by how much "
-            f"the loop's gain (here {count(round(self.gain))}{GAP}1/s²) could grow before it oscillates, after the "
-            "exact sampled model."
+            "Alternatives for smoothing a counted speed, all on this axis. A longer window adds delay and may be "
+            "unstable; a smaller multiplier reduces damping. KV is speed over following error; the last column "
+            f"says by what factor the loop gain (here {count(round(self.gain))}{GAP}1/s²) "
+            "could grow before it oscillates, from the exact sampled model."
         )
         table = Table(heads=HEADS, rows=[_row(case) for case in self.cases])
         return (
@@ -138,8 +138,9 @@ def _quieter(found: FeedbackComparison) -> str:
     without, with_filter = found.cases[:2]
     quieter = f", {number(without.std_error / with_filter.std_error, 2)} times quieter" if with_filter.std_error else ""
     return (
-        f"At a constant {number(found.rate, 4)} pulses per second the counted speed cannot be a whole number: it jumps "
-        "between two, and without a filter every jump, times B, reaches the motor. Look for: the filtered drive word"
+        f"At a constant {number(found.rate, 4)} pulses per second the count per window is not a whole number: it "
+        "jumps between two values, and without a filter every jump, times B, reaches the motor. Look for: the "
+        "filtered drive word"
         f"{quieter} at the same following error."
     )
 

@@ -158,7 +158,7 @@ def _feedback(m: FilteredFigures) -> Iterator[Derived]:
     formula = "(speed word B x TS x rate + word that holds the speed) / K1"
     yield Derived("following error at limits.speed", error, "count", text, formula)
     jump = coefficient * method.scale
-    formula = "A x B: a count is uncertain by one"
+    formula = "A x B: each count is uncertain by one"
     yield Derived("jump of the drive word for one pulse", jump, "count", f"{jump:.4g} x one count", formula)
     if coefficient == 1.0:
         return
@@ -184,9 +184,9 @@ def _loop(m: FilteredFigures) -> Iterator[Derived]:
         text = f"K = {limit:.5g} 1/s^2, {margin:.3g} x the gain"
         yield Derived("stability limit", limit, "1/s^2", text, "lowest K with a spectral radius of 1 (3.7)")
     radius = m.loop.spectral_radius()
-    yield Derived("spectral radius", radius, "", f"{radius:.4f}", "largest mode from sample to sample (3.7)")
+    yield Derived("spectral radius", radius, "", f"{radius:.4f}", "largest eigenvalue magnitude per sample (3.7)")
     damping = damping_of(m.loop)
-    yield Derived("damping of the loop", damping, "", f"{damping:.3g}", "least damped mode that swings")
+    yield Derived("damping of the loop", damping, "", f"{damping:.3g}", "least damped oscillatory mode")
     ratio = transfer.filter_ratio
     yield Derived("Tf / (K2 / K1)", ratio, "", f"{ratio:.3g}", "K1 / (A B); far below 1 for a first-order loop (3.6)")
     ratio = transfer.inertia_ratio

@@ -39,7 +39,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     seed = "encoder.seed"
     signals, timing = SIGNALS, TIMING
     linear_loops = "derive:linear_loops"
-    leaves_out = ("Left out: limits, counts, friction that does not grow with speed.",)
+    leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     compares = ("comparison:compare_feedback",)
     commands, shows = "host:FilteredHost", "page:FilteredView"
 

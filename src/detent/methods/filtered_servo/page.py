@@ -15,14 +15,13 @@ COMMAND, DEVIATION, WORD = "controller.generator.command", "controller.deviation
 COUNTED, FILTERED, WINDOW = "controller.speed.word", "controller.filter.output", "controller.clock.period"
 
 IN_THE_MOVE = (
-    "The slide follows the command pulses at a distance that grows with speed: the following error less the speed "
-    "word is the drive. Look for: the filtered speed word, smooth where the counted one jumps by whole pulses "
-    "times B."
+    "The slide follows the command pulses with a lag proportional to speed: the following error minus the speed word "
+    "is the drive. Compare the smooth filtered speed word with the counted one, which jumps by whole pulses times B."
 )
 
 AT_ITS_END = (
-    "Below: following error less filtered speed is the drive word. Look for: few swings around the target; the "
-    "lag of the filter costs damping."
+    "Below: following error minus filtered speed is the drive word. Check: few oscillations about the target; the lag "
+    "of the filter reduces damping."
 )
 
 
@@ -66,7 +65,7 @@ class FilteredView(MoveView):
         window = f"within ±{count(method.in_position, 'pulse')} for {number(method.in_position_time * 1e3)} ms"
         within = number(shown.run.tolerance / self.spec.pulse)
         return {
-            "the host asks for the move": 0.0,
+            "move commanded": 0.0,
             "last command pulse": shown.rows.first(shown.rows[COMMAND] == goal),
             f"within ±{within} pulses of the target for good": shown.settled,
             f"in position: {window}": move.ready - move.begin,

@@ -42,7 +42,7 @@ class FilteredServoAxisTable(AxisTable, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
-    travel: Length = required("free way of the slide between its two ends", '"0.5 m"', gt=0.0, le=100.0)
+    travel: Length = required("free travel of the slide between its two ends", '"0.5 m"', gt=0.0, le=100.0)
     speed: Velocity = required("largest speed ever commanded", '"125 mm/s"', start='"100 mm/s"', gt=0.0, le=100.0)
     effort: Force = required("largest force of the motor on the slide at standstill", '"280 N"', ge=1e-3, le=1e6)
 
@@ -109,8 +109,8 @@ class MethodTable(Table, frozen=True):
     command_acceleration: Acceleration = optional(
         "acceleration of the commanded speed; 0 jumps to it", 0.0, start='"0.5 m/s^2"', ge=0.0, le=1e4
     )
-    in_position: int = optional("following error that counts as in position, in pulses", 2, start="4", ge=0, le=1000)
-    in_position_time: Time = optional("how long it must last", 50e-3, gt=0.0, le=10.0)
+    in_position: int = optional("following in-position window, in pulses", 2, start="4", ge=0, le=1000)
+    in_position_time: Time = optional("time in the window until the axis is in position", 50e-3, gt=0.0, le=10.0)
     timeout: Time = optional(
         "time from the end of the command until a move that is not in position has failed", 2.0, gt=0.0, le=1000.0
     )

@@ -7,7 +7,7 @@
                                     sample clock drives counter and filter
 
 One tick is 10 us, ten clocks of the decoder. Its order is: sense what the encoder saw during the last tick, control,
-move. The controller ends with the drive word; PWM, amplifier and all that moves are the plant.
+move. The controller ends with the drive word; PWM, amplifier and the total moving mass are the plant.
 """
 
 from detent.kernel.loop import Bytes, Offsets, ticks, write_row

@@ -45,10 +45,10 @@ class MoveRow(Row, frozen=True):
     """A move as a file says it."""
 
     one_of: ClassVar[tuple[str, ...]] = ("target", "by")
-    target: Length | None = optional("where to", None)
-    by: Length | None = optional("how far from where the move before went to", None)
-    dwell: Time = optional("how long the axis stands after it is ready", 0.0, ge=0)
-    repeat: int = optional("how often it is done in succession", 1, ge=1, le=MOST_MOVES)
+    target: Length | None = optional("target position", None)
+    by: Length | None = optional("distance from the previous target", None)
+    dwell: Time = optional("dwell time after the axis is ready", 0.0, ge=0)
+    repeat: int = optional("number of repetitions", 1, ge=1, le=MOST_MOVES)
     speed: Velocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
     sample_period: Time | None = optional("of the servo in this move", None, derived="the axis's own", gt=0)
 
@@ -56,15 +56,15 @@ class MoveRow(Row, frozen=True):
 class RotaryMoveRow(MoveRow, frozen=True):
     """The same of an axis that turns."""
 
-    target: Angle | None = optional("where to", None)
-    by: Angle | None = optional("how far from where the move before went to", None)
+    target: Angle | None = optional("target position", None)
+    by: Angle | None = optional("distance from the previous target", None)
     speed: AngularVelocity | None = optional("speed of this move", None, derived="the axis's own", gt=0)
 
 
 class MoveFile(Table, Generic[AnyRow], frozen=True):
     """A file of moves."""
 
-    repeat: int = optional("how often the whole list is done", 1, ge=1, le=MOST_MOVES)
+    repeat: int = optional("number of repetitions of the whole list", 1, ge=1, le=MOST_MOVES)
     move: list[AnyRow] = rows("a move")
 
 
@@ -77,8 +77,8 @@ class Move:
 
     number: int  #: counted from 1 through the whole job, repeats counted
     row: int  #: line of the file that asks for the move, from 1
-    target: float | None = None  #: where to [m]
-    #: how far from where the move before went to [m], positive in the positive direction of the axis. Exactly one of
+    target: float | None = None  #: target position [m]
+    #: distance from the previous target [m], positive in the positive direction of the axis. Exactly one of
     #: `target` and `by` is given
     by: float | None = None
     dwell: float = 0.0  #: time the axis stands after it is ready [s], 0 or more
@@ -89,7 +89,7 @@ class Move:
 
     @property
     def place_key(self) -> str:
-        """The key that says where to."""
+        """The key that says target position."""
         return "target" if self.by is None else "by"
 
     def __post_init__(self) -> None:
@@ -155,8 +155,8 @@ def text_job(text: str, *, name: str, pitch: float, left_margin: float = 0.0, ha
     """
     struck = _struck(text, name)
     if not struck:
-        got = "a text that prints nothing" if text else "an empty file"
-        allowed, remedy = "a text with at least one character to print", "put some text into it, or name another file"
+        got = "a text without printable characters" if text else "an empty file"
+        allowed, remedy = "a text with at least one character to print", "add some text, or name another file"
         raise InputError.of_file(name, got, allowed, remedy)
     moves = (
         Move(number, row, target=left_margin + column * pitch, dwell=hammer_time, label=label)
@@ -192,7 +192,7 @@ def _struck(text: str, file: str) -> list[tuple[int, int, str]]:
                 raise too_many_moves(file, f"more than {MOST_MOVES} characters to print")
         elif len(problems) < MOST_PROBLEMS:
             code = f"0x{ord(char):02X}" if ord(char) < 0x100 else f"U+{ord(char):04X}"
-            got = f"the character {code}, which prints nothing alone"
+            got = f"the character {code}, which is not printable by itself"
             remedy = "remove it; save a document of a word processor as plain text first"
             problems.append(FileProblem(file, row, place, "", got, _WHAT_TEXT_HOLDS, remedy))
     if problems:

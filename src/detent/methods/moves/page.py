@@ -57,7 +57,7 @@ class ShownMove:
 
     @property
     def settled(self) -> float:
-        """When it was within the tolerance for good [s]; NaN if it was not."""
+        """When it was within tolerance for good [s]; NaN if it was not."""
         return self.move.settling
 
     @property
@@ -102,7 +102,7 @@ class MoveView:
     def events(self, shown: ShownMove) -> dict[str, float]:
         """What happens in the move, and when [s]; NaN if it does not."""
         ready = shown.move.ready - shown.move.begin
-        return {"the host asks for the move": 0.0, "within the tolerance for good": shown.settled, "arrived": ready}
+        return {"move commanded": 0.0, "within tolerance for good": shown.settled, "arrived": ready}
 
     def text_figure(self, run: MoveRun) -> Figure | None:
         """The text on paper, of an axis that prints."""
@@ -128,9 +128,9 @@ def moves_page(
         notes=_notes(figures),
         sections=[
             Section("Results", [figure for figure in result if figure]),
-            Section("How the axis did it", _move_figures(view, figures, trace)),
+            Section("How the axis performed", _move_figures(view, figures, trace)),
             comparison_section(comparisons),
-            Section("Move by move", [_every_move(run)] if run.moves else []),
+            Section("Moves", [_every_move(run)] if run.moves else []),
         ],
         settings=settings or {},
     )
@@ -197,7 +197,7 @@ def _job_figure(figures: MoveFigures, trace: Trace | None) -> Figure | None:
     return Figure(
         # A long job is drawn in part, and of a very long one only the beginning is recorded.
         title=whole_or_first(float(rows.t[end - 1]), figures.seconds, "The whole job"),
-        caption="Where the axis was and where it had to go. Look for: the line on the dashes at the end of every move.",
+        caption="Actual and target position. Check that the solid line meets the dashed one at the end of every move.",
         charts=time_charts(timeline, [Panel(name="job", label="position [mm]", height=260, curves=curves)]),
     )
 
@@ -208,8 +208,8 @@ def _rest_figure(view: MoveView, figures: MoveFigures) -> Figure | None:
         return None
     outside = " (outside the figure)" if error.value < run.tolerance / 1.5 else ""
     caption = (
-        "How far from its target the axis stood at the end of each dwell. Look for: narrow heaps around zero; heaps "
-        "that stand apart mean that it matters from which side the axis comes. "
+        "Position error at the end of each dwell. Look for: narrow peaks around zero; separate "
+        "peaks mean that the result depends on the direction of approach. "
         f"Allowed: ±{length(run.tolerance)}{outside}; a {view.unit.word} is {length(view.unit.size)}."
     )
     # Right of the target is where the error is negative.
@@ -256,7 +256,7 @@ def _telling(figures: MoveFigures, trace: Trace) -> tuple[MoveRecord | None, str
     if early and early.of in whole:
         return early.of, "the move that was ready too early"
     went = sorted((move for move in whole if _way(move) > figures.run.tolerance), key=_way)
-    return (went[(len(went) - 1) // 2], "the move of middle length") if went else (None, "")
+    return (went[(len(went) - 1) // 2], "a move of median length") if went else (None, "")
 
 
 def _way(move: MoveRecord) -> float:
@@ -302,11 +302,11 @@ def _approach_figures(view: MoveView, shown: ShownMove) -> list[Figure]:
         return []
     unit, tolerance = view.unit, shown.run.tolerance
     caption = (
-        f"The end of the same move, magnified: how far right of its target the axis is, in {unit.words} of "
+        f"The end of the same move, magnified: displacement to the right of the target, in {unit.words} of "
         f"{length(unit.size)}. Arrived means within ±{unit.counts(tolerance)} (dashed); the numbers are those above. "
         f"{view.captions[1]}"
     )
-    return [Figure(title="Coming to rest", caption=caption, charts=_approach_charts(view, shown))]
+    return [Figure(title="Settling", caption=caption, charts=_approach_charts(view, shown))]
 
 
 def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
@@ -340,13 +340,13 @@ def _approach_charts(view: MoveView, shown: ShownMove) -> list[Chart]:
 def _every_move(run: MoveRun) -> Figure:
     labelled = any(move.label for move in run.moves)
     heads = [("move", True), *([("character", False)] if labelled else []), ("start [s]", True), ("from [mm]", True),
-             ("to [mm]", True), ("way [mm]", False), ("ready after [ms]", True), ("settled after [ms]", True),
+             ("to [mm]", True), ("distance [mm]", False), ("ready after [ms]", True), ("settled after [ms]", True),
              ("overshoot [µm]", True), ("error [µm]", True)]  # fmt: skip
     longest = max(abs(move.error) for move in run.moves) or 1.0
     rows = [_row(run, move, longest, labelled=labelled) for move in run.moves]
     caption = (
-        f"Ready is what the axis says; settled, within ±{length(run.tolerance)} for good, is what is true. Error: "
-        "target less position at the end of the dwell, plus if the axis stands to the left of its target."
+        f"Ready: signalled by the axis. Settled: within ±{length(run.tolerance)} for good. Error: target minus "
+        "position at the end of the dwell, positive if the axis is to the left of its target."
     )
     return Figure(title="Every move", caption=caption + left_out(len(rows), "move"), table=long_table(heads, rows))
 

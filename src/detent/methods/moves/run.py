@@ -159,7 +159,7 @@ class MoveRecord:
 
     @property
     def settling(self) -> float:
-        """From the command until within the tolerance for good [s]; NaN for a move that ended outside."""
+        """From the command until within tolerance for good [s]; NaN for a move that ended outside."""
         return time_to_settle(self.begin, self.settled, rested=not math.isnan(self.settled))
 
     @property
@@ -169,7 +169,7 @@ class MoveRecord:
 
     @property
     def early(self) -> float:
-        """By how much the axis said that it had arrived before it was there for good [s]; NaN if it did not say so."""
+        """By how much the axis signalled arrival before it had settled [s]; NaN if it did not say so."""
         return self.settled - self.ready
 
     def arrived_within(self, tolerance: float) -> bool:
@@ -190,7 +190,7 @@ class MoveRun(RunRecord[MoveJob]):
     grid: float = 0.0  #: step of the positions the axis can be sent to
     peak_current: float = 0.0
     energy: float = 0.0
-    #: pulses put in and taken away, samples lost and corrupted by interference
+    #: pulses inserted and taken away, samples lost and corrupted by interference
     faults: dict[str, int] = field(default_factory=dict[str, int])
 
     told: ClassVar[tuple[str, ...]] = (
@@ -251,9 +251,9 @@ def _early(run: MoveRun) -> Iterator[str]:
     if early:
         worst = max(early, key=lambda move: move.early)
         yield (
-            f"in {len(early)} of {len(run.moves)} moves the axis said that it had arrived before it was there for "
-            f"good, in move {worst.number} by {format_quantity(worst.early, 's', 3)}; what the host does in that time "
-            "is done beside the target; widen the tolerance, or lower the gains until it comes to rest at once"
+            f"in {len(early)} of {len(run.moves)} moves the axis signalled arrival before it had "
+            f"settled, in move {worst.number} by {format_quantity(worst.early, 's', 3)}; what the host does in that "
+            "time happens off target; widen the tolerance, or lower the gains until it settles without ringing"
         )
 
 
@@ -296,9 +296,11 @@ def _verdict(host: Host, to: Destination, error: float, waited: float) -> str:
         return f"{where}: {host.failure}"
     if not math.isnan(waited):
         limit = format_quantity(waited, "s")
-        return f"{where}: did not arrive within {limit}; it stands {_away(host, error)}; look at the report's figures"
+        return (
+            f"{where}: did not arrive within {limit}; it is at rest {_away(host, error)}; see the figures of the report"
+        )
     if abs(error) > host.tolerance:
-        return f"{where}: the axis says that it has arrived and stands {_away(host, error)}; {_suspect(host)}"
+        return f"{where}: the axis signals arrival but rests {_away(host, error)}; {_suspect(host)}"
     return ""
 
 
@@ -308,8 +310,8 @@ def _suspect(host: Host) -> str:
     beyond = float(host.machine.state.plant.gauge.beyond)
     if beyond > host.tolerance:
         swing = f"it went {format_quantity(beyond, 'm')} beyond its target, and may still swing back"
-        return f"{swing}: give the loop more damping, or the move a dwell; look for {noise}a force it cannot hold"
-    return f"look for {noise}a force it cannot hold"
+        return f"{swing}: give the loop more damping, or the move a dwell; check for {noise}a load it cannot hold"
+    return f"check for {noise}a load it cannot hold"
 
 
 def _away(host: Host, error: float) -> str:

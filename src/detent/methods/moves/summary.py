@@ -8,8 +8,8 @@ from detent.page.run_page import median_of, worst
 from detent.page.words import GAP, CountUnit, count, duration, length, milliseconds, number
 
 FAULT_WORDS = {
-    "inserted": ("pulse put in", "pulses put in"),
-    "removed": ("pulse taken away", "pulses taken away"),
+    "inserted": ("pulse inserted", "pulses inserted"),
+    "removed": ("pulse removed", "pulses removed"),
     "lost samples": ("speed sample lost", "speed samples lost"),
     "corrupted": ("sensor sample corrupted", "sensor samples corrupted"),
 }
@@ -32,7 +32,7 @@ class MoveFigures:
         self.seconds = max(run.time_end - run.time_ready, 0.0)
         self.there = [move for move in moves if arrived(run, move)]
         self.went = [move for move in self.there if abs(move.target - move.start) > run.tolerance]  # and went anywhere
-        # Those of which the axis said so before they were within the tolerance for good, and the earliest of them [s].
+        # Those of which the axis said so before they were within tolerance for good, and the earliest of them [s].
         self.early = [move for move in self.there if move.early > SOONEST]
         self.earliest = worst(self.early, lambda move: move.early)
         self.longest = worst(self.went, lambda move: move.settling)  # time to settle [s]
@@ -88,5 +88,5 @@ def whose(move: MoveRecord) -> str:
 
 
 def interference_text(run: MoveRun) -> str:
-    """What interference did to the pulse lines: "30 pulses put in, 2 speed samples lost"; empty if it did nothing."""
+    """What interference did to the pulse lines: "30 pulses inserted, 2 speed samples lost"; empty if it did nothing."""
     return ", ".join(count(n, *FAULT_WORDS[kind]) for kind, n in run.faults.items() if n)

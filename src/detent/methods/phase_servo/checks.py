@@ -49,7 +49,7 @@ def _tracker(spec: PhaseServoSpec) -> Iterator[Contradiction]:
         allowed = f"below {text(fastest, 'm/s')}: the tracker follows one step in N + 1 = {n + 1} clocks (3.4)"
         yield wrong(keys, allowed, remedy.most("limits.speed", fastest * (1 - BARELY)))
     if lag >= n:
-        allowed = f"below detector.counts, {n}; left out it is N/4 - 1 = {n // 4 - 1}"
+        allowed = f"below detector.counts, {n}; its default is N/4 - 1 = {n // 4 - 1}"
         yield wrong("detector.lag_counts detector.counts", allowed, remedy.most("detector.lag_counts", n - 1))
 
 
@@ -194,7 +194,7 @@ def _machine(spec: PhaseServoSpec) -> Iterator[Contradiction]:
     yield from common.burst(spec.disturbance.lines.burst, spec.tick)
 
 
-# Contradictions are told in this order.
+# Contradictions are reported in this order.
 RULES = (_tracker, _speed_counted, _approach, _way, _words, _table, _edges, _machine)
 
 
@@ -226,7 +226,7 @@ def _current(m: PhaseFigures) -> Iterator[Caution]:
             "stall current",
             text(stall, "A"),
             f"above limits.effort, {text(limit, 'A')}",
-            "the supply drives no current that the limit would stop, and the axis is slower than the limit says",
+            "the supply cannot drive enough current to reach the limit, and the axis is slower than the limit suggests",
             remedy.most("limits.effort", stall, "raise drive.supply"),
         )
     most = m.spec.motor.max_current
@@ -241,7 +241,7 @@ def _force(m: PhaseFigures) -> Iterator[Caution]:
         gentler = remedy.most("method.table_acceleration", available * (1 - BARELY), "raise limits.effort")
         value = f"{text(m.force_limit, 'N')}, for {max(0.0, available):.3g} m/s^2 against friction"
         allowed = f"above a m + friction, {text(asked * m.mass + m.coulomb, 'N')}"
-        consequence = "the carriage cannot follow the velocity table and runs past its target"
+        consequence = "the carriage cannot follow the velocity table and overshoots its target"
         yield Caution("force at the current limit", value, allowed, consequence, gentler)
     if m.switch_deceleration >= available > 0:
         yield Caution(
@@ -249,7 +249,7 @@ def _force(m: PhaseFigures) -> Iterator[Caution]:
             f"{text(m.switch_deceleration, 'm/s^2')} from {text(m.switch_speed, 'm/s')} within "
             f"{text(m.switch_distance, 'm')}",
             f"below what the current limit gives against friction, {text(available, 'm/s^2')}",
-            "the carriage runs past its target, and with it past the positioning point if it is fast",
+            "the carriage overshoots its target, and at high speed the positioning point too",
             "raise method.threshold, or lower method.table_acceleration",
         )
 
@@ -260,10 +260,10 @@ def _speed(m: PhaseFigures) -> Iterator[Caution]:
     reached = spec.peak_count + OVERSHOOT
     if top < m.peak_speed:
         allowed = f"enough for the peak of the velocity table, {text(m.peak_speed, 'm/s')}"
-        consequence = "back-EMF and friction leave no voltage for more: the carriage never gets to the table's speed"
+        consequence = "back-EMF and friction leave no voltage reserve: the carriage never reaches the table's speed"
         advice = remedy.most("limits.speed", top, "raise drive.supply") if top > 0 else "raise drive.supply"
         yield Caution("supply", f"enough for {text(max(0.0, top), 'm/s')}", allowed, consequence, advice)
-    lost, over = "pulses are lost and the move ends early or late", "the speed word runs over and drives the wrong way"
+    lost, over = "pulses are lost and the move ends early or late", "the speed word overflows and drives the wrong way"
     for name, largest, consequence, other in (
         ("slew limit of the tracker", m.slew_backward / m.speed_per_count, lost, "raise clock.oscillator"),
         ("range of the speed word", most, over, "raise method.speed_bits"),
@@ -303,7 +303,7 @@ def _settling(m: PhaseFigures) -> Iterator[Caution]:
         allowed = f"up to 2 steps, {2 * k1 * k3} counts"
         consequence = "friction holds the carriage off its target until the integral moves it"
         advice = put("method.position_gains", [math.ceil(m.breakaway_counts / (2 * k3)), k2, k3])
-        yield Caution("drive that breaks the carriage loose", value, allowed, consequence, advice)
+        yield Caution("breakaway drive", value, allowed, consequence, advice)
 
 
 def _calmer(m: PhaseFigures) -> str:
@@ -325,14 +325,14 @@ def _integral(m: PhaseFigures) -> Iterator[Caution]:
         tap = clock.integrate_tap + math.ceil(math.log2(m.integral_rate / INTEGRAL_PACE))
         value, allowed = f"{m.integral_rate:.3g} steps within 1 rad of the position loop", f"up to {INTEGRAL_PACE:g}"
         advice = remedy.least("clock.integrate_tap", tap, "raise KP1 of method.position_gains")
-        yield Caution("pace of the integral", value, allowed, "under load the integral hunts for ever", advice)
+        yield Caution("rate of the integral", value, allowed, "under load the integral hunts indefinitely", advice)
     if method.dead_band == 0:
         value = "0 with the integrator in use"
-        consequence = "the integral never rests: the carriage hunts across the boundary"
+        consequence = "the integral never settles: the carriage hunts across the boundary"
         yield Caution("method.dead_band", value, "at least 1 step", consequence, put("method.dead_band", 1))
     if method.integral_limit * k3 < m.breakaway_counts:
         value = f"{method.integral_limit}, worth {method.integral_limit * k3} counts of drive"
-        allowed = f"enough to break the carriage loose, {m.breakaway_counts:.3g} counts"
+        allowed = f"enough to overcome static friction, {m.breakaway_counts:.3g} counts"
         consequence = "the integral cannot bring a carriage that friction holds to its target"
         advice = remedy.least("method.integral_limit", m.breakaway_counts / k3, "lower friction")
         yield Caution("method.integral_limit", value, allowed, consequence, advice)
@@ -376,12 +376,12 @@ def _burst(m: PhaseFigures) -> Iterator[Caution]:
             "pulses of disturbance.lines.burst",
             f"{pulses}",
             expectation,
-            "the protection is not said to stand so many: within one move they may lead to another pitch",
-            put("method.expected_spurious", pulses) if protected else f"let the burst have {expected} pulses or fewer",
+            "the protection is not specified for so many: within one move they may lead to another pitch",
+            put("method.expected_spurious", pulses) if protected else f"use a burst of {expected} pulses or fewer",
         )
     rate = lines.inserted + lines.removed
     if rate * longest > max(1, expected):
         value = f"{rate * longest:.3g} in the longest move, {text(longest, 's')}"
-        consequence = "the protection is not said to stand so many: a long move may end in another pitch"
+        consequence = "the protection is not specified for so many: a long move may end in another pitch"
         advice = f"lower disturbance.lines.inserted and removed to {at_most(max(1, expected) / longest, 'Hz')} together"
         yield Caution("pulses of disturbance.lines", value, expectation, consequence, advice)

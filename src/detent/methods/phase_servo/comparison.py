@@ -1,7 +1,7 @@
 """The phase servo beside its alternatives: what spurious pulses do to the stop, and what dead band and integrator do.
 
-Noise (tests 25, 26): the same move is made again and again, each time with some pulses put in on the counting lines on
-the way; once with the absolute word as the position error of the final approach, once with the signed count of pulses
+Noise (tests 25, 26): the same move is made again and again, each time with pulses inserted on the counting
+lines; once with the absolute word as the position error of the final approach, once with the signed count of pulses
 still to come. Hold (tests 28 to 30): a move brings each variant to the same target, at rest or under a push.
 """
 
@@ -82,7 +82,7 @@ class NoiseComparison(ComparisonOnScreen):
     @property
     def table(self) -> TextTable:
         """Rest points in steps, right and left."""
-        heads = ("pulses put in", "this servo, + pulses", "- pulses", "incremental servo, + pulses", "- pulses")
+        heads = ("pulses inserted", "this servo, + pulses", "- pulses", "incremental servo, + pulses", "- pulses")
         rows = [
             (str(n), *(_range(rest[k, sign]) for rest in (self.absolute, self.incremental) for sign in (0, 1)))
             for k, n in enumerate(self.pulses)
@@ -96,12 +96,12 @@ class NoiseComparison(ComparisonOnScreen):
     def figures(self) -> tuple[Figure, ...]:
         """Rest points over pulses, and the same magnified."""
         caption = (
-            f"Noise puts pulses on the counting lines during a move of {count(self.pitches, 'pitch', 'pitches')}. A "
-            "servo that only counts stops as far off its target as pulses came, and keeps the error. This one stops on "
-            "its target, because the phase of the resolver says where that is. Its limit: more than "
+            f"Noise inserts pulses on the counting lines during a move of {count(self.pitches, 'pitch', 'pitches')}. A "
+            "purely incremental servo stops off target by the number of inserted pulses, and keeps the error. This one "
+            "stops on target, because the resolver phase gives the absolute position. Its limit: more than "
             f"{count(self.margin, 'pulse')} in one move, and it stops exactly one pitch off."
         )
-        title = "Noise on the pulse lines: where the axis comes to rest"
+        title = "Noise on the pulse lines: rest position"
         return (Figure(title=title, caption=caption, charts=_rest_charts(self)),)
 
     def to_dict(self) -> dict[str, Any]:
@@ -140,11 +140,11 @@ def _rest_charts(found: NoiseComparison) -> list[Chart]:
         Panel(name="noise", label=label, height=300, zero=True, curves=[*counted, *stops]),
         Panel(
             name="noise-near", label="off [step]", height=180, zero=True, span=(-1.2, 1.2), levels=levels, curves=stops,
-            title=f"Magnified: no stop on the target may be more than {NOISE_BAND:g} steps off (dashed)",
+            title=f"Magnified: no stop on target may be more than {NOISE_BAND:g} steps off (dashed)",
         ),
     ]  # fmt: skip
     marks = {"marks": [{"x": side * found.margin, "label": "limit"} for side in (-1, 1)]}
-    return [line_chart(panel, x, "− pulses put in   [pulse]   + pulses put in") | marks for panel in panels]
+    return [line_chart(panel, x, "− pulses inserted   [pulse]   + pulses inserted") | marks for panel in panels]
 
 
 def compare_noise(spec: PhaseServoSpec, *, pitches: int = PITCHES, progress: Progress = untold) -> NoiseComparison:
@@ -217,7 +217,7 @@ class HoldCase:
     name: str  #: such as "without integrator"
     about: str  #: what is different in it, one sentence
     t: Numbers  #: time since power-on [s], from the beginning of position mode on; shape (n,)
-    displacement: Numbers  #: position less target [steps]; shape (n,)
+    displacement: Numbers  #: position minus target [steps]; shape (n,)
     integral: Whole  #: integral of the error [count]; shape (n,)
     word: Whole  #: drive word [count]; shape (n,)
 
@@ -247,7 +247,7 @@ class HoldCase:
 class HoldComparison(ComparisonOnScreen):
     """Result of `compare_hold`."""
 
-    #: without a push; settling for ever, as the file has it, and with the integrator but no dead band
+    #: without a push; never in stop mode, as in the axis file, and with the integrator but no dead band
     still: tuple[HoldCase, ...]
     loaded: tuple[HoldCase, ...]  #: under a push that stays, with the integrator and without
     push: float  #: force [N]
@@ -263,26 +263,26 @@ class HoldComparison(ComparisonOnScreen):
             (case.name, f"{case.swing:.2f}", f"{case.rest:+.2f}", f"{case.integral[-1]:g}")
             for case in (*self.still, *self.loaded)
         ]
-        return TextTable("Standing still, last 0.1 s, in steps", heads, rows)
+        return TextTable("At rest, last 0.1 s, in steps", heads, rows)
 
     def figures(self) -> tuple[Figure, ...]:
         """At rest: unloaded and hunting, then pushed."""
         swings = [f"{case.name} {number(round(case.swing, 2), 2)}" for case in self.still]
         still = (
-            "A digital servo that never reads zero swings for ever from one step to the next. Here a dead band opens a "
-            f"moment after the arrival, and an integrator works outside it. A step is {length(self.step)}. "
-            f"Swing at the end, peak to peak in steps: {', '.join(swings)}."
+            "A digital servo without a zero reading has a limit cycle from one step to the next. Here a dead band "
+            f"opens shortly after arrival, and an integrator works outside it. A step is {length(self.step)}. "
+            f"Final limit cycle, peak to peak in steps: {', '.join(swings)}."
         )
         rests = [f"{case.name} {number(round(case.rest, 2), 2)}" for case in self.loaded]
         loaded = (
             f"A force of {number(self.push)}{GAP}N pushes the carriage to the right after it has arrived. The error "
-            "alone makes too little drive to push back; the integral counts up until the motor holds the force. "
-            f"Where it stands at the end, in steps right of the target: {', '.join(rests)}."
+            "alone gives too little drive to push back; the integral counts up until the motor balances the "
+            f"force. Final position, in steps right of the target: {', '.join(rests)}."
         )
         push = f"a force of {number(self.push)}{GAP}N pushes from now on"
         events = happened({push: self.push_at, "stop: dead band and integrator take over": self.stop_at}, math.inf)
         return (
-            Figure(title="Standing still", caption=still, charts=_still_charts(self)),
+            Figure(title="At rest", caption=still, charts=_still_charts(self)),
             Figure(title="Under load", caption=loaded, charts=_loaded_charts(self, events), events=events),
         )
 
@@ -295,13 +295,13 @@ class HoldComparison(ComparisonOnScreen):
 Variant = tuple[str, str, dict[str, Any]]  # name, what is different, and the values of ``[method]`` that make it so
 
 STILL: tuple[Variant, ...] = (
-    ("settling for ever", "stop never comes: the corrector never gives zero", {"stop_always_off": True}),
-    ("as the file has it", "dead band and integrator as the axis file has them, from the stop on", {}),
+    ("never in stop mode", "stop mode never starts: the corrector never outputs zero", {"stop_always_off": True}),
+    ("as in the axis file", "dead band and integrator as in the axis file, from the stop on", {}),
     ("no dead band", "the integrator alone: D = 0", {"dead_band": 0, "integrator": True}),
 )
 LOADED: tuple[Variant, ...] = (
     ("with integrator", "from the stop on the integral counts until it balances the push", {"integrator": True}),
-    ("without integrator", "nothing but the error itself balances the push", {"integrator": False}),
+    ("without integrator", "only the error itself balances the push", {"integrator": False}),
 )
 
 

@@ -238,9 +238,9 @@ def _logic(m: PhaseFigures) -> Iterator[Derived]:
     yield Derived("speed word", bits, "bit", f"{bits} of {spec.method.speed_bits} bits", "peak and sign")
     steps = spec.limits.travel / spec.step
     text = f"{steps:.6g} steps ({math.floor(spec.limits.travel / spec.pitch + 1e-9)} pitches) of 65535"
-    yield Derived("longest way", steps, "step", text, "limits.travel / step")
+    yield Derived("longest distance", steps, "step", text, "limits.travel / step")
     spare = spec.detector.counts // 2 - spec.method.threshold - 1
-    yield Derived("spurious pulses it stands", spare, "count", f"up to {spare} in a move", "below N/2 - threshold")
+    yield Derived("tolerated spurious pulses", spare, "count", f"up to {spare} in a move", "below N/2 - threshold")
 
 
 def _motion(m: PhaseFigures) -> Iterator[Derived]:
@@ -254,7 +254,10 @@ def _motion(m: PhaseFigures) -> Iterator[Derived]:
     yield _speed("speed at the change of mode", m.switch_speed, formula, spec.step)
     way = format_quantity(m.switch_distance, "m")
     yield quantity_figure(
-        "deceleration from there", m.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
+        "deceleration after the change of mode", m.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
+    )
+    yield quantity_figure(
+        "time after the change of mode", m.switch_time, "s", f"2 x {way} / v, at constant deceleration"
     )
     if math.isfinite(m.approach.settling):
         formula = f"until a move stays within {spec.arrived_steps} steps, with whole counts, friction and winding"
@@ -288,6 +291,6 @@ def _loops(m: PhaseFigures) -> Iterator[Derived]:
         yield Derived("overshoot of a move", over, "step", text, formula)
     formula = "(KP2 KP3 velocity feedback + back-EMF) / (2 x position loop), without delays"
     yield Derived("damping of the position loop", m.damping, "", f"{m.damping:.3g}", formula)
-    yield count_figure("drive that breaks loose", m.breakaway_counts, "static x R / k / (count of the drive word)")
+    yield count_figure("breakaway drive", m.breakaway_counts, "static x R / k / (count of the drive word)")
     k1, _, k3 = m.spec.method.position_gains
     yield count_figure("drive of one step", k1 * k3, "KP1 x KP3")

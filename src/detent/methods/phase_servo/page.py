@@ -22,14 +22,14 @@ INTEGRAL, WORD = "controller.law.integral", "controller.law.word"
 PAGE_ROWS = 66  # lines of text on a page of paper: 11 in of 1/6 in each
 
 IN_THE_MOVE = (
-    "Until shortly before the target the speed follows a table of the way still to go, counted in pulses; then "
-    "position mode begins, and the phase of the resolver itself says where to stop. Look for: speed on the dashes "
-    "while braking, and a drive that comes to rest."
+    "Until shortly before the target the speed follows a table of the distance to go, counted in pulses; then position "
+    "mode begins, and the resolver phase itself determines the stop. Check: speed on the dashed line while "
+    "braking, and a drive that settles."
 )
 
 AT_ITS_END = (
-    "Below: the absolute error word, the integral and the drive word that they make with the speed. Look for: no "
-    "way back out of the dashed lines, and stillness after the stop."
+    "Below: the absolute error word, the integral and the drive word that results from them and the speed. Check: once "
+    "inside the dashed lines the axis stays there, and is at rest after the stop."
 )
 
 
@@ -46,7 +46,7 @@ class PhaseView(MoveView):
         return CountUnit(self.spec.step, "step")
 
     def panels(self, shown: ShownMove) -> list[Panel]:
-        """Speed with what the table demands, way to go, drive word."""
+        """Speed with what the table demands, distance to go, drive word."""
         rows, per_sample = shown.rows, self.spec.step / self.spec.sample_period
         demanded = np.where(_positioning(rows), np.nan, rows[SETPOINT] * per_sample)
         speeds = [
@@ -54,10 +54,10 @@ class PhaseView(MoveView):
             Curve(label="demanded by the table", colour="left", dash=(6, 4), step=True, y=demanded * MM, thin=0),
             true_speed(shown),
         ]
-        to_go = Curve(label="way to go", colour="speed", width=2, y=shown.to_go * MM, digits=4)
+        to_go = Curve(label="distance to go", colour="speed", width=2, y=shown.to_go * MM, digits=4)
         return [
             Panel(name="move-speed", label="speed [mm/s]", zero=True, curves=speeds),
-            Panel(name="move-to-go", label="way to go [mm]", height=140, zero=True, curves=[to_go]),
+            Panel(name="move-to-go", label="distance to go [mm]", height=140, zero=True, curves=[to_go]),
             Panel(name="move-drive", label="drive [count]", height=160, zero=True, curves=[drive_curve(rows[WORD])]),
         ]
 
@@ -78,7 +78,7 @@ class PhaseView(MoveView):
     def events(self, shown: ShownMove) -> dict[str, float]:
         """From the set strobe to the stop."""
         move, method = shown.move, self.spec.method
-        ruler = "the absolute word rules" if method.final == "absolute" else "the counted pulses rule"
+        ruler = "controlled by the absolute word" if method.final == "absolute" else "controlled by the counted pulses"
         within = number(shown.run.tolerance / self.spec.step)
         return {
             "set strobe: the host gives direction and distance": 0.0,
@@ -90,7 +90,7 @@ class PhaseView(MoveView):
 
     def text_figure(self, run: MoveRun) -> Figure:
         """Each character where the carriage stood for it."""
-        caption = "Each character stands where the carriage stood for it at the end of its dwell."
+        caption = "Each character is drawn at the carriage position at the end of its dwell."
         return paper_figure("The text", caption, marks_of(self.spec, run), run.tolerance)
 
 

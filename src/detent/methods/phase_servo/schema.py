@@ -58,7 +58,7 @@ class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
     travel: Length = required(
-        "free way of the carriage between its two ends", '"14 in"', start='"300 mm"', gt=0.0, le=10.0
+        "free travel of the carriage between its two ends", '"14 in"', start='"300 mm"', gt=0.0, le=10.0
     )
     speed: Velocity = required(
         "largest velocity of the table, rounded down to a whole count per speed sample",
@@ -87,7 +87,7 @@ class MechanicsTable(Table, frozen=True):
     carriage_mass: Mass = required("carriage with its load", '"0.6 kg"', gt=0.0, le=1000.0)
     pulley_inertia: Inertia = optional("pulley and detector disc", 0.0, ge=0.0, le=0.1)
     start_position: Length = optional(
-        "where the carriage stands at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
+        "carriage position at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
     )
     friction: FrictionTables
 

@@ -57,7 +57,11 @@ def _machine(spec: PrintHeadSpec) -> Iterator[Contradiction]:
         )
     if not math.isclose(drifted, supply) and not 0.5 * supply <= drifted <= 2 * supply:
         allowed = f"half to twice drive.supply: {text(0.5 * supply, 'V')} to {text(2 * supply, 'V')}"
-        yield wrong("disturbance.supply drive.supply", allowed, "correct disturbance.supply: a drift, not another one")
+        yield wrong(
+            "disturbance.supply drive.supply",
+            allowed,
+            "correct disturbance.supply: it models a drift, not a different supply",
+        )
 
 
 def _inside_limits(spec: PrintHeadSpec) -> Iterator[Contradiction]:
@@ -92,7 +96,7 @@ def _identified(spec: PrintHeadSpec) -> Iterator[Contradiction]:
         yield wrong(
             "method.default_slope method.slope_min method.slope_max",
             f"from method.slope_min, {low}, to method.slope_max, {high}",
-            "choose a default slope that the axis computer itself would take for plausible",
+            "choose a default slope that the axis computer itself would accept as plausible",
         )
     if friction > most:
         yield wrong(
@@ -115,7 +119,7 @@ def _homing(spec: PrintHeadSpec) -> Iterator[Contradiction]:
         yield wrong(
             "homing.contact_timeout method.zero_speed_timeout",
             f"longer than method.zero_speed_timeout, {text(zero_speed, 's')}",
-            "raise homing.contact_timeout: the head stands still before it can be said to be in contact",
+            "raise homing.contact_timeout: contact can be detected only at standstill",
         )
 
 
@@ -131,7 +135,7 @@ def _simulated(spec: PrintHeadSpec) -> Iterator[Contradiction]:
 
 Rule = Callable[[PrintHeadSpec], Iterator[Contradiction]]
 RULES: tuple[Rule, ...] = (_machine, _inside_limits, _identified, _homing, _simulated)
-"""Contradictions are told in this order."""
+"""Contradictions are reported in this order."""
 
 
 # ---- cautions
@@ -196,7 +200,7 @@ def _calibration(m: HeadFigures) -> Iterator[Caution]:
             "tolerance of the identification",
             f"slope K within {off:.2g} of 256, measured by passes at {top / 6:.3g} and 10 in/s",
             f"within 2.5, as from limits.speed of {EXACT_FAST_PASS / 6:.3g} in/s on",
-            "speeds are counted in whole emitters, and a short line between two points carries their rounding far",
+            "speeds are counted in whole emitters, and extrapolating from two close points amplifies the rounding",
             "raise limits.speed, or count on a drive that the trim has to correct by more",
         )
     for direction in DIRECTIONS:
@@ -206,7 +210,7 @@ def _calibration(m: HeadFigures) -> Iterator[Caution]:
                 f"slow calibration pass, {direction}",
                 f"{slow / 6:.2g} in/s at {drives[60]} counts",
                 f"above {CREEPING / 6:.2g} in/s",
-                "friction holds the head or lets it creep: the calibration fails, or the power-on values stay in use",
+                "friction stops the head or lets it creep: the calibration fails, or the power-on values stay in use",
                 f"lower mechanics.friction.{direction}, or raise method.default_friction_counts",
             )
         if fast > 1.1 * top:
@@ -252,7 +256,7 @@ def _breaking_loose(m: HeadFigures) -> Iterator[Caution]:
                 f"static friction, {direction}",
                 f"{m.static_counts[direction]:.4g} counts",
                 f"up to friction + IR = {available:.4g} counts",
-                "the drive a move starts with does not break the head loose",
+                "the initial drive of a move does not overcome static friction",
                 f"check mechanics.friction.{direction}.static, or raise method.ir_counts",
             )
     for direction in DIRECTIONS:
@@ -262,7 +266,7 @@ def _breaking_loose(m: HeadFigures) -> Iterator[Caution]:
                 f"homing drive, {direction}",
                 f"{needed:.4g} counts",
                 f"up to homing.drive_limit_counts, {homing.drive_limit_counts}",
-                "the head is slower than homing.speed or stands, which looks like a frame",
+                "the head is slower than homing.speed or stalls, which looks like contact with a frame",
                 "lower homing.speed or raise homing.drive_limit_counts",
             )
 

@@ -133,9 +133,10 @@ class DriveComparison(ComparisonOnScreen):
 
 def _error_figure(found: DriveComparison) -> Figure:
     caption = (
-        f"Steady speed without trim, measured less commanded, on this machine: {found.machine}. The default is what "
-        "the axis assumes at power-on, the nominal table what a conventional printer would hold, computed from the "
-        "nameplate. Look for: circles on the line; below it the head is too slow, at −100 % it does not move."
+        f"Steady-state speed error (measured minus commanded) without trim, on this machine: {found.machine}. The "
+        "default is what the axis assumes at power-on, the nominal table is that of a conventional printer, "
+        "computed from the nameplate. Circles should be on the line; below it the head is too slow, at −100 % it "
+        "does not move."
     )
     speeds, order = np.sort(found.speeds) / INCH, np.argsort(found.speeds)
     # A circle needs room at either end.
@@ -149,15 +150,15 @@ def _error_figure(found: DriveComparison) -> Figure:
     span = (round(low - room, 2), round(high + room, 2))
     panel = Panel(name="drives", label="speed error [%]", height=260, zero=True, span=span, curves=curves)
     chart = line_chart(panel, x, "\u2190 to the left   commanded speed [in/s]   to the right \u2192")
-    title = "How far off speed is the head with each way of choosing the drive?"
+    title = "Speed error for each choice of drive"
     return Figure(title=title, caption=caption, charts=[chart], table=found.table.on_page)
 
 
 def _start_figure(found: DriveComparison) -> Figure:
     target, band = found.target / INCH, f"±{100 * BAND:g} %"
     caption = (
-        f"The same drives, starting to the right at {target:.4g} in/s with the trim running. Below: the end of it, "
-        f"magnified. Look for: the first to be between the dashes for good; what comes after {FIRST_LINE:.1f} s is too "
+        f"The same drives, starting to the right at {target:.4g} in/s with the trim running. Below: the settling, "
+        f"magnified. Compare when each stays between the dashed lines; what settles after {FIRST_LINE:.1f} s is too "
         "late for a line of 13 in at 40 in/s."
     )
     longest = max((start.t for start in found.starts), key=len)
@@ -180,7 +181,7 @@ def _start_figure(found: DriveComparison) -> Figure:
          f"{100 * start.mean_error:+.1f}")
         for method, way, start in zip(found.methods, found.constants, found.starts, strict=True)
     ]  # fmt: skip
-    title = f"How soon is it within {band} of {target:.4g} in/s for good?"
+    title = f"Settling to within {band} of {target:.4g} in/s"
     return Figure(title=title, caption=caption, charts=charts, table=TextTable(title, heads, rows).on_page)
 
 

@@ -52,9 +52,9 @@ LAST = 1.0  # shown of the end of a run that failed, at most [s]
 TOP_SPEED = 240  # end of the axis of speed, 40 in/s [1/6 in/s]
 
 IN_THE_LINE = (
-    "Above: the speed. Below: the drive value the axis computer sent, 300 counts being the full supply. The drive is a "
-    "sum: friction + back-EMF (grows with speed) + a fixed IR part, added while speeding up, subtracted while slowing "
-    "down. Look for: speed on the dashed line, flat while printing."
+    "Top: speed. Bottom: drive value of the axis computer; 300 counts are the full supply. The drive is a sum: "
+    "friction + back-EMF (grows with speed) + a fixed IR part, added while accelerating, subtracted while "
+    "braking. Check: speed on the dashed line, constant while printing."
 )
 
 IN_THE_END = (
@@ -64,8 +64,8 @@ IN_THE_END = (
 )
 
 IN_THE_TURN = (
-    "The motor current while the head reverses. Nothing measures it: the drive ramp alone keeps it level. Look for: "
-    "two level stretches - braking, then speeding up, where friction adds to the work - and no step where the "
+    "The motor current while the head reverses. It is not measured: the drive ramp alone keeps it constant. Check: two "
+    "constant levels - braking, then accelerating, where friction adds to the load - and no step where the "
     "transition ends."
 )
 
@@ -201,11 +201,11 @@ def _identified_figure(run: PrintRun) -> Figure | None:
         end = "the axis works with its defaults" if run.lines else "the run ended before, with the defaults in force"
         known = f"Not identified, {' and '.join(sides)}: {end}."
     caption = (
-        f"The drive value that holds a speed. {known} Where it meets the axis is the drive that overcomes friction. "
-        "Look for: the line on the dashed truth."
+        f"The drive value that sustains a speed. {known} Its value at zero speed is the drive that overcomes friction. "
+        "Check: the line coincides with the dashed true line."
     )
     charts = [identified_chart(side, found) for side, found in run.identified.items()]
-    return Figure(title="What the axis knows of itself", caption=caption, charts=charts, beside=True)
+    return Figure(title="Identified constants", caption=caption, charts=charts, beside=True)
 
 
 def identified_chart(side: str, found: Direction) -> Chart:
@@ -243,7 +243,7 @@ def identified_chart(side: str, found: Direction) -> Chart:
 def _constants_figure(run: PrintRun) -> Figure | None:
     rows: list[list[str | Cell]] = []
     of_slope = "drive per speed: the motor's back-EMF in counts"
-    of_friction = f"drive that just keeps the head moving; {FULL_DRIVE_COUNTS} counts are the whole supply"
+    of_friction = f"drive that just keeps the head moving; {FULL_DRIVE_COUNTS} counts are the full supply"
     for side, found in run.identified.items():
         rows.append(_constant(f"slope K, {side}", of_slope, "1/256 count per 1/6 in/s", found.slope, found.true_slope))
         rows.append(_constant(f"friction Vf, {side}", of_friction, "count", found.friction, found.true_friction))
@@ -252,9 +252,12 @@ def _constants_figure(run: PrintRun) -> Figure | None:
     if not rows:
         return None
     heads = [("constant", False), ("in use", True), ("true", True), ("difference", True), ("unit", False)]
-    caption = "As the axis measured them, and as the simulated machine has them."
+    caption = "Measured by the axis, and true values of the simulated machine."
     if not all(found.valid for found in run.identified.values()):
-        caption = "Slope and friction are defaults where the axis could not measure them; beside them the true machine."
+        caption = (
+            "Slope and friction are defaults where the axis could not measure them; with the true values of the "
+            "machine."
+        )
     return Figure(title="Constants of the axis", caption=caption, table=Table(heads=heads, rows=rows))
 
 

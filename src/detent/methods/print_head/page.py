@@ -52,10 +52,10 @@ def print_page(
         notes=_notes(run),
         sections=[
             Section("Results", _result(run)),
-            Section("Where the head was", [path] if path else []),
-            Section("How the axis did it", how_figures(run, trace)),
+            Section("Head position", [path] if path else []),
+            Section("How the axis performed", how_figures(run, trace)),
             comparison_section(comparisons),
-            Section("Line by line", [_every_line(run)] if run.lines else []),
+            Section("Lines", [_every_line(run)] if run.lines else []),
         ],
         settings={"fidelity": spec.axis.fidelity} | (settings or {}),
     )
@@ -100,9 +100,9 @@ def _headline(spec: PrintHeadSpec, run: PrintRun) -> Headline:
         return run_headline(spec.axis.name, run, far, words=words)
     characters, pages = count(run.job.characters, "character"), count(run.job.pages, "page")
     lead = f"{asked} and {characters} on {pages} in {duration(run.print_time)}."
-    doubt = "Printed, but off its columns" if run.beyond else ""
+    doubt = "Printed, but columns misplaced" if run.beyond else ""
     if run.columns and not doubt:
-        lead += f" Every column of dots landed within {length(run.worst_error)} of its place."
+        lead += f" Every column of dots landed within {length(run.worst_error)} of its nominal position."
     return run_headline(spec.axis.name, run, lead, doubt=doubt, words=words)
 
 
@@ -175,15 +175,15 @@ def marks_of(run: PrintRun) -> Marks:
 def _error_figure(run: PrintRun) -> Figure:
     outside = " (outside the figure)" if run.worst_error < COLUMN_LIMIT / 1.5 else ""
     caption = (
-        "How far from its place each column of dots landed. Look for: two narrow heaps in the same place. Heaps that "
-        "stand apart mean that lines printed to the right and to the left do not line up. "
+        "Position error of each column of dots. Look for: two narrow peaks in the same place. Separate peaks "
+        "mean that lines printed to the right and to the left do not line up. "
         f"Allowed: ±{length(COLUMN_LIMIT)}{outside}; the finest column grid is {length(COLUMN)} (1/120{GAP}in)."
     )
     return Figure(title="Column errors", caption=caption, charts=[error_chart(run, COLUMN_LIMIT)])
 
 
 def error_chart(run: PrintRun, limit: float) -> Chart:
-    """Count how far from their place the columns landed, per direction of printing; `limit` is of good ones [m]."""
+    """Count how far off the columns landed, per direction of printing; `limit` is of good ones [m]."""
     heaps = [
         Heap(label=f"printed to the {name}", colour=name, at=ERROR_PLACES * UM, counts=counts)
         for name, counts in (("right", run.errors_right), ("left", run.errors_left))
@@ -250,7 +250,7 @@ def _every_line(run: PrintRun) -> Figure:
              ("time [s]", True), ("characters", True), ("worst error [µm]", True), ("rms [µm]", True)]  # fmt: skip
     longest = max((line.worst_error for line in run.lines), default=0.0) or 1.0
     rows = [_row(line, longest) for line in run.lines]
-    caption = "Time runs from the command to zero speed. The bar compares the lines with one another."
+    caption = "Time from the command to zero speed. The bars compare the lines with each other."
     return Figure(title="Every line", caption=caption + left_out(len(rows), "line"), table=long_table(heads, rows))
 
 

@@ -41,9 +41,9 @@ def load_job(path: str | PathLike[str]) -> PrintJob:
         except UnicodeDecodeError:
             job = parse_text(data.decode("latin-1"), file.name, encoding="latin-1")
     if not job.lines:
-        got = "an empty file" if not data else f"{len(data)} bytes that print nothing"
+        got = "an empty file" if not data else f"{len(data)} bytes without a printable character"
         raise InputError.of_file(
-            str(path), got, "a job with at least one character to print", "put some text into it, or name another file"
+            str(path), got, "a job with at least one character to print", "add some text, or name another file"
         )
     return job
 

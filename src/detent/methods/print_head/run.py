@@ -168,7 +168,7 @@ class PrintRun(RunRecord[PrintJob]):
 
     @property
     def beyond(self) -> int:
-        """Columns that landed farther from their place than is good."""
+        """Columns that landed farther from their nominal position than is good."""
         return int((self.errors_right + self.errors_left)[np.abs(ERROR_PLACES) > COLUMN_LIMIT].sum())
 
     @property
@@ -280,8 +280,8 @@ class _Runner:
         if top >= LOWEST_FAST_PASS:
             return describe_sb1(code)
         return (
-            f"the axis did not measure itself and works with its defaults; limits.speed, {top / 6:.3g} in/s, leaves no "
-            f"room for two passes that can be told apart; raise it to {LOWEST_FAST_PASS / 6:.3g} in/s, or state "
+            f"the axis did not measure itself and uses its defaults; limits.speed, {top / 6:.3g} in/s, is too "
+            f"low for two sufficiently different passes; raise it to {LOWEST_FAST_PASS / 6:.3g} in/s, or state "
             "true defaults in method.default_slope and method.default_friction_counts"
         )
 
@@ -292,7 +292,7 @@ class _Runner:
             return ""
         p = self.machine.params.controller
         if head.width < p.expected_width - p.width_tolerance:
-            return f" (the way found is {_both(head.width)}, limits.travel is {_both(p.expected_width)})"
+            return f" (the measured width is {_both(head.width)}, limits.travel is {_both(p.expected_width)})"
         return f" (the head stopped {_both(head.emitter)} from the left frame)"
 
     def book_line(self, index: int) -> None:
@@ -338,14 +338,14 @@ class _Runner:
         result.rms_error = math.sqrt(self.sum_squares / result.columns) if result.columns else 0.0
         if not result.failure and result.missed:
             result.failure = (
-                f"{result.missed} of {result.columns + result.missed} columns were not fired; look at the encoder "
+                f"{result.missed} of {result.columns + result.missed} columns were not fired; check the encoder "
                 "(missing edges, jitter)"
             )
         if result.beyond:
             result.warnings.append(
                 f"{result.beyond} of {result.columns} columns landed more than {format_quantity(COLUMN_LIMIT, 'm', 3)} "
-                "from their place; print to the right and to the left does not line up; look at the column errors and "
-                "at the encoder (jitter, missing edges)"
+                "from their nominal position; print to the right and to the left does not line up; check the column "
+                "errors and the encoder (jitter, missing edges)"
             )
         result.done = not result.failure and len(result.lines) == len(self.job.lines)
         return result

@@ -58,7 +58,7 @@ class PrintHeadAxisTable(AxisTable, frozen=True):
 class LimitsTable(Table, frozen=True):
     """What the axis must never exceed."""
 
-    travel: Length = required("free way of the head between the two side frames", '"14.5 in"', gt=0.0, le=10.0)
+    travel: Length = required("free travel of the head between the two side frames", '"14.5 in"', gt=0.0, le=10.0)
     speed: Velocity = required(
         "highest head speed ever commanded; rounded down to 1/6 in/s", '"40 in/s"', **SPEED_RANGE
     )
@@ -79,7 +79,7 @@ class MechanicsTable(Table, frozen=True):
     carriage_mass: Mass = required("carriage with the head", '"1.1 kg"', gt=0.0, le=1000.0)
     belt_mass: Mass = optional("belt and pulleys, as a mass moving with the carriage", 0.0, ge=0.0, le=1000.0)
     start_position: Length = optional(
-        "where the head stands at power-on, from the left frame", math.nan, derived="0.25 x limits.travel", ge=0.0
+        "head position at power-on, from the left frame", math.nan, derived="0.25 x limits.travel", ge=0.0
     )
     friction: FrictionTables
 
@@ -87,7 +87,7 @@ class MechanicsTable(Table, frozen=True):
 class MethodTable(Table, frozen=True):
     """Choices and constants of the axis computer's program."""
 
-    span: Literal["emf", "steady"] = optional("what the ramp interval is computed from (3.10)", "emf")
+    span: Literal["emf", "steady"] = optional("basis of the ramp interval (3.10)", "emf")
     intercept: Literal["measured", "literal"] = optional(
         "low speed used for the friction value: as measured, or the nominal 10 in/s (3.3)", "measured"
     )
@@ -102,9 +102,9 @@ class MethodTable(Table, frozen=True):
     default_slope: int = optional("slope at power-on, 1/256 count per 1/6 in/s (3.3)", 152, ge=1, le=1023)
     default_friction_counts: int = optional("friction at power-on, drive counts (3.3)", 32, ge=0, le=200)
     ir_counts: int = optional("drive counts added to accelerate, subtracted to brake (2.5)", 96, ge=1, le=250)
-    slope_min: int = optional("smallest slope taken for plausible, 1/256 count per 1/6 in/s (3.3)", 100, ge=1, le=1023)
-    slope_max: int = optional("largest slope taken for plausible, 1/256 count per 1/6 in/s (3.3)", 255, ge=1, le=1023)
-    friction_max_counts: int = optional("largest friction taken for plausible, drive counts (3.3)", 80, ge=0, le=250)
+    slope_min: int = optional("smallest plausible slope, 1/256 count per 1/6 in/s (3.3)", 100, ge=1, le=1023)
+    slope_max: int = optional("largest plausible slope, 1/256 count per 1/6 in/s (3.3)", 255, ge=1, le=1023)
+    friction_max_counts: int = optional("largest plausible friction, drive counts (3.3)", 80, ge=0, le=250)
     zero_speed_timeout: Time = optional(
         "time without an emitter that counts as standstill (4.1)", 5e-3, ge=1.2e-3, le=0.1
     )
@@ -119,7 +119,9 @@ class HomingTable(Table, frozen=True):
     speed: Velocity = optional("speed of both passes", 0.127, **HOMING_RANGE)
     drive_limit_counts: int = optional("largest drive value while homing (3.2)", 110, ge=1, le=FULL_DRIVE_COUNTS)
     contact_timeout: Time = optional("time without an emitter that counts as contact (3.2)", 50e-3, ge=5e-3, le=1.0)
-    width_tolerance: Length = optional("how much narrower than limits.travel the way may be found", 0.00127, ge=0.0)
+    width_tolerance: Length = optional(
+        "how much narrower than limits.travel the measured width may be", 0.00127, ge=0.0
+    )
 
 
 class PrintTable(Table, frozen=True):

@@ -112,7 +112,7 @@ class Supervisor:
             else:
                 self.pass_time(0.0)
         raise AxisError(
-            f"{command.text}: the axis computer does not take the byte before it; it hangs in state "
+            f"{command.text}: the axis computer does not accept the previous byte; it hangs in state "
             f"{STATE_NAMES[self.controller.head.state]!r}"
         )
 
@@ -122,7 +122,9 @@ class Supervisor:
             if byte == ACKNOWLEDGE and not (self.outstanding and self.outstanding[0].returns_data):
                 return
             if not self.outstanding:
-                raise AxisError(f"{command.text}: a byte was answered {describe_sb1(byte)}, expected FF (byte taken)")
+                raise AxisError(
+                    f"{command.text}: a byte was answered {describe_sb1(byte)}, expected FF (byte accepted)"
+                )
             self._book(byte)
 
     def _book(self, byte: int) -> None:
@@ -134,7 +136,7 @@ class Supervisor:
             self.pass_time(self.patience)
         if not latch.flag:
             raise AxisError(
-                f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state "
+                f"{command.text}: no result within {self.patience:g} s; the axis computer hangs in state "
                 f"{STATE_NAMES[self.controller.head.state]!r}"
             )
         return int(read_status(self.controller))

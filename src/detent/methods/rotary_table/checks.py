@@ -209,7 +209,7 @@ def _machine(spec: RotaryTableSpec) -> Iterator[Contradiction]:
     static, load = spec.mechanics.static, spec.disturbance.load
     yield from common.static_friction({"mechanics": spec.mechanics}, "N*m")
     if spec.limits.effort <= static:
-        allowed = f"above mechanics.static, {text(static, 'N*m')}: the motor never breaks loose"
+        allowed = f"above mechanics.static, {text(static, 'N*m')}: the motor never breaks away"
         keys = "limits.effort mechanics.static mechanics.coulomb"
         yield _below(keys, static * (1 + BARELY), allowed, "lower mechanics.static")
     if load is not None and load.duration < TICK * (1 - BARELY):
@@ -217,7 +217,7 @@ def _machine(spec: RotaryTableSpec) -> Iterator[Contradiction]:
 
 
 RULES = (_gear, _detector, _clocks, _speeds, _acceleration, _positions, _machine)
-"""Contradictions are told in this order."""
+"""Contradictions are reported in this order."""
 
 
 # --------------------------------------------------------------------------------------------------------- cautions
@@ -241,7 +241,7 @@ def _loop(m: TableFigures) -> Iterator[Caution]:
             "following error at limits.speed",
             f"{text(error, 'rad')} after an acceleration",
             f"up to protection.following_error, {text(spec.protection.following_error, 'rad')}",
-            "the drive goes off when a jog has come to its speed",
+            "the drive trips when a jog reaches its speed",
             remedy.least("protection.following_error", error, "raise method.position_gain"),
         )
     if damping < LEAST_DAMPING:
@@ -249,10 +249,10 @@ def _loop(m: TableFigures) -> Iterator[Caution]:
             "damping of the loop",
             f"{damping:.3g}",
             f"at least {LEAST_DAMPING:g}",
-            "the table overshoots and swings at each stop"
+            "the table overshoots and rings at each stop"
             if m.is_stable
-            else f"the loop is unstable, spectral radius {m.loop.spectral_radius:.4f}: the table swings more and more",
-            remedy.most("method.position_gain", m.loop.largest_gain(LEAST_DAMPING), "make drive.time_constant shorter"),
+            else f"the loop is unstable, spectral radius {m.loop.spectral_radius:.4f}: the oscillation grows",
+            remedy.most("method.position_gain", m.loop.largest_gain(LEAST_DAMPING), "shorten drive.time_constant"),
         )
     if m.is_stable and m.peak_word(m.speed) > most * (1 + BARELY):
         needed = m.word_at(m.speed)
@@ -262,7 +262,7 @@ def _loop(m: TableFigures) -> Iterator[Caution]:
             f"up to {most}, the largest word",
             "the drive does not keep up, and the following error grows for as long as a jog lasts"
             if needed > most
-            else "the word is clipped after each acceleration, and the table lags by more than the figures say",
+            else "the word saturates after each acceleration, and the table lags by more than the derived figures say",
             "lower limits.speed, or raise drive.full_speed",
         )
 
@@ -275,7 +275,7 @@ def _drive(m: TableFigures) -> Iterator[Caution]:
             "drive.full_speed",
             text(full, "rad/s"),
             f"up to motor.max_speed, {text(most, 'rad/s')}",
-            "in a fault the largest word drives the motor faster than it stands",
+            "in a fault the largest word drives the motor above its rated speed",
             remedy.most("drive.full_speed", most),
         )
     words = {f"a dial of limits.speed / {DIAL_RANGE}": spec.per_interrupt(m.speed / DIAL_RANGE)}
@@ -289,9 +289,9 @@ def _drive(m: TableFigures) -> Iterator[Caution]:
             "method.fraction_bits",
             f"{bits}: {name} is {word:.3g} parts of a count per interrupt",
             f"enough for {0.5 / SMALL_ERROR:g} of them",
-            "it is rounded to nothing, and the table stays where it is (test 20)"
+            "it is rounded to zero, and the table does not move (test 20)"
             if word < 0.5
-            else f"it is rounded to whole ones and wrong by up to {text(error, '%')} (test 20)",
+            else f"it is rounded to whole counts, an error of up to {text(error, '%')} (test 20)",
             remedy.least("method.fraction_bits", more, "use a longer method.strobe_period"),
         )
 
@@ -303,10 +303,10 @@ def _torque(m: TableFigures) -> Iterator[Caution]:
     if moves and needed > effort * (1 + BARELY):
         lower = spec.limits.acceleration * (effort - steady) / (needed - steady)
         yield Caution(
-            "torque of an acceleration",
+            "acceleration torque",
             text(needed, "N*m"),
             f"up to limits.effort, {text(effort, 'N*m')}",
-            "the amplifier is at its limit, the table lags and passes its target at the end",
+            "the amplifier saturates, the table lags and overshoots at the end",
             remedy.most("limits.acceleration", lower, "raise limits.effort"),
         )
     giver = "the amplifier asks for, reversed from full speed"
@@ -318,9 +318,9 @@ def _torque(m: TableFigures) -> Iterator[Caution]:
             "disturbance.load.torque",
             f"{text(torque, 'N*m')} at the motor, {text(together, 'N*m')} with an acceleration",
             f"up to limits.effort, {text(effort, 'N*m')}",
-            "the table is driven off its place while the load acts"
+            "the load displaces the table while it acts"
             if torque > effort + spec.mechanics.coulomb
-            else "a table that is moving against the load falls behind",
+            else "a table moving against the load falls behind",
             remedy.least("limits.effort", together, "use a larger mechanics.gear_ratio"),
         )
 
@@ -333,7 +333,7 @@ def _rest(m: TableFigures) -> Iterator[Caution]:
             "static friction",
             text(spec.mechanics.static, "N*m"),
             f"below the torque of the largest word, {text(m.spec.stiffness * spec.drive.full_speed, 'N*m')}",
-            "the table never breaks loose",
+            "the table never breaks away",
             "shorten drive.time_constant or lower mechanics.static",
         )
     elif spec.method.position_control and error > window:
@@ -342,7 +342,7 @@ def _rest(m: TableFigures) -> Iterator[Caution]:
             f"up to {counted(error)}, {text(error * spec.count, 'rad')}",
             f"up to method.in_position, {window}",
             f"{'friction' if spec.mechanics.static > 0 else 'a word that is rounded to 0'} holds the table off its "
-            "place, and a positioning does not end",
+            "target, and positioning never finishes",
             remedy.least("method.in_position", error, "raise method.position_gain"),
         )
     elif spec.method.position_control and error + noise > window:
@@ -350,7 +350,7 @@ def _rest(m: TableFigures) -> Iterator[Caution]:
             "noise in position",
             f"up to {counted(noise)}, with {error} at rest",
             f"together up to method.in_position, {window}",
-            "readings leave the window again and again, and a positioning takes long to end or does not",
+            "readings keep leaving the window, and positioning takes long or never finishes",
             remedy.least("method.in_position", error + noise, "lower detector.fine.noise"),
         )
 
@@ -364,9 +364,9 @@ def _slow(m: TableFigures) -> Iterator[Caution]:
         lower = window * spec.count * m.gain * spec.ratio * m.spec.stiffness
         yield Caution(
             "stick-slip",
-            f"{step:.4g} counts of deviation more to break loose than to move on",
+            f"{step:.4g} counts more deviation to break away than to keep moving",
             f"up to {window}",
-            "at a slow jog the table stands, breaks loose and stands again",
+            "at a slow jog the table moves in stick-slip",
             remedy.most("mechanics.static", mechanics.coulomb + lower),
         )
     numbers = [number for number, entry in spec.position.items() if entry.direction in {"positive", "negative"}]
@@ -377,7 +377,7 @@ def _slow(m: TableFigures) -> Iterator[Caution]:
             text(method.short_way, "rad"),
             f"at least {counted(counts)}, {text(counts * spec.count, 'rad')}, what is in position, where a position "
             f"has a direction: {', '.join(numbers)}",
-            "a table that stands beyond its target by a count goes round a whole turn when it is sent there again",
+            "a table that rests one count beyond its target makes a whole turn when it is sent there again",
             remedy.least("method.short_way", counts * spec.count, "lower method.in_position"),
         )
 

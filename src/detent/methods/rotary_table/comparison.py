@@ -120,7 +120,7 @@ class AngleComparison(ComparisonOnScreen):
         for place, starts in self.by_place.items():
             others = "; ".join(f"{form} {_start_text(start)}" for form, start in starts.items() if form != USED)
             rows.append((f"jog from {math.degrees(place):.3f} deg", _start_text(starts[USED]), others))
-        title = f"Endless angle at {degrees(self.speed)} deg/s, beside its alternatives"
+        title = f"Endless angle at {degrees(self.speed)} deg/s, compared with the alternatives"
         heads = ("", "turn counter, position control", "raw angle; no position control; other forms")
         return TextTable(title, heads, rows)
 
@@ -146,8 +146,8 @@ def compare_angle(spec: RotaryTableSpec, *, progress: Progress | None = None) ->
     if speed < math.tau / LONGEST_TURN:
         least = format_quantity(math.tau / LONGEST_TURN, "rad/s")
         raise DetentError(
-            f"compare: got a table that goes round at {format_quantity(speed, 'rad/s')}; expected: {least} or more, a "
-            "turn in an hour; try: raise limits.speed, or limits.acceleration where it stops the table too slowly"
+            f"compare: got a table that turns at {format_quantity(speed, 'rad/s')}; expected: {least} or more, one "
+            "turn per hour; try: raise limits.speed, or limits.acceleration where it stops the table too slowly"
         )
     speeds = sorted({min(wanted, spec.limits.speed) for wanted in FEED_SPEEDS})
     lag = speed / spec.method.position_gain / (1 - spec.drive.droop)
@@ -279,18 +279,20 @@ def _crossing_figure(found: AngleComparison) -> Figure:
     conventional, endless = found.crossings
     caption = (
         f"Both start at 100 deg and run at {degrees(found.speed)} deg/s. The conventional unit has a target beyond the "
-        "end of the turn and reads its angle as it comes; this method jogs. Look for: the lag at the mark. A unit that "
-        f"believes the table a whole turn back drives it on as fast as it can: after {number(endless.t[-1])}{GAP}s it "
-        f"has turned {degrees(conventional.travel)} deg, and still runs at {degrees(conventional.speed)} deg/s."
+        "end of the turn and uses its angle as it is; this method jogs. Check the lag at the mark. The "
+        "conventional unit believes that the table is a whole turn behind and drives it on at full speed: after "
+        f"{number(endless.t[-1])}{GAP}s "
+        f"it has turned {degrees(conventional.travel)} deg, and is still running at {degrees(conventional.speed)} "
+        "deg/s."
     )
     t, events = conventional.t, _events(found)
     ways, lags = _curves(found, lambda case: case.angle), _curves(found, lambda case: case.deviation)
     signals = _curves(found, lambda case: case.s4)
     return Figure(
-        title="Across the end of the turn, with an endless angle and without",
+        title="Across the end of the turn, with and without an endless angle",
         caption=caption,
         charts=time_charts(Timeline(name="cross", t=t, label="time since the start", unit="s", events=events), [
-            Panel(name="cross-way", label="way [deg]", height=200, zero=True, curves=ways),
+            Panel(name="cross-way", label="distance [deg]", height=200, zero=True, curves=ways),
             Panel(name="cross-deviation", label="lag dR [deg]", height=160, zero=True, curves=lags),
             Panel(name="cross-speed", label="S4 [deg/s]", height=160, zero=True, curves=signals),
         ]),
@@ -322,9 +324,9 @@ def _events(found: AngleComparison) -> list[Event]:
 def _feed_figure(found: AngleComparison) -> Figure:
     heads = [("dial [deg/s]", True), ("with position control, speed off by [%]", True), ("without [%]", True)]
     caption = (
-        "Manual feed used to run without position control, because the end of the turn stood in its way. Then the "
-        "table turns at what the drive makes of the speed signal: a droop, and steps of the speed word that are coarse "
-        "at low speed. With the loop closed all the time the mean speed is that of the dial."
+        "Conventional manual feed runs without position control, because of the end of the turn. The table then turns "
+        "at whatever speed the drive produces from the speed signal: with droop, and with the coarse steps of "
+        "the speed word at low speed. With the loop always closed the mean speed is that of the dial."
     )
     errors = [abs(error) for one in found.feeds for error in (one.closed, one.opened) if not math.isnan(error)]
     longest = 100 * max(errors, default=0.0) or 1.0
@@ -338,9 +340,9 @@ def _feed_figure(found: AngleComparison) -> Figure:
 
 def _start_figure(found: AngleComparison) -> Figure:
     forms = list(dict.fromkeys(start.form for start in found.starts))
-    heads = [("start [deg]", True), ("in lags", True), *((f"{form}, way [deg]", True) for form in forms)]
+    heads = [("start [deg]", True), ("in lags", True), *((f"{form}, distance [deg]", True) for form in forms)]
     caption = (
-        "The original form of the method remembers a crossing by one flag, and rolls over when C has gone one turn. "
+        "The original form of the method stores a crossing in one flag, and rolls over when C has gone one turn. "
         f"From a start less than the lag, {angle(found.following_error)}, beyond 0 the table has not crossed the end "
         "of the turn by then: only C goes back, and the table is thrown after it. A guarded flag, which is asked "
         "before the rollover, and a counter of turns, the default, are safe from every start."
@@ -350,7 +352,7 @@ def _start_figure(found: AngleComparison) -> Figure:
         [f"{math.degrees(place):.3f}", f"{place / lag:.2f}", *(_start_cell(starts[form]) for form in forms)]
         for place, starts in found.by_place.items()
     ]
-    title = "Jog from just beyond the end of the turn, for two turns and more"
+    title = "Jog from just beyond the end of the turn, for more than two turns"
     return Figure(title=title, caption=caption, table=Table(heads=heads, rows=rows))
 
 

@@ -60,7 +60,7 @@ class TableFigures:
         self.latency_way = self.speed * method.task_period  # in a period of the timer task at limits.speed [rad]
         # Largest sum of errors with which the motor turns still come out right [rad] (3.1).
         self.allowed_coarse_error = math.pi / spec.ratio - math.tau / spec.detector.coarse.counts - spec.count
-        # Largest error of the table against the fine resolver's angle, which no loop sees [rad].
+        # Largest angle error of the table against the fine resolver's angle, which no loop sees [rad].
         self.table_error = 0.5 * mechanics.backlash + mechanics.eccentricity + resolver_error(fine) / spec.ratio
 
     @cached_property
@@ -181,11 +181,11 @@ def _words(machine: TableFigures) -> Iterator[Derived]:
     yield quantity_figure("largest table speed", spec.largest_speed, "rad/s", formula)
     per_interrupt = machine.speed * method.strobe_period / spec.count
     text = f"{per_interrupt:.4g} counts in an interrupt"
-    yield Derived("way of an interrupt at limits.speed", per_interrupt, "count", text, "v x strobe period / count")
+    yield Derived("distance per interrupt at limits.speed", per_interrupt, "count", text, "v x strobe period / count")
     least = spec.count / method.strobe_period
     formula = "count / 2^(fraction bits) / strobe period"
     yield quantity_figure("slowest jog", least / (1 << method.fraction_bits), "rad/s", formula)
-    formula = "count / strobe period: below it D stands still in some interrupts"
+    formula = "count / strobe period: below it D is at standstill in some interrupts"
     yield quantity_figure("slowest jog with a count in each interrupt", least, "rad/s", formula)
     passes = method.task_period / method.strobe_period
     yield Derived("interrupts in a pass of the task", passes, "", f"{passes:.4g}", "task period / strobe period")
@@ -198,12 +198,12 @@ def _drive(machine: TableFigures) -> Iterator[Derived]:
     spec, speed, acceleration = machine.spec, machine.speed, machine.spec.limits.acceleration
     yield quantity_figure("inertia at the motor J", spec.inertia, "kg*m^2", "rotor + gear + table / G^2")
     yield quantity_figure("stiffness of the velocity loop", spec.stiffness, "N*m*s/rad", "(1 - droop) x J / tau")
-    yield quantity_figure("time of an acceleration", speed / acceleration, "s", "v / a")
+    yield quantity_figure("acceleration time", speed / acceleration, "s", "v / a")
     formula = "v^2 / (2 a), to limits.speed or from it to rest"
-    yield quantity_figure("way of an acceleration", speed**2 / (2 * acceleration), "rad", formula)
+    yield quantity_figure("acceleration distance", speed**2 / (2 * acceleration), "rad", formula)
     if machine.spec.method.position_control and machine.is_stable:
         formula = f"J x G x {machine.peak_acceleration:.3g} a, as the loop swings, + droop and friction at limits.speed"
-        yield quantity_figure("torque of an acceleration", machine.accelerating_torque, "N*m", formula)
+        yield quantity_figure("acceleration torque", machine.accelerating_torque, "N*m", formula)
 
 
 def _loop(machine: TableFigures) -> Iterator[Derived]:
@@ -214,7 +214,7 @@ def _loop(machine: TableFigures) -> Iterator[Derived]:
     yield quantity_figure("following error at limits.speed", error, "rad", formula)
     ideal = 1 / (2 * math.sqrt(loop.gain * loop.share * loop.time_constant))
     yield Derived("damping without sampling", ideal, "", f"{ideal:.3g}", "1 / (2 sqrt(Kp (1 - droop) tau))")
-    formula = "least damped mode that swings, with strobe period and interrupt delay"
+    formula = "least damped oscillatory mode, with strobe period and interrupt delay"
     yield Derived("damping of the loop", loop.damping, "", f"{loop.damping:.3g}", formula)
     limit = loop.largest_gain(0.0)
     text = f"Kp = {limit:.4g} 1/s, {limit / loop.gain:.3g} x the gain"
@@ -256,12 +256,12 @@ def _detector(machine: TableFigures) -> Iterator[Derived]:
         total = sum(errors.values())
         yield Derived("coarse error", total, "rad", f"up to {format_quantity(total, 'rad')}", " + ".join(errors))
     if machine.table_error > 0:
-        formula = "gear's backlash / 2 + eccentricity + fine resolver / G: no loop sees it"
-        yield quantity_figure("error of the table", machine.table_error, "rad", formula)
+        formula = "gear's backlash / 2 + eccentricity + fine resolver / G: outside the loop"
+        yield quantity_figure("angle error of the table", machine.table_error, "rad", formula)
     fine, coarse = detector.fine.counts / detector.clock, detector.coarse.counts / detector.clock
     yield quantity_figure("fine conversion", fine, "s", "fine counts / clock: a period of the excitation")
     if coarse != fine:
         yield quantity_figure("coarse conversion", coarse, "s", "coarse counts / clock: a period of the excitation")
     way = machine.speed * fine / spec.count
     formula = "v x fine conversion: the word of a strobe is up to that old"
-    yield count_figure("way of a conversion at limits.speed", way, formula)
+    yield count_figure("distance per conversion at limits.speed", way, formula)

@@ -38,9 +38,9 @@ NEEDED = (STATE, AHEAD, TARGET, DETECTED, PRESENT, REMAINING, TURNS, FLAG, DEVIA
 """Signals that a step is drawn from."""
 
 CARRIED = {
-    "turn counter": "The positioner adds n turns and reckons with the present angle R = D + n turns.",
+    "turn counter": "The positioner adds n turns and uses the present angle R = D + n turns.",
     "flag": "The positioner notes the jump in FLG, and adds one turn along the motion to R while that is on.",
-    "raw": "A conventional unit reckons with this angle as it comes: R is D.",
+    "raw": "A conventional unit uses this angle as it is: R is D.",
 }
 """What becomes of the jump, by the form of the axis."""
 
@@ -94,7 +94,7 @@ def step_section(spec: RotaryTableSpec, run: SequenceRun, trace: Trace | None) -
         charts=_charts(shown, events),
         events=events,
     )
-    return Section("How the table goes on beyond a turn" if shown.crossed else "One step in detail", [figure])
+    return Section("Beyond one turn" if shown.crossed else "One step in detail", [figure])
 
 
 def telling(run: SequenceRun, recorded: float) -> tuple[StepRecord, str] | None:
@@ -146,18 +146,18 @@ def _cut(spec: RotaryTableSpec, trace: Trace, step: StepRecord, why: str) -> Sho
 
 def _caption(shown: ShownStep) -> str:
     form = shown.spec.method.form
-    carried = f"The detector knows one turn: at its end D jumps by 360 deg. {CARRIED[form]} "
-    carried += "Shaded: R is not D. " if shown.crossed and form != "raw" else ""
+    carried = f"The detector is absolute within one turn: at its end D jumps by 360 deg. {CARRIED[form]} "
+    carried += "Shaded: R differs from D. " if shown.crossed and form != "raw" else ""
     if shown.step.kind == "go":
         asked = "The commanded angle C runs to the target M, and R follows. "
-        look = "Look for: a deviation that knows nothing of the end of the turn."
+        look = "Check: the deviation is not affected by the end of the turn."
     else:
         asked = (
             "The target M of a jog is two turns ahead and never reached: as soon as less than one turn is left, R and "
-            "C go back by a whole turn together (rollover), and everything begins again. "
+            "C are reduced by a whole turn together (rollover), and the cycle repeats. "
         )
-        look = "Look for: a deviation that knows nothing of all this; if one went alone, it would jump by 360 deg."
-    return carried + asked + ("Look for: where the lag leaves its course." if shown.why == FAILED else look)
+        look = "Check: the deviation is not affected; if only one of them changed, it would jump by 360 deg."
+    return carried + asked + ("Check where the lag starts to deviate." if shown.why == FAILED else look)
 
 
 # ---- charts
@@ -213,8 +213,8 @@ def _events(shown: ShownStep) -> list[Event]:
     texts += [(row, _rollover_text(shown, row)) for row in shown.rolled[:MOST_MOMENTS]]
     held = "at rest: the table is held"
     if shown.spec.method.form == "turn counter":
-        held = "at rest: M, R and C come back to within one turn, where the table is held"
-    for now, text in ((STOPPING, "button released: M comes to where the table can stop"), (HOLD, held)):
+        held = "at rest: M, R and C are reduced to within one turn, where the table is held"
+    for now, text in ((STOPPING, "button released: M moves to where the table can stop"), (HOLD, held)):
         found = np.flatnonzero((t > 0) & (state == now)).tolist()
         texts += [(row, text) for row in found[:1]]
     return [Event(float(t[row]), text) for row, text in sorted(texts, key=lambda moment: moment[0])]
@@ -242,7 +242,7 @@ def _rollover_text(shown: ShownStep, row: int) -> str:
     before, after = shown.fine_angle(DEVIATION)[row - 1 : row + 1].tolist()
     stays = abs(after - before) < UNCHANGED
     deviation = f"stays {_angle_text(after)}" if stays else f"jumps from {_angle_text(before)} to {_angle_text(after)}"
-    return f"less than one turn remains to M: rollover, R and C go back by one turn; the deviation {deviation}"
+    return f"less than one turn remains to M: rollover, R and C are reduced by one turn; the deviation {deviation}"
 
 
 def _angle_text(value: float) -> str:

@@ -191,7 +191,7 @@ def _step_faults(spec: RotaryTableSpec, step: Step) -> Iterator[FileProblem]:
         remedy = f"write speed = {at_least(least, 'rad/s')}, or raise method.fraction_bits"
         yield FileProblem.of_key("speed", format_quantity(step.speed, "rad/s"), allowed, remedy)
     if step.duration is not None and step.duration < task * (1 - BARELY):
-        allowed = f"method.task_period, {format_quantity(task, 's')}, or longer: the button is looked at so often"
+        allowed = f"method.task_period, {format_quantity(task, 's')}, or longer: the button is polled at this interval"
         remedy = f"write for = {at_least(task, 's')}, or shorten method.task_period"
         yield FileProblem.of_key("for", format_quantity(step.duration, "s"), allowed, remedy)
 

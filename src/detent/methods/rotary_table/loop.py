@@ -63,7 +63,7 @@ class HeldLoop:
 
     @property
     def damping(self) -> float:
-        """Damping ratio of the least damped mode that swings; 1 where none does, below 0 where one grows."""
+        """Damping ratio of the least damped oscillatory mode; 1 where none does, below 0 where one grows."""
         least = 1.0
         for value in self.eigenvalues():
             factor = complex(value)

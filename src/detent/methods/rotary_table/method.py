@@ -32,7 +32,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     )  # fmt: skip
     takes, reads, runs = "sequence_job:SequenceJob", "sequence_file:load_sequence", "run:run_sequence"
     linear_loops = "derive:linear_loops"
-    leaves_out = ("Left out: limits, counts, friction that does not grow with speed.",)
+    leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     compares = ("comparison:compare_angle",)
     sums_up, reports = "summary:sequence_summary_rows", "page:table_page"
     says = "{job}: every step was done on {axis}.", "Not done: {failure}"

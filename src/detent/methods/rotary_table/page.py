@@ -32,20 +32,21 @@ from detent.record.trace import Trace
 PHASE, COMMANDED = "plant.table", "controller.positioner.interpolator.speed"
 NEEDED = (PHASE, VELOCITY, DETECTED, AHEAD, COMMANDED)  # signals that the whole sequence is drawn from
 PHASE_TURN = float(1 << 32)  # register of the true angle per turn
-LINE_SECONDS = 120.0  # time that the time line shows: more than this is a grey block on any screen
-MOST_SIGNALS = 12  # inputs and outputs that the time line shows
+LINE_SECONDS = 120.0  # time that the timeline shows: more than this is a grey block on any screen
+MOST_SIGNALS = 12  # inputs and outputs that the timeline shows
 
 KINDS = (("go", "go to", "right"), ("jog", "jog", "left"), ("wait", "wait", "muted"))
 """Kinds of steps that last, their lanes and colours; an output is switched in no time."""
 
 COLOURS = {kind: colour for kind, _, colour in KINDS} | {"output": "good"}
-LINE = "line"  # name of the time line: its plot areas share their cursor
+LINE = "line"  # name of the timeline: its plot areas share their cursor
 
 SINCE = "time since the sequence began"
 
 HEADS = (
-    ("step", True), ("what", False), ("begin [s]", True), ("took [s]", True), ("from [deg]", True), ("to [deg]", True),
-    ("way [deg]", True), ("error [count]", True), ("lag [deg]", True), ("crossed", True), ("roll\u00adovers", True),
+    ("step", True), ("what", False), ("start [s]", True), ("duration [s]", True), ("from [deg]", True),
+    ("to [deg]", True), ("distance [deg]", True), ("error [count]", True), ("lag [deg]", True), ("crossed", True),
+    ("roll\u00adovers", True),
 )  # fmt: skip
 
 
@@ -64,10 +65,10 @@ def table_page(
         cards=_cards(spec, figures),
         notes=warnings(run.warnings),
         sections=[
-            Section("What the sequence did", [_line_figure(spec, figures, trace)] if run.steps else []),
+            Section("Results", [_line_figure(spec, figures, trace)] if run.steps else []),
             step_section(spec, run, trace),
             comparison_section(comparisons),
-            Section("Step by step", [_every_step(spec, run)] if run.steps else []),
+            Section("Steps", [_every_step(spec, run)] if run.steps else []),
         ],
         settings=settings or {},
     )
@@ -89,8 +90,8 @@ def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
         return run_headline(name, run, lead)
     off = f"{angle(error.value)} ({CountUnit(spec.count, 'count').counts(error.value)})"
     if is_off(run, error.value):
-        return run_headline(name, run, lead, doubt="Done, but beside its targets")
-    return run_headline(name, run, f"{lead} In every positioning it came to within {off} of its target.")
+        return run_headline(name, run, lead, doubt="Done, but off target")
+    return run_headline(name, run, f"{lead} In every positioning it stopped within {off} of its target.")
 
 
 def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
@@ -114,7 +115,7 @@ def _cards(spec: RotaryTableSpec, figures: SequenceFigures) -> list[Card]:
     return shown
 
 
-# ---- time line
+# ---- timeline
 
 
 def _line_figure(spec: RotaryTableSpec, figures: SequenceFigures, trace: Trace | None) -> Figure:
@@ -123,17 +124,17 @@ def _line_figure(spec: RotaryTableSpec, figures: SequenceFigures, trace: Trace |
     end = min(figures.seconds, recorded, LINE_SECONDS)
     signals = _signal_lanes(run)
     lanes = [*_step_lanes(run), *signals[:MOST_SIGNALS]]
-    caption = "What the sequence controller did, and what the table did with it."
+    caption = "Actions of the sequence controller, and the response of the table."
     if run.inputs and any(step.kind == "jog" for step in run.steps):
         caption += " A jog that waits for its signal begins before the table moves."
     if rows:
-        caption += " D is what the detector says: it starts again at 0 in every turn."
+        caption += " D is the detected angle: it restarts at 0 in every turn."
     if rows and run.done and run.crossings:
-        caption += " Look for: the true angle, which runs on without a step where D jumps."
+        caption += " Check: the true angle continues without a step where D jumps."
     if len(signals) > MOST_SIGNALS:
         caption += f" {further(len(signals) - MOST_SIGNALS, 'signal')} not drawn."
     return Figure(
-        title=whole_or_first(end, figures.seconds, "Time line"),
+        title=whole_or_first(end, figures.seconds, "Timeline"),
         caption=caption,
         charts=_line_charts(spec, run, rows.between(0.0, end), lanes) if rows else [_lane_chart(lanes, (0.0, end))],
     )
@@ -215,9 +216,9 @@ def _every_step(spec: RotaryTableSpec, run: SequenceRun) -> Figure:
     longest = max((error for error in errors if not math.isnan(error)), default=0.0) / spec.count or 1.0
     rows = [_row(spec, run, step, longest) for step in run.steps]
     caption = (
-        "Colours as in the time line. From and to are true angles of the table within its turn; way counts on through "
-        "turns. Error is target less true angle when the step ends; a count is "
-        f"{angle(spec.count)}. Lag is the largest deviation dR; crossed counts ends of the turn."
+        "Colours as in the timeline. From and to are true angles of the table within its turn; distance accumulates "
+        "over turns. Error is target minus true angle when the step ends; a count is "
+        f"{angle(spec.count)}. Lag is the largest deviation dR; crossed counts the passes over the end of the turn."
     )
     return Figure(title="Every step", caption=caption + left_out(len(rows), "step"), table=long_table(HEADS, rows))
 

@@ -261,7 +261,7 @@ class _WatchedTable(TableObserver):
             if spec.detector.composition != "rounded":
                 remedy = 'set detector.composition = "rounded"'
             return (
-                f"the axis says that it is in position, but stands {_degrees(abs(turns) * math.tau / spec.ratio)} "
+                f"the axis signals in position, but is {_degrees(abs(turns) * math.tau / spec.ratio)} "
                 f"{'below' if turns > 0 else 'above'} it, {abs(turns):.1f} turns of the motor: the detected angle is "
                 f"wrong; {remedy}"
             )
@@ -274,9 +274,9 @@ class _WatchedTable(TableObserver):
             worst = max(steps, key=lambda step: abs(step.error))
             off, counts = format_quantity(abs(worst.error), "rad", 3), abs(worst.error) / self._result.count
             yield (
-                f"in step {worst.number} the table stood {off} ({counts:.2g} counts) beside its target while the axis "
-                "said that it was in position; the detector cannot see what backlash and eccentricity of the gear do "
-                "to the table; lower mechanics.backlash, or widen method.in_position"
+                f"in step {worst.number} the table was {off} ({counts:.2g} counts) off target while the axis signalled "
+                "in position; backlash and eccentricity of the gear are outside the loop; lower mechanics.backlash, or "
+                "widen method.in_position"
             )
 
     def finish(self) -> None:
@@ -296,7 +296,7 @@ class _WatchedTable(TableObserver):
         result.done = not result.failure
         if result.done and controller.coming:
             names = ", ".join(f'"{name}"' for name in controller.coming)
-            result.warnings.append(f"the sequence ended before all of these inputs had come: {names}")
+            result.warnings.append(f"the sequence ended before all of these inputs had arrived: {names}")
 
 
 def is_off(run: SequenceRun, error: float) -> bool:

@@ -51,7 +51,7 @@ class MotorTable(Table, frozen=True):
     """Servo motor with its tachometer."""
 
     rotor_inertia: Inertia = required("rotor with tachometer", '"9 kg*cm^2"', ge=1e-9, le=100.0)
-    max_speed: AngularVelocity = required("largest speed of the motor shaft", '"2000 rpm"', gt=0.0, le=2e4)
+    max_speed: AngularVelocity = required("maximum speed of the motor shaft", '"2000 rpm"', gt=0.0, le=2e4)
 
 
 class DriveTable(Table, frozen=True):
@@ -77,9 +77,7 @@ class MechanicsTable(Table, frozen=True):
     eccentricity: Angle = optional("largest angle by which the table leads or lags the gear", 0.0, ge=0.0, le=0.2)
     eccentricity_angle: Angle = optional("angle at which it is right and begins to lead", 0.0, ge=-6.3, le=6.3)
     coulomb: Torque = optional("Coulomb friction at the motor shaft", 0.0, ge=0.0, le=1e5)
-    static: Torque = optional(
-        "torque that breaks the motor loose", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5
-    )
+    static: Torque = optional("breakaway torque of the motor", usual_stiction, derived="1.15 x coulomb", ge=0.0, le=1e5)
     start_angle: Angle = optional("angle of the table at power-on", 0.0, ge=-6.3, le=6.3)
 
 
@@ -163,8 +161,8 @@ class MethodTable(Table, frozen=True):
     )
     signed_remaining: bool = optional("off: the unsigned |M - R| of the flowchart", default=True)
     fraction_bits: int = optional("bits after the point of the remaining angle", 16, ge=0, le=16)
-    in_position: int = optional("deviation that counts as in position, in counts", 2, ge=0, le=100_000)
-    in_position_time: Time = optional("how long it must last", 20e-3, gt=0.0, le=10.0)
+    in_position: int = optional("in-position window, in counts", 2, ge=0, le=100_000)
+    in_position_time: Time = optional("time in the window until the axis is in position", 20e-3, gt=0.0, le=10.0)
     short_way: Angle = optional(
         "a target this near is taken the short way, whatever its direction", 0.0, ge=0.0, le=3.0
     )
@@ -187,17 +185,17 @@ class TableProtectionTable(TurnProtectionTable, frozen=True):
     The speed word may be at its limit: what a drive cannot follow shows in the deviation.
     """
 
-    saturation_time: Time = optional("how long the speed word may stay at its limit", 0.0, ge=0.0, le=1000.0)
+    saturation_time: Time = optional("time the speed word may stay at its limit", 0.0, ge=0.0, le=1000.0)
     overspeed: float = optional(
         "speed that is a fault, as a share of limits.speed and what breaks the table loose; 0: any",
         1.25, ge=0.0, le=100.0,
     )  # fmt: skip
-    reversed_time: Time = optional("how long the table may speed up against its effort", 0.05, ge=0.0, le=10.0)
+    reversed_time: Time = optional("time the table may accelerate against its effort", 0.05, ge=0.0, le=10.0)
     following_error: Angle = optional(
         "deviation dR that is a fault", math.nan, derived="twice that of limits.speed with the static friction",
         gt=0.0, le=LARGEST_ERROR,
     )  # fmt: skip
-    following_time: Time = optional("how long it may last", 0.06, ge=0.0, le=10.0)
+    following_time: Time = optional("time it may last", 0.06, ge=0.0, le=10.0)
 
 
 class LoadTable(Table, frozen=True):

@@ -111,8 +111,8 @@ class SequenceController:
             waited = host.settling_time + host.spec.method.in_position_time
             away = f"it is {format_quantity(host.way, 'rad')} from where it is held"
             raise AxisError(f"{away} {format_quantity(waited, 's')} after the jog; {suspect(host)}")
-        away = "after the jog the table did not come within its window of where it is held: look at the step's error"
-        self._warn(step, f"{away}; friction, a load or noise of the detector keeps it away")
+        away = "after the jog the table did not come within its window of where it is held: check the step's error"
+        self._warn(step, f"{away}; friction, a load or noise of the detector keeps it off")
 
     def _warn(self, step: Action, text: str) -> None:
         """Note a warning, once for each step of the job."""
@@ -172,8 +172,8 @@ def input_edges(inputs: dict[str, Stretches], start: int) -> list[tuple[int, str
 def suspect(host: TableHost) -> str:
     """What to look at when a table does not do what it is told."""
     return weakness(host.spec) or (
-        "look at deviation and torque in the report: a load, friction, limits.effort too low for the acceleration, or "
-        "noise of the detector keeps the table away"
+        "check deviation and torque in the report: a load, friction, limits.effort too low for the acceleration, or "
+        "noise of the detector keeps the table off its target"
     )
 
 
@@ -181,7 +181,7 @@ def weakness(spec: RotaryTableSpec) -> str:
     """What the form of the method or of the detector is known to fail by; empty for the sound ones."""
     method = spec.method
     if not method.position_control:
-        return "nothing corrects the table's angle: set method.position_control = true"
+        return "the table's angle is not controlled: set method.position_control = true"
     if not method.signed_remaining:
         return "beyond its target the unsigned remaining angle drives it on: set method.signed_remaining = true"
     if method.form != "turn counter":

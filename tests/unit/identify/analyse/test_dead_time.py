@@ -71,7 +71,7 @@ def test_a_motion_that_is_not_of_this_effort_is_doubted():
 def test_an_effort_after_its_motion_is_doubted():
     t, effort, position = record()
     found = find_dead_time(t[:-6], effort[:-6], position[6:])
-    assert "the motion comes 1.5 ms before its effort, which no drive does" in found.reason
+    assert "the motion comes 1.5 ms before its effort, which is not causal" in found.reason
 
 
 def test_recordings_too_short_are_refused():

@@ -71,14 +71,14 @@ def test_stamps_count_where_the_excitation_follows_them():
     rng = np.random.default_rng(4)
     moments = ROWS + rng.uniform(-0.2, 0.2, len(ROWS))
     cut = cut_periods(1e-3 * moments, multisine(moments, 500.0, lines=20))
-    assert "put on an even grid by straight lines" in cut.grid
+    assert "resampled to an even grid by linear interpolation" in cut.grid
     assert cut.mismatch < 0.01
 
 
 def test_stamps_do_not_count_where_the_excitation_goes_by_rows():
     stamps = 1e-3 * (ROWS + np.random.default_rng(4).uniform(-0.2, 0.2, len(ROWS)))
     cut = cut_periods(stamps, multisine(ROWS, 500.0))
-    assert "taken for even" in cut.grid
+    assert "treated as even" in cut.grid
     assert cut.mismatch < 1e-9
 
 

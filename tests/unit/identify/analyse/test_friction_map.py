@@ -1,4 +1,4 @@
-"""Friction over the speed: known laws come back with intervals that hold, the dip is found where there is one."""
+"""Friction versus speed: known laws come back with intervals that hold, the dip is found where there is one."""
 
 import numpy as np
 import pytest
@@ -101,7 +101,7 @@ def test_a_bin_seen_once_is_refused_in_words():
     force = MASS * np.gradient(v, DT) + line(v) + coloured(np.random.default_rng(6), len(t), 0.2, 0.9)
     found = map_friction(make_log(t, position=np.cumsum(v) * DT, force=force), mass=MASS)
     assert found.reason == ""
-    assert "record this speed longer or more often" in found.refused[0]
+    assert "record this speed for longer or more often" in found.refused[0]
     assert found.speed.min() > 0.05
 
 

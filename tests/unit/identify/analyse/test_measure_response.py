@@ -144,7 +144,7 @@ def test_the_first_period_settles_and_is_left_out():
 def test_an_excitation_that_does_not_come_back_is_refused():
     rng = np.random.default_rng(1)
     periods = Periods((rng.normal(size=(3, 400)), rng.normal(size=(3, 400))), T, 1.0, "")
-    with pytest.raises(DetentError, match="without a line that comes back"):
+    with pytest.raises(DetentError, match="an excitation that does not repeat"):
         average_periods(periods)
 
 

@@ -216,7 +216,7 @@ def test_a_resonance_in_noise_is_not_trusted():
 def test_a_resonance_narrower_than_a_window_is_not_trusted():
     responses, _, hold = noisy_responses(5)
     found = fit_resonances(replace(responses[0], resolution=20.0), hold=hold)
-    assert "the windows see 20 Hz: its damping comes out too large" in found.reason
+    assert "the windows resolve 20 Hz: its damping is overestimated" in found.reason
 
 
 def damped_response(seed, damping):

@@ -111,7 +111,7 @@ def test_several_steps_and_small_ones():
         (0.0, 0.01), (0.0101, -0.01), (-0.01, 0.005),
     ]  # fmt: skip
     assert found.steps[2].duration == pytest.approx(0.006, abs=DT)
-    assert found.notes == ("1 steps below 5% of the largest passed over",)
+    assert found.notes == ("1 steps below 5% of the largest skipped",)
     assert [step.overshoot is not None for step in found.steps] == [True] * 3
 
 
@@ -156,8 +156,8 @@ def test_what_holds_no_step_has_a_reason():
     assert "no step" in measure_steps(make_log(t, reference=0 * t, position=t)).reason
     late = np.where(t > t[-12], 1.0, 0.0)
     found = measure_steps(make_log(t, reference=late, position=late))
-    assert "followed by a rest" in found.reason
-    assert "passed over" in found.notes[0]
+    assert "followed by rest" in found.reason
+    assert "skipped" in found.notes[0]
     assert find_steps(np.r_[np.zeros(20), 1.0, np.zeros(20)]) == []
 
 

@@ -95,14 +95,14 @@ def test_a_velocity_signal_and_a_chosen_effort_are_used():
 def test_one_speed_or_none_is_refused_in_words():
     rng = np.random.default_rng(4)
     one = fit_two_speeds(record(rng, (0.2, -0.2, 0.205)))
-    assert "only one steady speed in positive direction (0.205 m/s)" in one.positive.reason
-    assert "two steady speeds" in one.negative.reason
+    assert "only one constant speed in the positive direction (0.205 m/s)" in one.positive.reason
+    assert "two constant speeds" in one.negative.reason
     assert one.estimates == ()
     t = np.arange(0.0, 4.0, DT)
     shaken = make_log(t, position=0.01 * np.sin(20 * t), force=np.cos(20 * t))
-    assert "no steady speed in positive direction" in fit_two_speeds(shaken).reason
+    assert "no constant speed in the positive direction" in fit_two_speeds(shaken).reason
     rest = make_log(t, position=0 * t, force=0 * t)
-    assert "no steady speed in negative direction" in fit_two_speeds(rest).reason
+    assert "no constant speed in the negative direction" in fit_two_speeds(rest).reason
     short = make_log(t[:15], position=t[:15], force=t[:15])
     assert fit_two_speeds(short).estimates == ()
 

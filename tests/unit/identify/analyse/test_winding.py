@@ -117,7 +117,7 @@ def test_a_speed_proportional_to_the_current_is_said():
     assert found.back_emf_constant is None
     assert found.apparent_resistance.name == "resistance.apparent"
     assert found.apparent_resistance.value == pytest.approx(3.0, rel=0.01)
-    assert "cannot be told apart" in found.notes[0]
+    assert "cannot be separated" in found.notes[0]
 
 
 def test_a_constant_speed_is_said():
@@ -153,18 +153,15 @@ def test_a_voltage_that_acts_later_is_said():
 
 def test_signs_that_do_not_fit_are_refused():
     t, signals, _, _ = record(np.random.default_rng(10))
-    assert (
-        "the resistance comes out negative"
-        in fit_winding(turning(t, signals | {"current": -signals["current"]})).reason
-    )
-    assert "turn one" in fit_winding(turning(t, signals | {"position": -signals["position"]})).reason
+    assert "the resistance is negative" in fit_winding(turning(t, signals | {"current": -signals["current"]})).reason
+    assert "invert one" in fit_winding(turning(t, signals | {"position": -signals["position"]})).reason
 
 
 def test_what_says_nothing_about_a_winding_has_a_reason():
     rng = np.random.default_rng(11)
     t, signals, _, _ = record(rng)
     u, i = signals["voltage"], signals["current"]
-    assert "cannot be told apart" in fit_winding(make_log(t, voltage=u, current=i)).reason
+    assert "cannot be separated" in fit_winding(make_log(t, voltage=u, current=i)).reason
     assert "record longer" in fit_winding(make_log(t[:60], velocity=u[:60], voltage=u[:60], current=i[:60])).reason
     assert "voltage is constant" in fit_winding(make_log(t, velocity=u, voltage=0 * u + 1, current=i)).reason
     uneven = t + 0.3 * DT * rng.uniform(-1, 1, len(t))

@@ -248,7 +248,7 @@ def test_the_verdict_follows_from_the_refusals():
     one = Refusal("little acceleration", "", "", ("mass",))
     assert with_refusals(one).verdict == "partly trusted"
     assert [e.name for e in with_refusals(one).trusted] == ["coulomb.positive"]
-    each = Refusal("not told by the data", "", "", ("coulomb.positive",))
+    each = Refusal("not determined by the data", "", "", ("coulomb.positive",))
     assert with_refusals(one, each).verdict == "refused"
     assert with_refusals(one, Refusal("saturated", "", "")).verdict == "refused"
     assert with_refusals(one, Refusal("saturated", "", "")).trusted == ()

@@ -89,7 +89,7 @@ def four_constants(run):
 
 
 def free_run_error(constants, run, begin):
-    """Root mean square and largest error of the rest of a run, simulated in one piece under its force [mm]."""
+    """Root mean square and largest error of the rest of a run, simulated without restarts under its force [mm]."""
     position, velocity = float(run.position[begin]), float(start_velocities(run)[begin])
     made = Plant(constants, run.step).run(run.effort, begin, len(run.position) - begin, position, velocity)
     error = 1e3 * (made - run.position[begin:])

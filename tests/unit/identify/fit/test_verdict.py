@@ -52,7 +52,7 @@ def test_a_clean_log_is_not_refused():
 @pytest.mark.parametrize(
     ("kind", "subject", "advice"),
     [
-        (Kind.WRONG_SIGN, "wrong sign", "turn the signal round in the mapping, as in force=-COLUMN"),
+        (Kind.WRONG_SIGN, "wrong sign", "invert the signal in the mapping, as in force=-COLUMN"),
         (Kind.WRONG_UNIT, "wrong unit", "state the unit of the column in the mapping"),
         (Kind.LOST_SIGN, "lost sign", "record the signal with its sign"),
     ],
@@ -78,8 +78,8 @@ def test_a_stuck_signal_is_refused_beyond_five_per_cent(rows, refused):
     assert bool(found) is refused
     if refused:
         assert found[0].subject == "stuck signal"
-        assert "stands still in 6% of the rows" in found[0].text
-        assert found[0].record == "look at the sensor and its cable, and record again"
+        assert "is at standstill in 6% of the rows" in found[0].text
+        assert found[0].record == "check the sensor and its cable, and record again"
     assert look(finding(Kind.STUCK, "temperature", [(1, 1000)])) == []
 
 
@@ -93,8 +93,8 @@ def test_a_position_that_stays_behind_its_reference_is_refused():
         cut = make_log(log.t, log.signals | {"position": stands, "reference": reference})
         found = [*look_at_log(cut, make_run(cut))]
         assert [r.subject for r in found] == subjects
-    assert "of its way while the position stands still" in found[0].text
-    assert found[0].record == "look at the encoder, its cable and the drive's enable, and record again"
+    assert "of its travel while the position does not change" in found[0].text
+    assert found[0].record == "check the encoder, its cable and the drive enable, and record again"
 
 
 @pytest.mark.parametrize(("rows", "refused"), [(290, False), (310, True)])
@@ -124,8 +124,8 @@ def test_less_than_a_second_of_motion_is_too_short():
     run = RUN.part(0, 300)
     (found,) = look_at_motion([run], [prepared(run)])
     assert (found.subject, found.constants) == ("too short", ())
-    assert found.text.startswith("in 0.598 s the axis moves clear of standstill for 0.")
-    assert found.record == "record 10 s or more of moves to and fro"
+    assert found.text.startswith("in 0.598 s the axis moves clearly for 0.")
+    assert found.record == "record 10 s or more of back-and-forth moves"
     # Several short runs are as good as a long one.
     runs = [RUN.part(k, k + 600) for k in range(0, 2400, 600)]
     assert [*look_at_motion(runs, [prepared(run) for run in runs])] == []
@@ -138,8 +138,8 @@ def test_motion_one_way_is_refused(sign, way):
     run = make_run(log)
     (found,) = look_at_motion([run], [prepared(run)])
     assert (found.subject, found.constants) == ("no reversal", ())
-    assert f"to {way} positions in 100% of the time" in found.text
-    assert "friction and a constant force cannot be told apart" in found.text
+    assert f"towards {way} positions in 100% of the time" in found.text
+    assert "friction and a constant force cannot be separated" in found.text
     assert found.record == "record moves in both directions, at two speeds or more"
 
 
@@ -172,7 +172,7 @@ def test_a_delay_with_limits_of_more_than_ten_samples_is_refused_alone():
     edge = 10 * RUN.step / 1.96
     assert look_at(delay=(0.004, 0.97 * edge)) == []
     (found,) = look_at(delay=(0.004, 1.03 * edge))
-    assert (found.subject, found.constants) == ("not told by the data", ("delay",))
+    assert (found.subject, found.constants) == ("not determined by the data", ("delay",))
     assert found.text == "delay 4 +- 21 ms"
     assert found.record == "record moves with short ramps, sampled faster"
 
@@ -181,8 +181,8 @@ def test_a_negative_mass_refuses_everything():
     found = look_at(mass=(-2.0, 0.01))
     assert ("wrong sign", ()) in told(found)
     first = found[0]
-    assert first.text == "the mass comes out as -2 kg: effort and motion point apart"
-    assert first.record == "turn the effort or the position round in the mapping"
+    assert first.text == "the mass is -2 kg: effort and motion have opposite signs"
+    assert first.record == "invert the effort or the position in the mapping"
 
 
 def test_a_mass_that_may_be_none_is_not_known_rather_than_of_the_wrong_sign():
@@ -195,7 +195,7 @@ def test_a_mass_with_wide_limits_is_refused_alone(error, refused):
     found = look_at(mass=(2.0, error))
     assert told(found) == ([("little acceleration", ("mass",))] if refused else [])
     if refused:
-        assert found[0].text == "mass 2 +- 0.43 kg, as there is hardly any acceleration"
+        assert found[0].text == "mass 2 +- 0.43 kg, because there is hardly any acceleration"
         assert found[0].record == "record moves with short ramps"
         assert str(found[0]).startswith("refused: mass: little acceleration")
 
@@ -206,7 +206,7 @@ def test_forces_with_wide_limits_beside_the_effort_are_refused(name):
     assert look_at(**{name: (1.6, 0.97 * edge)}) == []
     (found,) = look_at(**{name: (1.6, 1.03 * edge)})
     dotted = name.replace("_", ".")
-    assert (found.subject, found.constants) == ("not told by the data", (dotted,))
+    assert (found.subject, found.constants) == ("not determined by the data", (dotted,))
     assert found.text.startswith(f"{dotted} 1.6 +- ")
     assert found.text.endswith(" N")
     assert found.record == "record slow moves in both directions"
@@ -217,13 +217,13 @@ def test_viscous_friction_counts_at_the_top_speed(name):
     edge = 0.15 * EFFORT / 1.96 / TOP
     assert look_at(**{name: (6.0, 0.97 * edge)}) == []
     (found,) = look_at(**{name: (6.0, 1.03 * edge)})
-    assert (found.subject, found.constants) == ("not told by the data", (name.replace("_", "."),))
+    assert (found.subject, found.constants) == ("not determined by the data", (name.replace("_", "."),))
     assert found.record == "record steady moves at several speeds"
 
 
 def test_a_constant_of_which_nothing_is_known_has_no_figures():
     (found,) = look_at(coulomb_positive=(1.6, 1e6))
-    assert found.text == "coulomb.positive not known at all"
+    assert found.text == "coulomb.positive not determined at all"
 
 
 def test_without_instruments_there_is_no_delay_to_look_at():
@@ -235,14 +235,14 @@ def test_without_instruments_there_is_no_delay_to_look_at():
 
 def test_an_error_that_nobody_knows_is_no_narrow_one():
     assert told(look_at(mass=(2.0, np.nan))) == [("little acceleration", ("mass",))]
-    assert told(look_at(coulomb_positive=(1.6, np.nan))) == [("not told by the data", ("coulomb.positive",))]
+    assert told(look_at(coulomb_positive=(1.6, np.nan))) == [("not determined by the data", ("coulomb.positive",))]
 
 
 def test_friction_that_would_drive_the_axis_refuses_everything():
     (found,) = look_at(coulomb_positive=(0.5, 0.01), coulomb_negative=(-0.9, 0.01))
     assert (found.subject, found.constants) == ("friction below 0", ())
     assert "-0.4 N, which would drive the axis" in found.text
-    assert found.record == "look at the sign of the effort and at the delay between the signals"
+    assert found.record == "check the sign of the effort and the delay between the signals"
     # A weight may make one of both negative, and errors may make the sum so.
     assert look_at(coulomb_positive=(5.0, 0.01), coulomb_negative=(-3.0, 0.01)) == []
     assert look_at(coulomb_positive=(0.1, 0.05), coulomb_negative=(-0.2, 0.05)) == []
@@ -251,8 +251,8 @@ def test_friction_that_would_drive_the_axis_refuses_everything():
 def test_friction_that_falls_with_speed_is_refused_in_its_direction():
     (found,) = look_at(viscous_negative=(-5.0, 0.05))
     assert (found.subject, found.constants) == ("friction below 0", ("viscous.negative",))
-    assert found.text == "viscous.negative is -5 N*s/m: friction falls with speed"
-    assert found.record == "record several speeds; look for a limit or a delay of the effort"
+    assert found.text == "viscous.negative is -5 N*s/m: friction decreases with speed"
+    assert found.record == "record several speeds; check the effort for saturation or delay"
     little = -0.04 * EFFORT / TOP
     assert look_at(viscous_negative=(little, 0.001)) == []
 
@@ -276,7 +276,7 @@ def test_a_model_that_predicts_and_simulates_well_is_trusted():
 def test_a_model_that_does_not_predict_is_refused():
     (found,) = look_at_prediction([climb(0.1), climb(0.4), climb(0.2, taken=False)], (), [])
     assert (found.subject, found.constants) == ("model does not explain the log", ())
-    assert found.text == "the effort of stretches not seen is predicted with an error of 40%"
+    assert found.text == "the effort on held-out segments is predicted with an error of 40%"
     assert "its sign, unit and delay" in found.record
     assert told([*look_at_prediction([climb(np.nan)], (), [])]) == [("model does not explain the log", ())]
 
@@ -285,8 +285,8 @@ def test_a_model_that_simulates_no_better_than_none_is_refused():
     tested = [horizon("0.1 s", 0.8, 1.0), horizon("0.5 s", 0.9, 1.0)]
     (found,) = look_at_prediction([climb(0.1)], tested, [])
     assert (found.subject, found.constants) == ("model does not explain the log", ())
-    assert found.text == "simulated over 0.5 s it errs by 0.9, going on with the velocity by 1"
-    assert found.record == "record with more acceleration, or look at units"
+    assert found.text == "simulated over 0.5 s its error is 0.9, constant velocity gives 1"
+    assert found.record == "record with more acceleration, or check the units"
     # One good horizon is enough, and others than the short ones do not count.
     assert [*look_at_prediction([climb(0.1)], [horizon("0.1 s", 0.6, 1.0), horizon("0.5 s", 0.9, 1.0)], [])] == []
     assert [*look_at_prediction([climb(0.1)], [horizon("2 s", 0.9, 1.0), horizon("free run", 2.0, 1.0)], [])] == []

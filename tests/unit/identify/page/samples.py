@@ -20,12 +20,12 @@ from detent.logs.read_log import read_log
 
 SHORT = Refusal("too short", "it moves for <0.3> s", "record 10 s")
 SLOW = Refusal(
-    "not told by the data", "it is & stays unknown", "record slow moves", ("viscous.positive", "viscous.negative")
+    "not determined by the data", "it is & stays unknown", "record slow moves", ("viscous.positive", "viscous.negative")
 )
 DROPPED = Finding(
     Kind.DROPPED_ROWS, "", ((17, 19), (40, 40)), "4 rows < 5 are gone", Action.LEFT, "record & save faster"
 )
-FLIPPED = Finding(Kind.WRONG_SIGN, "force", (), "works against the motion", Action.TURNED, severity=Severity.ERROR)
+FLIPPED = Finding(Kind.WRONG_SIGN, "force", (), "opposes the motion", Action.TURNED, severity=Severity.ERROR)
 
 
 @cache

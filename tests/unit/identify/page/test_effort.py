@@ -89,7 +89,7 @@ def test_all_residuals_are_counted_the_far_ones_at_the_end() -> None:
     far = replace(one, residual=np.where(np.arange(400) == 7, 1e6, one.residual))
     chart = residual_chart([far], "N")
     assert sum(chart["series"][0]["y"]) == 400
-    assert chart["xLabel"] == "recorded less model [N]"
+    assert chart["xLabel"] == "recorded minus model [N]"
     reach = 4 * np.sqrt(np.mean(far.residual**2))
     assert max(chart["x"]) < 1.2 * reach
 

@@ -1,4 +1,4 @@
-"""Friction over the speed with its limits, and its chart."""
+"""Friction versus speed with its limits, and its chart."""
 
 from dataclasses import replace
 

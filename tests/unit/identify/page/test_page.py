@@ -32,8 +32,8 @@ CHARTS = [
 ]  # fmt: skip
 
 SECTIONS = [
-    "Constants", "What was found in the log", "Measured and simulated", "Force, measured and fitted",
-    "Friction over the speed", "Which model", "What the recording separates", "Frequency response",
+    "Constants", "Findings in the log", "Measured and simulated", "Force, measured and fitted",
+    "Friction versus speed", "Model selection", "Correlation of the constants", "Frequency response",
 ]  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def test_a_partly_trusted_one_says_what_is_not_and_why() -> None:
     assert [card.title for card in page.cards if card.bad] == ["Viscous friction +", "Viscous friction \u2212"]
     doubted = [row for row in rows_of(page, "Model: ") if row[-1].startswith("✘")]
     assert len(doubted) == 2
-    assert all("not told by the data" in row[-1] for row in doubted)
+    assert all("not determined by the data" in row[-1] for row in doubted)
 
 
 def test_a_refused_one_says_what_to_record_at_once() -> None:
@@ -95,7 +95,7 @@ def test_a_refused_one_says_what_to_record_at_once() -> None:
 
 def test_one_without_constants_shows_the_log_and_what_to_record() -> None:
     page = identify_page(unfitted())
-    assert sections(page) == ["What was found in the log", "What to record instead"]
+    assert sections(page) == ["Findings in the log", "What to record instead"]
     assert [chart["id"] for chart in page.charts] == CHARTS[:2]
 
 
@@ -133,13 +133,13 @@ def test_the_chosen_model_is_marked() -> None:
     rung = identified().rung
     assert rung is not None
     assert figure_of(page, "Model: ").title == f"Model: {rung.text}"
-    rows = rows_of(page, "Models from the simplest up")
+    rows = rows_of(page, "Models, simplest first")
     (chosen,) = [row[0] for row in rows if row[-1].startswith("✔")]
     assert chosen.lower() == rung.text.lower()
 
 
 def test_horizons_stand_in_figures() -> None:
-    rows = rows_of(identify_page(trusted()), "How far it can be foretold")
+    rows = rows_of(identify_page(trusted()), "Prediction error versus horizon")
     assert len(rows) == len(identified().horizons)
     assert [row[1] for row in rows] == [str(h.starts) for h in identified().horizons]
 
@@ -151,7 +151,7 @@ def test_the_worst_log_is_drawn() -> None:
     twice = replace(found, runs=(found.runs[0], other), logs=logs, fit=None)
     held = hold_out(twice)
     worst = max((0, 1), key=lambda k: held[k].rms_restarted)
-    assert figure_of(identify_page(twice), "What was recorded").caption.startswith(logs[worst].name)
+    assert figure_of(identify_page(twice), "Recorded signals").caption.startswith(logs[worst].name)
 
 
 def test_titles_are_the_names_of_the_logs() -> None:

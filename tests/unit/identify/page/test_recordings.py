@@ -1,4 +1,4 @@
-"""What was recorded, in people's units, and the faults of it."""
+"""Recorded signals, in people's units, and the faults of it."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def test_findings_have_rows_action_and_advice_the_worst_first() -> None:
     assert table is not None
     flipped, dropped = (plain(row) for row in table.rows)
     assert flipped[:3] == ["error", "all rows", "force"]
-    assert dropped == ["warning", "rows 17-19, 40", "all", f"dropped rows: {DROPPED.text}", "left as it is",
+    assert dropped == ["warning", "rows 17-19, 40", "all", f"dropped rows: {DROPPED.text}", "unchanged",
                        DROPPED.advice]  # fmt: skip
     assert flipped[3].endswith(FLIPPED.text)
 
@@ -78,7 +78,7 @@ def test_several_logs_are_listed_and_the_drawn_one_is_named() -> None:
     faults = figure_of(figures, "Faults").table
     assert faults is not None
     assert all(str(row[1]).startswith("run <1>.csv: ") for row in faults.rows)
-    assert figure_of(figures, "What was recorded").caption.startswith("second.csv")
+    assert figure_of(figures, "Recorded signals").caption.startswith("second.csv")
 
 
 def test_refusals_say_what_to_record_and_which_constants_they_cost() -> None:

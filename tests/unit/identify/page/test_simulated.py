@@ -55,7 +55,7 @@ def test_differences_are_recorded_less_simulated_in_their_unit() -> None:
     assert restarted["series"][0]["y"][5] == pytest.approx(-2.0)
     assert free["yLabel"] == "difference [mm]"
     assert free["series"][0]["y"][-1] == pytest.approx(-9.99, abs=0.01)
-    assert "again every 0.5 s" in place["series"][0]["label"]
+    assert "restarted from the recording every 0.5 s" in place["series"][0]["label"]
 
 
 def test_a_simulation_that_runs_away_does_not_squeeze_the_rest() -> None:

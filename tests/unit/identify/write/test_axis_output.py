@@ -147,7 +147,9 @@ def test_nothing_is_written_of_a_refused_log(folder: Path) -> None:
 
 
 def test_a_number_that_is_not_trusted_stands_in_a_comment(folder: Path, found: Identification) -> None:
-    partly = replace(found, refusals=(Refusal("not told by the data", "wide", "record more", ("viscous.positive",)),))
+    partly = replace(
+        found, refusals=(Refusal("not determined by the data", "wide", "record more", ("viscous.positive",)),)
+    )
     text = axis_toml(partly)
     assert "# not trusted: viscous = " in text
     assert "try: record more" in text
@@ -232,7 +234,7 @@ def test_a_table_in_one_line_stays_one(found: Identification) -> None:
 
 def test_a_lighter_axis_than_the_file_can_be_is_refused(found: Identification) -> None:
     base = HEAD + LIMITS + '\n[mechanics]\nload_mass = "3 kg"\nmotor_mass = "9 kg"\n' + LOOPS
-    with pytest.raises(DetentError, match=r"got 3.999 kg for all that moves; expected: more than 9 kg"):
+    with pytest.raises(DetentError, match=r"got 3.999 kg for the total moving mass; expected: more than 9 kg"):
         axis_toml(found, base)
 
 
@@ -240,7 +242,7 @@ def test_stated_constants_outside_of_the_intervals_are_named(found: Identificati
     assert not contrasts(found, cascade_spec(AXIS, "base"))
     named = contrasts(found, cascade_spec(AXIS.replace('"4 kg"', '"4.2 kg"').replace("delay = 2", "delay = 1"), "base"))
     assert {one.name for one in named} == {"mass", "delay"}
-    assert re.fullmatch(r"mass: the file says 4\.2 kg, the log [34][\d.]* kg to 4[\d.]* kg", str(named[0]))
+    assert re.fullmatch(r"mass: the file states 4\.2 kg, the log [34][\d.]* kg to 4[\d.]* kg", str(named[0]))
 
 
 # ---- other efforts, other motions

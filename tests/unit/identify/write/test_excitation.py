@@ -51,12 +51,12 @@ def refusal(subject: str, *constants: str) -> Refusal:
     [
         ((), [SPEEDS, RAMPS, SLOW]),
         ((refusal("little acceleration", "mass"),), [RAMPS]),
-        ((refusal("not told by the data", "viscous.positive"),), [SPEEDS]),
-        ((refusal("not told by the data", "coulomb.negative"),), [REVERSALS]),
-        ((refusal("not told by the data", "static.negative"), refusal("x", "stribeck")), [SLOW]),
+        ((refusal("not determined by the data", "viscous.positive"),), [SPEEDS]),
+        ((refusal("not determined by the data", "coulomb.negative"),), [REVERSALS]),
+        ((refusal("not determined by the data", "static.negative"), refusal("x", "stribeck")), [SLOW]),
         ((refusal("too short"),), [SPEEDS, RAMPS]),
         ((refusal("model does not explain the log"),), [SPEEDS, RAMPS, SLOW]),
-        ((refusal("not told by the data", "mass"), refusal("x", "coulomb.positive")), [REVERSALS, RAMPS]),
+        ((refusal("not determined by the data", "mass"), refusal("x", "coulomb.positive")), [REVERSALS, RAMPS]),
     ],
 )
 def test_moves_are_those_that_the_refusals_ask_for(refusals: tuple[Refusal, ...], parts: list[object]) -> None:

@@ -213,7 +213,7 @@ def test_the_continuous_current_is_warned_about():
 
 def test_resistance_of_a_current_drive_is_told():
     one, other = (
-        {f.name: f.value for f in derive(load("cascade", *overrides))}["voltage of the motor"]
+        {f.name: f.value for f in derive(load("cascade", *overrides))}["motor voltage"]
         for overrides in ((), ("motor.resistance=2.4 ohm",))
     )
     assert other > one + 1

@@ -1,4 +1,4 @@
-"""One move in four ways: what feed-forward and a limited jerk bring, and what is left out of the comparison."""
+"""One move in four variants: what feedforward and a jerk-limited bring, and what is left out of the comparison."""
 
 import math
 
@@ -75,4 +75,4 @@ def test_plain_data_holds_no_curves_and_progress_is_told():
         "shape", "feed", "duration", "peak_following", "approach", "twist_after", "peak_command",
     }  # fmt: skip
     assert [share for share, _ in told] == [0.25, 0.5, 0.75, 1.0]
-    assert told[0][1] == "trapezoid, no feed-forward"
+    assert told[0][1] == "trapezoid, no feedforward"

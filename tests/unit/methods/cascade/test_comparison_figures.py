@@ -1,4 +1,4 @@
-"""What the comparison of a move in four ways shows: its figures, and its table for the terminal."""
+"""What the comparison of a move in four variants shows: its figures, and its table for the terminal."""
 
 import math
 from dataclasses import replace
@@ -13,7 +13,7 @@ from detent.page.draw import draw_figures
 def test_the_charts_have_four_curves_and_the_twist_begins_at_the_end_of_each_reference() -> None:
     move, swinging, _ = comparison().figures()
     (speed, following), (twist,) = move.charts, swinging.charts
-    assert [curve["label"] for curve in speed["series"]] == ["trapezoid", "limited jerk"]
+    assert [curve["label"] for curve in speed["series"]] == ["trapezoid", "jerk-limited"]
     assert len(following["series"]) == len(twist["series"]) == 4
     looks = [(curve["colour"], curve.get("dash")) for curve in twist["series"]]
     assert looks == [("left", [5, 4]), ("left", None), ("speed", [5, 4]), ("speed", None)]
@@ -37,16 +37,16 @@ def test_the_table_of_the_page_has_a_row_for_each_way() -> None:
     table = comparison().figures()[-1].table
     assert table is not None
     rows = [[cell.text for cell, _ in table.cells(row)] for row in table.rows]
-    assert rows[0] == ["trapezoid, no feed-forward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V"]
-    assert rows[3][:2] == ["limited jerk, feed-forward", "625 ms"]
+    assert rows[0] == ["trapezoid, no feedforward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V"]
+    assert rows[3][:2] == ["jerk-limited, feedforward", "625 ms"]
 
 
 def test_the_terminal_has_a_row_for_each_way() -> None:
     title, heads, rows = comparison().table
-    assert title == "A move of 250 mm at 500 mm/s, in four ways"
+    assert title == "A move of 250 mm at 500 mm/s, in four variants"
     assert len(heads) == 6
-    assert rows[0] == ("trapezoid, no feed-forward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V")
-    assert [row[0] for row in rows][3] == "limited jerk, feed-forward"
+    assert rows[0] == ("trapezoid, no feedforward", "600 ms", "12.5 mm", "120 ms", "4.4 µm", "2.40 V")
+    assert [row[0] for row in rows][3] == "jerk-limited, feedforward"
     first = rigid_comparison().cases[0]
     never = replace(rigid_comparison(), cases=(replace(first, approach=math.nan), *rigid_comparison().cases[1:]))
     assert never.table.rows[0][3:5] == ("not", "rigid")

@@ -24,23 +24,23 @@ def test_figures_of_the_example(load_text, good_text):
     found = figures(load_text(good_text).spec)
     m1, m2, k = 8 + 600e-7 / (0.01 / (2 * math.pi)) ** 2, 30.0, 60e6
     assert found["moving mass m"].value == pytest.approx(m1 + m2)
-    assert found["mass on the motor's side m1"].value == pytest.approx(m1)
+    assert found["motor-side mass m1"].value == pytest.approx(m1)
     assert found["anti-resonance"].value == pytest.approx(math.sqrt(k / m2) / (2 * math.pi))
     assert found["resonance"].value == pytest.approx(math.sqrt(k * (1 / m1 + 1 / m2)) / (2 * math.pi))
-    assert found["damping of the resonance"].value == pytest.approx(
+    assert found["damping ratio of the resonance"].value == pytest.approx(
         2000 * (1 / m1 + 1 / m2) / 2 / (2 * math.pi * 314), 1e-3
     )
     assert found["dead time of the velocity loop"].value == pytest.approx(0.25e-3 * 2 + 0.3e-3)
-    assert found["velocity of one count"].value == pytest.approx(1e-6 / 0.25e-3)
+    assert found["velocity resolution"].value == pytest.approx(1e-6 / 0.25e-3)
     assert found["motor speed at limits.speed"].text == "3000 rpm"
     assert found["largest force"].value == pytest.approx(600)
-    assert found["force of an acceleration"].value == pytest.approx(5 * (m1 + m2) + 14 + 8 + 60)
+    assert found["acceleration force"].value == pytest.approx(5 * (m1 + m2) + 14 + 8 + 60)
     per_volt = 0.8 * 0.35 / (0.01 / (2 * math.pi))
-    assert found["command of an acceleration"].value == pytest.approx((5 * (m1 + m2) + 82) / per_volt)
+    assert found["acceleration command"].value == pytest.approx((5 * (m1 + m2) + 82) / per_volt)
     current = (5 * (m1 + m2) + 82) / (per_volt / 0.8)
-    assert found["voltage of the motor"].value == pytest.approx(1.2 * current + 0.35 * 100 * math.pi)
-    assert found["time of an acceleration"].value == pytest.approx(0.1)
-    assert found["way of an acceleration"].value == pytest.approx(0.025)
+    assert found["motor voltage"].value == pytest.approx(1.2 * current + 0.35 * 100 * math.pi)
+    assert found["acceleration time"].value == pytest.approx(0.1)
+    assert found["acceleration distance"].value == pytest.approx(0.025)
     assert found["following error at limits.speed"].value == 0.0
     assert "error at rest" not in found
     assert 40 < found["bandwidth of the velocity loop"].value < 50
@@ -51,14 +51,14 @@ def test_a_rotary_axis_speaks_of_torque_and_inertia(load_text, rotary_text):
     found = figures(load_text(rotary_text).spec)
     assert found["moving moment of inertia m"].unit == "kg*m^2"
     assert found["largest torque"].text == "3 N*m"
-    assert found["velocity of one count"].text == "1 deg/s"
-    assert found["way of an acceleration"].text == "45 deg"
-    assert "voltage of the motor" not in found
+    assert found["velocity resolution"].text == "1 deg/s"
+    assert found["acceleration distance"].text == "45 deg"
+    assert "motor voltage" not in found
 
 
 def test_a_force_drive_has_no_motor_figures(load_text, short_text):
     found = figures(load_text(short_text, "mechanics.weight=3 N").spec)
-    assert not {"motor speed at limits.speed", "voltage of the motor", "resonance"} & set(found)
+    assert not {"motor speed at limits.speed", "motor voltage", "resonance"} & set(found)
     assert found["moving mass m"].formula == "motor_mass + load_mass"
     assert found["command that holds the weight"].text == "3 V"
     assert found["error at rest"].value == pytest.approx(3 / (60 * 500))

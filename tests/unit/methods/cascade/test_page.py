@@ -193,7 +193,7 @@ def test_a_load_at_rest_is_right_where_it_has_gone_too_far(linear: CascadeSpec) 
     page = cascade_page(linear, run, trace_of(run))
     assert curve_of(page, "move-rest", "load")[-1] == pytest.approx(4.0)
     assert curve_of(page, "move-rest", "reference")[-1] == pytest.approx(0.0, abs=1e-6)
-    assert curve_of(page, "job-following", "reference less measured position")[-1] == pytest.approx(-4e-3)
+    assert curve_of(page, "job-following", "reference minus measured position")[-1] == pytest.approx(-4e-3)
 
 
 @pytest.mark.compiled
@@ -226,7 +226,7 @@ def test_a_drive_that_is_off_shows_no_reference_and_no_error(failed: Played) -> 
     assert 0 < np.count_nonzero(off) < len(off)
     reference, following = (
         curve_of(page, *names)
-        for names in (("job-position", "reference"), ("job-following", "reference less measured position"))
+        for names in (("job-position", "reference"), ("job-following", "reference minus measured position"))
     )
     assert np.isnan(reference[off]).all()
     assert np.isnan(following[off]).all()

@@ -127,17 +127,17 @@ def test_a_stronger_recording_than_the_axis_is_cut_off_and_said(own):
     strong = replace(own, reference=None, efforts={"voltage": 20 * own.efforts["voltage"]})
     run = run_cascade_replay(linear("limits.travel=500 m", "limits.lowest=-200 m"), strong)
     assert run.limited > 0.1
-    (text,) = [text for text in run.warnings if "cut off" in text]
-    assert text.startswith("the recorded voltage is cut off at the limit of this axis, 3.41 V of command, for")
+    (text,) = [text for text in run.warnings if "is clipped" in text]
+    assert text.startswith("the recorded voltage is clipped at the limit of this axis, 3.41 V of command, for")
 
 
 def test_what_the_drive_would_have_gone_off_for_is_a_warning(own):
     run = run_cascade_replay(linear("method.feed_forward.velocity=0", "method.following_error=1 mm"), own)
     assert run.done
     assert run.peak_following > 1e-3
-    assert "the simulated following error went beyond 1 mm, method.following_error" in run.warnings[0]
+    assert "the simulated following error exceeded 1 mm, method.following_error" in run.warnings[0]
     run = run_cascade_replay(linear("limits.travel=100 mm"), own)
-    assert "the simulated load left the way of the axis, 0 m to 100 mm" in run.warnings[0]
+    assert "the simulated load left the travel of the axis, 0 m to 100 mm" in run.warnings[0]
 
 
 def test_efforts_that_the_axis_does_not_have_are_named(own, force_axis):
@@ -146,7 +146,7 @@ def test_efforts_that_the_axis_does_not_have_are_named(own, force_axis):
     (text,) = run_cascade_replay(spec, other).warnings
     assert text.startswith('torque: recorded, but an axis with drive.input = "force" and no [motor] has no such')
     (text,) = run_cascade_replay(spec, replace(own, efforts={})).warnings
-    assert "the log states no force, current, voltage or command" in text
+    assert "the log has no force, current, voltage or command" in text
 
 
 def test_an_axis_that_runs_away_ends_the_comparison(own, monkeypatch):
@@ -160,7 +160,7 @@ def test_an_axis_that_runs_away_ends_the_comparison(own, monkeypatch):
     monkeypatch.setattr(CascadeHost, "watch", broken)
     run = run_cascade_replay(linear(), own)
     assert not run.done
-    assert run.failure.startswith("the simulated axis ran away 500 ms after the begin: its loops are unstable")
+    assert run.failure.startswith("the simulated axis ran away 500 ms after the start: its loops are unstable")
     assert run.compared == []
 
 

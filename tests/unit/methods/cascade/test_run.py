@@ -120,9 +120,7 @@ def failed(spec, *moves):
 
 def test_a_following_error_beyond_its_limit_switches_the_drive_off():
     run = failed(linear("method.following_error=15 um", "method.in_position=5 um"))
-    assert run.failure.startswith(
-        "move 1 to 120 mm: the following error went beyond 15 um, method.following_error, and"
-    )
+    assert run.failure.startswith("move 1 to 120 mm: the following error exceeded 15 um, method.following_error, and")
     (move,) = run.moves
     assert not move.in_position
     # In the first sample beyond it, not one later.
@@ -138,7 +136,7 @@ def test_a_load_beyond_its_way_switches_the_drive_off():
     push = ("disturbance.push.force=-2000 N", "disturbance.push.at=0.2 s", "disturbance.push.duration=1 s")
     spec = linear(*push, "mechanics.start_position=1 mm")
     run = failed(spec, {"target": 0.0, "dwell": 1.0})
-    assert "ran over the lower end of its way, 0 m, limits.lowest, and the drive is off" in run.failure
+    assert "overran the lower end of travel, 0 m, limits.lowest, and the drive is off" in run.failure
 
 
 @pytest.mark.parametrize(
@@ -175,7 +173,7 @@ def test_an_axis_that_is_not_in_position_after_power_on_makes_no_move():
 
 def test_a_force_beyond_that_of_the_drive_moves_the_axis_over_its_end():
     run = failed(linear("mechanics.weight=900 N", "method.following_error=100 m"))
-    assert run.failure.startswith("after power-on: the axis ran over the lower end")
+    assert run.failure.startswith("after power-on: the axis overran the lower end")
 
 
 def test_a_command_that_stays_at_its_limit_switches_the_drive_off():
@@ -193,7 +191,7 @@ def test_a_load_that_the_loop_does_not_see_is_warned_about():
     assert run.done
     assert run.worst_error > run.tolerance
     (text,) = run.warnings
-    assert "2 of 2 moves were in position while the load stood beside its target, move" in text
+    assert "2 of 2 moves were in position while the load was off target, move" in text
 
 
 def test_moves_that_the_axis_cannot_make_are_refused_with_their_lines():

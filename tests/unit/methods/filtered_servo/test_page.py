@@ -55,7 +55,7 @@ def test_it_follows_its_command_at_a_distance() -> None:
     np.testing.assert_allclose(commanded[(t > 0.025) & (t < 0.095)], 20.0, rtol=0.03)
     assert commanded[np.searchsorted(t, 0.01)] == pytest.approx(10.0, rel=0.05)
     assert [event.text for event in figure.events] == [
-        "the host asks for the move", "last command pulse", "within ±3 pulses of the target for good",
+        "move commanded", "last command pulse", "within ±3 pulses of the target for good",
         "in position: within ±2 pulses for 50 ms",
     ]  # fmt: skip
     assert figure.events[1].t == pytest.approx(2e-3 / 20e-3 + 20e-3, abs=1e-3)
@@ -75,7 +75,7 @@ def test_an_axis_that_has_given_up_comes_to_no_rest() -> None:
     spec, run, trace = play(0.1, overrides=pushed)
     page = moves_page(FilteredView(spec), run, trace)
     figure = next(figure for figure in page.figures if figure.events)
-    assert [event.text for event in figure.events] == ["the host asks for the move", "the run ends here"]
+    assert [event.text for event in figure.events] == ["move commanded", "the run ends here"]
     assert math.isnan(curve_of(page, "move-speed", "commanded")[-1])
     assert not any(chart["id"].startswith("approach") for chart in page.charts)
 

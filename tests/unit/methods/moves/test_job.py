@@ -122,7 +122,7 @@ def test_an_accent_without_a_letter_is_refused(before):
 
 def test_a_text_of_cp_m_ends_in_sub():
     assert strikes("ab\n\x1a\x1a\x1a") == strikes("ab\n")
-    assert [problem.got for problem in refusal("a\x1ab")] == ["the character 0x1A, which prints nothing alone"]
+    assert [problem.got for problem in refusal("a\x1ab")] == ["the character 0x1A, which is not printable by itself"]
 
 
 def test_every_character_that_cannot_be_printed_is_named_with_its_place():
@@ -136,7 +136,9 @@ def test_rubbish_is_not_reported_for_ever():
     assert len(refusal("\x01" * 1000)) == MOST_PROBLEMS
 
 
-@pytest.mark.parametrize(("text", "got"), [("", "an empty file"), (" \n\t\f\r\n", "a text that prints nothing")])
+@pytest.mark.parametrize(
+    ("text", "got"), [("", "an empty file"), (" \n\t\f\r\n", "a text without printable characters")]
+)
 def test_a_text_that_prints_nothing_is_refused(text, got):
     (problem,) = refusal(text)
     assert (problem.line, problem.got) == (0, got)

@@ -339,7 +339,7 @@ def test_text_is_refused_by_an_axis_without_a_pitch(write):
 def test_text_names_the_file_as_the_user_did(write, tmp_path):
     write("job.txt", "a\x1bb")
     (problem,) = refusal(tmp_path / "job.txt", pitch=0.002)
-    assert told([problem]) == [(1, 2, "", "the character 0x1B, which prints nothing alone")]
+    assert told([problem]) == [(1, 2, "", "the character 0x1B, which is not printable by itself")]
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_a_page_shows_the_job_the_rests_a_move_and_every_move() -> None:
     page = page_of(six_moves(), trace_of(six_moves()))
     assert (page.headline.level, page.headline.verdict) == ("good", "Done")
     assert [section.title for section in page.sections if section.shown] == [
-        "Results", "How the axis did it", "Move by move",
+        "Results", "How the axis performed", "Moves",
     ]  # fmt: skip
     assert ids_of(page) == ["job", "rest", "move-speed", "approach-place", "approach-words"]
     assert all(figure.caption for figure in page.figures)
@@ -88,7 +88,7 @@ def test_interference_is_noted() -> None:
     faults = {"inserted": 30, "removed": 0, "lost samples": 0, "corrupted": 0}
     (note,) = page_of(run_of(record(1, 0.0, 0.02), faults=faults)).notes
     assert note.level == "note"
-    assert "30 pulses put in" in note.text
+    assert "30 pulses inserted" in note.text
 
 
 def test_the_job_is_position_over_target_since_it_was_ready() -> None:
@@ -131,7 +131,7 @@ def test_few_moves_make_no_histogram() -> None:
 
 
 def shown(page: Page) -> Figure:
-    (section,) = [section for section in page.sections if section.title == "How the axis did it"]
+    (section,) = [section for section in page.sections if section.title == "How the axis performed"]
     return section.shown[0]
 
 

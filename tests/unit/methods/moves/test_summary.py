@@ -88,7 +88,7 @@ def test_of_a_job_that_began_with_a_fault_only_what_happened_is_shown() -> None:
 def test_interference_is_counted_in_words() -> None:
     faults = {"inserted": 30, "removed": 1, "lost samples": 2, "corrupted": 0}
     assert moved(record(1, 0.0, 0.02), faults=faults)["interference"] == (
-        "30 pulses put in, 1 pulse taken away, 2 speed samples lost"
+        "30 pulses inserted, 1 pulse removed, 2 speed samples lost"
     )
     assert "interference" not in moved(record(1, 0.0, 0.02), faults=dict.fromkeys(faults, 0))
 

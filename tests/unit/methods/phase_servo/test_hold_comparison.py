@@ -21,7 +21,7 @@ def between(case, begin, end):
 
 def test_what_was_compared():
     found = compared()
-    assert [case.name for case in found.still] == ["settling for ever", "as the file has it", "no dead band"]
+    assert [case.name for case in found.still] == ["never in stop mode", "as in the axis file", "no dead band"]
     assert [case.name for case in found.loaded] == ["with integrator", "without integrator"]
     assert (found.push, found.push_at) == (3.0, 30e-3)
     assert found.stop_at == pytest.approx(41.5e-3, abs=0.5e-3)
@@ -86,7 +86,7 @@ def test_progress_names_each_case():
     told = []
     compare_hold(make_spec(), progress=lambda share, text: told.append((share, text)))
     assert told == [
-        (0.0, "settling for ever"), (0.2, "as the file has it"), (0.4, "no dead band"), (0.6, "with integrator"),
+        (0.0, "never in stop mode"), (0.2, "as in the axis file"), (0.4, "no dead band"), (0.6, "with integrator"),
         (0.8, "without integrator"),
     ]  # fmt: skip
 

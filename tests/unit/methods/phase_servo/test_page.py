@@ -91,7 +91,7 @@ def test_the_modes_divide_the_move(moves: Played) -> None:
     assert np.nanmax(demanded) == pytest.approx(27 * per_sample, abs=1e-3)
     assert np.abs(counted - true).max() < 4 * per_sample
     assert true.max() == pytest.approx(move.peak_speed * 1e3, rel=1e-3)
-    to_go = curve_of(page, "move-to-go", "way to go")
+    to_go = curve_of(page, "move-to-go", "distance to go")
     assert to_go[0] == pytest.approx((move.target - move.start) * 1e3, abs=0.01)
     assert abs(to_go[-1]) < spec.step * 1e3
     error = curve_of(page, "approach-words", "absolute error word")

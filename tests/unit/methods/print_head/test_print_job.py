@@ -163,7 +163,9 @@ def test_refuses_a_file_that_never_ends():
     assert refusal("/dev/zero").got == "more than 8000 kB"
 
 
-@pytest.mark.parametrize(("data", "got"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes that print nothing")])
+@pytest.mark.parametrize(
+    ("data", "got"), [(b"", "an empty file"), (b" \n\t\n", "4 bytes without a printable character")]
+)
 def test_refuses_a_job_without_ink(tmp_path, data, got):
     (tmp_path / "job").write_bytes(data)
     assert refusal(tmp_path / "job").got == got

@@ -204,7 +204,7 @@ def test_an_obstacle_before_homing_is_met_and_said(place: str, found: str) -> No
     assert run.failure.startswith(
         "CALCULATE PARAMETERS: the head is obstructed or stalled, or moves against its drive, and the drive"
     )
-    assert f"the way found is {'' if found[0] == '=' else found}" in run.failure
+    assert f"the measured width is {'' if found[0] == '=' else found}" in run.failure
     assert found in run.failure
     assert "limits.travel is 368.3 mm = 14.50 in" in run.failure
     assert run.lines == []
@@ -343,7 +343,7 @@ def test_an_axis_too_slow_for_two_passes_makes_none_and_says_so(limit: int) -> N
     run = print_job(load_spec(EXAMPLE, overrides), parse_text("a"))
     assert run.done
     assert run.level == "warn"
-    assert "works with its defaults; limits.speed" in run.warnings[0]
+    assert "uses its defaults; limits.speed" in run.warnings[0]
     for found in run.identified.values():
         assert (found.valid, found.slope, found.friction) == (False, found.default_slope, found.default_friction)
         assert (found.speed_fast, found.speed_slow) == (0, 0)

@@ -174,7 +174,7 @@ def test_an_axis_that_does_not_answer_has_failed() -> None:
     supervisor, _ = connect(axis)
     supervisor.send(run_to(100))
     with pytest.raises(
-        AxisError, match=r"^RUN TILL 100: no answer within 1 s; the axis computer hangs in state 'idle'$"
+        AxisError, match=r"^RUN TILL 100: no result within 1 s; the axis computer hangs in state 'idle'$"
     ):
         supervisor.finish()
 
@@ -184,7 +184,7 @@ def test_an_axis_that_takes_no_byte_has_failed() -> None:
     axis.deaf = True
     supervisor, _ = connect(axis)
     supervisor.send(POSITION_HIGH)
-    with pytest.raises(AxisError, match=r"^POSITION LOW BYTE: .* does not take the byte before it; .* 'power on'$"):
+    with pytest.raises(AxisError, match=r"^POSITION LOW BYTE: .* does not accept the previous byte; .* 'power on'$"):
         supervisor.send(POSITION_LOW)
 
 

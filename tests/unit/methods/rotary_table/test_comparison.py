@@ -89,7 +89,7 @@ def test_every_speed_of_the_feed_is_a_row_and_what_is_coarse_stands_out() -> Non
 def test_every_start_is_a_row_and_what_is_thrown_back_stands_out() -> None:
     figure = angle_comparison().figures()[2]
     assert figure.table is not None
-    assert [title for title, _ in figure.table.heads[2:]] == ["flag, way [deg]", "turn counter, way [deg]"]
+    assert [title for title, _ in figure.table.heads[2:]] == ["flag, distance [deg]", "turn counter, distance [deg]"]
     assert texts_of(figure) == [["1.000", "0.50", "thrown back: −30", "830"], ["100.000", "50.00", "830", "830"]]
     assert [[cell.over for cell in row] for row in cells_of(figure)] == [[False, False, True, False], [False] * 4]
     assert "2 deg" in figure.caption.replace("\u202f", " ")
@@ -98,7 +98,7 @@ def test_every_start_is_a_row_and_what_is_thrown_back_stands_out() -> None:
 # -- in the terminal --------------------------------------------------------------------------------------------------
 def test_the_table_holds_the_method_beside_what_it_betters() -> None:
     title, heads, rows = angle_comparison().table
-    assert title == "Endless angle at 60 deg/s, beside its alternatives"
+    assert title == "Endless angle at 60 deg/s, compared with the alternatives"
     assert heads == ("", "turn counter, position control", "raw angle; no position control; other forms")
     assert rows == [
         ("deviation across the end of the turn", "2 to 2 deg", "2 to 362 deg"),
@@ -241,7 +241,7 @@ def test_a_table_that_stops_slowly_crosses_slowly():
 @pytest.mark.compiled
 def test_a_table_that_hardly_moves_is_not_compared():
     spec = table("limits.speed=0.05 deg/s", "position.1.speed=0.05 deg/s")
-    with pytest.raises(DetentError, match=r"got a table that goes round at 0\.05 deg/s; expected: 0\.1 deg/s or more"):
+    with pytest.raises(DetentError, match=r"got a table that turns at 0\.05 deg/s; expected: 0\.1 deg/s or more"):
         compare_angle(spec)
 
 

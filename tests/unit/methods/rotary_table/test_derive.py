@@ -30,15 +30,15 @@ def figures(load_text, good_text):
         ("count", 360 / 368_640 * DEG, 1e-15),
         ("speed of one word", 0.0651 * DEG, 5e-5 * DEG),
         ("largest table speed", 133.33 * DEG, 0.005 * DEG),
-        ("way of an interrupt at limits.speed", 122.88, 1e-9),
+        ("distance per interrupt at limits.speed", 122.88, 1e-9),
         ("slowest jog", 360 / 368_640 / 65_536 / 2e-3 * DEG, 1e-18),
         ("slowest jog with a count in each interrupt", 0.48828 * DEG, 1e-5 * DEG),
         ("interrupts in a pass of the task", 10, 1e-12),
         ("interrupts in a turn at limits.speed", 3000, 1e-9),
         ("inertia at the motor J", 9e-4 + 0.8 / 8100, 1e-15),
         ("stiffness of the velocity loop", (9e-4 + 0.8 / 8100) / 20e-3, 1e-12),
-        ("time of an acceleration", 0.2, 1e-12),
-        ("way of an acceleration", 6 * DEG, 1e-12),
+        ("acceleration time", 0.2, 1e-12),
+        ("acceleration distance", 6 * DEG, 1e-12),
         ("following error at limits.speed", 2 * DEG, 1e-12),
         ("damping without sampling", 0.6455, 5e-5),
         ("damping of the loop", 0.622, 0.001),
@@ -50,7 +50,7 @@ def figures(load_text, good_text):
         ("deviation at rest", 1, 0),
         ("allowed coarse error", 1.9 * DEG, 0.015 * DEG),
         ("fine conversion", 204.8e-6, 1e-12),
-        ("way of a conversion at limits.speed", 122.88 * 0.1024, 1e-6),
+        ("distance per conversion at limits.speed", 122.88 * 0.1024, 1e-6),
     ],
 )
 def test_derived_figures_are_those_of_the_specification(figures, name, value, tolerance):
@@ -66,7 +66,7 @@ def test_derived_figures_are_those_of_the_specification(figures, name, value, to
         ("in position", "+-0.001953 deg (7.031 seconds of arc) for 20 ms"),
         ("deviation at rest", "up to 1 count"),
         ("allowed coarse error", "+-1.911 deg"),
-        ("way of an interrupt at limits.speed", "122.9 counts in an interrupt"),
+        ("distance per interrupt at limits.speed", "122.9 counts in an interrupt"),
     ],
 )
 def test_figures_read_as_people_say_them(figures, name, text):
@@ -137,14 +137,14 @@ def test_without_position_control_there_is_no_loop(load_text, good_text):
     rows = derived(load_text(good_text, "method.position_control=false", *LOAD))
     for name in ("following error at limits.speed", "damping of the loop", "overshoot", "deviation at rest"):
         assert name not in rows
-    assert not {"torque of an acceleration", "deviation under the load"} & set(rows)
+    assert not {"acceleration torque", "deviation under the load"} & set(rows)
     assert rows["cycle of a jog"].text == "6 s"
 
 
 def test_an_unstable_loop_has_a_limit_and_no_overshoot(load_text, good_text):
     rows = derived(load_text(good_text, "method.position_gain=1000"))
     assert rows["stability limit"].text == "Kp = 890.7 1/s, 0.891 x the gain"
-    assert not {"overshoot", "torque of an acceleration"} & set(rows)
+    assert not {"overshoot", "acceleration torque"} & set(rows)
 
 
 # ----------------------------------------------------------------------------------------------------------- detector
@@ -217,9 +217,9 @@ def test_composition_is_right_up_to_the_allowed_error(load_text, good_text, shar
 
 
 def test_what_no_loop_sees(load_text, good_text):
-    assert "error of the table" not in derived(load_text(good_text))
+    assert "angle error of the table" not in derived(load_text(good_text))
     more = ("mechanics.backlash=0.1 deg", "mechanics.eccentricity=0.02 deg", "detector.fine.offset_error=10 %")
-    error = derived(load_text(good_text, *more))["error of the table"]
+    error = derived(load_text(good_text, *more))["angle error of the table"]
     assert error.value == pytest.approx((0.05 + 0.02) * DEG + math.asin(0.1) / 90)
 
 

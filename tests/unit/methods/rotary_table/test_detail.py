@@ -195,7 +195,7 @@ def test_what_happens_in_a_jog_is_told_in_order(forward: Played) -> None:
             "deviation stays 2.000\u202fdeg", "button released", "at rest: M, R and C")  # fmt: skip
     for text, part in zip(texts_of(figure), told, strict=True):
         assert part in text
-    assert step_section(*forward).title == "How the table goes on beyond a turn"
+    assert step_section(*forward).title == "Beyond one turn"
 
 
 def test_a_jog_of_many_turns_is_shown_as_far_as_its_second_rollover() -> None:

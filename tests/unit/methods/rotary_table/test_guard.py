@@ -198,7 +198,7 @@ def test_a_form_that_is_known_to_fail_is_named_beside_the_cause():
     over = [f"position.{number}.direction=as commanded" for number in range(5)]
     over += ["method.form=raw", "mechanics.start_angle=100 deg"]
     found = run(Jog(1, duration=14.0), over=over)
-    assert "the following error went beyond 4.211 deg, protection.following_error, and the drive" in found.failure
+    assert "the following error exceeded 4.211 deg, protection.following_error, and the drive" in found.failure
     assert found.failure.endswith('set method.form = "turn counter"')
     # At the boundary, 260 deg on, dR is a turn: 60 ms and a look later the drive is off.
     assert math.degrees(found.steps[0].travel) < 260 + 0.08 * 133

@@ -108,7 +108,7 @@ def test_a_way_too_far_is_refused(host):
     host.machine.params.controller.positioner.pdt.angle[1] = 1 << 40
     host.begin(1)
     host.machine.pass_ticks(400)
-    assert host.refusal.startswith("the way is longer than the remaining angle can count")
+    assert host.refusal.startswith("the distance exceeds the range of the remaining angle")
 
 
 def test_limits_of_time_are_generous_but_not_endless(host):

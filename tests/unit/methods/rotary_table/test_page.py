@@ -109,7 +109,7 @@ def test_a_run_that_failed_says_where_why_and_what_to_do() -> None:
 
 def test_a_table_that_stands_beside_its_targets_gets_no_praise() -> None:
     page = page_of(run_of(record(1, error=20 * COUNT), warnings=["in step 1 it stood 20 counts off; look"]))
-    assert (page.headline.level, page.headline.verdict) == ("warn", "Done, but beside its targets")
+    assert (page.headline.level, page.headline.verdict) == ("warn", "Done, but off target")
     assert page.headline.lead.startswith("In step 1 it stood 20 counts off. ")
     assert [card.title for card in page.cards if card.bad] == ["Worst error at rest"]
     # The window and one count of the detector are allowed.
@@ -122,7 +122,7 @@ def test_warnings_comparisons_and_small_print_stand_on_the_page() -> None:
     assert [(note.level, note.text) for note in page.notes] == [("warning", "signal <late>")]
     assert page.settings == {"seed": "7"}
     assert [section.title for section in page.sections if section.shown] == [
-        "What the sequence did", "What the method is worth on this axis", "Step by step",
+        "Results", "Comparison with the alternatives on this axis", "Steps",
     ]  # fmt: skip
     assert ids_of(page)[4:] == ["cross-way", "cross-deviation", "cross-speed"]
     assert all(figure.caption for figure in page.figures)
@@ -135,7 +135,7 @@ def test_a_run_without_a_step_has_no_figures() -> None:
     assert not any("nan" in card.value for card in page.cards)
 
 
-# ---- time line
+# ---- timeline
 
 
 def test_the_time_line_has_a_lane_per_kind_of_step_and_per_signal() -> None:
@@ -187,7 +187,7 @@ def test_angle_and_speed_stand_below_over_the_same_time() -> None:
     assert curves_of(speed)["true speed"][at] == 45.0
     assert curves_of(speed)["commanded"][at] == 45.0
     assert [chart.get("foot", True) for chart in page.charts] == [False, False, False, True]
-    assert page.figures[0].title == "Time line"
+    assert page.figures[0].title == "Timeline"
 
 
 def test_without_a_trace_the_lanes_stand_alone() -> None:
@@ -206,7 +206,7 @@ def test_a_trace_without_a_needed_signal_draws_the_lanes_alone(left_out: str) ->
 def test_a_long_sequence_shows_its_beginning() -> None:
     long = page_of(shop_run(time_end=5000.5))
     assert long.charts[0]["x"][-1] == table_pages.LINE_SECONDS
-    assert long.figures[0].title != "Time line"
+    assert long.figures[0].title != "Timeline"
     # What was not recorded cannot be drawn.
     part = page_of(shop_run(time_end=5000.5), shop_trace())
     assert part.charts[1]["x"][-1] == 9.99

@@ -209,7 +209,7 @@ def test_backlash_and_eccentricity_are_errors_the_axis_does_not_know():
 def test_a_sequence_that_ends_before_its_inputs_says_so():
     found = run(Wait(0.5), late=((1.0, 2.0),), cut=((0.1, 2.0),), fine=((0.1, 0.2),))
     assert found.done
-    assert found.warnings == ['the sequence ended before all of these inputs had come: "late", "cut"']
+    assert found.warnings == ['the sequence ended before all of these inputs had arrived: "late", "cut"']
 
 
 def test_progress_is_told_by_steps():
@@ -302,7 +302,7 @@ def test_a_table_that_runs_away_while_it_waits():
 
 def test_a_detector_wrong_by_a_motor_turn_is_told():
     found = run(Go(1), over=["detector.coarse.alignment_error=2.2 deg"])
-    assert "but stands 4.00049 deg below it, 1.0 turns of the motor: the detected angle is wrong" in found.failure
+    assert "but is 4.00049 deg below it, 1.0 turns of the motor: the detected angle is wrong" in found.failure
     assert "below half a turn of the motor, 2 deg of the table" in found.failure
     assert degrees(found.steps[0].error) == pytest.approx(4, abs=0.01)
     truncated = ["detector.composition=truncated", "detector.coarse.alignment_error=-0.2 deg"]
@@ -322,7 +322,7 @@ def test_a_jog_that_falls_behind_is_told():
     over = ["disturbance.load.torque=-270 N*m", "disturbance.load.at=0 s", "disturbance.load.duration=100 s"]
     found = run(Jog(1, duration=20.0), over=[*over, *UNGUARDED])
     assert not found.done
-    assert "look at deviation and torque in the report" in found.failure
+    assert "check deviation and torque in the report" in found.failure
 
 
 def test_a_run_ends_where_its_signal_is_over():
