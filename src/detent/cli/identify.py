@@ -1,4 +1,4 @@
-"""`detent identify`: from recordings to constants with limits, and a verdict. `detent analyse`: single questions."""
+"""`detent identify`: from recordings to constants with limits, and a verdict. `detent analyse`: single analyses."""
 
 import shlex
 from contextlib import suppress
@@ -231,7 +231,7 @@ def _print_horizons(found: Any) -> None:
         say(f"The same with the control loops found in the log: {told}")
 
 
-# ---- single questions, each answered by its own method
+# ---- single analyses, each by its own method
 
 WHAT = "two-speeds, friction-map, winding, frequency, steps or sensors; repeat for more. Default: all."
 What = Annotated[list[str] | None, option("--what", "WORD", WHAT)]

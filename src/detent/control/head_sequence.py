@@ -237,7 +237,7 @@ def finish(p: HeadParams, c: HeadComputer, code: int, turn: bool) -> None:
 
 @step
 def begin_next(p: HeadParams, c: HeadComputer, turn: bool) -> None:
-    """Execute waiting commands until one moves the head; without one the drive goes off."""
+    """Execute waiting commands until one moves the head; without one the drive is switched off."""
     while c.queue.waiting > 0:
         take_next(c)
         if is_motion(c.operation):

@@ -1,4 +1,4 @@
-"""What a recording says to single questions, what to do with each answer, and a report."""
+"""Single analyses of a recording, what to do with each result, and a report."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ HEADS = ("", "value", "95 % interval", "unit")
 
 @dataclass(frozen=True, repr=False)
 class Analysed(OnScreen):
-    """Answers of a recording to single questions.
+    """Results of the analyses of a recording.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ def analyse(  # noqa: PLR0913 - the options of `detent analyse`
     mass: float = 0.0,
     progress: "Progress | None" = None,
 ) -> Analysed:
-    """Ask a recording single questions.
+    """Analyse single aspects of a recording.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class Identified(OnScreen):
         return TextTable(title, ("", "value", "95 % interval", "unit", "trusted"), rows)
 
     def screen(self) -> Screen:
-        """The verdict, what is refused and what to do about it, and the constants."""
+        """The verdict, refusals and what to do about them, and the constants."""
         told = [f"{one.subject}: {one.text}; try: {one.record}" for one in self.refusals[:MOST_REFUSALS]]
         left = len(self.refusals) - len(told)
         told += [f"{left} more: .refusals"] if left > 0 else []

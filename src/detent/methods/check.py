@@ -1,4 +1,4 @@
-"""What `detent check` shows: effective values, what follows from them, and what looks wrong.
+"""What `detent check` shows: effective values, derived figures, and warnings.
 
 Data only; the command line prints it.
 """
@@ -17,7 +17,7 @@ from detent.methods.registry import METHODS
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class EffectiveRow:
-    """One value in effect."""
+    """One effective value."""
 
     key: str  # dotted key
     value: str  # value with its SI unit (prefixed)
@@ -45,10 +45,10 @@ class CheckReport(OnScreen):
         figures = [(figure.name, figure.text, figure.formula) for figure in self.derived]
         values = [(row.key, row.value, row.origin) for row in self.rows]
         blocks = [
-            Block("What follows from its values", ("figure", "value", "from"), figures, 24, ".derived has all"),
+            Block("Derived figures", ("figure", "value", "from"), figures, 24, ".derived has all"),
             Block("Every effective value", ("key", "value", "origin"), values, 0),
         ]
-        return Screen(title, blocks, f"{len(values)} values in effect: .rows")
+        return Screen(title, blocks, f"{len(values)} effective values: .rows")
 
     def to_dict(self) -> dict[str, Any]:
         """Give the report as plain data for ``--json``."""

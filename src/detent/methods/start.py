@@ -18,7 +18,7 @@ HEAD = """\
 # Lines that begin with a key are needed, and hold an axis that runs: replace them by yours. Behind a # without a space
 # stands what may be stated too, with the value that holds otherwise, or an example where that follows from other keys.
 #
-#   detent check {file}              shows every effective value, what follows from them, and what looks wrong
+#   detent check {file}              shows every effective value, the derived figures, and warnings
 #   detent run {file} --job JOB      does a job: {jobs}
 #   detent keys {name} --search WORD      looks a key up
 

@@ -21,7 +21,7 @@ HAPPENED = 1e-6  # how much later than the end of a move an event may be noted [
 T = TypeVar("T", bound=Any)
 
 
-# ---- what came out
+# ---- results
 
 
 def page_title(axis_name: str, run: RunRecord[Any], *, done: str = "done") -> str:

@@ -66,7 +66,7 @@ class Climb:
     """What the held-out stretches say about one rung."""
 
     rung: Rung
-    error: float  # root mean square of the prediction of stretches not seen, over that of the effort
+    error: float  # root mean square of the prediction of held-out segments, over that of the effort
     stretches: Values  # mean squares, stretch by stretch
     gain: float  # mean gain over the rung chosen so far, in standard errors; nan for the first
     taken: bool  # True where it was climbed

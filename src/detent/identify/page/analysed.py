@@ -1,4 +1,4 @@
-"""The page about single questions to a recording: what to do, then each answer with its figures."""
+"""The page about the analyses of a recording: what to do, then each result with its figures."""
 
 from typing import TYPE_CHECKING
 

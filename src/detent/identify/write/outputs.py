@@ -154,7 +154,7 @@ def _limits(seen: Bounds, numbers: dict[str, Number]) -> dict[str, float]:
 
 
 def _shares(loops: Loops | None, numbers: dict[str, Number]) -> dict[str, str]:
-    """Feed-forward of the log's loops, as shares of what the file says; where none are known, by rule."""
+    """Feedforward of the log's loops, as shares of what the file says; where none are known, by rule."""
     if loops is None:
         shares = {"velocity": "1", "acceleration": "1", "viscous": "1", "coulomb": "0.8"}
         return shares | ({"weight": "1"} if "mechanics.pendulum" in numbers else {})

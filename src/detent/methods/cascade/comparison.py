@@ -140,7 +140,7 @@ def _twist_figure(found: ProfileComparison) -> Figure:
     """Twist of the coupling, each case from the end of its own reference on."""
     caption = (
         f"Twist of the coupling after the reference has ended. With the motor held by its loop the load oscillates "
-        f"at {number(found.frequency)}{GAP}Hz. Look for: the oscillation left by a step in acceleration, and how a "
+        f"at {number(found.frequency)}{GAP}Hz. Compare the oscillation left by a step in acceleration, and how a "
         "ramp about one period long reduces it. Without feedforward (dashed) the axis is still braking when its "
         "reference ends."
     )

@@ -71,7 +71,7 @@ def cascade_page(
     )
 
 
-# ---- what came out, in one glance
+# ---- results, in one glance
 
 
 def cascade_summary(spec: CascadeSpec, run: CascadeRun) -> list[tuple[str, str]]:
@@ -216,7 +216,7 @@ def _move_figures(spec: CascadeSpec, run: CascadeRun, trace: Trace | None) -> li
     events = happened({text: moment - move.begin for text, moment in moments.items()}, move.end - move.begin)
     caption = f"Shown is {'the move that failed' if failed else 'the fastest move'}."
     if run.done:
-        caption += " Look for: how soon the load settles after its reference, and the command at the start of the move."
+        caption += " Check how soon the load settles after its reference, and the command at the start of the move."
     timeline = Timeline(name="move", t=rows.t, label="time since the move began", events=events)
     charts = time_charts(timeline, _panels(spec, run, rows, "move"))
     shown = Figure(title=f"Move {count(move.number)}", caption=caption, charts=charts, events=events)

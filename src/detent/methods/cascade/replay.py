@@ -270,7 +270,7 @@ def _open_loop(spec: CascadeSpec, job: ReplayJob) -> tuple[str, Numbers]:
     )
 
 
-# ---- what came out
+# ---- results
 
 
 def _judge(spec: CascadeSpec, result: ReplayRun, host: CascadeHost, seen: Rows) -> None:

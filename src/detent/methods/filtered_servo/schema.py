@@ -105,7 +105,7 @@ class MethodTable(Table, frozen=True):
     )
     counter_bits: int = optional("width of the speed counter: two or three 4-bit counters", 8, ge=8, le=12)
     position_gain: float = optional("K1: drive counts per pulse of following error", 1.0, ge=1e-3, le=100.0)
-    position_bits: int = optional("width of the position counter; beyond it the drive goes off", 12, ge=8, le=16)
+    position_bits: int = optional("width of the position counter; beyond it the drive trips", 12, ge=8, le=16)
     command_acceleration: Acceleration = optional(
         "acceleration of the commanded speed; 0 jumps to it", 0.0, start='"0.5 m/s^2"', ge=0.0, le=1e4
     )

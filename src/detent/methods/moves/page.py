@@ -136,7 +136,7 @@ def moves_page(
     )
 
 
-# ---- what came out, in one glance
+# ---- results, in one glance
 
 
 def _headline(view: MoveView, figures: MoveFigures) -> Headline:
@@ -208,7 +208,7 @@ def _rest_figure(view: MoveView, figures: MoveFigures) -> Figure | None:
         return None
     outside = " (outside the figure)" if error.value < run.tolerance / 1.5 else ""
     caption = (
-        "Position error at the end of each dwell. Look for: narrow peaks around zero; separate "
+        "Position error at the end of each dwell. Expected: narrow peaks around zero; separate "
         "peaks mean that the result depends on the direction of approach. "
         f"Allowed: ±{length(run.tolerance)}{outside}; a {view.unit.word} is {length(view.unit.size)}."
     )

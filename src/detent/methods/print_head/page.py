@@ -90,7 +90,7 @@ def _plain(value: int, word: str = "") -> str:
     return count(value, word).replace(GAP, " ")
 
 
-# ---- what came out, in one glance
+# ---- results, in one glance
 
 
 def _headline(spec: PrintHeadSpec, run: PrintRun) -> Headline:
@@ -138,7 +138,7 @@ def _notes(run: PrintRun) -> list[Note]:
     return notes
 
 
-# ---- what came out
+# ---- results
 
 
 def _result(run: PrintRun) -> list[Figure]:
@@ -175,7 +175,7 @@ def marks_of(run: PrintRun) -> Marks:
 def _error_figure(run: PrintRun) -> Figure:
     outside = " (outside the figure)" if run.worst_error < COLUMN_LIMIT / 1.5 else ""
     caption = (
-        "Position error of each column of dots. Look for: two narrow peaks in the same place. Separate peaks "
+        "Position error of each column of dots. Expected: two narrow peaks in the same place. Separate peaks "
         "mean that lines printed to the right and to the left do not line up. "
         f"Allowed: ±{length(COLUMN_LIMIT)}{outside}; the finest column grid is {length(COLUMN)} (1/120{GAP}in)."
     )

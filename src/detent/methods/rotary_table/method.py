@@ -13,7 +13,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     """Absolute angle of one turn, servo-controlled jog for any number of turns."""
 
     name = "rotary_table"
-    title = "rotary table: absolute angle of one turn, servo-controlled jog without end"
+    title = "rotary table: absolute angle of one turn, servo-controlled endless jog"
     jobs = "a sequence (.toml)"
     pace = "100 us, every 20th"
     spec = RotaryTableSpec

@@ -74,7 +74,7 @@ def table_page(
     )
 
 
-# ---- what came out, in one glance
+# ---- results, in one glance
 
 
 def _headline(spec: RotaryTableSpec, figures: SequenceFigures) -> Headline:
