@@ -357,7 +357,7 @@ def margin() -> None:
 
 
 def smooth_ramp(found: Any, step: float) -> Any:
-    """The rising part of a profile of jerk-limited as a ramp list: the frequency of each of its steps."""
+    """The rising part of a jerk-limited profile as a ramp list: the frequency of each of its steps."""
     from detent.planning.step_ramp import StepRamp
 
     v, a, j = found.speed, found.acceleration, found.jerk
@@ -371,7 +371,7 @@ def smooth_ramp(found: Any, step: float) -> Any:
 
 
 def jerk() -> None:
-    """Start by the envelope and by a profile of jerk-limited, each as a ramp list, on the rotor."""
+    """Start by the envelope and by a jerk-limited profile, each as a ramp list, on the rotor."""
     from detent.methods.stepper_envelope.comparison import compare_jerk
     from detent.methods.stepper_envelope.controller import load_rule
     from detent.methods.stepper_envelope.system import tables

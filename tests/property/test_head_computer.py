@@ -109,7 +109,7 @@ class Bench:
         while len(self.answers) < len(self.expected) and waited < LONGEST_WAIT / 0.1:
             self.drain(2500)
             waited += 1
-        assert len(self.answers) == len(self.expected), "a command got no result, or two"
+        assert len(self.answers) == len(self.expected), "a command got no answer, or two"
         for answer, allowed in zip(self.answers, self.expected, strict=True):
             assert allowed is None or answer in allowed | {OVERRUN}
         assert self.rig.head.status.lost == 0

@@ -112,7 +112,7 @@ def _ask(process: "subprocess.Popen[bytes]", request: bytes, seconds: float) -> 
 
     watch = threading.Timer(seconds, expire)
     watch.daemon = True
-    told: Any = ""  # no result
+    told: Any = ""  # no answer
     try:
         watch.start()
         requests.write(request)
@@ -211,7 +211,7 @@ def serve() -> None:
     """Read files until nobody asks any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches who asked, and that one ends this process
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is no result
+    os.dup2(2, 1)  # what libraries print is no answer
     while True:
         try:
             folder, limits, request = pickle.load(sys.stdin.buffer)  # noqa: S301 - from detent itself

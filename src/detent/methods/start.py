@@ -15,12 +15,12 @@ from detent.methods.method import Method
 HEAD = """\
 # An axis of the method {name}: {title}.
 #
-# Lines that begin with a key are needed, and hold an axis that runs: replace them by yours. Behind a # without a space
-# stands what may be stated too, with the value that holds otherwise, or an example where that follows from other keys.
+# Keys without a # are required; their values make an axis that runs: replace them with yours. Keys behind a # without
+# a space are optional, with their default, or with an example if the default is derived from other keys.
 #
 #   detent check {file}              shows every effective value, the derived figures, and warnings
-#   detent run {file} --job JOB      does a job: {jobs}
-#   detent keys {name} --search WORD      looks a key up
+#   detent run {file} --job JOB      runs a job: {jobs}
+#   detent keys {name} --search WORD      finds keys
 
 """
 

@@ -89,7 +89,7 @@ class Move:
 
     @property
     def place_key(self) -> str:
-        """The key that says target position."""
+        """The key that states the target."""
         return "target" if self.by is None else "by"
 
     def __post_init__(self) -> None:

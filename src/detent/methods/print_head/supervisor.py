@@ -136,7 +136,7 @@ class Supervisor:
             self.pass_time(self.patience)
         if not latch.flag:
             raise AxisError(
-                f"{command.text}: no result within {self.patience:g} s; the axis computer hangs in state "
+                f"{command.text}: no answer within {self.patience:g} s; the axis computer hangs in state "
                 f"{STATE_NAMES[self.controller.head.state]!r}"
             )
         return int(read_status(self.controller))

@@ -1,4 +1,4 @@
-"""One move in four variants: what feedforward and a jerk-limited bring, and what is left out of the comparison."""
+"""One move in four variants: what feedforward and a jerk limit bring, and what is left out of the comparison."""
 
 import math
 

@@ -174,7 +174,7 @@ def test_an_axis_that_does_not_answer_has_failed() -> None:
     supervisor, _ = connect(axis)
     supervisor.send(run_to(100))
     with pytest.raises(
-        AxisError, match=r"^RUN TILL 100: no result within 1 s; the axis computer hangs in state 'idle'$"
+        AxisError, match=r"^RUN TILL 100: no answer within 1 s; the axis computer hangs in state 'idle'$"
     ):
         supervisor.finish()
 
