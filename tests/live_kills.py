@@ -18,8 +18,8 @@ from pathlib import Path
 from random import Random
 from typing import NoReturn
 
-from detent.live.trust import Trust
 from detent.methods.position import PositionSensor
+from detent.operate.trust import Trust
 from tests.live_rig import SENSORS, TRAVEL, Model, open_store, read, table_change, table_of
 
 LONGEST = 0.005  # life of a host, from its start or its first motion [s]

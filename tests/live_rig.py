@@ -9,8 +9,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from detent.live.store import Store
 from detent.methods.position import PositionSensor, Sensed
+from detent.operate.store import Store
 
 BENCH = "bench"  # place of every store here, wherever its file lies
 TRAVEL = 20_000  # counts

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from detent.errors import DetentError, InputError
     from detent.identify.analysed import Analysed, analyse
     from detent.identify.identified import Identified, identify_axis
+    from detent.operate.client import LiveAxis
+    from detent.operate.start import connect, live
 
 __version__ = "0.1.0"
 
@@ -23,12 +25,14 @@ _PLACES = {
     "detent.errors": ("DetentError", "InputError"),
     "detent.identify.analysed": ("Analysed", "analyse"),
     "detent.identify.identified": ("Identified", "identify_axis"),
+    "detent.operate.start": ("connect", "live"),
+    "detent.operate.client": ("LiveAxis",),
 }
 """Where the words of the API stand; each loads at its first use: `import detent` and `detent --help` stay quick."""
 
 __all__ = [
-    "Analysed", "Axis", "DetentError", "Identified", "InputError", "Run", "Timing", "__version__", "analyse", "example",
-    "examples", "identify_axis", "load", "load_trace",
+    "Analysed", "Axis", "DetentError", "Identified", "InputError", "LiveAxis", "Run", "Timing", "__version__",
+    "analyse", "connect", "example", "examples", "identify_axis", "live", "load", "load_trace",
 ]  # fmt: skip
 
 

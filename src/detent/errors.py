@@ -138,6 +138,38 @@ GUARD_TEXT: dict[int, str] = {
 """Faults reported by a controller's guard (control.guard), by their numbers; in all of them the first cause stays."""
 
 
+LOOP_OVERRUN = 50  # fault of a live loop that cannot keep its time
+
+REFUSAL_TEXT: dict[int, str] = {
+    31: "the target lies beyond a soft limit; name one between the limits",
+    35: "the position is not known, so that only creeping by a way or by hand is allowed; home the axis",
+    41: "whoever held the jog was silent for longer than its lease; hold it again",
+    43: "somebody else commands; take over first, or ask them",
+    44: "a stop came after this was asked; look at the axis and ask again",
+    50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
+    "give it real-time priority, or a longer period",
+    52: "a value that is no number, infinite, or a share of the speed outside 0 to 1; correct it",
+    101: "the axis is not enabled; enable it first",
+    102: "the axis stands in a fault; read it, mend its cause, reset, then enable",
+    103: "there is no fault to reset",
+    104: "there is no such command; look at the list of commands",
+    105: "this control method has no such command",
+    106: "not while the axis is enabled; switch it off first",
+    107: "the axis takes no other move while one is under way; wait for its end, or stop it",
+    108: "the axis is not ready: it has not yet taken its first position; wait a moment",
+    109: "no job is under way that this could be a piece of; begin the job first",
+    110: "the first motion since enabling has not been confirmed, and a job goes at speeds of its own; confirm first",
+    201: "the table was still moving; wait until it stands, or stop it",
+    202: "the position table has no such number; name one that it has, or add it to the axis file",
+    203: "the way is longer than the remaining angle can count; name a nearer position",
+    210: "the axis is not ready, or the way is longer than its counter; wait until it is ready, or go in parts",
+    230: "the head is looking for its frames or measures itself; wait until that is over, or stop it",
+    231: "the head came to rest farther from its target than a stop may miss it; look for what blocks or drives it",
+    232: "the axis computer did not do it, and what it answered stands in its status byte; mend that and ask again",
+}
+"""Why an operation refuses a command, or ends one that it had taken (control.operation)."""
+
+
 STEP_FAULT_TEXT: dict[int, str] = {
     1: "the table of permissible speeds fell by more than one ramp step, which the motor cannot follow; it came down "
     "its ramp and stands; build the table anew from its extremes, or edit it with move_stop",

@@ -1,11 +1,16 @@
 """Live specification, section 8. The first ones are about the cut: what a controller is, and that it is whole."""
 
 import math
+import mmap
 import subprocess
 import sys
+import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from random import Random
 from typing import Any
 
 import numba
@@ -14,11 +19,18 @@ import pytest
 from numpy.typing import NDArray
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.difference import diff
+from tests.live_bench import MOVED, OPERATED, Bench
 
+from detent.control import operation as ops
+from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
+from detent.control.guard import FOLLOWING, STUCK
+from detent.errors import LOOP_OVERRUN, DetentError
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
 from detent.methods.cascade.system import Cascade, along
 from detent.methods.registry import METHODS
+from detent.operate.host import Ending, repeat
+from detent.planning.course import advance as advance_course
 
 SAMPLES = 50
 """Of the standard job, each of so many ticks as it takes from one to the next: both of its commands."""
@@ -159,3 +171,760 @@ def test_04_the_guard_is_a_step_of_the_loop(monkeypatch):
     for _ in range(60):
         best = [min(before, axis.seconds()) for before, axis in zip(best, (with_guard, without), strict=True)]
     assert best[0] <= 1.15 * best[1]
+
+
+# ---- the loop in wall time
+
+
+def started(bench: Bench) -> Iterator[Bench]:
+    """The bench with its loop in a thread, in wall time."""
+    bench.host.start()
+    try:
+        yield bench
+    finally:
+        bench.host.close()
+
+
+def test_06_late_periods_are_skipped_and_the_grid_is_kept():
+    bench = Bench("cascade").enable()
+    bench.host.ask(ops.MOVE_BY, 0.1)
+    bench.pass_time(0.1)
+    loop, before = bench.loop, bench.loop.deadline
+    (here, speed), worst = bench.watch(0.001)[0], bench.spec.limits.speed
+    ran, skipped = loop.periods, loop.skipped
+    loop.delay_at, loop.delay = loop.periods + 1, round(3.5 * loop.period)
+    ((there, _),) = bench.watch(0.001)
+    assert (loop.periods - ran, loop.skipped - skipped, loop.overruns) == (1, 3, 1)
+    # The period ran 3.5 periods late, and the deadline that it kept was the third after its own.
+    assert loop.worst == round(3.5 * loop.period)
+    bench.host.run(1)
+    assert (loop.deadline - before) % loop.period == 0
+    assert loop.deadline - before == (loop.periods - ran + 1 + 3) * loop.period
+    assert (loop.periods - ran, loop.skipped - skipped) == (2, 3)
+    # One period of time has passed on the axis, not four.
+    assert 0.0 < there - here < 1.5 * worst * 1e-3
+    assert there - here == pytest.approx(speed * 1e-3, rel=0.2)
+    assert bench.host.state == "operation enabled"
+
+
+@pytest.mark.parametrize("periods", [5.2, 40.0])
+def test_07_a_long_overrun_is_a_fault_and_stops_in_a_ramp(periods):
+    bench = Bench("cascade").enable()
+    move = bench.host.ask(ops.MOVE_BY, 0.2)
+    bench.pass_time(0.2)
+    at, speed = bench.answer.commanded, bench.answer.commanded_velocity
+    bench.loop.delay_at, bench.loop.delay = bench.loop.periods + 1, round(periods * bench.loop.period)
+    ramp = bench.watch(0.5)
+    assert bench.host.ending(move) == Ending(move, ops.FAILED, LOOP_OVERRUN, 0)
+    assert (bench.operation.fault, bench.host.state) == (50, "fault")
+    limits, places = bench.spec.limits, [at, *(place for place, _ in ramp)]
+    assert all(0.0 <= b - a <= 1.001 * limits.speed * 1e-3 for a, b in pairwise(places))
+    bound = speed**2 / (2 * limits.acceleration) + speed * limits.acceleration / (2 * limits.jerk)
+    assert 0.0 < ramp[-1][0] - at <= bound + speed * 2e-3 + limits.acceleration**3 / limits.jerk**2
+    assert ramp[-1][1] == 0.0
+    assert bench.host.axis.state.controller.on  # type: ignore[attr-defined]  # it holds
+
+
+def test_07_many_overruns_in_a_second_are_a_fault():
+    bench = Bench("cascade").enable()
+    for k in range(4):
+        assert bench.operation.fault == 0
+        bench.loop.delay_at, bench.loop.delay = bench.loop.periods + 1, bench.loop.period
+        bench.pass_time(0.2)
+        assert bench.loop.overruns == k + 1
+    assert bench.operation.fault == LOOP_OVERRUN
+    slower = Bench("cascade").enable()
+    for _ in range(12):
+        slower.loop.delay_at, slower.loop.delay = slower.loop.periods + 1, slower.loop.period
+        slower.pass_time(0.4)
+    assert (slower.operation.fault, slower.loop.overruns) == (0, 12)
+
+
+def test_08_histogram_and_counters_sum_to_the_periods_run():
+    bench = Bench("filtered_servo")
+    delays = [0, 1, 999, 1000, 1001, 500_000, 999_999, 1_000_000, 3_500_000]
+    for delay in delays:
+        bench.loop.delay_at, bench.loop.delay = bench.loop.periods + 1, delay
+        bench.host.run(7)
+    late = list(bench.loop.late)
+    assert sum(late) == bench.loop.periods == 7 * len(delays)
+    assert bench.loop.deadline == (bench.loop.periods + bench.loop.skipped) * bench.loop.period
+    bins = Counter((delay // 1000).bit_length() for delay in delays) + Counter({0: 6 * len(delays)})
+    assert {k: n for k, n in enumerate(late) if n} == bins
+    assert (bench.loop.skipped, bench.loop.overruns) == (4, 2)
+
+
+WRITER = """
+import sys
+from detent.operate.host import write_request
+from detent.operate.loop import INBOX, Board
+import mmap
+with open(sys.argv[1], "r+b") as file:
+    board = Board.from_buffer(mmap.mmap(file.fileno(), 0))
+box, operation = board.inbox, board.operation
+for number in range(1, int(sys.argv[2]) + 1):
+    while number - operation.taken > INBOX:
+        pass
+    write_request(box, number, 10, number, 0, 1, number * 0.5, 1.0)
+"""
+
+
+@pytest.mark.wide
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a million requests")
+def test_09_no_request_is_lost_doubled_or_torn(tmp_path):
+    """A million, written by another process into the memory that both map."""
+    bench, requests = Bench("filtered_servo"), 1_000_000
+    memory = tmp_path / "board"
+    memory.write_bytes(bytes(bench.host.board))
+    with memory.open("r+b") as file:
+        board = bench.host.board = type(bench.host.board).from_buffer(mmap.mmap(file.fileno(), 0))
+    writer = subprocess.Popen([sys.executable, "-c", WRITER, str(memory), str(requests)])
+    read, sums = 0, 0
+    while read < requests:
+        assert writer.poll() in {None, 0}
+        before = board.operation.taken
+        bench.host.run(1)
+        ends = board.operation.endings
+        for k in range(read, ends.count):
+            assert ends.id[k % 256] == k + 1
+            sums += ends.id[k % 256]
+        read = ends.count
+        assert read == board.operation.taken <= before + 64
+    assert writer.wait() == 0
+    assert sums == requests * (requests + 1) // 2
+
+
+def test_09_a_torn_request_is_not_taken():
+    """Each byte of a record spoilt, one after the other: it is left until it is whole, and then taken once."""
+    bench = Bench("filtered_servo")
+    box = bench.host.board.inbox
+    for field in ("number", "kind", "id", "epoch", "client", "value", "speed", "check"):
+        bench.host.ask(ops.KEEP)
+        k = bench.operation.taken % 1024
+        column, whole = getattr(box, field), getattr(box, field)[k]
+        column[k] = whole + 1
+        taken, torn = bench.operation.taken, bench.operation.torn
+        bench.host.run(3)
+        assert (bench.operation.taken, bench.operation.torn) == (taken, torn + 3)
+        column[k] = whole
+        bench.host.run(1)
+        assert bench.operation.taken == taken + 1
+
+
+def check_rows(rows: Any, first: int) -> int:
+    """No row is torn, none is out of its place; gives the number of the next."""
+    assert np.array_equal(rows["loop.periods"], np.arange(first + 1, first + 1 + len(rows)))
+    answer = {name: rows[f"operation.answer.{name}"] for name in ("position", "commanded", "error")}
+    assert np.array_equal(answer["commanded"] - answer["position"], answer["error"])
+    assert np.array_equal(rows["controller.reference.position"], answer["commanded"])
+    return first + len(rows)
+
+
+def test_10_a_reader_that_was_stopped_sees_no_torn_row():
+    """It reads while the loop runs as fast as it can, is stopped for longer than the ring holds, and reads on."""
+    channels = ("controller.reference.position", "lines.motor.count", "controller.on", "controller.law.command")
+    bench = Bench("cascade", channels=channels).enable()
+    scope = bench.host.scope
+    bench.host.ask(ops.MOVE_BY, 0.2)
+    following = int(bench.loop.rows)
+    bench.pass_time(0.5)
+    rows, following, missed = scope.rows(following)
+    assert (len(rows), missed) == (500, 0)
+    check_rows(rows, following - 500)
+    assert set(rows["controller.on"]) == {1}
+    assert np.ptp(rows["lines.motor.count"]) > 100_000
+    bench.pass_time(20.0)  # the reader is stopped
+    rows, following, missed = scope.rows(following)
+    assert len(rows) + missed == 20_000
+    assert 8000 < len(rows) < 8192
+    check_rows(rows, following - len(rows))
+    bench.host.ask(ops.MOVE_BY, -0.2)
+    runner = threading.Thread(target=bench.host.run, args=(600_000,))
+    end = following + 600_000
+    runner.start()
+    seen = 0
+    while following < end:
+        rows, following, missed = scope.rows(following)
+        check_rows(rows, following - len(rows))
+        seen += len(rows)
+    runner.join()
+    assert seen > 8000
+    assert (bench.loop.overruns, bench.operation.fault) == (0, 0)
+
+
+def test_10_channels_change_under_way():
+    bench = Bench("cascade").enable()
+    bench.host.scope.show(["controller.law.command", "controller.law.limited"])
+    first = int(bench.loop.rows)
+    bench.host.ask(ops.MOVE_BY, 0.05)
+    bench.pass_time(0.2)
+    rows, following, _ = bench.host.scope.rows(0)
+    assert len(rows) == following - first == 200
+    assert rows["controller.law.command"][-1] == bench.host.axis.state.controller.law.command  # type: ignore[attr-defined]
+    assert np.ptp(rows["controller.law.command"]) > 1.0
+    with pytest.raises(ValueError, match="8 or fewer"):
+        bench.host.scope.show(["tick"] * 9)
+    with pytest.raises(DetentError, match="did you mean"):
+        bench.host.scope.show(["controller.law.comand"])
+
+
+# ---- states and commands
+
+# CiA 402 part 2, figure of the state machine: order by order, from each state that knows it.
+DOCUMENTED = {
+    ("shutdown", "switch on disabled"): "ready to switch on", ("shutdown", "switched on"): "ready to switch on",
+    ("shutdown", "operation enabled"): "ready to switch on", ("switch on", "ready to switch on"): "switched on",
+    ("enable operation", "switched on"): "operation enabled",
+    ("enable operation", "quick stop active"): "operation enabled",
+    ("disable operation", "operation enabled"): "switched on",
+    ("disable voltage", "ready to switch on"): "switch on disabled",
+    ("disable voltage", "switched on"): "switch on disabled",
+    ("disable voltage", "operation enabled"): "switch on disabled",
+    ("disable voltage", "quick stop active"): "switch on disabled",
+    ("quick stop", "ready to switch on"): "switch on disabled", ("quick stop", "switched on"): "switch on disabled",
+    ("quick stop", "operation enabled"): "quick stop active", ("fault reset", "fault"): "switch on disabled",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("order", range(7))
+@pytest.mark.parametrize("state", range(8))
+def test_11_every_order_leads_where_cia_402_says(state, order):
+    name = STATE_NAMES[state]
+    expected = DOCUMENTED.get((ORDER_NAMES[order], name), name)
+    assert STATE_NAMES[ordered(state, order)] == expected
+
+
+def test_11_the_axis_obeys_the_orders():
+    bench = Bench("cascade")
+    bench.pass_time(0.01)
+    for order, state in ((0, "ready to switch on"), (1, "switched on"), (2, "operation enabled"), (3, "switched on"),
+                         (2, "operation enabled"), (5, "quick stop active"), (2, "operation enabled"),
+                         (4, "switch on disabled")):  # fmt: skip
+        assert bench.do(ops.ORDER, order).how == ops.DONE
+        assert bench.host.state == state
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_13_each_command_ends_exactly_once(name):
+    bench = Bench(name).enable()
+    first = bench.host.ask(ops.MOVE_BY, 0.005)
+    bench.pass_time(0.003)
+    second = bench.host.ask(ops.MOVE_BY, 0.0)
+    bench.pass_time(2.0)
+    ends = [bench.host.ending(command) for command in (first, second)]
+    if bench.host.axis.live.operation.one_at_a_time:  # type: ignore[attr-defined]
+        assert ends == [Ending(first, ops.DONE, 0, 0), Ending(second, ops.REFUSED, ops.BUSY, 0)]
+    else:
+        assert ends == [Ending(first, ops.ABORTED, 0, second), Ending(second, ops.DONE, 0, 0)]
+    assert bench.operation.endings.count == bench.operation.taken == len({a.fields[2] for a in bench.host.log.asked})
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_13_a_null_move_is_done_after_the_window_time(name):
+    bench = Bench(name).enable()
+    command, before = bench.host.ask(ops.MOVE_BY, 0.0), bench.operation.looks
+    bench.host.run(1)
+    assert bench.host.ending(command) is None
+    assert bench.host.until_ended(command).how == ops.DONE
+    assert bench.operation.looks - before >= bench.host.axis.live.operation.window_looks  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", OPERATED)
+def test_13_a_command_of_an_old_epoch_is_dropped_and_told_so(name):
+    bench = Bench(name).enable()
+    epoch = bench.operation.epoch
+    bench.host.stop()
+    stale = bench.host.ask(ops.GO if name == "rotary_table" else ops.MOVE_BY, 1.0, epoch=epoch)
+    at = bench.answer.commanded
+    bench.pass_time(0.2)
+    assert bench.host.ending(stale) == Ending(stale, ops.REFUSED, ops.STALE, 0)
+    assert bench.answer.commanded == pytest.approx(at, abs=1e-4)
+
+
+def stop_bound(bench: Bench, speed: float, acceleration: float) -> float:
+    """Largest way of a stop.
+
+    Specification, test 14: v^2 / 2a + v a / 2j + v T. That is of an axis that speeds up no more. While it does, with b,
+    the stop first takes b away: it makes v b/j + b^3 / 3j^2 in that, and gains b^2 / 2j of speed.
+    """
+    spec, name = bench.spec, bench.spec.axis.method
+    most = spec.method.command_acceleration if name == "filtered_servo" else spec.limits.acceleration
+    # A table hears of it at a look, then with its next task and interrupt, and goes on to a whole count.
+    late = bench.loop.period * 1e-9
+    if name == "rotary_table":
+        late += spec.method.task_period + 2 * spec.method.strobe_period
+    if name == "cascade":
+        jerk, more = spec.limits.jerk, max(acceleration * math.copysign(1.0, speed), 0.0)
+        first, speed = abs(speed) * more / jerk + more**3 / (3 * jerk**2), abs(speed) + more**2 / (2 * jerk)
+        return first + speed**2 / (2 * most) + speed * most / (2 * jerk) + speed * late
+    speed = min(abs(speed) + most * late, spec.limits.speed) if most else abs(speed)  # it may speed up until it hears
+    return (speed**2 / (2 * most) if most else 0.0) + speed * late + 2.0 * bench.grain
+
+
+def stops_from_random_states(name: str, times: int, seed: int) -> None:
+    """Jogs and moves, stopped at any moment of any phase: rest within the bound, no reversal, nothing steps."""
+    rng, bench = Random(seed), Bench(name).enable()
+    bench.host.axis.live.operation.lease_looks = 1 << 40  # type: ignore[attr-defined]
+    top, rows_of = bench.spec.limits.speed, bench.host.scope.rows
+    for _ in range(times):
+        if name == "rotary_table" or rng.random() < 0.5:
+            bench.host.ask(ops.JOG, rng.choice((-1.0, 1.0)) * rng.uniform(0.02, 1.0) * top)
+        else:
+            bench.host.ask(ops.MOVE_TO, rng.uniform(0.0, bench.spec.limits.travel), rng.uniform(0.05, 1.0))
+        bench.host.run(rng.choice((1, 3, rng.randrange(1, 60), rng.randrange(1, 700))))
+        # Turned round under way; a table then takes its angle over, which is a step of its lag.
+        if name != "rotary_table" and rng.random() < 0.3:
+            bench.host.ask(ops.JOG, rng.uniform(-1.0, 1.0) * top)
+            bench.host.run(rng.randrange(1, 200))
+        row = int(bench.loop.rows)
+        at, speed = bench.answer.commanded, bench.answer.commanded_velocity
+        now = bench.host.axis.memory.course.acceleration if name == "cascade" else 0.0  # type: ignore[attr-defined]
+        # While it still speeds up, the speed that counts is the one that is left when the acceleration is taken away.
+        counts = speed + (now * abs(now) / (2 * bench.spec.limits.jerk) if now else 0.0)
+        bench.host.stop()
+        bench.host.run(1200)
+        rows, _, _ = rows_of(row)
+        places = rows["operation.answer.commanded"]
+        assert bench.answer.rests
+        assert bench.operation.fault == 0
+        if speed * counts >= 0.0:  # it is not about to turn round
+            way, heading = np.max(np.abs(places - at)), math.copysign(1.0, counts) if counts else 0.0
+            assert way <= stop_bound(bench, speed, now), (speed, now)
+            assert np.all(np.diff(places) * heading >= -1.5 * bench.grain)
+        if name == "cascade":
+            assert np.max(np.abs(np.diff(places, prepend=at))) <= top * 1e-3 * (1 + 1e-6) + 1e-12
+            assert np.all((places >= -1e-9) & (places <= bench.spec.limits.travel + 1e-9))
+
+
+@pytest.mark.parametrize("name", ["cascade", "rotary_table", "filtered_servo"])
+def test_14_a_stop_comes_to_rest_within_its_bound(name):
+    stops_from_random_states(name, 60, 14)
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("name", ["cascade", "rotary_table", "filtered_servo"])
+def test_14_twenty_thousand_stops(name):
+    stops_from_random_states(name, 6_700, 15)
+
+
+@pytest.mark.parametrize("name", OPERATED)
+def test_16_off_takes_the_torque_in_the_same_period(name):
+    """At rest, in a move or jog, while a stop runs out, in a quick stop and in a fault."""
+    for phase in range(5):
+        bench = Bench(name).enable()
+        if phase:
+            bench.host.ask(ops.GO, 1.0) if name == "rotary_table" else bench.host.ask(ops.MOVE_BY, 0.02)
+            bench.pass_time(0.06)
+        if phase == 2:
+            bench.host.stop()
+        if phase == 3:
+            bench.host.ask(ops.ORDER, 5.0)
+        if phase == 4:
+            bench.loop.delay_at, bench.loop.delay = bench.loop.periods + 1, 6 * bench.loop.period
+        bench.host.run(2)
+        bench.host.off()
+        bench.host.run(1)
+        lines = bench.host.axis.state.lines  # type: ignore[attr-defined]
+        assert not getattr(lines, "run" if name == "filtered_servo" else "enable")
+        assert bench.host.state == ("fault" if phase == 4 else "switch on disabled")
+
+
+def test_17_enabling_takes_the_position_over():
+    """The load is moved by hand while the axis is off."""
+    bench = Bench("cascade").enable()
+    bench.host.off()
+    bench.pass_time(0.05)
+    machine = bench.host.axis.state.plant.machine  # type: ignore[attr-defined]
+    for mass in (machine.motor, machine.load):
+        mass.position += 0.037
+    bench.host.axis.state.lines.motor.count += 37_000  # type: ignore[attr-defined]
+    bench.pass_time(0.05)
+    assert bench.do(ops.ENABLE).how == ops.DONE
+    efforts = []
+    for _ in range(20):
+        bench.host.run(1)
+        efforts.append(abs(bench.answer.effort))
+    assert bench.answer.commanded == pytest.approx(0.057, abs=2e-6)
+    assert bench.answer.position == pytest.approx(bench.answer.commanded, abs=2e-6)
+    assert max(efforts) < 0.01
+
+
+@pytest.mark.parametrize("name", ["cascade", "rotary_table", "filtered_servo"])
+def test_18_a_jog_that_nobody_keeps_stops_within_its_lease(name):
+    bench = Bench(name).enable()
+    jog = bench.host.ask(ops.JOG, 0.02)
+    for _ in range(10):
+        bench.pass_time(0.1)
+        bench.host.ask(ops.KEEP)
+        assert bench.host.ending(jog) is None
+    bench.host.run(1)
+    speeds = [speed for _, speed in bench.watch(0.7)]
+    period = bench.loop.period * 1e-9
+    full = speeds[0]
+    slower = next(k for k, speed in enumerate(speeds) if abs(speed) < 0.999 * abs(full))
+    look = bench.host.axis.live.look_ticks * bench.host.axis.tick  # type: ignore[attr-defined]
+    assert 0.15 < (slower + 1) * period <= 0.2 + period + look + 0.02 * (name == "rotary_table")
+    assert bench.host.ending(jog) == Ending(jog, ops.FAILED, ops.LEASE_LOST, 0)
+    assert bench.answer.rests
+
+
+BAD = {
+    "nan": (ops.MOVE_TO, math.nan, 1.0, {}, ops.NOT_FINITE),
+    "infinite": (ops.MOVE_TO, math.inf, 1.0, {}, ops.NOT_FINITE),
+    "huge": (ops.MOVE_TO, 1e300, 1.0, {}, ops.NOT_FINITE), "share": (ops.MOVE_TO, 0.03, 0.0, {}, ops.NOT_FINITE),
+    "more than all": (ops.MOVE_TO, 0.03, 1.5, {}, ops.NOT_FINITE), "unknown": (99, 0.0, 1.0, {}, ops.UNKNOWN),
+    "zero": (0, 0.0, 1.0, {}, ops.UNKNOWN), "stale": (ops.MOVE_TO, 0.03, 1.0, {"epoch": -1}, ops.STALE),
+    "from the future": (ops.MOVE_TO, 0.03, 1.0, {"epoch": 77}, ops.STALE),
+    "second commander": (ops.MOVE_TO, 0.03, 1.0, {"client": 2}, ops.SECOND),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", BAD)
+@pytest.mark.parametrize("name", MOVED)
+def test_19_what_makes_no_sense_is_refused_and_changes_nothing(name, what):
+    bench = Bench(name).enable()
+    kind, value, speed, more, why = BAD[what]
+    before, at = bench.host.state, bench.answer.commanded
+    bad = bench.do(kind, value, speed, **more)
+    assert (bad.how, bad.why) == (ops.REFUSED, why)
+    bench.pass_time(0.05)
+    assert (bench.host.state, bench.answer.commanded, bench.operation.running) == (before, at, 0)
+
+
+def test_19_a_doubled_request_is_done_once():
+    bench = Bench("cascade").enable()
+    move = bench.host.ask(ops.MOVE_BY, 0.01)
+    bench.host.until_ended(move)
+    box, taken = bench.host.board.inbox, bench.operation.taken
+    k = (taken - 1) % 1024
+    write = [box.kind[k], box.id[k], box.epoch[k], box.client[k], box.value[k], box.speed[k]]
+    at = bench.answer.commanded
+    for column, old in zip(("number", "kind", "id", "epoch", "client", "value", "speed", "check"),
+                           (taken, *write, box.check[k]), strict=True):  # fmt: skip
+        getattr(box, column)[(k + 1) % 1024] = old
+    box.written += 1
+    bench.pass_time(0.1)
+    assert (bench.operation.taken, bench.answer.commanded) == (taken, at)
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_20_soft_limits_hold(name):
+    bench = Bench(name).enable()
+    travel = bench.spec.limits.travel
+    for kind, value in (
+        (ops.MOVE_TO, travel + 1e-3),
+        (ops.MOVE_TO, -1e-3),
+        (ops.MOVE_BY, travel),
+        (ops.MOVE_BY, -travel),
+    ):
+        refused = bench.do(kind, value)
+        assert (refused.how, refused.why) == (ops.REFUSED, ops.BEYOND)
+    if name == "phase_servo":  # it takes moves only
+        return
+    for side, end in ((1.0, travel), (-1.0, 0.0)):
+        jog = bench.host.ask(ops.JOG, side * bench.spec.limits.speed)
+        for _ in range(2000):
+            bench.pass_time(0.05)
+            bench.host.ask(ops.KEEP)
+            if bench.answer.rests:
+                break
+        assert bench.answer.rests
+        bench.pass_time(0.15)
+        assert abs(bench.answer.position - end) <= 2e-4
+        assert bench.operation.fault == 0
+        bench.host.stop()
+        bench.pass_time(0.05)
+        assert bench.host.ending(jog).how in {ops.ABORTED, ops.FAILED}
+        assert bench.do(ops.MOVE_BY, -side * 1e-2).how == ops.DONE  # back inside is always allowed
+
+
+@pytest.mark.parametrize("name", ["cascade", "filtered_servo"])
+def test_21_an_axis_without_a_reference_creeps(name):
+    bench = Bench(name)
+    bench.operation.trust = ops.NOT_KNOWN
+    bench.enable()
+    refused = bench.do(ops.MOVE_TO, 0.03)
+    assert (refused.how, refused.why) == (ops.REFUSED, ops.UNREFERENCED)
+    bench.host.ask(ops.MOVE_BY, -0.015)
+    speeds = [abs(speed) for _, speed in bench.watch(0.2)]
+    assert max(speeds) == pytest.approx(0.1 * bench.spec.limits.speed, rel=1e-3)
+    bench.host.stop()
+    bench.pass_time(0.3)
+    bench.host.off()
+    bench.host.run(1)
+    assert bench.do(ops.TRUST, ops.REFERENCED).how == ops.DONE
+    bench.enable()
+    assert bench.do(ops.MOVE_TO, 0.03).how == ops.DONE
+
+
+# ---- methods live
+
+
+@pytest.mark.wide
+def test_24_the_table_jogs_for_ever_and_then_goes_to_a_number():
+    bench = Bench("rotary_table").enable()
+    turns = 10_000
+    bench.host.axis.live.operation.lease_looks = 1 << 40  # type: ignore[attr-defined]
+    bench.host.ask(ops.JOG, bench.spec.limits.speed)
+    bench.pass_time(turns * 2 * math.pi / bench.spec.limits.speed)
+    bench.host.stop()
+    bench.pass_time(5.0)
+    assert bench.answer.rests
+    assert bench.answer.position / (2 * math.pi) > turns - 2
+    positioner = bench.host.axis.state.controller.positioner  # type: ignore[attr-defined]
+    expected = Bench("rotary_table").enable()
+    assert bench.do(ops.GO, 3).how == expected.do(ops.GO, 3).how == ops.DONE
+    other = expected.host.axis.state.controller.positioner  # type: ignore[attr-defined]
+    period = bench.host.axis.params.controller.positioner.angle.period  # type: ignore[attr-defined]
+    assert positioner.angle.aar % period == other.angle.aar % period
+    assert (positioner.s4, positioner.state, positioner.oar) == (other.s4, other.state, other.oar)
+
+
+@pytest.mark.parametrize("name", OPERATED)
+def test_28_a_session_is_repeated_from_its_requests(name):
+    """Requests of every kind at random moments, pulls of both lines; the controller's bytes are the same."""
+    rng = Random(28)
+    first = Bench(name).enable()
+    kinds = (ops.MOVE_BY, ops.MOVE_TO, ops.JOG, ops.GO, ops.KEEP, ops.STOP, ops.ENABLE, ops.CONFIRM, ops.RESET, ops.OFF)
+    for _ in range(60):
+        kind = rng.choices(kinds, weights=(9, 5, 5, 9, 9, 3, 5, 5, 2, 1))[0]
+        first.host.ask(
+            kind, rng.choice((1, 2, 3)) if kind == ops.GO else rng.uniform(-0.02, 0.04), rng.uniform(0.2, 1.0)
+        )
+        if rng.random() < 0.1:
+            rng.choice((first.host.stop, first.host.off))()
+        first.host.run(rng.randrange(1, 150))
+    second = Bench(name)
+    repeat(second.host, first.host.log, first.loop.periods)
+    assert second.loop.periods == first.loop.periods
+    for part in ("controller", "lines", "plant"):
+        ones, others = getattr(first.host.axis.state, part), getattr(second.host.axis.state, part)
+        assert diff(ones, others) == {}
+    assert diff(first.operation, second.operation) == {}
+
+
+def test_03_a_blocked_load_is_the_same_fault_in_the_same_sample():
+    """Live and in a simulation by the host of `detent run`: the load is held from the same sample on."""
+    from detent.methods.cascade.host import CascadeHost
+
+    live = Bench("cascade", period=0.25e-3).enable()  # a sample
+    axis: Any = live.host.axis
+    live.host.ask(ops.MOVE_BY, 0.3)
+    live.pass_time(0.25)
+    run = CascadeHost(live.spec)
+    # The simulation begins where the live axis stands, and is led by the course that it would have followed.
+    run.state.restore(axis.state.snapshot())
+    course, limits = axis.memory.course.copy(), axis.memory.limits
+    path: list[tuple[float, float, float]] = []
+    for _ in range(4000):
+        advance_course(limits, course, run.period)
+        path.append((course.position, course.velocity, course.acceleration))
+    run.feed, run.controller.entry = along(*(np.array(column) for column in zip(*path, strict=True))), 0
+
+    def held(machine: Any) -> None:
+        machine.load.velocity = machine.motor.velocity = 0.0
+
+    faults = []
+    for state, once in ((axis.state, lambda: live.host.run(1)), (run.state, lambda: run.pass_samples(1))):
+        for _ in range(2000):
+            held(state.plant.machine)
+            once()
+            if state.controller.guard.code:
+                break
+        faults.append((state.controller.guard.code, state.controller.samples))
+    assert faults[0] == faults[1]
+    assert faults[0][0] in {FOLLOWING, STUCK}
+    live.host.run(1)
+    assert live.operation.fault == faults[0][0]
+    assert live.host.state in {"fault reaction active", "fault"}
+
+
+class LiveAxisMachine:
+    """Whatever is asked of an axis, in whatever order: the invariants of operation (I1, I2, I4, I6, I8, I9)."""
+
+    def __init__(self, name: str, rng: Random) -> None:
+        self.bench, self.rng = Bench(name), rng
+        self.asked: list[int] = []
+        self.limits = self.bench.spec.limits
+        self.before = (self.bench.answer.commanded, self.bench.answer.commanded_velocity)
+
+    def anything(self) -> None:
+        """One command, pull, fault or stretch of time."""
+        rng, host = self.rng, self.bench.host
+        kind = rng.choice((*ops.COMMANDS, ops.ENABLE, ops.CONFIRM, ops.RESET, *(ops.MOVE_BY, ops.MOVE_TO, ops.JOG) * 4))
+        travel = self.limits.travel
+        value = {ops.JOG: rng.uniform(-1, 1) * self.limits.speed, ops.MOVE_TO: rng.uniform(-0.1, 1.1) * travel,
+                 ops.MOVE_BY: rng.uniform(-0.3, 0.3) * travel, ops.TRUST: rng.choice((0, 1, 2)),
+                 ops.ORDER: rng.randrange(7), ops.GO: rng.randrange(5)}.get(kind, 0.0)  # fmt: skip
+        if rng.random() < 0.05:
+            value = rng.choice((math.nan, math.inf, -math.inf, 1e300))
+        self.asked.append(host.ask(kind, value, rng.choice((1.0, 0.5, 0.03)), client=rng.choice((1, 1, 1, 2))))
+        if rng.random() < 0.1:
+            rng.choice((host.stop, host.stop, host.off))()
+        if rng.random() < 0.03:
+            self.bench.loop.delay_at, self.bench.loop.delay = self.bench.loop.periods + 1, 6 * self.bench.loop.period
+
+    def pass_and_check(self) -> None:
+        """Some periods, each looked at."""
+        bench, o, a = self.bench, self.bench.operation, self.bench.answer
+        period = bench.loop.period * 1e-9
+        for _ in range(self.rng.choice((1, 1, 3, 20, 60))):
+            state, trust, running = int(o.state), int(o.trust), int(o.running)
+            bench.host.run(1)
+            here, speed = a.commanded, a.commanded_velocity
+            assert math.isfinite(here)  # I1
+            assert abs(speed) <= self.limits.speed * (1 + 1e-9)
+            if trust and int(o.trust) and state == int(o.state) == 4:  # I2, I4
+                assert -1e-9 <= here <= self.limits.travel + 1e-9
+                assert abs(here - self.before[0]) <= self.limits.speed * period * (1 + 1e-6) + 1e-12
+            if state != 4 and int(o.state) not in {4, 5, 6, 7}:  # I6: no torque, no motion asked for
+                assert o.running == 0
+            if state == 7 and int(o.state) != 7:  # I9
+                assert (int(o.state), int(o.running)) == (1, 0)
+            if state == 7 and int(o.state) == 7:
+                assert running == o.running == 0
+            self.before = here, speed
+
+    def finish(self) -> None:
+        """Each command has ended exactly once."""
+        for _ in range(200):
+            self.bench.host.run(50)
+            if all(self.bench.host.ending(command) for command in self.asked):
+                break
+        self.bench.host.stop()
+        self.bench.pass_time(1.0)
+        assert self.bench.answer.commanded_velocity == 0.0  # I3
+        assert all(self.bench.host.ending(command) for command in self.asked)
+        assert self.bench.operation.endings.count == len(self.asked)  # I8
+
+
+def _random_operation(name: str, seeds: range) -> None:
+    for seed in seeds:
+        rng = Random(seed)
+        machine = LiveAxisMachine(name, rng)
+        for _ in range(rng.randrange(50, 200)):
+            machine.anything()
+            machine.pass_and_check()
+        machine.finish()
+
+
+def test_12_invariants_hold_in_random_operation():
+    _random_operation("cascade", range(20))
+
+
+@pytest.mark.wide
+@pytest.mark.parametrize("first", range(0, 1000, 50))
+def test_12_invariants_hold_in_a_thousand_sequences(first):
+    _random_operation("cascade", range(first, first + 50))
+
+
+# ---- methods live, against `detent run`
+
+
+def at_rest(c: Any) -> list[float]:
+    """What a controller of a move servo holds when its move is over."""
+    if hasattr(c, "deviation"):
+        return [c.deviation.position, c.deviation.deviation, c.generator.command, c.generator.goal, c.speed.word,
+                round(c.deviation.error, 3), round(c.filter.output, 3)]  # fmt: skip
+    q = c.sequencer
+    return [q.position, q.distance, q.remaining, q.state, q.mode, q.direction, c.speed.word, c.law.integral, c.law.word,
+            c.converters.tracking.reference, c.converters.absolute.word]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["phase_servo", "filtered_servo"])
+def test_26_moves_live_are_those_of_a_run(name):
+    """Fifty moves: at rest, position, command and error of the controller are those that the host of a run leaves."""
+    rng = Random(26)
+    live = Bench(name, "detector.jitter=0 s") if name == "phase_servo" else Bench(name)
+    live.enable()
+    from detent.methods.moves.job import Move
+    from detent.methods.registry import METHODS
+
+    method = METHODS[live.spec.axis.method]
+    run: Any = method.brought(method.commands)(live.spec)  # type: ignore[attr-defined]
+    run.start()
+    ones, others = live.host.axis.state.controller, run.controller  # type: ignore[attr-defined]
+    axis: Any = live.host.axis.state
+
+    def bring(tick: int) -> None:
+        """Let the run's time pass up to that of the live axis, answering what its controller tells its host."""
+        while run.machine.state.tick < tick:
+            run.machine.pass_ticks(tick - run.machine.state.tick)
+            getattr(others, "sequencer", others).event = 0
+
+    for _ in range(50):
+        target = run.home + round(rng.uniform(0.05, 0.95) * live.spec.limits.travel / run.grid) * run.grid
+        target = min(max(target, 0.0), live.spec.limits.travel)
+        bring(axis.tick)
+        run.command(run.place(Move(number=1, row=0, target=target), target))
+        assert live.do(ops.MOVE_TO, target).how == ops.DONE
+        live.pass_time(0.3)
+        bring(axis.tick)
+        assert at_rest(ones) == at_rest(others)
+        assert live.answer.position == pytest.approx(target, abs=2.5 * run.count)
+
+
+def test_27_fifty_moves_live_end_in_the_window_and_are_repeated():
+    rng = Random(27)
+    live = Bench("cascade", speed=10.0).enable()
+    for _ in range(50):
+        target = rng.uniform(0.0, live.spec.limits.travel)
+        assert live.do(ops.MOVE_TO, target, rng.uniform(0.1, 1.0)).how == ops.DONE
+        assert abs(live.answer.position - target) <= live.spec.method.in_position
+    again = Bench("cascade", speed=10.0)
+    repeat(again.host, live.host.log, live.loop.periods)
+    assert diff(live.host.axis.state, again.host.axis.state) == {}
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
+def test_05_a_busy_thread_of_python_does_not_delay_the_loop():
+    """A thread that computes without yielding, beside the loop and beside one written in Python, in the same run."""
+    seconds, period = 4.0, 1e-3
+
+    def misses(busy: threading.Event | None) -> float:
+        bench = Bench("filtered_servo", wall=True)
+        bench.host.start()
+        begin = bench.loop.periods
+        if busy:
+            busy.set()
+        while bench.loop.periods - begin < seconds / period:
+            time.sleep(0.05)
+        if busy:
+            busy.clear()
+        share = bench.loop.skipped / (bench.loop.periods + bench.loop.skipped)
+        bench.host.close()
+        return share
+
+    busy, left = threading.Event(), threading.Event()
+
+    def compute() -> None:
+        while not left.is_set():
+            if busy.is_set():
+                sum(range(1000))
+            else:
+                busy.wait(0.01)
+
+    hog = threading.Thread(target=compute, daemon=True)
+    hog.start()
+    alone = misses(None)
+    beside = misses(busy)
+    busy.set()
+    late = python_loop(1000, period)
+    busy.clear()
+    left.set()
+    hog.join()
+    assert beside <= 1.5 * alone + 0.002
+    assert late > 0.2
+
+
+def python_loop(periods: int, period: float) -> float:
+    """Share of periods that a loop in plain Python comes to a whole period late."""
+    late, deadline = 0, time.monotonic()
+    for _ in range(periods):
+        deadline += period
+        time.sleep(max(0.0, deadline - time.monotonic()))
+        if time.monotonic() - deadline >= period:
+            late += 1
+            deadline = time.monotonic()
+    return late / periods

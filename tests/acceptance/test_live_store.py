@@ -13,12 +13,12 @@ import pytest
 from tests.live_rig import SENSORS, memory_folder, open_store, read, table_of
 from tests.power_cut import RecordingDisk, images
 
-from detent.live.opening import meanings, store_path
-from detent.live.store import Store
-from detent.live.trust import Trust, Why
 from detent.methods.load import load_spec
 from detent.methods.position import Sensed
 from detent.methods.registry import METHODS
+from detent.operate.opening import meanings, store_path
+from detent.operate.store import Store
+from detent.operate.trust import Trust, Why
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "src" / "detent" / "examples"

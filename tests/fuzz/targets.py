@@ -15,12 +15,12 @@ from detent import example, load, load_trace
 from detent.files.patch import NewValue, patch
 from detent.identify.analyse.analyses import ANALYSES, analyse
 from detent.identify.fit.identification import identify
-from detent.live.positions import load_positions
 from detent.logs.mapping import load_mapping, parse_options
 from detent.logs.read_log import read_log
 from detent.methods.check import check_spec
 from detent.methods.load import read_axis
 from detent.methods.registry import METHODS
+from detent.operate.positions import load_positions
 from detent.record.trace import Trace
 from detent.record.trace_files import save_trace
 from detent.units import parse_quantity

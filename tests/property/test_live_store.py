@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from tests.live_rig import SENSORS, TRAVEL, Model, open_store, read, table_of
 
-from detent.live.positions import load_positions, save_positions
-from detent.live.rows import LARGEST, Position
-from detent.live.trust import Saved, Trust, Why, judge
 from detent.methods.position import PositionSensor, Sensed
+from detent.operate.positions import load_positions, save_positions
+from detent.operate.rows import LARGEST, Position
+from detent.operate.trust import Saved, Trust, Why, judge
 
 NAMES = st.sampled_from(["1", "2", "loading", "é", "a,b"])
 COUNTS = st.integers(0, TRAVEL)

@@ -374,6 +374,43 @@ def on_command(p: HeadParams, c: HeadComputer) -> None:
 
 
 @step
+def forget_commands(c: HeadComputer) -> None:
+    """Drop what waits, what of a command has come so far, and what is still to be answered or printed."""
+    c.queue.waiting = c.queue.motions = 0
+    c.receiver.left = c.command_latch.flag = 0
+    c.status.waiting = c.status.latch.flag = 0
+    c.columns.active = 0
+    c.columns.fire_us = NEVER
+    c.calibration_pass = c.repositioning = 0
+
+
+@step
+def halt(p: HeadParams, c: HeadComputer) -> None:
+    """An operator's stop: come to rest from whatever the head does now, and answer only the command it was doing.
+
+    It is the stop that ends every move (3.9, 3.12), only earlier: so it takes no longer way than that of its speed.
+    """
+    if c.state in (HOME_LEFT, HOME_RIGHT):
+        c.speed = min(p.homing_speed, HIGH_SPEED - 1)
+        begin_stop(p, c)
+    elif c.state in (LOW_START, LOW_STEADY, HIGH_ACCEL, HIGH_STEADY):
+        if c.state == LOW_START:
+            c.drive = c.steady
+        begin_stop(p, c)
+    forget_commands(c)
+    c.wake_us = next_wake(p, c)
+
+
+@step
+def switch_off(p: HeadParams, c: HeadComputer) -> None:
+    """Drive off at once, and nothing left to do or to answer; the head rolls out, and is counted on."""
+    forget_commands(c)
+    c.operation = NO_OPERATION
+    stand(p, c, c.state if c.state in (POWER_ON, FAULT) else IDLE)
+    c.wake_us = NEVER
+
+
+@step
 def next_wake(p: HeadParams, c: HeadComputer) -> int:
     """Earliest time at which a timer of the present state can be due."""
     if c.state in (POWER_ON, IDLE, FAULT):
@@ -416,4 +453,4 @@ def power_on(p: HeadParams, c: HeadComputer) -> None:
         line.slope, line.friction = p.slope_default, p.friction_default
 
 
-__all__ = ["LOW_STEADY", "decide", "next_wake", "on_emitter", "on_reverse_edge", "power_on"]
+__all__ = ["LOW_STEADY", "decide", "halt", "next_wake", "on_emitter", "on_reverse_edge", "power_on", "switch_off"]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from detent.kernel.registers import Registers, i1, i2, i4, i4_array, i8, register, u1, u2
-from detent.kernel.step import hot_step
+from detent.kernel.step import hot_step, step
 
 Entries = NDArray[np.int16]
 
@@ -208,16 +208,20 @@ def start_move(r: StepRule, heading: int, turns: int = 0) -> None:
     r.heading, r.turns, r.start, r.manual, r.event = heading, turns, 1, 0, 0
 
 
+@step
 def deflect(p: StepRuleParams, r: StepRule, word: int, last: int, heading: int) -> None:
     """The operator takes over and asks for a frequency [Hz], or with reload words a period [tick]; 0 releases."""
     r.manual, r.heading, r.event = 1, heading, 0
     r.request_word = word
-    words = list(p.ramp[: last + 1])
     # The first index that is fast enough; of several with this very word the last, which the motor passes them to.
-    below = sum(one > word if p.reload else one < word for one in words)
-    r.request = AT_REST if word == 0 else min(below + max(words.count(word) - 1, 0), last)
+    below = same = 0
+    for k in range(last + 1):
+        below += compare_words(p, p.ramp[k], word) < 0
+        same += p.ramp[k] == word
+    r.request = AT_REST if word == 0 else min(below + max(same - 1, 0), last)
 
 
+@step
 def release(r: StepRule) -> None:
     """The operator lets go: the motor comes down its ramp and rests."""
     r.manual, r.request, r.request_word, r.event = 1, AT_REST, 0, 0

@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 
 # What a step can be made of, beside the modules of methods that declare steps or registers; nothing else is compiled.
-STEP_ROOMS = ("control", "drive", "kernel", "plant", "planning", "sensing", "errors.py", "units.py")
+STEP_ROOMS = ("control", "drive", "kernel", "operate", "plant", "planning", "sensing", "errors.py", "units.py")
 DECLARES = re.compile(r"^from detent\.kernel\.(step|registers) import", re.MULTILINE)  # a method's part of a step
 PACKAGE = Path(__file__).resolve().parent.parent
 KEPT_FOLDERS = 6  # compiled folders that stay: a few checkouts and versions side by side, not every edit ever made

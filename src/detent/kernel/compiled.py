@@ -9,6 +9,7 @@ fields in machine registers.
 import ctypes
 import math
 import operator
+import struct
 from collections.abc import Callable
 from typing import Any, get_args
 
@@ -191,7 +192,7 @@ def _write_field(context: Any, builder: Any, sig: Any, args: Any, attr: str) -> 
     _store(builder, _field_address(builder, target, field.offset), field.width, wide, place)
 
 
-def _compiles(function: Any, gives: types.Type | Callable[[Any], Any], *kinds: Any) -> Any:
+def compiles(function: Any, gives: types.Type | Callable[[Any], Any], *kinds: Any) -> Any:
     """What is decorated writes the instructions of a call of `function` with arguments of these kinds.
 
     It takes whole numbers as int64, the rest as it comes; `gives` is the type of the result, or finds it from that of
@@ -218,29 +219,34 @@ def _element_address(builder: Any, array: Any, width: Width, index: Any) -> Any:
     return builder.gep(array, [offset], source_etype=BYTE)
 
 
-@_compiles(operator.getitem, lambda array: _scalar_type(array.width), RegisterArrayType, types.Integer)
+@compiles(operator.getitem, lambda array: _scalar_type(array.width), RegisterArrayType, types.Integer)
 def _read_element(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
     typ = sig.args[0]
     return _load(builder, _element_address(builder, args[0], typ.width, args[1]), typ.width, str(typ))
 
 
-@_compiles(operator.getitem, lambda array: _scalar_type(array.width), HostArrayType, types.Integer)
+@compiles(operator.getitem, lambda array: _scalar_type(array.width), HostArrayType, types.Integer)
 def _read_host_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _read_element(context, builder, sig, (builder.extract_value(args[0], 0), args[1]))
 
 
-@_compiles(len, types.int64, HostArrayType)
+@compiles(len, types.int64, HostArrayType)
 def _length(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     return builder.extract_value(args[0], 1)
 
 
-@_compiles(operator.setitem, types.none, RegisterArrayType, types.Integer, types.Type)
+@compiles(operator.setitem, types.none, RegisterArrayType, types.Integer, types.Type)
 def _write_element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     array, index, value = args
     typ = sig.args[0]
     wide = context.cast(builder, value, sig.args[2], _scalar_type(typ.width))
     _store(builder, _element_address(builder, array, typ.width, index), typ.width, wide, str(typ))
     return context.get_dummy_value()
+
+
+@compiles(operator.setitem, types.none, HostArrayType, types.Integer, types.Type)
+def _write_host_array(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return _write_element(context, builder, sig, (builder.extract_value(args[0], 0), *args[1:]))
 
 
 def _copy_memory(builder: Any, target: Any, source: Any, size: int) -> None:
@@ -252,7 +258,7 @@ def local_copy(registers: Any) -> Any:
     return registers.copy()
 
 
-@_compiles(local_copy, lambda registers: registers, RegistersType)
+@compiles(local_copy, lambda registers: registers, RegistersType)
 def _local_copy(_context: Any, builder: Any, sig: Any, args: Any) -> Any:
     size = ctypes.sizeof(sig.args[0].registers)
     slot = cgutils.alloca_once(builder, ir.ArrayType(WORD, (size + 7) // 8))
@@ -266,7 +272,7 @@ def copy_back(target: Any, source: Any) -> None:
     ctypes.memmove(ctypes.addressof(target), ctypes.addressof(source), ctypes.sizeof(target))
 
 
-@_compiles(copy_back, types.none, RegistersType, RegistersType)
+@compiles(copy_back, types.none, RegistersType, RegistersType)
 def _copy_back(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     _copy_memory(builder, args[0], args[1], ctypes.sizeof(sig.args[0].registers))
     return context.get_dummy_value()
@@ -277,7 +283,7 @@ def byte_at(registers: Any, offset: int) -> int:
     return ctypes.c_uint8.from_buffer(registers, offset).value
 
 
-@_compiles(byte_at, types.int64, RegistersType, types.Integer)
+@compiles(byte_at, types.int64, RegistersType, types.Integer)
 def _byte_at(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     return builder.zext(builder.load(builder.gep(args[0], [args[1]], source_etype=BYTE)), WORD)
 
@@ -287,7 +293,7 @@ def put_byte(registers: Any, offset: int, value: int) -> None:
     ctypes.c_uint8.from_buffer(registers, offset).value = value
 
 
-@_compiles(put_byte, types.none, RegistersType, types.Integer, types.Integer)
+@compiles(put_byte, types.none, RegistersType, types.Integer, types.Integer)
 def _put_byte(context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     place = builder.gep(args[0], [args[1]], source_etype=BYTE)
     builder.store(builder.trunc(args[2], BYTE), place)
@@ -299,10 +305,20 @@ def power_of_two(exponent: int) -> float:
     return math.ldexp(1.0, exponent)
 
 
-@_compiles(power_of_two, types.float64, types.Integer)
+@compiles(power_of_two, types.float64, types.Integer)
 def _power_of_two(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     biased = builder.add(args[0], ir.Constant(WORD, 1023))
     return builder.bitcast(builder.shl(biased, ir.Constant(WORD, 52)), ir.DoubleType())
+
+
+def bits_of(value: float) -> int:
+    """The eight bytes of a float as a whole number."""
+    return int.from_bytes(struct.pack("<d", value), "little", signed=True)
+
+
+@compiles(bits_of, types.int64, types.Float)
+def _bits_of(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    return builder.bitcast(args[0], WORD)
 
 
 def unlikely(condition: bool) -> bool:  # noqa: FBT001 - a condition
@@ -310,7 +326,7 @@ def unlikely(condition: bool) -> bool:  # noqa: FBT001 - a condition
     return condition
 
 
-@_compiles(unlikely, types.boolean, types.Boolean)
+@compiles(unlikely, types.boolean, types.Boolean)
 def _unlikely(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     bit = ir.IntType(1)
     hint = cgutils.get_or_insert_function(builder.module, ir.FunctionType(bit, [bit, bit]), "llvm.expect.i1")

@@ -26,6 +26,7 @@ extending: Any = numba.extending  # it publishes no types
 HostArray = Any  # a ctypes array; compiled code reads ``array[k]`` and ``len(array)``
 _TICKS: dict[type[Registers], tuple[Callable[..., Any], str]] = {}
 
+_SERVES: dict[type[Registers], Callable[..., Any]] = {}
 _CONTROLS: dict[type[Registers], Callable[..., Any]] = {}
 
 
@@ -58,6 +59,36 @@ def controls(params: type[Registers]) -> Callable[[F], F]:
         return function
 
     return register
+
+
+def serves(params: type[Registers]) -> Callable[[F], F]:
+    """State how a controller is operated live: ``serve(live, params, controller, lines, memory, operation, *feed)``.
+
+    It turns what the operation demands into what a host of the controller would write, and says how the axis is. What
+    the host has laid ready for the ticks is its to edit, too: between two of them.
+    """
+
+    def register(function: F) -> F:
+        """Keep it for this class of parameters."""
+        _SERVES[params] = function
+        return function
+
+    return register
+
+
+def run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> None:  # noqa: PLR0913 - as `serves` says
+    """One look of the controller whose live parameters `q` are."""
+    _SERVES[type(q)](q, p, controller, lines, memory, operation, *feed)
+
+
+@extending.overload(run_serve, jit_options={"forceinline": True})
+def _run_serve(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> Any:  # noqa: ARG001, PLR0913 - as above
+    serve = _SERVES[q.registers]
+
+    def compiled(q: Any, p: Any, controller: Any, lines: Any, memory: Any, operation: Any, *feed: Any) -> None:  # noqa: PLR0913
+        serve(q, p, controller, lines, memory, operation, *feed)
+
+    return compiled
 
 
 def run_controller(p: Any, controller: Any, lines: Any, *feed: Any) -> None:

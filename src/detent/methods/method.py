@@ -22,6 +22,9 @@ from detent.files.findings import Caution, Contradiction, Derived
 from detent.files.locate import Path
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from detent.kernel.registers import Registers
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
@@ -98,6 +101,40 @@ class Simulated:
     sample_job: Callable[[], Any]  # a short job for looking at signals
 
 
+@dataclass(frozen=True, slots=True)
+class Live:
+    """An axis at power-on as the live loop takes it."""
+
+    params: "Registers"  # of controller and plant
+    state: "Registers"  # controller, lines and plant
+    live: "Registers"  # how it is operated: `operation`, `look_ticks`, and what the method needs
+    memory: "Registers"  # what the method remembers between two looks
+    tick: float  # base tick [s]
+    unit: str = "m"  # of positions
+    feed: tuple[Any, ...] = ()  # what the host lays ready
+    fault: Callable[[], str] = str  # the fault of its guard in a sentence, empty where there is none
+    tray: "NDArray[np.uint8] | None" = None
+    """Places for pieces of a job in what the loop shares, a row each; None where it does no jobs."""
+    work: "Callable[[Any], Work] | None" = None  # a job as pieces for the tray
+
+
+class Work(Protocol):
+    """A job done live: the host lays piece after piece ready, and the loop takes them."""
+
+    @property
+    def pieces(self) -> int:
+        """How many it has."""
+        ...
+
+    def piece(self) -> bytes | None:
+        """The next piece as a row of the tray; None where none is left, or none may be laid yet."""
+        ...
+
+    def result(self) -> Result:
+        """What came of it so far."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
     """What a report shows beside the result of a run."""
@@ -147,6 +184,9 @@ class Method(Protocol[SpecT]):
     runs: ClassVar[str]  # place of what makes a job: ``run(spec, job, recorder=, progress=)``
     senses: ClassVar[str] = ""
     """Place of what counts its position: ``senses(spec)``, by the name of the motor; of a single one by ""."""
+    lives: ClassVar[str] = ""
+    """Place of what makes it live: ``live(spec, operation)`` gives a `Live` by the name of each motor, by "" where
+    there is one only; none where it has no operator."""
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
@@ -253,6 +293,18 @@ class Method(Protocol[SpecT]):
             run=partial(self.run, spec),
             sample_job=partial(self.sample_job, spec),
         )
+
+    def live(self, spec: SpecT, operation: Callable[..., Any], motor: str = "") -> Live:
+        """One motor at power-on, to be operated; by its name where the file has several."""
+        motors: Mapping[str, Live] = self.brought(self.lives)(spec, operation)
+        if not motor and len(motors) == 1:
+            return next(iter(motors.values()))
+        if motor not in motors:
+            names = ", ".join(motors)
+            got = f"the motor {motor}" if motor else "no motor"
+            allowed = f"one of {names}" if names else "none, for it has one motor only"
+            raise DetentError(f"{spec.axis.name}: got {got}; expected: {allowed}; try: name one of them")
+        return motors[motor]
 
     def linear(self, spec: SpecT) -> "LinearModel":
         """Its linear model; refused where its loop is not a linear one."""

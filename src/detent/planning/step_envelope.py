@@ -171,6 +171,11 @@ class StepEnvelope:
         written = sum(self._write(place - reach + 1, place + 1) for place in {former, self._stop})
         return StopEdit(self.stop, wanted < nearest, written)
 
+    @property
+    def stretches(self) -> tuple[list[int], list[int], list[int]]:
+        """In the order of travel: where the limit changes, both ends included; largest index and number of each."""
+        return self._map.edges.tolist(), self._caps.tolist(), self._map.numbers.tolist()
+
     def indices(self) -> NDArray[np.int64]:
         """Ramp index of every step i, -1 at a sentinel, shape (N,)."""
         entries = (self.entries[:-1] if self.direction > 0 else self.entries[1:]).astype(np.int64)

@@ -66,6 +66,13 @@ def hold_field(r: StepperRotor) -> None:
     r.strength = 1.0
 
 
+@step
+def free_rotor(r: StepperRotor) -> None:
+    """No current: the field is nowhere, and nothing but friction holds the rotor."""
+    r.field_velocity = 0.0
+    r.strength = 0.0
+
+
 @hot_step
 def turn_rotor(p: RotorParams, r: StepperRotor) -> None:
     """One time step; friction takes speed away but never turns it round."""

@@ -28,9 +28,11 @@ from detent.control.head_sequence import (
     REVERSAL_US,
     begin_windows,
     fault,
+    halt,
     next_wake,
     on_emitter,
     on_reverse_edge,
+    switch_off,
     window_timer,
 )
 from detent.plant.drive_train import fill_period
@@ -383,3 +385,70 @@ def test_the_computer_wakes_for_its_earliest_timer():
     for state in (POWER_ON, IDLE, FAULT):
         c.state = state
         assert next_wake(p, c) > 1 << 60
+
+
+def moving(state: int) -> Rig:
+    """A head in some state of a move, another command behind it."""
+    rig = Rig().pretend_identified(emitter=1000)
+    if state in (LOW_START, LOW_STEADY, LOW_STOP):
+        rig.send(0x99, 48)
+        rig.next_status()
+        rig.send(0xA2, 0x08, 0x00)
+    else:
+        rig.run_to(2048, wait=False)
+    while rig.head.state != state:
+        assert rig.run(1) == 1
+    rig.run(100 if state != LOW_STOP else 1)
+    assert rig.head.state == state
+    rig.send(0x92, 0x00, 0x40)
+    assert rig.head.queue.waiting == 1
+    return rig
+
+
+@pytest.mark.parametrize("state", MOVING)
+def test_an_operators_stop_answers_the_running_command_only_and_rests(state):
+    rig = moving(state)
+    at, speed = rig.head.emitter, abs(rig.r.plant.train.velocity) / 0.0254
+    halt(rig.p.controller, rig.head)
+    assert rig.head.state in (LOW_STOP, HIGH_TRANSITION, HIGH_REVERSE)
+    assert rig.next_status(1.0) == OK
+    assert rig.next_status(0.1) is None
+    assert (rig.head.state, rig.head.drive_cmd, rig.head.queue.waiting) == (IDLE, 0, 0)
+    assert -1 <= rig.head.emitter - at <= 300 * speed * speed / 1200 + 12
+
+
+@pytest.mark.parametrize("make", [powered, faulty, lambda: Rig().pretend_identified()])
+def test_an_operators_stop_leaves_a_head_at_rest_as_it_is(make):
+    rig = make()
+    rig.run(5000)  # what ran against something swings back
+    state, at = rig.head.state, rig.head.emitter
+    halt(rig.p.controller, rig.head)
+    assert rig.next_status(0.2) is None
+    assert (rig.head.state, rig.head.emitter, rig.head.drive_cmd) == (state, at, 0)
+
+
+@pytest.mark.parametrize("state", [HOME_LEFT, HOME_RIGHT])
+def test_an_operators_stop_ends_homing(state):
+    rig = Rig()
+    rig.send(0x01)
+    while rig.head.state != state:
+        rig.run(1)
+    rig.run(2500)
+    at = rig.head.emitter
+    halt(rig.p.controller, rig.head)
+    assert rig.next_status(1.0) == OK
+    assert (rig.head.state, rig.head.homed) == (IDLE, 0)
+    assert abs(rig.head.emitter - at) <= 20
+    assert rig.run_to(100) == NOT_CALIBRATED
+
+
+@pytest.mark.parametrize("state", MOVING)
+def test_switched_off_a_head_rolls_out_and_is_counted_on(state):
+    rig = moving(state)
+    switch_off(rig.p.controller, rig.head)
+    assert rig.next_status(2.0) is None
+    assert (rig.head.state, rig.head.drive_cmd, rig.r.lines.count) == (IDLE, 0, 0)
+    assert rig.r.plant.train.velocity == 0.0
+    counted = (rig.r.plant.train.position - rig.p.plant.encoder.origin) / EMITTER
+    assert abs(counted - rig.head.emitter) <= 1.0
+    assert rig.run_to(500) == OK

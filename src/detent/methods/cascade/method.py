@@ -41,6 +41,7 @@ class CascadeMethod(Method[CascadeSpec]):
     leaves_out = (
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
+    lives = "live:live"
     compares = ("comparison:compare_profiles",)
     reports = "page:cascade_page"
     says = "{job}: every move was in position on {axis}.", "Not done: {failure}"

@@ -129,13 +129,13 @@ def run_cascade_moves(
     place = spec.mechanics.start_position
     try:
         if _arrive(host) == FAULT:
-            result.failure = f"after power-on: {_cause(host)}"
+            result.failure = f"after power-on: {describe_cause(host)}"
         result.time_ready = host.time
         for done, (move, target) in enumerate(zip(job.moves, targets, strict=True), 1):
             if result.failure:
                 break
             if _make_move(host, result, evidence, move, place, target) == FAULT:
-                result.failure = f"move {move.number} to {_text(spec, target, 6)}: {_cause(host)}"
+                result.failure = f"move {move.number} to {_text(spec, target, 6)}: {describe_cause(host)}"
             place = target
             if progress is not None:
                 progress(done / len(targets), f"move {done} of {len(targets)}")
@@ -207,7 +207,7 @@ def _arrive(host: CascadeHost) -> int:
     return host.arrive(math.ceil(host.spec.method.timeout / host.period))
 
 
-def _cause(host: CascadeHost) -> str:
+def describe_cause(host: CascadeHost) -> str:
     """Why the drive went off, and what to do."""
     spec, method, guard = host.spec, host.spec.method, host.controller.guard
     if guard.code == NO_ARRIVAL:

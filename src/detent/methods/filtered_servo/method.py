@@ -40,6 +40,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     signals, timing = SIGNALS, TIMING
     linear_loops = "derive:linear_loops"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
+    lives = "live:live"
     compares = ("comparison:compare_feedback",)
     commands, shows = "host:FilteredHost", "page:FilteredView"
 

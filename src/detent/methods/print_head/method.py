@@ -31,6 +31,7 @@ class PrintHeadMethod(Method[PrintHeadSpec]):
         "controller.head.drive_cmd", "plant.timer.pulse", "lines.right_left", "lines.transition", "plant.train.current",
     )  # fmt: skip
     takes, reads, runs = "print_job:PrintJob", "print_job:load_job", "run:print_job"
+    lives = "live:live"
     compares = ("comparison:compare_drives",)
     sums_up, reports = "page:summary_rows", "page:print_page"
     says = "Printed {job} on {axis}.", "Not printed: {failure}"

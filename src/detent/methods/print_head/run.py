@@ -25,7 +25,15 @@ from detent.methods.print_head.derive import HeadFigures
 from detent.methods.print_head.line_plan import Geometry, LinePlan, plan_lines
 from detent.methods.print_head.printed_page import PrintedCharacter, PrintJob, PrintLine
 from detent.methods.print_head.schema import COLUMN, EMITTER, SPEED_STEP, PrintHeadSpec
-from detent.methods.print_head.supervisor import Answer, Supervisor, calculate_parameters, print_from, run_to, set_speed
+from detent.methods.print_head.supervisor import (
+    Answer,
+    Command,
+    Supervisor,
+    calculate_parameters,
+    print_from,
+    run_to,
+    set_speed,
+)
 from detent.record.machine import AnyRecorder, Machine, Progress
 from detent.record.run import RunRecord
 from detent.units import format_quantity
@@ -198,7 +206,7 @@ def print_job(
     spec: PrintHeadSpec, job: PrintJob, *, recorder: AnyRecorder | None = None, progress: Progress | None = None
 ) -> PrintRun:
     """Print a job on the axis of `spec`, from power-on."""
-    runner = _Runner(spec, job, recorder, progress or (lambda _share, _text: None))
+    runner = SimulatedPrinting(spec, job, recorder, progress or (lambda _share, _text: None))
     try:
         runner.prepare()
         if not runner.result.failure:
@@ -210,73 +218,42 @@ def print_job(
     return runner.finish()
 
 
-class _Runner:
-    """The supervisor's program for one job."""
+class Printing:
+    """A job on an axis: how its lines are to be printed, and what became of them."""
 
-    def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: AnyRecorder | None, progress: Progress) -> None:
-        self.spec, self.job, self.progress = spec, job, progress
-        self.machine = print_head_machine(spec, recorder)
-        self.state = self.machine.state
+    def __init__(
+        self, spec: PrintHeadSpec, job: PrintJob, params: print_head.PrintHeadParams, state: print_head.PrintHead
+    ) -> None:
+        self.spec, self.job, self.params, self.state = spec, job, params, state
         self.result = PrintRun(job)
-        controller, self.head = self.state.controller, self.state.controller.head
-        self.supervisor = Supervisor(controller, self.machine.pass_time, self.on_answer, spec.method.ack_last)
+        self.head = state.controller.head
         self.buffer: Any = self.head.buffer  # ctypes gives the elements of an array no type
-        paper: Any = self.state.plant.paper
+        paper: Any = state.plant.paper
         # By bank of the line buffer: banks alternate with every PRINT, the first is bank 1.
         self.ink: NDArray[np.uint8] = np.ctypeslib.as_array(self.buffer.ink).reshape(2, COLUMNS)
         self.landed: NDArray[np.int32] = np.ctypeslib.as_array(paper.landed).reshape(2, COLUMNS)
         self.plans: tuple[LinePlan, ...] = ()
         self.sum_squares = 0.0
-        self.began = 0.0
 
-    def prepare(self) -> None:
-        """CALCULATE PARAMETERS, then plan the lines between the frames found."""
-        self.progress(0.0, "homing and identification")
-        self.supervisor.send(calculate_parameters())
-        self.supervisor.finish()
-        head = self.head
-        self.result.time_ready = self.began = self.machine.time
+    @property
+    def time(self) -> float:
+        """Time since power-on [s]."""
+        return self.state.tick * print_head.TICK
+
+    def plan(self) -> None:
+        """Plan the lines between the frames found."""
+        head, p = self.head, self.params.controller
+        self.result.time_ready = self.time
         self.result.width = head.width * EMITTER
         self.result.identified = {side: self._direction(side) for side in ("right", "left")}
         if self.result.failure:
             return
-        column0 = self.machine.params.controller.columns.column_zero / 256
-        geometry = Geometry(head.width, column0, max_speed=head.maximum)
+        geometry = Geometry(head.width, p.columns.column_zero / 256, max_speed=p.print_speed)
         self.plans = plan_lines(self.job.lines, geometry, head=int(head.emitter), job_name=self.job.name)
-
-    def print_all(self) -> None:
-        """Send the lines, one waiting behind the running one."""
-        preselected = int(self.head.maximum)
-        for index, plan in enumerate(self.plans):
-            while self.supervisor.outstanding and self.supervisor.outstanding[0].tag != index - 1:
-                self.supervisor.await_answer()
-            if self.result.failure:
-                return
-            bank = (index + 1) & 1
-            self.landed[bank] = NOT_FIRED
-            load_line(self.state.controller, bank, [range(*_ink_span(one)) for one in plan.line.characters])
-            if plan.speed != preselected:
-                self.supervisor.send(set_speed(plan.speed))
-                preselected = plan.speed
-            if plan.run_to is not None:
-                self.supervisor.send(run_to(plan.run_to))
-            self.supervisor.send(print_from(plan.print_from, plan.print_to, tag=index))
-        self.supervisor.finish()
-
-    def on_answer(self, answer: Answer) -> None:
-        """Book the end of a command."""
-        if answer.command.tag >= 0 and answer.byte == 0:
-            self.book_line(answer.command.tag)
-        elif answer.byte == IMPLAUSIBLE:
-            self.result.warnings.append(f"{answer.command.text}: {self._unidentified(answer.byte)}")
-        elif answer.byte and not self.result.failure:
-            where = f" (line {self.plans[answer.command.tag].line.number})" if answer.command.tag >= 0 else ""
-            self.result.failure = f"{answer.command.text}{where}: {describe_sb1(answer.byte)}{self._place(answer.byte)}"
-        self.began = self.machine.time
 
     def _unidentified(self, code: int) -> str:
         """Why the axis works with its defaults."""
-        top = self.machine.params.controller.run_speed
+        top = self.params.controller.run_speed
         if top >= LOWEST_FAST_PASS:
             return describe_sb1(code)
         return (
@@ -285,19 +262,23 @@ class _Runner:
             "true defaults in method.default_slope and method.default_friction_counts"
         )
 
+    def fail(self, what: str, code: int) -> None:
+        """The axis did not do a command: say which, why and where."""
+        self.result.failure = f"{what}: {describe_sb1(code)}{self._place(code)}"
+
     def _place(self, code: int) -> str:
         """Where an obstruction is, as far as the axis knows."""
         head = self.head
         if not code & OBSTRUCTION or head.width <= 0:
             return ""
-        p = self.machine.params.controller
+        p = self.params.controller
         if head.width < p.expected_width - p.width_tolerance:
             return f" (the measured width is {_both(head.width)}, limits.travel is {_both(p.expected_width)})"
         return f" (the head stopped {_both(head.emitter)} from the left frame)"
 
-    def book_line(self, index: int) -> None:
+    def book_line(self, index: int, bank: int, start: float, stop: float) -> None:
         """Read what a finished line left in its bank."""
-        line, result, bank = self.plans[index].line, self.result, (index + 1) & 1
+        line, result = self.plans[index].line, self.result
         inked, landed = self.ink[bank] != 0, self.landed[bank]
         fired = inked & (landed != NOT_FIRED)
         errors: NDArray[np.float64] = landed[fired].astype(np.float64) * 1e-9
@@ -312,8 +293,8 @@ class _Runner:
                 direction=direction,
                 speed_value=int(self.buffer.speed[bank]),
                 turn_around=bool(self.buffer.turned[bank]),
-                start=self.began,
-                stop=self.machine.time,
+                start=start,
+                stop=stop,
                 characters=len(line.characters),
                 columns=columns,
                 missed=missed,
@@ -327,12 +308,11 @@ class _Runner:
         result.missed += missed
         result.worst_error = max(result.worst_error, worst)
         self.sum_squares += squares
-        self.progress((index + 1) / len(self.plans), f"line {index + 1} of {len(self.plans)}")
 
     def finish(self) -> PrintRun:
         """Fill in the totals."""
         result, head, train = self.result, self.head, self.state.plant.train
-        result.time_end = self.machine.time
+        result.time_end = self.time
         result.turn_arounds, result.repositions = int(head.turn_arounds), int(head.repositions)
         result.peak_current, result.energy = train.peak_current, train.energy
         result.rms_error = math.sqrt(self.sum_squares / result.columns) if result.columns else 0.0
@@ -360,7 +340,7 @@ class _Runner:
             self.result.strikes.append(Strike(character, line.number, offset))
 
     def _direction(self, side: str) -> Direction:
-        line, p, true = getattr(self.head, side), self.machine.params.controller, HeadFigures(self.spec)
+        line, p, true = getattr(self.head, side), self.params.controller, HeadFigures(self.spec)
         return Direction(
             slope=line.slope,
             friction=line.friction,
@@ -376,6 +356,54 @@ class _Runner:
         )
 
 
+class SimulatedPrinting(Printing):
+    """The supervisor's program for one job, from power-on."""
+
+    def __init__(self, spec: PrintHeadSpec, job: PrintJob, recorder: AnyRecorder | None, progress: Progress) -> None:
+        self.machine, self.progress = print_head_machine(spec, recorder), progress
+        super().__init__(spec, job, self.machine.params, self.machine.state)
+        pass_time, controller = self.machine.pass_time, self.state.controller
+        self.supervisor = Supervisor(controller, pass_time, self.on_answer, spec.method.ack_last)
+        self.began = 0.0
+
+    def prepare(self) -> None:
+        """CALCULATE PARAMETERS, then plan the lines."""
+        self.progress(0.0, "homing and identification")
+        self.supervisor.send(calculate_parameters())
+        self.supervisor.finish()
+        self.began = self.time
+        self.plan()
+
+    def print_all(self) -> None:
+        """Send the lines, one waiting behind the running one."""
+        preselected = int(self.head.maximum)
+        for index, plan in enumerate(self.plans):
+            while self.supervisor.outstanding and self.supervisor.outstanding[0].tag != index - 1:
+                self.supervisor.await_answer()
+            if self.result.failure:
+                return
+            bank = (index + 1) & 1
+            self.landed[bank] = NOT_FIRED
+            load_line(self.state.controller, bank, inked(plan.line))
+            for command in line_commands(plan, preselected, index):
+                self.supervisor.send(command)
+            preselected = plan.speed
+        self.supervisor.finish()
+
+    def on_answer(self, answer: Answer) -> None:
+        """Book the end of a command."""
+        if answer.command.tag >= 0 and answer.byte == 0:
+            index = answer.command.tag
+            self.book_line(index, (index + 1) & 1, self.began, self.time)
+            self.progress((index + 1) / len(self.plans), f"line {index + 1} of {len(self.plans)}")
+        elif answer.byte == IMPLAUSIBLE:
+            self.result.warnings.append(f"{answer.command.text}: {self._unidentified(answer.byte)}")
+        elif answer.byte and not self.result.failure:
+            where = f" (line {self.plans[answer.command.tag].line.number})" if answer.command.tag >= 0 else ""
+            self.fail(f"{answer.command.text}{where}", answer.byte)
+        self.began = self.time
+
+
 def count_errors(errors: NDArray[np.float64]) -> NDArray[np.int64]:
     """Columns per bin of `ERROR_BIN`, the middle bin centred on zero; errors beyond the ends count in the end bins."""
     bins = np.clip(np.round(errors / ERROR_BIN).astype(np.int64) + ERROR_BINS // 2, 0, ERROR_BINS - 1)
@@ -385,6 +413,19 @@ def count_errors(errors: NDArray[np.float64]) -> NDArray[np.int64]:
 def _both(emitters: int) -> str:
     """A length in the two units people use."""
     return f"{emitters * EMITTER * 1e3:.1f} mm = {emitters * EMITTER / INCH:.2f} in"
+
+
+def inked(line: PrintLine) -> list[range]:
+    """Columns of a line that carry ink."""
+    return [range(*_ink_span(one)) for one in line.characters]
+
+
+def line_commands(plan: LinePlan, preselected: int, tag: int) -> list[Command]:
+    """Commands that print a line, with this speed preselected before it."""
+    found = [set_speed(plan.speed)] if plan.speed != preselected else []
+    if plan.run_to is not None:
+        found.append(run_to(plan.run_to))
+    return [*found, print_from(plan.print_from, plan.print_to, tag)]
 
 
 def _ink_span(character: PrintedCharacter) -> tuple[int, int]:

@@ -33,6 +33,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     takes, reads, runs = "sequence_job:SequenceJob", "sequence_file:load_sequence", "run:run_sequence"
     linear_loops = "derive:linear_loops"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
+    lives = "live:live"
     compares = ("comparison:compare_angle",)
     sums_up, reports = "summary:sequence_summary_rows", "page:table_page"
     says = "{job}: every step was done on {axis}.", "Not done: {failure}"

@@ -45,6 +45,7 @@ class StepperLines(Registers):
     pulse: u1 = register("1 in the tick of a step pulse", by=CONTROLLER)
     direction: i1 = register("direction line: 1 or -1", by=CONTROLLER)
     period: u4 = register("period that the last pulse began; 0: hold, no step follows it", unit="tick", by=CONTROLLER)
+    disable: u1 = register("1: no current in the coils, the motor is free", by=CONTROLLER)
 
 
 @hot_step

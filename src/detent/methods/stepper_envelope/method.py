@@ -39,6 +39,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     state, params = "system:Stepper", "system:StepperParams"
     every = 100
     takes, runs = "stage_job:StageJob", "run:run_stage"
+    lives = "live:live"
     sums_up, reports = "summary:stage_summary_rows", "page:stage_page"
     says = "{job}: every move arrived on {axis}, no step was lost.", "Not done: {failure}"
 

@@ -3,7 +3,7 @@
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import hot_step
 from detent.methods.stepper_envelope.controller import StepperLines
-from detent.plant.stepper_rotor import RotorParams, StepperRotor, hold_field, step_field, turn_rotor
+from detent.plant.stepper_rotor import RotorParams, StepperRotor, free_rotor, hold_field, step_field, turn_rotor
 
 
 class StepperPlantParams(Registers):
@@ -37,6 +37,8 @@ def move(p: StepperPlantParams, tick: int, lines: StepperLines, plant: StepperPl
         step_field(p.rotor, plant.rotor, lines.direction, hz)
     elif lines.period == 0:
         hold_field(plant.rotor)
+    if lines.disable:
+        free_rotor(plant.rotor)
     turn_rotor(p.rotor, plant.rotor)
     if abs(plant.rotor.lag) > p.tolerance:
         plant.gauge.outside = tick + 1

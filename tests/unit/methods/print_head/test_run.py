@@ -18,7 +18,7 @@ from detent.methods.print_head.run import (
     ERROR_BINS,
     SIGNALS,
     PrintRun,
-    _Runner,
+    SimulatedPrinting,
     count_errors,
     print_job,
 )
@@ -44,7 +44,7 @@ def play(job: PrintJob | str, *overrides: str) -> PrintRun:
 
 def play_recorded(job: PrintJob | str, *overrides: str, every: int = 5) -> tuple[PrintRun, Trace, bytes]:
     recorder = Recorder(PrintHead, SIGNALS, every=every, period=TICK)
-    runner = _Runner(
+    runner = SimulatedPrinting(
         load_spec(EXAMPLE, overrides), job if isinstance(job, PrintJob) else parse_text(job), recorder, untold
     )
     runner.prepare()
@@ -212,7 +212,7 @@ def test_an_obstacle_before_homing_is_met_and_said(place: str, found: str) -> No
 
 
 def test_an_obstacle_after_homing_stops_the_job_where_it_stands() -> None:
-    runner = _Runner(load_spec(EXAMPLE), LETTER, None, untold)
+    runner = SimulatedPrinting(load_spec(EXAMPLE), LETTER, None, untold)
     runner.prepare()
     runner.machine.params.plant.train.left_end = 4 * INCH
     runner.print_all()
@@ -277,7 +277,7 @@ def test_without_noise_the_seed_changes_nothing_but_itself() -> None:
 
 
 def test_column_errors_agree_wherever_they_are_counted() -> None:
-    runner = _Runner(load_spec(EXAMPLE, ["disturbance.push.force=6 N", *PUSH]), LETTER, None, untold)
+    runner = SimulatedPrinting(load_spec(EXAMPLE, ["disturbance.push.force=6 N", *PUSH]), LETTER, None, untold)
     runner.prepare()
     runner.print_all()
     run, columns = runner.finish(), runner.state.controller.head.columns

@@ -48,3 +48,14 @@ def test_the_observer_notes_the_last_tick_outside_the_tolerance(p):
             last = tick + 1
     assert plant.gauge.outside == last
     assert abs(plant.rotor.lag) < 0.5
+
+
+def test_without_current_nothing_but_friction_holds_the_rotor(p):
+    plant = standing()
+    plant.rotor.commanded = 1
+    move(p, 0, StepperLines(disable=1), plant)
+    assert plant.rotor.strength == 0.0
+    assert plant.rotor.velocity == 0.0
+    move(p, 1, StepperLines(), plant)
+    assert plant.rotor.strength == 1.0
+    assert plant.rotor.velocity > 0.0

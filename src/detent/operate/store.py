@@ -15,8 +15,9 @@ from typing import Any, Self
 
 from detent.errors import DetentError, DiskError
 from detent.files.text import did_you_mean, short
-from detent.live.opening import here, open_fitting
-from detent.live.rows import (
+from detent.methods.position import PositionSensor
+from detent.operate.opening import here, open_fitting
+from detent.operate.rows import (
     COUNTERS,
     LARGEST,
     MOST_EDITS,
@@ -31,9 +32,8 @@ from detent.live.rows import (
     Reference,
     is_name,
 )  # fmt: skip
-from detent.live.sealed import Change, Connect, connect
-from detent.live.trust import Judgement, Saved, Trust, Why, judge
-from detent.methods.position import PositionSensor
+from detent.operate.sealed import Change, Connect, connect
+from detent.operate.trust import Judgement, Saved, Trust, Why, judge
 from detent.record.evidence import now
 from detent.units import format_quantity
 

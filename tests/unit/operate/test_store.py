@@ -15,10 +15,10 @@ import pytest
 from tests.live_rig import SENSORS, TRAVEL, Model, memory_folder, open_store, table_of
 
 from detent.errors import DetentError, DiskError
-from detent.live.rows import VERSION
-from detent.live.sealed import APPLICATION, DamagedError, StoreHeldError
-from detent.live.store import MarkError
-from detent.live.trust import Trust, Why
+from detent.operate.rows import VERSION
+from detent.operate.sealed import APPLICATION, DamagedError, StoreHeldError
+from detent.operate.store import MarkError
+from detent.operate.trust import Trust, Why
 
 HELD = SENSORS["incremental, held"]
 RULED = SENSORS["absolute"]
@@ -207,8 +207,8 @@ def test_many_positions_are_one_step(store):
 
 
 def test_what_can_be_undone_is_bounded_and_whole(store, monkeypatch):
-    monkeypatch.setattr("detent.live.store.MOST_POSITIONS", 10)
-    monkeypatch.setattr("detent.live.store.MOST_EDITS", 25)
+    monkeypatch.setattr("detent.operate.store.MOST_POSITIONS", 10)
+    monkeypatch.setattr("detent.operate.store.MOST_EDITS", 25)
     entries = [(f"p{k}", k, 0) for k in range(10)]
     model = Model()
     for number in range(4):
@@ -466,7 +466,7 @@ def test_what_another_process_has_kept_aside_meanwhile_is_not_moved_again(path, 
             file.with_name("new").rename(file)
             raise DamagedError("as another process found as well")
 
-    monkeypatch.setattr("detent.live.sealed._check_head", check)
+    monkeypatch.setattr("detent.operate.sealed._check_head", check)
     with open_store(path, HELD) as store:
         assert store.aside is None
         assert store.restore().counts == 5000

@@ -3,8 +3,8 @@ from dataclasses import replace
 import pytest
 from tests.live_rig import BAND, SENSORS, TRAVEL, read, sensor
 
-from detent.live.trust import Saved, Trust, Why, judge
 from detent.methods.position import PositionSensor, Sensed
+from detent.operate.trust import Saved, Trust, Why, judge
 
 PARKED = Saved(moving=False, trust=Trust.REFERENCED, counts=5000, offset=77)
 MOVING = replace(PARKED, moving=True)

@@ -19,8 +19,8 @@ from detent.files.read import Row, read_tables, refuse
 from detent.files.read_csv import CsvRows
 from detent.files.source import parse_source
 from detent.files.text import check_target, decode_utf8, read_data, short, write_text
-from detent.live.rows import LARGEST, MOST_NAME, MOST_POSITIONS, NAME, Position, is_name
 from detent.methods.position import PositionSensor
+from detent.operate.rows import LARGEST, MOST_NAME, MOST_POSITIONS, NAME, Position, is_name
 from detent.units import format_quantity
 
 AnyRow = TypeVar("AnyRow", bound=Row)

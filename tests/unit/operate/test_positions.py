@@ -4,9 +4,9 @@ import pytest
 from tests.live_rig import SENSORS, memory_folder, open_store, table_of
 
 from detent.errors import DetentError, InputError
-from detent.live.positions import load_positions, save_positions
-from detent.live.rows import MOST_POSITIONS, Position
 from detent.methods.position import PositionSensor, Sensed
+from detent.operate.positions import load_positions, save_positions
+from detent.operate.rows import MOST_POSITIONS, Position
 
 RULED = SENSORS["absolute"]
 TURNED = PositionSensor(sensor="disc", kind=Sensed.ABSOLUTE, scale=2e-5, unit="rad", band=314_159)

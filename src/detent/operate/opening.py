@@ -9,9 +9,9 @@ from datetime import datetime
 from pathlib import Path
 
 from detent.errors import DiskError
-from detent.live.rows import KINDS, VERSION, Meaning, Position
-from detent.live.sealed import Connect, DamagedError, ForeignError, SealedFile, identity, salvage, set_aside
 from detent.methods.position import PositionSensor
+from detent.operate.rows import KINDS, VERSION, Meaning, Position
+from detent.operate.sealed import Connect, DamagedError, ForeignError, SealedFile, identity, salvage, set_aside
 
 SUFFIX = ".state"
 MOST_ASIDE = 10  # times that a store is found not to fit, by this process or another, before it is given up

@@ -1,0 +1,517 @@
+"""Operation of an axis under somebody's hand: states, commands, who commands, and when a command is done.
+
+It stands between those who ask (a panel, a program, a fieldbus; they write `Request`) and the controller of a method,
+which is told by `Demand` what to do and says by `Answer` how it is. It is a step of the controller: it knows neither
+who sits at the other end of the wires nor what time it is, only looks.
+
+A command has an id and ends exactly once: done, aborted by another, refused, or failed. Done means: inside the window
+for the window's time while the commanded point rests; a move of no length takes that time, too. Stop and off are
+taken in every state, from everybody. A stop raises the epoch: what was asked before it is not done after it.
+"""
+
+from detent.control.axis_states import (
+    DISABLE_VOLTAGE,
+    ENABLE_OPERATION,
+    ENABLED,
+    FAULT,
+    FAULT_REACTION,
+    HALT_QUICKLY,
+    NOT_READY,
+    QUICK_STOP,
+    RESET_FAULT,
+    SHUTDOWN,
+    SWITCH_ON,
+    SWITCH_ON_DISABLED,
+    ordered,
+)
+from detent.kernel.compiled import bits_of
+from detent.kernel.registers import Registers, block, f8, i2_array, i8, i8_array, register, u1, u1_array, u2
+from detent.kernel.step import hot_step, step
+
+# ---- what may be asked
+(
+    ENABLE, OFF, STOP, RESET, MOVE_TO, MOVE_BY, JOG, GO, HOME, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE, JOB, FEED,
+    LOWER, UPPER,
+) = COMMANDS = tuple(range(1, 20))  # fmt: skip
+COMMAND_NAMES = (
+    "enable", "off", "stop", "reset", "move to", "move by", "jog", "go", "home", "keep", "confirm", "take", "order",
+    "trust", "leave", "job", "feed", "lower end", "upper end",
+)  # fmt: skip
+MANAGED = ENABLE, OFF, STOP, RESET, KEEP, CONFIRM, TAKE, ORDER, TRUST, LEAVE  # of every method; the others move it
+NEEDS_ID = 1  # smallest id of a command; 0 is none
+
+# ---- how a command ends
+DONE, ABORTED, REFUSED, FAILED = range(1, 5)
+ENDINGS = ("", "done", "aborted", "refused", "failed")
+
+# ---- why it was refused, or failed; below 100 as in the table of faults, `errors.REFUSAL_TEXT`
+NOT_ENABLED, IN_FAULT, NO_FAULT, UNKNOWN, NOT_OFFERED, MOVING, BUSY, UNREADY, NO_JOB, NOT_CONFIRMED = range(101, 111)
+BEYOND, UNREFERENCED, LEASE_LOST, SECOND, STALE, NOT_FINITE = 31, 35, 41, 43, 44, 52
+
+# ---- trust in the position
+NOT_KNOWN, RESTORED, REFERENCED = range(3)
+
+# ---- what the method's controller is told to do
+REST_OFF, HOLD, TRAVEL, RUN, HALT, SEEK, NUMBERED, WORK = range(8)
+
+SUM = (1 << 62) - 1
+
+ENDS = 256  # endings that are kept until the host has read them
+
+
+class Request(Registers):
+    """One record of the mailbox."""
+
+    number: i8 = register("place in the sequence of all requests, from 1", unit="count")
+    kind: i8 = register("what is asked, `COMMANDS`", unit="code")
+    id: i8 = register("of the command, from 1; how it ends is told under it", unit="code")
+    epoch: i8 = register("number of stops that whoever asks knows of", unit="count")
+    client: i8 = register("who asks", unit="code")
+    value: f8 = register("target, way or velocity", unit="m")
+    speed: f8 = register("share of the largest speed, above 0 to 1", unit="1")
+    check: i8 = register("sum over the record, so that a torn one is seen", unit="code")
+
+
+class OperationParams(Registers):
+    """Times and rules."""
+
+    window_looks: i8 = register("looks inside the window until a command is done", unit="count")
+    lease_looks: i8 = register("looks that a jog lives without being kept", unit="count")
+    lowest: f8 = register("lower soft limit", unit="m")
+    highest: f8 = register("upper soft limit", unit="m")
+    endless: u1 = register("1: it turns for ever, and has no limits")
+    careful: u1 = register("1: after enabling, a tenth of the speed until confirmed")
+    creep: f8 = register("share of the largest speed while the position is not known", unit="1")
+    one_at_a_time: u1 = register("1: a move under way must end before another begins")
+    takes: i8 = register("what the method offers: a bit per command", unit="code")
+
+
+class Demand(Registers):
+    """What the method's controller is told."""
+
+    do: u1 = register("what to do", unit="code")
+    fresh: u1 = register("1 in the look in which that changes")
+    target: f8 = register("where to, of a move", unit="m")
+    velocity: f8 = register("of a jog", unit="m/s")
+    number: i8 = register("position number, or pieces of a job", unit="code")
+    share: f8 = register("part of the largest speed that is allowed", unit="1")
+    laid: i8 = register("pieces of the job that the host has laid ready", unit="count")
+    lowest: f8 = register("lower end, where a hand has moved it", unit="m")
+    highest: f8 = register("upper end, where a hand has moved it", unit="m")
+    moved: u1 = register("ends that a hand has moved: bit 0 lower, bit 1 upper", unit="code")
+    edited: u1 = register("1 in the look in which one has moved")
+
+
+class Answer(Registers):
+    """What the method's controller says."""
+
+    position: f8 = register("as its sensor shows it", unit="m")
+    velocity: f8 = register("as its sensor shows it", unit="m/s")
+    commanded: f8 = register("commanded point", unit="m")
+    commanded_velocity: f8 = register("its velocity", unit="m/s")
+    error: f8 = register("commanded point less position", unit="m")
+    effort: f8 = register("command to the actuator over its limit", unit="1")
+    rests: u1 = register("1 while the commanded point is at rest")
+    near: u1 = register("1 while the position is in the window")
+    ready: u1 = register("1 once it can be enabled")
+    limited: u1 = register("1 while the command is at its limit")
+    fault: u2 = register("fault of its guard, 0 none", unit="code")
+    refused: u2 = register("why it does not do what it was told, 0 it does", unit="code")
+
+
+class Endings(Registers):
+    """How commands ended, for the host."""
+
+    count: i8 = register("commands that have ended", unit="count")
+    id: i8_array = register("of each of the last ones", length=ENDS, unit="code")
+    how: u1_array = register("how each ended", length=ENDS, unit="code")
+    why: i2_array = register("reason of a refusal, code of a failure", length=ENDS, unit="code")
+    by: i8_array = register("id of the command that aborted it", length=ENDS, unit="code")
+
+
+class Operation(Registers):
+    """How the axis stands, and what it is about."""
+
+    state: u1 = register("state as CiA 402 numbers it here", unit="code")
+    epoch: i8 = register("stops so far", unit="count")
+    running: i8 = register("id of the command that is under way, 0 none", unit="code")
+    kind: u1 = register("what it is", unit="code")
+    within: i8 = register("looks in the window, the commanded point at rest", unit="count")
+    lease: i8 = register("looks until an unkept jog is stopped", unit="count")
+    client: i8 = register("who commands, 0 nobody", unit="code")
+    fault: u2 = register("first fault since the last reset, 0 none", unit="code")
+    confirmed: u1 = register("1 once the first motion since enabling has been confirmed")
+    trust: u1 = register("in the position: 0 not known, 1 restored, 2 referenced", unit="code")
+    taken: i8 = register("requests taken", unit="count")
+    torn: i8 = register("requests whose sum was wrong", unit="count")
+    stops: i8 = register("stop lines seen so far", unit="count")
+    offs: i8 = register("off lines seen so far", unit="count")
+    looks: i8 = register("looks since power-on", unit="count")
+    last_stop: f8 = register("way of the last stop", unit="m")
+    stop_from: f8 = register("commanded point at the last stop", unit="m")
+    halted: u1 = register("1 while a stop runs out")
+    softly: u1 = register("1 while a fault lets the commanded point come to rest, and hold it")
+    demand: Demand = block("what the method is told")
+    answer: Answer = block("what it says")
+    endings: Endings = block("how commands ended")
+
+
+# ---------------------------------------------------------------------------------------------------- endings
+
+
+@step
+def end(o: Operation, number: int, how: int, why: int, by: int) -> None:
+    """Tell how a command has ended."""
+    e = o.endings
+    k = e.count % ENDS
+    e.id[k], e.how[k], e.why[k], e.by[k] = number, how, why, by
+    e.count += 1
+
+
+@step
+def end_running(o: Operation, how: int, why: int, by: int) -> None:
+    """End the command that is under way, if one is."""
+    if o.running:
+        end(o, o.running, how, why, by)
+    o.running = o.kind = 0
+    o.within = o.lease = 0
+
+
+@hot_step
+def tell(o: Operation, do: int) -> None:
+    """Tell the method to do something else."""
+    o.demand.do = do
+    o.demand.fresh = 1
+
+
+# ---------------------------------------------------------------------------------------------------- stop and off
+
+
+@step
+def stop(o: Operation, by: int) -> None:
+    """Come to rest from the commanded state, and drop what was asked before."""
+    o.epoch += 1
+    end_running(o, ABORTED, 0, by)
+    if o.state == ENABLED:
+        halt(o)
+
+
+@step
+def halt(o: Operation) -> None:
+    """The commanded point comes to rest as soon as its limits let it."""
+    o.stop_from = o.answer.commanded
+    o.halted = 1
+    tell(o, HALT)
+
+
+@step
+def off(o: Operation, by: int) -> None:
+    """Take the torque away, now."""
+    o.epoch += 1
+    end_running(o, ABORTED, 0, by)
+    o.state = ordered(o.state, DISABLE_VOLTAGE)
+    leave_torque(o)
+
+
+@hot_step
+def leave_torque(o: Operation) -> None:
+    """No torque: a motion has to be confirmed anew."""
+    o.confirmed = o.halted = o.softly = 0
+    tell(o, REST_OFF)
+
+
+@step
+def fail(o: Operation, code: int) -> None:
+    """A fault: the first one stays, the command ends, the method has taken its torque away or is told to."""
+    if o.fault == 0:
+        o.fault = code
+    end_running(o, FAILED, code, 0)
+    o.state = FAULT_REACTION
+    leave_torque(o)
+
+
+@step
+def fail_softly(o: Operation, code: int) -> None:
+    """A fault that leaves the loop able to steer: the commanded point comes to rest, and is held."""
+    if o.state in (ENABLED, QUICK_STOP):
+        o.fault, o.softly = code, 1
+        end_running(o, FAILED, code, 0)
+        o.state = FAULT_REACTION
+        halt(o)
+
+
+# ---------------------------------------------------------------------------------------------------- what is asked
+
+
+@step
+def why_not(q: OperationParams, o: Operation, r: Request) -> int:
+    """Reason to refuse a request, 0 for none; stop and off are never refused."""
+    if not (1 <= r.kind <= UPPER) or r.id < NEEDS_ID:
+        return UNKNOWN
+    if not (abs(r.value) < 1e12 and 0.0 < r.speed <= 1.0):  # neither infinite nor no number
+        return NOT_FINITE
+    if (q.takes >> r.kind & 1) == 0:
+        return NOT_OFFERED
+    if r.epoch != o.epoch:
+        return STALE
+    if o.client not in (0, r.client) and r.kind != TAKE:
+        return SECOND
+    if r.kind == LEAVE:
+        return 0
+    if r.kind == RESET:
+        return 0 if o.state == FAULT else NO_FAULT
+    return IN_FAULT if o.state in (FAULT, FAULT_REACTION) else why_not_now(q, o, r)
+
+
+@step
+def why_not_now(q: OperationParams, o: Operation, r: Request) -> int:
+    """Reason to refuse a request of an axis without a fault, 0 for none."""
+    if r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, CONFIRM, JOB):
+        return why_not_move(q, o, r)
+    if r.kind in (LOWER, UPPER):
+        return 0 if can_move_end(q, o, r) else BEYOND
+    if r.kind == FEED:
+        return 0 if o.kind == JOB else NO_JOB
+    if r.kind == TRUST and o.state == ENABLED:
+        return MOVING
+    if r.kind == ENABLE and o.answer.ready == 0:
+        return UNREADY
+    return 0
+
+
+@hot_step
+def can_move_end(q: OperationParams, o: Operation, r: Request) -> bool:
+    """An end moves between the limit of the file and the other end."""
+    if r.kind == LOWER:
+        return q.lowest <= r.value < upper_end(q, o)
+    return lower_end(q, o) < r.value <= q.highest
+
+
+@step
+def why_not_move(q: OperationParams, o: Operation, r: Request) -> int:
+    """Reason to refuse a motion."""
+    if o.state != ENABLED:
+        return NOT_ENABLED
+    if q.one_at_a_time and o.running and r.kind != CONFIRM:
+        return BUSY
+    if o.trust == NOT_KNOWN and r.kind in (MOVE_TO, GO, JOB):
+        return UNREFERENCED
+    if r.kind == JOB and q.careful and not o.confirmed:  # it goes at speeds of its own
+        return NOT_CONFIRMED
+    if r.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, goal(o, r)):
+        return BEYOND
+    return 0
+
+
+@hot_step
+def goal(o: Operation, r: Request) -> float:
+    """Where a move ends; by a way, from where the commanded point is."""
+    return r.value if r.kind == MOVE_TO else o.answer.commanded + r.value
+
+
+@hot_step
+def lower_end(q: OperationParams, o: Operation) -> float:
+    """Lower soft limit, or where a hand has moved it since."""
+    return o.demand.lowest if o.demand.moved & 1 else q.lowest
+
+
+@hot_step
+def upper_end(q: OperationParams, o: Operation) -> float:
+    """Upper soft limit, or where a hand has moved it since."""
+    return o.demand.highest if o.demand.moved & 2 else q.highest
+
+
+@hot_step
+def is_allowed(q: OperationParams, o: Operation, target: float) -> bool:
+    """A target between the ends, or nearer to them than the axis is; without a reference they mean nothing."""
+    lowest, highest, here = lower_end(q, o), upper_end(q, o), o.answer.commanded
+    if q.endless or o.trust == NOT_KNOWN or lowest <= target <= highest:
+        return True
+    return here < target < lowest or highest < target < here
+
+
+@step
+def obey(q: OperationParams, o: Operation, r: Request) -> None:
+    """Take one request."""
+    o.taken += 1
+    if r.kind == STOP:
+        stop(o, r.id)
+        o.running, o.kind = r.id, STOP  # done at rest
+        return
+    if r.kind == OFF:
+        off(o, r.id)
+        end(o, r.id, DONE, 0, 0)
+        return
+    why = why_not(q, o, r)
+    if why:
+        end(o, r.id, REFUSED, why, 0)
+    elif r.kind in (MOVE_TO, MOVE_BY, JOG, GO, HOME, JOB):
+        begin_motion(q, o, r)
+    else:
+        manage(q, o, r)
+        end(o, r.id, DONE, 0, 0)
+
+
+@step
+def begin_motion(q: OperationParams, o: Operation, r: Request) -> None:
+    """A motion takes the place of the one under way; a jog that is asked again goes on, at another velocity."""
+    if not (r.kind == JOG and o.kind == JOG and o.running == r.id):
+        end_running(o, ABORTED, 0, r.id)
+    o.client, o.running, o.kind = r.client, r.id, r.kind
+    o.within = o.halted = 0
+    d = o.demand
+    d.share = allowed_share(q, o, r.speed)
+    if r.kind == JOG:
+        o.lease = q.lease_looks
+        d.velocity = r.value
+        tell(o, RUN)
+    elif r.kind == GO:
+        d.number = round(r.value)
+        tell(o, NUMBERED)
+    elif r.kind == HOME:
+        tell(o, SEEK)
+    elif r.kind == JOB:
+        d.number, d.laid = round(r.value), 0
+        tell(o, WORK)
+    else:
+        d.target = goal(o, r)
+        tell(o, TRAVEL)
+
+
+@hot_step
+def allowed_share(q: OperationParams, o: Operation, asked: float) -> float:
+    """Part of the largest speed: less at first and where the position is not known."""
+    share = asked
+    if o.trust == NOT_KNOWN:
+        share = min(share, q.creep)
+    if q.careful and not o.confirmed:
+        share = min(share, 0.1)
+    return share
+
+
+@step
+def manage(q: OperationParams, o: Operation, r: Request) -> None:
+    """What is done when it is asked, without motion."""
+    if r.kind == ENABLE:
+        enable(o)
+        o.client = r.client
+    elif r.kind == RESET:
+        o.state, o.fault = ordered(o.state, RESET_FAULT), 0
+        leave_torque(o)
+    elif r.kind == KEEP:
+        if o.kind == JOG:
+            o.lease = q.lease_looks
+    elif r.kind == CONFIRM:
+        o.confirmed = 1
+    elif r.kind in (TAKE, LEAVE):
+        hand_over(o, r)
+    elif r.kind == TRUST:
+        o.trust = round(min(max(r.value, 0.0), 2.0))
+    elif r.kind == ORDER:
+        take_order(o, round(min(max(r.value, 0.0), 6.0)), r.id)
+    elif r.kind == FEED:
+        o.demand.laid = round(r.value)
+    elif r.kind in (LOWER, UPPER):
+        move_end(q, o, r)
+
+
+@step
+def move_end(q: OperationParams, o: Operation, r: Request) -> None:
+    """An end of the travel moves under the operator's hand; a move that it cuts short is aborted, and rests there."""
+    d = o.demand
+    if r.kind == LOWER:
+        d.lowest, d.moved = r.value, d.moved | 1
+    else:
+        d.highest, d.moved = r.value, d.moved | 2
+    d.edited = 1
+    if o.kind in (MOVE_TO, MOVE_BY) and not is_allowed(q, o, d.target):
+        end_running(o, ABORTED, 0, r.id)
+
+
+@step
+def enable(o: Operation) -> None:
+    """All the way to operation enabled, if the method is ready; the target is where the axis is."""
+    if o.state == ENABLED:
+        return
+    o.state = ordered(ordered(ordered(o.state, SHUTDOWN), SWITCH_ON), ENABLE_OPERATION)
+    if o.state == ENABLED:
+        tell(o, HOLD)
+
+
+@step
+def hand_over(o: Operation, r: Request) -> None:
+    """Another one commands, or nobody; a motion under way is stopped first."""
+    if (r.kind == TAKE and o.client != r.client) or (r.kind == LEAVE and o.running):
+        stop(o, r.id)
+    o.client = r.client if r.kind == TAKE else 0
+
+
+@step
+def take_order(o: Operation, order: int, number: int) -> None:
+    """One order of the control word of CiA 402."""
+    before = o.state
+    if order == ENABLE_OPERATION and o.answer.ready == 0:
+        return
+    o.state = ordered(before, order)
+    if o.state == ENABLED and before != ENABLED:
+        tell(o, HOLD)
+    if order == HALT_QUICKLY and o.state == QUICK_STOP and before == ENABLED:
+        o.epoch += 1
+        end_running(o, ABORTED, 0, number)
+        halt(o)
+    elif before in (ENABLED, QUICK_STOP) and o.state not in (ENABLED, QUICK_STOP):
+        end_running(o, ABORTED, 0, number)
+        leave_torque(o)
+    if before == FAULT and o.state != FAULT:
+        o.fault = 0
+        leave_torque(o)
+
+
+# ---------------------------------------------------------------------------------------------------- a look
+
+
+@step
+def look(o: Operation) -> None:
+    """One look before the method's: the drive's own transitions, faults, and the lease of a jog."""
+    o.looks += 1
+    a = o.answer
+    if o.state == NOT_READY:
+        o.state = SWITCH_ON_DISABLED
+    if o.state == FAULT_REACTION and (o.softly == 0 or a.rests):
+        o.state = FAULT
+    if a.fault and o.state != FAULT:
+        fail(o, a.fault)
+    if o.kind == JOG and o.lease > 0:
+        o.lease -= 1
+        if o.lease == 0:
+            end_running(o, FAILED, LEASE_LOST, 0)
+            halt(o)
+
+
+@step
+def judge(q: OperationParams, o: Operation) -> None:
+    """After the method has answered: did it take the demand, and is the command done."""
+    a, d = o.answer, o.demand
+    if a.refused:  # in the look in which it was told, or later: a controller may need time to find out
+        end_running(o, REFUSED, a.refused, 0)
+    d.fresh = d.edited = 0
+    if not a.rests:
+        o.within = 0
+        return
+    if o.halted:
+        o.halted = 0
+        o.last_stop = abs(a.commanded - o.stop_from)
+    if o.kind == STOP:
+        end_running(o, DONE, 0, 0)
+    if o.running and not (o.kind == JOG and d.velocity != 0.0):
+        o.within = o.within + 1 if a.near else 0
+        if o.within >= q.window_looks:
+            end_running(o, DONE, 0, 0)
+
+
+@step
+def sum_of(number: int, kind: int, command: int, epoch: int, client: int, value: float, speed: float) -> int:
+    """Sum over a request, each word with an odd factor of its own, so that a torn record is seen."""
+    words = number * 3 + kind * 5 + command * 7 + epoch * 11 + client * 13
+    first, second = bits_of(value), bits_of(speed)  # folded, for the sum keeps 62 bits
+    return (words + (first ^ first >> 32) * 17 + (second ^ second >> 32) * 19) & SUM

@@ -1,0 +1,130 @@
+"""The cascade axis under somebody's hand: a course of limited jerk leads it, sample by sample."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from detent.control.guard import enable_guard
+from detent.control.operation import (
+    BEYOND,
+    HALT,
+    HOLD,
+    JOG,
+    MOVE_BY,
+    MOVE_TO,
+    NOT_KNOWN,
+    REST_OFF,
+    RUN,
+    TRAVEL,
+    Operation,
+    OperationParams,
+)  # fmt: skip
+from detent.kernel.loop import lay_ready, serves
+from detent.kernel.registers import Registers, block, f8, i8, register
+from detent.kernel.step import step
+from detent.methods.cascade.build import motion_limits
+from detent.methods.cascade.controller import CascadeController, CascadeControllerParams, CascadeLines
+from detent.methods.cascade.host import CascadeHost
+from detent.methods.cascade.run import describe_cause
+from detent.methods.cascade.schema import CascadeSpec
+from detent.methods.method import Live
+from detent.planning.course import Course, CourseLimits, advance, begin_at, come_to_rest, go_to, is_at_rest, run_at
+
+
+class CascadeLiveParams(Registers):
+    """How it is operated."""
+
+    operation: OperationParams = block("times and limits")
+    look_ticks: i8 = register("ticks between two looks", unit="tick")
+    course: CourseLimits = block("what a motion may do")
+    settled: f8 = register("position error that counts as in position", unit="m")
+
+
+class CascadeLive(Registers):
+    """What leads the axis."""
+
+    limits: CourseLimits = block("limits of the present motion")
+    course: Course = block("the commanded point")
+
+
+@step
+def set_limits(q: CascadeLiveParams, memory: CascadeLive, o: Operation) -> None:
+    """Limits of a motion: its share of the speed; no ends while nobody knows where they are."""
+    m = memory.limits
+    m.speed, m.acceleration, m.jerk = q.course.speed * o.demand.share, q.course.acceleration, q.course.jerk
+    m.lowest, m.highest = q.course.lowest, q.course.highest
+    if o.trust == NOT_KNOWN:
+        m.lowest, m.highest = -1e9, 1e9
+
+
+@step
+def lead(q: CascadeLiveParams, c: CascadeController, memory: CascadeLive, o: Operation) -> int:
+    """What is freshly demanded; gives a reason to refuse it, 0 for none."""
+    d, why = o.demand, 0
+    if d.do == REST_OFF:
+        c.on = 0
+    elif d.do == HOLD:
+        c.law.integral = 0.0
+        enable_guard(c.guard)
+        c.on = 1
+    elif d.do == TRAVEL:
+        set_limits(q, memory, o)
+        why = go_to(memory.limits, memory.course, d.target)
+    elif d.do == RUN:
+        set_limits(q, memory, o)
+        top = memory.limits.speed
+        why = run_at(memory.limits, memory.course, min(max(d.velocity, -top), top))
+    elif d.do == HALT:
+        come_to_rest(memory.limits, memory.course)
+    return BEYOND if why else 0
+
+
+@serves(CascadeLiveParams)
+@step
+def serve(
+    q: CascadeLiveParams, p: CascadeControllerParams, c: CascadeController, _lines: CascadeLines, memory: CascadeLive,
+    o: Operation, *_feed: Any,
+) -> None:  # fmt: skip
+    """One look, before a sample: the next point of the course."""
+    a, course, before = o.answer, memory.course, c.on
+    here = c.load_sensor if p.feedback.position_on_load else c.motor_sensor
+    c.event = 0
+    a.refused = lead(q, c, memory, o) if o.demand.fresh else 0
+    if c.on == 0 or before == 0:  # the commanded point is where the axis is
+        begin_at(course, here.position)
+    advance(memory.limits, course, p.law.period)
+    c.reference.position, c.reference.velocity = course.position, course.velocity
+    c.reference.acceleration = course.acceleration
+    a.position, a.velocity = here.position, here.velocity
+    a.commanded, a.commanded_velocity = course.position, course.velocity
+    a.error = course.position - here.position
+    a.effort = c.law.command / p.law.max_command if c.on else 0.0
+    a.limited = c.law.limited
+    a.rests = 1 if is_at_rest(course) else 0
+    a.near = 1 if abs(a.error) <= q.settled else 0
+    a.ready = 1
+    a.fault = c.guard.code if c.on == 0 and o.demand.do != REST_OFF else 0
+
+
+def live(spec: CascadeSpec, operation: Callable[..., OperationParams]) -> dict[str, Live]:
+    """The axis at power-on, its drive off, to be operated."""
+    host, limits = CascadeHost(spec), motion_limits(spec)
+    host.controller.on = 0
+    q, memory = CascadeLiveParams(look_ticks=host.sample_ticks), CascadeLive()
+    q.settled = host.params.controller.limits.window
+    ends = spec.limits.lowest, spec.highest
+    q.operation = operation(
+        host.period, host.params.controller.limits.arrival * host.period, ends, MOVE_TO, MOVE_BY, JOG
+    )
+    jerk = limits.jerk if limits.jerk < 1e12 else 0.0
+    q.course = CourseLimits(
+        speed=limits.speed, acceleration=limits.acceleration, jerk=jerk, lowest=ends[0], highest=ends[1]
+    )
+    memory.limits = q.course
+    host.feed = (lay_ready(np.zeros(0)),) * 4  # what leads the axis is in its memory
+
+    def fault() -> str:
+        return describe_cause(host) if host.controller.guard.code else ""
+
+    return {"": Live(host.params, host.state, q, memory, host.tick, spec.unit("m"), host.feed, fault)}

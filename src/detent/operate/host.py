@@ -1,0 +1,287 @@
+"""The host of a live axis: it makes the board, runs the loop in a thread, asks, and hears how that has ended."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from detent.axisfile.tables import AxisSpec
+from detent.control import operation as ops
+from detent.control.axis_states import STATE_NAMES
+from detent.control.operation import ENDS, OperationParams
+from detent.errors import DetentError
+from detent.methods.method import Live, Method, Work
+from detent.operate.loop import INBOX, PULLS, Board, run_loop
+from detent.operate.realtime import ask_for_time
+from detent.operate.scope import Scope
+
+PERIOD = 1e-3  # of the loop [s]
+LEASE = 0.2  # time that a jog lives without being kept [s]
+LEAST_WINDOW = 0.02  # shortest time in the window until a command is done [s]
+REST = 10.0  # time that an axis is given to come to rest before its loop ends [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a command has ended."""
+
+    id: int
+    how: int  # `operation.DONE`, ABORTED, REFUSED or FAILED
+    why: int  # reason or code, 0 where there is none
+    by: int  # of one that was aborted: id of what did it, 0 for a line
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A request, and the period in which it was taken."""
+
+    period: int
+    fields: tuple[int, int, int, int, int, float, float]
+
+
+@dataclass
+class Log:
+    """All that came from outside: who repeats it, repeats the session."""
+
+    asked: list[Asked] = field(default_factory=list[Asked])
+    pulled: list[int] = field(default_factory=list[int])  # periods of the stop line; negative of the off line
+    pieces: list[bytes] = field(default_factory=list[bytes])  # of jobs, in the order in which requests laid them ready
+
+
+def operation_params(**more: Any) -> Any:
+    """Give a method what it fills its `OperationParams` with.
+
+    That is ``make(look, window, (lowest, highest), *motions)``: time between two looks and time in the window [s], the
+    soft limits, and the motions that it offers.
+    """
+
+    def make(look: float, window: float, limits: tuple[float, float], *motions: int) -> OperationParams:
+        takes = sum(1 << kind for kind in (*ops.MANAGED, *motions))
+        looks = math.ceil(max(window, LEAST_WINDOW) / look - 1e-9)
+        lease = math.floor(LEASE / look + 1e-9)
+        return OperationParams(
+            window_looks=looks, lease_looks=lease, lowest=limits[0], highest=limits[1], takes=takes, creep=0.1, **more
+        )
+
+    return make
+
+
+class Host:
+    """An axis that runs in its loop; `wall` False lets it run as fast as it can, when `run` is called."""
+
+    def __init__(  # noqa: PLR0913 - an axis and its clock
+        self, method: Method[Any], spec: AxisSpec, *, motor: str = "", period: float = PERIOD, speed: float = 1.0,
+        wall: bool = True, careful: bool = True, channels: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        make = operation_params(careful=int(careful))
+        self.axis: Live = method.live(spec, make, motor)
+        self.board: Any = Board()
+        loop = self.board.loop
+        loop.period, loop.ticks, loop.wall = round(period * 1e9), period * speed / self.axis.tick, int(wall)
+        self.board.operation.trust = ops.REFERENCED
+        self.scope = Scope(self.board, type(self.axis.state), channels)
+        self.log = Log()
+        self._ids = self._read = self._noted = self._pulls = 0
+        self._thread: threading.Thread | None = None
+        self._ended: dict[int, Ending] = {}
+        self.job: Work | None = None  # the last one begun
+        self._of_job: dict[str, int] = {}
+        self._job_id = self._laid = 0
+
+    # ---- the loop
+
+    def run(self, periods: int) -> int:
+        """Run periods in this thread."""
+        done = self._run(periods)
+        self.note()
+        return done
+
+    def _run(self, periods: int) -> int:
+        axis = self.axis
+        return run_loop(
+            axis.params, axis.state, axis.live, axis.memory, self.board, self.scope.ring, self.scope.of_board,
+            self.scope.of_axis, periods, *axis.feed,
+        )  # fmt: skip
+
+    @property
+    def is_running(self) -> bool:
+        """True while the loop runs in its thread."""
+        return self._thread is not None
+
+    def start(self) -> list[str]:
+        """Run the loop in a thread of its own; gives what the system did not permit."""
+        self.run(0)  # compiles
+        self.board.loop.deadline = 0
+        ready, missing = threading.Event(), list[str]()
+
+        def loop() -> None:
+            missing.extend(ask_for_time())
+            ready.set()
+            self._run(1 << 62)
+
+        self._thread = threading.Thread(target=loop, name="loop", daemon=True)
+        self._thread.start()
+        ready.wait()
+        self.run_until_ready()
+        return missing
+
+    @property
+    def is_alive(self) -> bool:
+        """True while the thread of the loop runs."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def run_until_ready(self) -> None:
+        """Let time pass until the axis could be enabled."""
+        self._until(lambda: bool(self.board.operation.answer.ready))
+
+    def close(self) -> None:
+        """Stop, wait for rest, take the torque away, and end the loop."""
+        self.stop()
+        self._until(lambda: bool(self.board.operation.answer.rests))
+        self.off()
+        pulls = self.board.loop.offs
+        self._until(lambda: self.board.operation.offs == pulls)
+        self.board.loop.leave = 1
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _until(self, met: Callable[[], bool]) -> None:
+        """Let time pass until something holds, but not for ever; a few periods at least, for the loop to see a line."""
+        begin, period = int(self.board.loop.periods), self.board.loop.period * 1e-9
+        while self.board.loop.periods < begin + 3 or (not met() and self.board.loop.periods < begin + REST / period):
+            if self._thread is None:
+                self.run(1)
+            elif not self._thread.is_alive():
+                return
+            else:
+                time.sleep(period)
+
+    # ---- asking
+
+    def ask(self, kind: int, value: float = 0.0, speed: float = 1.0, **more: int) -> int:
+        """Write a request; gives the id under which it will end. `more`: id, epoch, client."""
+        box, number = self.board.inbox, self.board.inbox.written + 1
+        if not self._has_room():
+            raise BlockingIOError("the mailbox is full")
+        command = more.get("id") or self._next_id()
+        epoch, client = more.get("epoch", int(self.board.operation.epoch)), more.get("client", 1)
+        write_request(box, number, kind, command, epoch, client, value, speed)
+        return command
+
+    def work(self, job: Any, client: int = 1) -> int:
+        """Begin a job; gives the id under which it will end. Its pieces are laid ready whenever the host takes note."""
+        if self.axis.work is None:
+            raise DetentError("got a job; expected: commands without one, for this axis does none live; ask for moves")
+        self.job = self.axis.work(job)
+        self._of_job = {"epoch": int(self.board.operation.epoch), "client": client}
+        self._job_id, self._laid = self.ask(ops.JOB, self.job.pieces, **self._of_job), 0
+        return self._job_id
+
+    def _feed(self) -> None:
+        """Lay pieces ready, as far as the job gives them; the loop sees each when it takes the request for it."""
+        while self.job is not None and self.board.operation.running == self._job_id:
+            piece = self.job.piece() if self._has_room() else None
+            if piece is None:
+                return
+            self._laid += 1
+            self.lay(piece, self._laid)
+            self.ask(ops.FEED, self._laid, **self._of_job)
+
+    def lay(self, piece: bytes, number: int) -> None:
+        """Put a piece of a job, the first has number 1, in its place; nobody looks there before a request says so."""
+        tray: Any = self.axis.tray
+        tray[(number - 1) % len(tray)] = np.frombuffer(piece, np.uint8)
+        self.log.pieces.append(piece)
+
+    def _has_room(self) -> bool:
+        return self.board.inbox.written - self.board.operation.taken < INBOX
+
+    def _next_id(self) -> int:
+        self._ids += 1
+        return self._ids
+
+    def stop(self) -> None:
+        """Pull the stop line: no mailbox, no queue."""
+        self.board.loop.stops += 1
+
+    def off(self) -> None:
+        """Pull the line that takes the torque away."""
+        self.board.loop.offs += 1
+
+    # ---- hearing
+
+    def note(self) -> None:
+        """Take down what was taken and what has ended since the last time."""
+        box, loop = self.board.inbox, self.board.loop
+        while self._noted < self.board.operation.taken:
+            k = self._noted % INBOX
+            taken = (box.number[k], box.kind[k], box.id[k], box.epoch[k], box.client[k], box.value[k], box.speed[k])
+            self.log.asked.append(Asked(int(box.period[k]), taken))
+            self._noted += 1
+        while self._pulls < loop.pulls:
+            self.log.pulled.append(int(loop.pulled[self._pulls % PULLS]))
+            self._pulls += 1
+        for ending in self._new_endings():
+            self._ended[ending.id] = ending
+        self._feed()
+
+    def _new_endings(self) -> Iterator[Ending]:
+        e = self.board.operation.endings
+        while self._read < e.count:
+            k = self._read % ENDS
+            yield Ending(int(e.id[k]), int(e.how[k]), int(e.why[k]), int(e.by[k]))
+            self._read += 1
+
+    def ending(self, command: int) -> Ending | None:
+        """How a command has ended; None while it has not."""
+        self.note()
+        return self._ended.get(command)
+
+    def until_ended(self, command: int, periods: int = 100_000) -> Ending:
+        """Without a wall clock: run until a command has ended."""
+        for _ in range(periods):
+            found = self.ending(command)
+            if found is not None:
+                return found
+            self.run(1)
+        raise TimeoutError(f"command {command} has not ended within {periods} periods")
+
+    @property
+    def state(self) -> str:
+        """Name of the state."""
+        return STATE_NAMES[int(self.board.operation.state)]
+
+
+def write_request(  # noqa: PLR0913 - a record
+    box: Any, number: int, kind: int, command: int, epoch: int, client: int, value: float, speed: float
+) -> None:
+    """One writer's request: all of the record, then the count."""
+    k = (number - 1) % INBOX
+    box.number[k], box.kind[k], box.id[k], box.epoch[k], box.client[k] = number, kind, command, epoch, client
+    box.value[k], box.speed[k] = value, speed
+    box.check[k] = ops.sum_of(number, kind, command, epoch, client, float(value), float(speed))
+    box.written = number
+
+
+def repeat(host: Host, log: Log, periods: int) -> None:
+    """Do a session again: each request and each pull in the period in which it was taken."""
+    asked, pulled, pieces = iter(log.asked), iter(log.pulled), iter(log.pieces)
+    request, pull = next(asked, None), next(pulled, None)
+    loop = host.board.loop
+    while loop.periods < periods:
+        upto = min([periods, *(at - 1 for at in (request and request.period, pull and abs(pull)) if at)])
+        host.run(upto - loop.periods)
+        while pull is not None and abs(pull) == loop.periods + 1:
+            loop.stops, loop.offs = loop.stops + (pull > 0), loop.offs + (pull < 0)
+            pull = next(pulled, None)
+        while request is not None and request.period == loop.periods + 1:
+            if request.fields[1] == ops.FEED:
+                host.lay(next(pieces), round(request.fields[5]))
+            write_request(host.board.inbox, *request.fields)
+            request = next(asked, None)
+        host.run(min(1, periods - loop.periods))

@@ -1,0 +1,28 @@
+"""What the thread of the loop asks of the system: priority, memory that stays, a processor of its own."""
+
+import ctypes
+import gc
+import os
+import sys
+from contextlib import suppress
+
+PRIORITY = 80  # of SCHED_FIFO
+MCL_CURRENT_AND_FUTURE = 3
+PR_SET_TIMERSLACK = 29
+
+
+def ask_for_time() -> list[str]:
+    """Ask for the calling thread; gives what was not permitted, each with what permits it."""
+    gc.collect()
+    gc.freeze()
+    libc = ctypes.CDLL(None, use_errno=True)
+    missing: list[str] = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except (OSError, AttributeError):
+        missing.append(f"real-time priority; permit it with: sudo setcap cap_sys_nice,cap_ipc_lock+ep {sys.executable}")
+        with suppress(AttributeError):
+            libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    if not hasattr(libc, "mlockall") or libc.mlockall(MCL_CURRENT_AND_FUTURE) != 0:
+        missing.append("memory that is never swapped out; permit it with: ulimit -l unlimited")
+    return missing

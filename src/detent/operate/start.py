@@ -1,0 +1,109 @@
+"""An axis file made live: `detent live`, `detent.live` and `detent.connect` begin here."""
+
+import fcntl
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from detent.errors import AxisError, DetentError
+from detent.methods.load import read_axis
+from detent.methods.registry import METHODS
+from detent.operate.channel import Channel, Connection, channel_of
+from detent.operate.client import LiveAxis
+from detent.operate.host import PERIOD, Host
+from detent.operate.session import Session
+
+SPEEDS = 0.1, 10.0
+
+
+def make_host(
+    file: Path | str, overrides: Sequence[str] = (), *, motor: str = "", speed: float = 1.0, wall: bool = True
+) -> tuple[Host, str]:
+    """Host of the simulated axis of a file, and its name."""
+    if not SPEEDS[0] <= speed <= SPEEDS[1]:
+        raise DetentError(
+            f"speed {speed:g}: time may pass {SPEEDS[0]:g} to {SPEEDS[1]:g} times as fast; choose between"
+        )
+    spec = read_axis(file, overrides).spec
+    method = METHODS[spec.axis.method]
+    if not method.lives:
+        raise DetentError(f"{file}: the method {spec.axis.method} has no operator yet; simulate it with: detent run")
+    return Host(method, spec, motor=motor, period=PERIOD, speed=speed, wall=wall), spec.axis.name
+
+
+def live(
+    file: Path | str, overrides: Sequence[str] = (), *, motor: str = "", speed: float = 1.0, wall: bool = True
+) -> LiveAxis:
+    """Run the axis of a file live, in this process.
+
+    Parameters
+    ----------
+    file : path
+        Axis file.
+    overrides : sequence of str, optional
+        Values in place of those of the file, as ``"method.position_gain=30"``.
+    motor : str, optional
+        Which motor, of a file with several.
+    speed : float, optional
+        How fast time passes on the simulated axis, 0.1 to 10.
+    wall : bool, optional
+        False: time passes only while a command is waited for, as fast as it can.
+
+    Returns
+    -------
+    LiveAxis
+        To be used in a ``with`` block, behind which the axis is at rest and without torque.
+    """
+    host, name = make_host(file, overrides, motor=motor, speed=speed, wall=wall)
+    if wall:
+        host.start()
+    else:
+        host.run_until_ready()
+    return LiveAxis(Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed}))
+
+
+def connect(file: Path | str) -> LiveAxis:
+    """The axis of a file that another process runs live, or the one behind a socket.
+
+    Parameters
+    ----------
+    file : path
+        Axis file that was given to ``detent live``, or the socket that it has printed.
+
+    Returns
+    -------
+    LiveAxis
+        Closing it leaves the axis as it is.
+    """
+    path = Path(file)
+    return LiveAxis(Connection(path if path.suffix == ".sock" else channel_of(path)))
+
+
+class Place:
+    """The right to run an axis: one process at a time."""
+
+    def __init__(self, file: Path) -> None:
+        self.channel = channel_of(file)
+        self._lock: IO[str] = self.channel.with_suffix(".lock").open("a+")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._lock.seek(0)
+            who = self._lock.read().strip() or "another process"
+            self._lock.close()
+            told = f"process {who} runs it live already; end that one, or use: detent connect {file}"
+            raise AxisError(f"{file}: {told}") from error
+        self._lock.truncate(0)
+        self._lock.write(str(os.getpid()))
+        self._lock.flush()
+
+    def serve(self, session: Session) -> Channel:
+        """Open its channel."""
+        channel = Channel(session, self.channel)
+        channel.start()
+        return channel
+
+    def leave(self) -> None:
+        """Let others run it."""
+        self._lock.close()

@@ -1,0 +1,167 @@
+"""Commands in words: what a person, a program or a page says, and what it is told."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+from detent.control import operation as ops
+from detent.control.axis_states import STATE_NAMES
+from detent.errors import REFUSAL_TEXT, AxisError, DetentError
+from detent.units import format_quantity, parse_quantity
+
+TRUSTS = ("unknown", "restored", "referenced")
+
+
+class Word(NamedTuple):
+    """A command: its kind, what its value is in the unit of the axis (empty: none; "number": a position number)."""
+
+    kind: int
+    value: str = ""
+    help: str = ""
+
+
+WORDS = {
+    "enable": Word(ops.ENABLE, help="take torque; the target is where the axis is"),
+    "disable": Word(ops.OFF, help="take the torque away, now"),
+    "stop": Word(ops.STOP, help="come to rest as soon as the limits let it, and hold"),
+    "reset": Word(ops.RESET, help="leave a fault; never moves"),
+    "confirm": Word(ops.CONFIRM, help="the first motion went as expected: full speed from now on"),
+    "move_to": Word(ops.MOVE_TO, "place", "to a position"),
+    "move_by": Word(ops.MOVE_BY, "place", "by a way"),
+    "jog": Word(ops.JOG, "speed", "at a velocity for as long as it is kept"),
+    "keep": Word(ops.KEEP, help="go on with the jog"),
+    "go_to": Word(ops.GO, "number", "to a numbered position"),
+    "home": Word(ops.HOME, help="find the reference"),
+    "take": Word(ops.TAKE, help="take over the command; a motion under way is stopped first"),
+    "trust": Word(ops.TRUST, "number", "0 position unknown, 1 restored, 2 referenced"),
+    "leave": Word(ops.LEAVE, help="command no longer; a motion under way is stopped"),
+    "order": Word(ops.ORDER, "number", "an order of the control word of CiA 402, 0 shutdown to 6 fault reset"),
+}
+
+
+class CommandError(AxisError):
+    """A live command that was not done: `reason` says why, `remedy` what to do, `code` is the number of both."""
+
+    def __init__(self, command: str, what: str, code: int, reason: str, remedy: str) -> None:
+        self.command, self.code, self.reason, self.remedy = command, code, reason, remedy
+        told = f"{command} {what}"
+        told += f" ({code})" if code else ""
+        super().__init__("; ".join(filter(None, (f"{told}: {reason}" if reason else told, remedy))))
+
+
+class CommandRefusedError(CommandError):
+    """A command that was not taken: nothing has changed."""
+
+
+class CommandAbortedError(CommandError):
+    """A command that another one, or a stop, has ended."""
+
+
+class CommandFailedError(CommandError):
+    """A command that a fault has ended."""
+
+
+ERRORS: dict[str, type[CommandError]] = {
+    "refused": CommandRefusedError, "aborted": CommandAbortedError, "failed": CommandFailedError,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a command has ended, for people."""
+
+    id: int
+    how: str  # done, aborted, refused or failed
+    code: int = 0
+    reason: str = ""
+    remedy: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def ended(id_: int, how: int, why: int, by: int, fault: str) -> Ended:
+    """What is told of an ending; `fault` is the sentence of a fault that the method knows."""
+    name = ops.ENDINGS[how]
+    if how == ops.ABORTED:
+        return Ended(id_, name, 0, f"command {by} took its place" if by else "a stop ended it")
+    text = fault if how == ops.FAILED and fault else REFUSAL_TEXT.get(why, "") if why else ""
+    reason, _, remedy = text.partition("; ")
+    return Ended(id_, name, why, reason, remedy)
+
+
+def value_of(word: Word, value: object, unit: str) -> float:
+    """Read what a command is about: a number in SI units, or a text with a unit such as "5 mm"."""
+    if not word.value:
+        return 0.0
+    wanted = {"place": unit, "speed": f"{unit}/s", "number": ""}[word.value]
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        shown = "nothing" if value is None else repr(value)
+        raise DetentError(f"a command with {shown}; it needs {example_of(wanted)}")
+    if isinstance(value, str):
+        try:
+            return parse_quantity(value, wanted) if wanted else float(value)
+        except (DetentError, ValueError) as error:
+            raise DetentError(f"{value!r} is not {example_of(wanted)}") from error
+    return float(value)
+
+
+def example_of(unit: str) -> str:
+    """What a command takes, with an example.
+
+    >>> example_of("m"), example_of("rad/s"), example_of("")
+    ('a value such as "5 mm"', 'a value such as "30 deg/s"', 'a number such as 3')
+    """
+    examples = {"m": "5 mm", "m/s": "20 mm/s", "rad": "90 deg", "rad/s": "30 deg/s"}
+    return f'a value such as "{examples[unit]}"' if unit in examples else "a number such as 3"
+
+
+def status_of(host: Any, fault: str) -> dict[str, Any]:
+    """The axis now, as plain data; positions in SI units."""
+    o, loop = host.board.operation, host.board.loop
+    a = o.answer
+    kind = ops.COMMAND_NAMES[int(o.kind) - 1] if o.kind else ""
+    return {
+        "state": STATE_NAMES[o.state], "position": a.position, "velocity": a.velocity, "commanded": a.commanded,
+        "error": a.error, "effort": a.effort, "limited": bool(a.limited), "rests": bool(a.rests),
+        "in_window": bool(a.near), "ready": bool(a.ready), "trust": TRUSTS[o.trust], "confirmed": bool(o.confirmed),
+        "fault": {"code": int(o.fault), "text": fault or REFUSAL_TEXT.get(o.fault, "")} if o.fault else None,
+        "running": {"id": int(o.running), "command": kind} if o.running else None, "epoch": int(o.epoch),
+        "client": int(o.client), "last_stop": o.last_stop,
+        "loop": {
+            "periods": int(loop.periods), "skipped": int(loop.skipped), "overruns": int(loop.overruns),
+            "worst": loop.worst * 1e-9, "mean_work": loop.work * 1e-9 / max(loop.periods, 1),
+            "longest_work": loop.longest * 1e-9, "late": [int(n) for n in loop.late],
+        },
+    }  # fmt: skip
+
+
+def why_not_moving(status: dict[str, Any]) -> list[tuple[str, str]]:
+    """Every condition of a motion that is not met, each with what to do."""
+    found: list[tuple[str, str]] = []
+    state, fault = status["state"], status["fault"]
+    if fault:
+        found.append((f"fault {fault['code']}: {fault['text']}", "mend its cause, then reset"))
+    if not status["ready"]:
+        found.append(("the axis is not ready yet", "wait; after power-on it takes its first position"))
+    if state == "quick stop active":
+        found.append(("a quick stop holds it", "enable"))
+    elif state != "operation enabled" and not fault:
+        found.append((f"no torque: {state}", "enable"))
+    if status["trust"] == "unknown":
+        found.append(("the position is not known: it creeps, and goes to no position", "home"))
+    if state == "operation enabled" and not status["confirmed"]:
+        found.append(("the first motion is held to a tenth of the speed", "look at it, then confirm"))
+    if status["limited"]:
+        found.append(("the command is at its limit", "look for what holds the axis"))
+    return found
+
+
+def describe_status(status: dict[str, Any], unit: str) -> str:
+    """One line for a terminal."""
+    place = format_quantity(status["position"], unit, 6)
+    moving = "" if status["rests"] else f", {format_quantity(status['velocity'], unit + '/s')}"
+    fault = f"; fault {status['fault']['code']}: {status['fault']['text']}" if status["fault"] else ""
+    error = "" if math.isclose(status["error"], 0.0) else f", error {format_quantity(status['error'], unit, 3)}"
+    return f"{status['state']}, {place} ({status['trust']}){moving}{error}{fault}"

@@ -1,0 +1,180 @@
+"""`detent live` and `detent connect` as processes; `detent.live` and `detent.connect` in Python."""
+
+import asyncio
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+
+import detent
+from detent.errors import AxisError, DetentError
+from detent.operate.words import CommandError, CommandRefusedError
+
+pytestmark = [
+    pytest.mark.compiled,
+    pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time"),
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An axis file, and a folder of its own for channels."""
+    made = tmp_path_factory.mktemp("live")
+    shutil.copy(detent.example("filtered_servo.toml"), made / "slide.toml")
+    made.chmod(0o700)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(made))
+        yield made
+
+
+class Running:
+    """`detent live` in another process."""
+
+    def __init__(self, file: Path, *more: str) -> None:
+        command = [sys.executable, "-m", "detent", "live", str(file), "--json", *more]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        self.started: dict[str, Any] = json.loads(self.process.stdout.readline())
+
+    def end(self, number: int = signal.SIGINT) -> dict[str, Any]:
+        """Interrupt it; what it says at its end."""
+        self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=30)
+        assert self.process.returncode == 0
+        assert all(line.startswith("First run") for line in err.splitlines())
+        return json.loads(out)["ended"]
+
+
+@pytest.fixture
+def running(folder: Path) -> Iterator[Running]:
+    """The axis live."""
+    one = Running(folder / "slide.toml")
+    yield one
+    if one.process.poll() is None:
+        one.process.kill()
+        one.process.communicate()
+
+
+def run(*args: str) -> subprocess.CompletedProcess[str]:
+    """A command in another process."""
+    return subprocess.run([sys.executable, "-m", "detent", *args], capture_output=True, text=True, check=False)
+
+
+def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(folder: Path, running: Running) -> None:
+    file = str(folder / "slide.toml")
+    assert running.started["simulated"] is True
+    assert running.started["state"] == "switch on disabled"
+    assert running.started["period"] == 1e-3
+    with detent.connect(file) as axis:
+        assert axis.about["name"]
+        axis.enable()
+        axis.confirm()
+        at = axis.position
+        axis.move_by("5 mm")
+        assert axis.position == pytest.approx(at + 5e-3, abs=1e-4)
+    told = run("connect", file, "--json")
+    assert told.returncode == 0
+    status = json.loads(told.stdout)["status"]
+    assert (status["state"], status["client"]) == ("operation enabled", 0)
+    assert status["position"] == pytest.approx(at + 5e-3, abs=1e-4)
+    refused = run("connect", file, "move_to", "7 m")
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert "31" in refused.stderr
+    assert run("connect", file, "move_to", "7 V").returncode == 2
+    with detent.connect(file) as axis:  # interrupted while it moves: at rest before it ends
+        axis.do("jog", "50 mm/s", wait=False)
+        ended = running.end()
+    assert ended["rests"] is True
+    assert ended["state"] == "switch on disabled"
+    assert run("connect", file).returncode == 1
+
+
+def test_55_a_second_one_on_the_same_axis_is_refused(folder: Path, running: Running) -> None:
+    second = run("live", str(folder / "slide.toml"), "--for", "0")
+    assert (second.returncode, second.stdout) == (1, "")
+    assert str(running.process.pid) in second.stderr
+    running.end(signal.SIGTERM)
+
+
+def test_18_a_jog_of_a_killed_program_stops_within_its_lease(folder: Path, running: Running) -> None:
+    """SIGSTOP: the connection stays, nobody keeps the jog."""
+    script = (
+        "import sys, time, detent\n"
+        "axis = detent.connect(sys.argv[1])\n"
+        "axis.enable(); axis.confirm()\n"
+        "with axis.jog('20 mm/s'):\n"
+        "    print('jogs', flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    file = folder / "slide.toml"
+    program = subprocess.Popen([sys.executable, "-c", script, str(file)], stdout=subprocess.PIPE, text=True)
+    assert program.stdout is not None
+    assert program.stdout.readline() == "jogs\n"
+    with detent.connect(file) as watcher:
+        while watcher.status["rests"]:
+            pass
+        os.kill(program.pid, signal.SIGSTOP)
+        while watcher.status["running"]:
+            pass
+        status = watcher.status
+        while not status["rests"]:
+            status = watcher.status
+        assert status["fault"] is None
+        os.kill(program.pid, signal.SIGKILL)
+        program.communicate()
+        while watcher.status["client"]:  # its right to command ends with it
+            pass
+    running.end()
+
+
+def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        assert [what for what, _ in axis.why_not_moving] == [
+            "no torque: switch on disabled",
+        ]
+        axis.enable()
+        assert axis.why_not_moving[0][1] == "look at it, then confirm"
+        axis.confirm()
+        assert axis.why_not_moving == []
+        at = axis.position
+
+        async def there_and_back() -> None:
+            await axis.move_by("2 mm", wait=False)
+            await axis.move_by(-0.002, wait=False)
+
+        asyncio.run(there_and_back())
+        assert axis.position == pytest.approx(at, abs=1e-5)
+        seen = next(axis.telemetry())
+        assert seen.state == "operation enabled"
+        with pytest.raises(CommandRefusedError) as refused:
+            axis.move_to("9 m")
+        assert (refused.value.code, refused.value.exit_status) == (31, 1)
+        assert refused.value.remedy
+        long = axis.move_by("100 mm", wait=False)
+        axis.stop()
+        with pytest.raises(CommandRefusedError, match="a stop came after"):  # no time passes between the two
+            long.wait()
+        with pytest.raises(CommandError, match="105"):
+            axis.go_to(3)
+        assert "operation enabled" in repr(axis)
+    with pytest.raises(DetentError, match=r"0\.1 to 10"):
+        detent.live(folder / "slide.toml", speed=20.0)
+
+
+@pytest.mark.parametrize("value", [None, True, "5", "5 V", "x", [1], {}, "nan mm"])
+def test_a_value_that_makes_no_sense_is_told(folder: Path, value: Any) -> None:
+    with detent.live(folder / "slide.toml", wall=False) as axis, pytest.raises(DetentError, match="such as"):
+        axis.move_to(value)
+
+
+def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:
+    with pytest.raises(AxisError, match="detent live"):
+        detent.connect(folder / "nobody.toml")
