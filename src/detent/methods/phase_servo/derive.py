@@ -256,12 +256,9 @@ def _motion(m: PhaseFigures) -> Iterator[Derived]:
     yield quantity_figure(
         "deceleration after the change of mode", m.switch_deceleration, "m/s^2", f"v^2 / 2 / {way} (threshold x step)"
     )
-    yield quantity_figure(
-        "time after the change of mode", m.switch_time, "s", f"2 x {way} / v, at constant deceleration"
-    )
     if math.isfinite(m.approach.settling):
         formula = f"until a move stays within {spec.arrived_steps} steps, with whole counts, friction and winding"
-        yield quantity_figure("settling from there", m.approach.settling, "s", formula)
+        yield quantity_figure("settling after the change of mode", m.approach.settling, "s", formula)
     supply, resistance = spec.drive.supply, m.resistance
     yield quantity_figure("moving mass", m.mass, "kg", "carriage + (rotor + pulley) / r^2")
     yield quantity_figure("force at the current limit", m.force_limit, "N", "limits.effort x k")
