@@ -147,7 +147,7 @@ def test_any_file_gives_a_job_or_an_input_error(data, ending, pitch, tmp_path_fa
 def test_a_text_strikes_its_characters_and_no_others(text, left_margin, hammer_time):
     ink = [char for char in text if not char.isspace()]
     if not ink:
-        with pytest.raises(InputError, match=r"nothing|empty"):
+        with pytest.raises(InputError, match=r"printable|empty"):
             text_job(text, name="job.txt", pitch=PITCH)
         return
     job = text_job(text, name="job.txt", pitch=PITCH, left_margin=left_margin, hammer_time=hammer_time)

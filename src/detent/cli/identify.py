@@ -115,7 +115,9 @@ def _check_outputs(axis: Path | None, *targets: Path | None, force: bool) -> Pat
         if path is not None:
             check_target(path, (ending,), what, force=force or (path is write and is_kept))
     if job is not None and job in (write, axis):
-        raise DetentError(f"--job {job}: got the name of the axis file; expected: a file of its own; choose another")
+        raise DetentError(
+            f"--job {job}: got the name of the axis file; expected: a different file; choose another name"
+        )
     return axis
 
 

@@ -151,7 +151,7 @@ def test_an_axis_file_of_somebody_gets_the_values_and_keeps_the_rest(log: str) -
     lines = answer.out.splitlines()
     told = lines[lines.index("written: slide.toml") + 1 :]
     assert any(line.startswith("  mechanics.motor_mass: '4400 g' -> '39") for line in told)
-    assert "not as the axis file: mass: the file says 4.4 kg" in answer.out
+    assert "differs from the axis file: mass: the file states 4.4 kg" in answer.out
     made = Path("slide.toml").read_bytes()
     assert made.count(b"\n") == made.count(b"\r\n")
     same = [

@@ -14,7 +14,7 @@ MOVES = "target [mm],dwell [ms]\n5,10\n2,10\n"
 JOBS = {
     "cascade": ("job.csv", MOVES),
     "filtered_servo": ("job.csv", MOVES),
-    "phase_servo": ("job.csv", MOVES),
+    "phase_servo": ("job.csv", "target [mm],dwell [ms]\n6,10\n2,10\n"),  # whole pitches
     "print_head": ("job.txt", "a\n"),
     "rotary_table": ("job.toml", "[[step]]\ngo = 1\n"),
     "stepper_envelope": ("job.csv", "x [mm]\n5\n2\n"),

@@ -207,12 +207,12 @@ def texts(pair: tuple[Path, Path]) -> list[str]:
 def test_files_written_together_get_their_names_at_one_time(pair: tuple[Path, Path]) -> None:
     with together():
         for file in pair:
-            write_text(file, "new")
+            write_text(file, "new", force=True)
         assert [file.read_text() for file in pair] == ["old", "old"]
         with pytest.raises(DiskError, match="another process is writing there"):
-            write_text(pair[0], "another")
+            write_text(pair[0], "another", force=True)
     assert texts(pair) == ["new", "new"]
-    write_text(pair[0], "alone")
+    write_text(pair[0], "alone", force=True)
     assert texts(pair) == ["alone", "new"]
 
 
@@ -222,8 +222,8 @@ def test_when_the_second_fails_the_first_gets_no_name_either(pair: tuple[Path, P
 
     def fail() -> None:
         with together():
-            write_text(pair[0], "new")
-            with writing(pair[1]):
+            write_text(pair[0], "new", force=True)
+            with writing(pair[1], force=True):
                 raise error
 
     with pytest.raises((DiskError, KeyError)) as told:
@@ -253,7 +253,7 @@ def test_ended_while_they_are_named_all_get_their_names(
     with suppress(KeyboardInterrupt):
         with together():
             for file in pair:
-                write_text(file, "new")
+                write_text(file, "new", force=True)
         kept.extend(abandon())
     assert texts(pair) == ["new", "new"]
     assert sorted(kept) == sorted(pair)
@@ -264,8 +264,8 @@ def test_ended_before_all_are_whole_none_gets_its_name(
 ) -> None:
     monkeypatch.setattr(files_text, "_WRITTEN", {})
     with suppress(KeyboardInterrupt), together():
-        write_text(pair[0], "new")
-        with writing(pair[1]) as part:
+        write_text(pair[0], "new", force=True)
+        with writing(pair[1], force=True) as part:
             part.write_text("half")
             assert abandon() == []
             assert texts(pair) == ["old", "old"]

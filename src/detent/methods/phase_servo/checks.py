@@ -285,19 +285,22 @@ def _settling(m: PhaseFigures) -> Iterator[Caution]:
         "lower KP1, KP2 or KP3 of method.position_gains, or shorten the speed sample (clock.sample_tap)",
     )
     if m.gain_margin < LEAST_GAIN_MARGIN:
-        value, consequence = f"{m.gain_margin:.3g}", "the carriage oscillates about its target, or barely comes to rest"
+        value, consequence = f"{m.gain_margin:.3g}", "the carriage oscillates about its target, or barely settles"
         yield Caution("gain margin of the position loop", value, f"at least {LEAST_GAIN_MARGIN:g}", consequence, lower)
     elif math.isinf(end.settling) and m.gain_margin < STIFF:
-        value, consequence = f"{end.off_at_ready:.2g} steps", "whole counts of the speed word swing it about its target"
+        value, consequence = (
+            f"{end.off_at_ready:.2g} steps",
+            "it oscillates about its target by whole counts of the speed word",
+        )
         yield Caution("carriage after ready", value, arrived, consequence, lower)
     elif end.overshoot > m.spec.arrived_steps:
-        consequence = "the carriage runs past its target and swings back after the axis has said that it is ready"
+        consequence = "the carriage overshoots and swings back after the axis has signalled ready"
         yield Caution("overshoot of a move", f"{end.overshoot:.2g} steps", arrived, consequence, _calmer(m))
     elif ready < end.settling:
         value = f"{text(ready, 's')}, when a move may be {end.off_at_ready:.2g} steps off"
         allowed = f"at least the settling from the change of mode, {text(end.settling, 's')}"
         advice = remedy.least("method.ready_time", end.settling)
-        yield Caution("method.ready_time", value, allowed, "the axis says that it is ready before it stands", advice)
+        yield Caution("method.ready_time", value, allowed, "the axis signals ready before it has settled", advice)
     if rest > 2:
         value = f"{m.breakaway_counts:.3g} counts, {rest:.3g} steps of error"
         allowed = f"up to 2 steps, {2 * k1 * k3} counts"

@@ -84,7 +84,7 @@ class MechanicsTable(Table, frozen=True):
     pulley_circumference: Length = required(
         "carriage travel per motor turn", '"50.8 mm"', start='"40 mm"', ge=1e-4, le=10.0
     )
-    carriage_mass: Mass = required("carriage with its load", '"0.6 kg"', gt=0.0, le=1000.0)
+    carriage_mass: Mass = required("carriage with its load", '"0.6 kg"', start='"1 kg"', gt=0.0, le=1000.0)
     pulley_inertia: Inertia = optional("pulley and detector disc", 0.0, ge=0.0, le=0.1)
     start_position: Length = optional(
         "carriage position at power-on, from the left end", math.nan, derived="0.1 x limits.travel", ge=0.0
@@ -95,7 +95,7 @@ class MechanicsTable(Table, frozen=True):
 class DetectorTable(Table, frozen=True):
     """Resolver or Inductosyn on the motor shaft, and its comparator."""
 
-    pitches_per_revolution: int = required("electrical turns per motor turn", "120", ge=1, le=100_000)
+    pitches_per_revolution: int = required("electrical turns per motor turn", "120", start="60", ge=1, le=100_000)
     counts: int = optional(
         "steps per pitch N, counts of the carrier cycle (section 2)",
         64,

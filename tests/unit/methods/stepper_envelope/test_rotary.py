@@ -482,7 +482,7 @@ def test_a_figure_of_the_tables_is_in_degrees(dial, tmp_path, monkeypatch):
     from detent.methods.stepper_envelope import envelope_files
 
     kept = Figure()
-    monkeypatch.setattr(envelope_files, "new_figure", contextmanager(lambda *_: iter([kept])))
+    monkeypatch.setattr(envelope_files, "new_figure", contextmanager(lambda *_, **__: iter([kept])))
     envelope_files.plot_envelope(envelope_tables(dial, "dial"), tmp_path / "dial.png")
     (area,) = kept.axes
     top, right = area.child_axes
