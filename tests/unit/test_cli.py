@@ -715,14 +715,19 @@ def check_told(words: tuple[str, ...], answer: Answer, reason: str) -> None:
 
 @contextmanager
 def files_up_to(size: int) -> Generator[None]:
-    """No file may grow beyond a size: as a full disk, but on every machine."""
+    """No file may grow beyond a size: as a full disk, but on every machine.
+
+    Python does not notice that the bytecode of what it imports here is cut short, and takes it at the next import.
+    """
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "dont_write_bytecode", True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.compiled
