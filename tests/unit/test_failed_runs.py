@@ -66,16 +66,16 @@ ORDINARY = {
     "cascade, stuck": Failure("cascade.toml", MOVES, "0 of 2 moves", ("limits.effort=1 N",)),
 }  # fmt: skip
 WIDE = {
-    "slide, stuck": Failure("filtered_servo.toml", MOVES, "breaks the axis loose", sticky("900 N")),
-    "slide, too fast": Failure("filtered_servo.toml", MOVES, "force beyond the effort", push("500 N", "0.7 s")),
+    "slide, stuck": Failure("filtered_servo.toml", MOVES, "blocked axis", sticky("900 N")),
+    "slide, too fast": Failure("filtered_servo.toml", MOVES, "force that exceeds the effort", push("500 N", "0.7 s")),
     "slide, late": Failure(
         "filtered_servo.toml", MOVES, "did not arrive within",
         ("method.in_position=0", "method.position_gain=0.2", "method.timeout=0.5 s", *sticky("9 N")),
     ),
     "slide, noise": Failure(
-        "filtered_servo.toml", MOVES, "says that it has arrived and stands", ("disturbance.lines.inserted=200 Hz",)
+        "filtered_servo.toml", MOVES, "signals arrival but rests", ("disturbance.lines.inserted=200 Hz",)
     ),
-    "carriage, stuck": Failure("phase_servo.toml", PITCHES, "breaks the axis loose", sticky("90 N")),
+    "carriage, stuck": Failure("phase_servo.toml", PITCHES, "blocked axis", sticky("90 N")),
     "head, carried away in a line": Failure(
         "print_head.toml", "letter.txt", "Stopped after 1 of 11 lines", push("-60 N", "8.1 s")
     ),

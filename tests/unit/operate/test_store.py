@@ -485,13 +485,15 @@ def test_stores_that_are_kept_aside_do_not_replace_one_another(path):
 
 @contextmanager
 def full_disk(limit):
-    """No file grows beyond so many bytes."""
+    """No file grows beyond so many bytes; no bytecode is written meanwhile, which would be cut short."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "dont_write_bytecode", True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_on_a_full_disk_no_motion_begins_and_one_that_runs_goes_on(store, tried):
