@@ -879,24 +879,13 @@ def test_27_fifty_moves_live_end_in_the_window_and_are_repeated():
 @pytest.mark.compiled
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop in wall time")
 def test_05_a_busy_thread_of_python_does_not_delay_the_loop():
-    """A thread that computes without yielding, beside the loop and beside one written in Python, in the same run."""
-    seconds, period = 4.0, 1e-3
+    """A thread that computes without yielding, beside the loop and beside one written in Python, in the same run.
 
-    def misses(busy: threading.Event | None) -> float:
-        bench = Bench("filtered_servo", wall=True)
-        bench.host.start()
-        begin = bench.loop.periods
-        if busy:
-            busy.set()
-        while bench.loop.periods - begin < seconds / period:
-            time.sleep(0.05)
-        if busy:
-            busy.clear()
-        share = bench.loop.skipped / (bench.loop.periods + bench.loop.skipped)
-        bench.host.close()
-        return share
-
-    busy, left = threading.Event(), threading.Event()
+    With and without it by turns; of each the best turn counts, for whatever else the machine does comes and goes.
+    Without real-time priority the thread takes a processor away, too; then it is compared with the loop in Python only.
+    """
+    period, busy, left = 1e-3, threading.Event(), threading.Event()
+    bench = Bench("filtered_servo", wall=True)
 
     def compute() -> None:
         while not left.is_set():
@@ -905,17 +894,28 @@ def test_05_a_busy_thread_of_python_does_not_delay_the_loop():
             else:
                 busy.wait(0.01)
 
+    def misses(seconds: float) -> float:
+        ran, skipped = int(bench.loop.periods), int(bench.loop.skipped)
+        while bench.loop.periods - ran < seconds / period:
+            time.sleep(0.05)
+        ran, skipped = bench.loop.periods - ran, bench.loop.skipped - skipped
+        return skipped / (ran + skipped)
+
     hog = threading.Thread(target=compute, daemon=True)
     hog.start()
-    alone = misses(None)
-    beside = misses(busy)
-    busy.set()
-    late = python_loop(1000, period)
-    busy.clear()
+    missing = bench.host.start()
+    alone, beside, late = [1.0], [1.0], [1.0]
+    for _ in range(6):
+        alone.append(misses(0.7))
+        busy.set()
+        beside.append(misses(0.7))
+        late.append(python_loop(200, period))
+        busy.clear()
+    bench.host.close()
     left.set()
     hog.join()
-    assert beside <= 1.5 * alone + 0.002
-    assert late > 0.2
+    assert min(late) > 0.2
+    assert min(beside) <= (0.1 * min(late) if missing else 1.5 * min(alone) + 0.002)
 
 
 def python_loop(periods: int, period: float) -> float:
