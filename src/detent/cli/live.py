@@ -16,6 +16,7 @@ from detent.errors import DetentError
 
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
+PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 FOR = "End after so many seconds by itself."
 WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
 
@@ -26,6 +27,7 @@ def live(
     overrides: Set = None,
     motor: Annotated[str, option("--motor", "NAME", "Which motor, of a file with several.")] = "",
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
+    period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
     *,
     as_json: Json = False,
@@ -36,7 +38,7 @@ def live(
     from detent.operate.start import Place, make_host
 
     place = Place(file)
-    host, name = make_host(file, overrides or [], motor=motor, speed=speed)
+    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
     missing, left = host.start(), threading.Event()
     session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
     channel = place.serve(session)
@@ -67,6 +69,16 @@ def live(
              f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
     if died:
         raise typer.Exit(NOT_DONE)
+
+
+def _seconds(period: str) -> float:
+    """A time with its unit [s]."""
+    from detent.units import QuantityError, parse_quantity
+
+    try:
+        return parse_quantity(period, "s")
+    except QuantityError as error:
+        raise DetentError(f"--period {period}: {error}") from error
 
 
 def _tell_start(file: Path, started: dict[str, Any]) -> None:

@@ -15,21 +15,32 @@ from detent.operate.host import PERIOD, Host
 from detent.operate.session import Session
 
 SPEEDS = 0.1, 10.0
+PERIODS = 1e-4, 0.1  # of the loop [s]
 
 
-def make_host(
-    file: Path | str, overrides: Sequence[str] = (), *, motor: str = "", speed: float = 1.0, wall: bool = True
+def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
+    file: Path | str,
+    overrides: Sequence[str] = (),
+    *,
+    motor: str = "",
+    speed: float = 1.0,
+    wall: bool = True,
+    period: float = PERIOD,
 ) -> tuple[Host, str]:
     """Host of the simulated axis of a file, and its name."""
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise DetentError(
             f"speed {speed:g}: time may pass {SPEEDS[0]:g} to {SPEEDS[1]:g} times as fast; choose between"
         )
+    if not PERIODS[0] <= period <= PERIODS[1]:
+        raise DetentError(
+            f"period {period:g} s: it must be from {PERIODS[0]:g} s to {PERIODS[1]:g} s; choose one between"
+        )
     spec = read_axis(file, overrides).spec
     method = METHODS[spec.axis.method]
     if not method.lives:
         raise DetentError(f"{file}: the method {spec.axis.method} has no operator yet; simulate it with: detent run")
-    return Host(method, spec, motor=motor, period=PERIOD, speed=speed, wall=wall), spec.axis.name
+    return Host(method, spec, motor=motor, period=period, speed=speed, wall=wall), spec.axis.name
 
 
 def live(

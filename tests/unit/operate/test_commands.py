@@ -56,7 +56,7 @@ class Running:
 @pytest.fixture
 def running(folder: Path) -> Iterator[Running]:
     """The axis live."""
-    one = Running(folder / "slide.toml")
+    one = Running(folder / "slide.toml", "--period", "10 ms")  # other tests want the processors, too
     yield one
     if one.process.poll() is None:
         one.process.kill()
@@ -72,7 +72,7 @@ def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(folder: P
     file = str(folder / "slide.toml")
     assert running.started["simulated"] is True
     assert running.started["state"] == "switch on disabled"
-    assert running.started["period"] == 1e-3
+    assert running.started["period"] == 1e-2
     with detent.connect(file) as axis:
         assert axis.about["name"]
         axis.enable()
@@ -173,6 +173,12 @@ def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
 def test_a_value_that_makes_no_sense_is_told(folder: Path, value: Any) -> None:
     with detent.live(folder / "slide.toml", wall=False) as axis, pytest.raises(DetentError, match="such as"):
         axis.move_to(value)
+
+
+@pytest.mark.parametrize("period", ["1 us", "1 s", "5", "x"])
+def test_a_period_that_no_loop_has_is_refused(folder: Path, period: str) -> None:
+    refused = run("live", str(folder / "slide.toml"), "--period", period)
+    assert (refused.returncode, refused.stdout) == (2, "")
 
 
 def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:
