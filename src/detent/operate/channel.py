@@ -10,7 +10,6 @@ import json
 import os
 import socket
 import threading
-from collections import deque
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
@@ -52,7 +51,7 @@ class Channel:
 
     def __init__(self, session: Session, path: Path) -> None:
         self.session, self.path = session, path
-        self._clients = 0
+        self._clients = self._open = 0  # that have ever come, and that are there
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._serve, name="channel", daemon=True)
         self._ready, self._left = threading.Event(), asyncio.Event()
@@ -85,6 +84,11 @@ class Channel:
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One client, until it leaves."""
+        if self._open >= MOST_CLIENTS:
+            _send(writer, {"error": f"{MOST_CLIENTS} clients are there already; close one of them"})
+            writer.close()
+            return
+        self._open += 1
         self._clients += 1
         number, open_ = self._clients + 1, set[int]()  # the process itself is client 1
         telling = asyncio.ensure_future(self._tell_endings(open_, writer))
@@ -94,7 +98,9 @@ class Channel:
                 if not _send(writer, answer):
                     break
         telling.cancel()
-        self.session.ask("leave", client=number)
+        self._open -= 1
+        with suppress(BlockingIOError):  # the lease of a jog runs out by itself
+            self.session.ask("leave", client=number)
         writer.close()
 
     def _answer(self, line: bytes, client: int, open_: set[int]) -> dict[str, Any]:
@@ -159,7 +165,6 @@ class Connection:
             raise AxisError(f"{shown(str(path))}: {told}") from error
         self._file = self._socket.makefile("rb")
         self._lock, self._marks, self._ended = threading.RLock(), 0, dict[int, Ended]()
-        self._told: deque[dict[str, Any]] = deque()
 
     def _read(self) -> dict[str, Any]:
         line = self._file.readline(LONGEST * 4)
@@ -177,7 +182,8 @@ class Connection:
             try:
                 self._socket.sendall(json.dumps(message | {"as": self._marks}).encode() + b"\n")
                 while (answer := self._read()).get("as") != self._marks:
-                    pass
+                    if "error" in answer:
+                        raise AxisError(answer["error"])
             except OSError as error:
                 raise AxisError(f"the live axis does not answer ({error}); look at the process that runs it") from error
         if "error" in answer:
@@ -213,6 +219,6 @@ class Connection:
         return found
 
     def close(self) -> None:
-        """Leave; the axis goes on."""
+        """Give the command back; what this client had under way is stopped."""
         self._file.close()
         self._socket.close()

@@ -16,7 +16,7 @@ from detent.control.operation import ENDS, OperationParams
 from detent.errors import DetentError
 from detent.methods.method import Live, Method, Work
 from detent.operate.loop import INBOX, PULLS, Board, run_loop
-from detent.operate.realtime import ask_for_time
+from detent.operate.realtime import ask_for_time, give_back
 from detent.operate.scope import Scope
 
 PERIOD = 1e-3  # of the loop [s]
@@ -149,6 +149,7 @@ class Host:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
+            give_back()
 
     def _until(self, met: Callable[[], bool]) -> None:
         """Let time pass until something holds, but not for ever; a few periods at least, for the loop to see a line."""

@@ -1,7 +1,6 @@
-"""What the thread of the loop asks of the system: priority, memory that stays, a processor of its own."""
+"""What the thread of the loop asks of the system: priority, and memory that stays."""
 
 import ctypes
-import gc
 import os
 import sys
 from contextlib import suppress
@@ -13,8 +12,6 @@ PR_SET_TIMERSLACK = 29
 
 def ask_for_time() -> list[str]:
     """Ask for the calling thread; gives what was not permitted, each with what permits it."""
-    gc.collect()
-    gc.freeze()
     libc = ctypes.CDLL(None, use_errno=True)
     missing: list[str] = []
     try:
@@ -26,3 +23,9 @@ def ask_for_time() -> list[str]:
     if not hasattr(libc, "mlockall") or libc.mlockall(MCL_CURRENT_AND_FUTURE) != 0:
         missing.append("memory that is never swapped out; permit it with: ulimit -l unlimited")
     return missing
+
+
+def give_back() -> None:
+    """What was asked for the whole process: its memory may be swapped out again."""
+    with suppress(AttributeError):
+        ctypes.CDLL(None).munlockall()

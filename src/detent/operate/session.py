@@ -19,7 +19,6 @@ class Session:
         self.host, self.about = host, dict(about)
         self.unit = host.axis.unit
         self._lock = threading.Lock()
-        self._kept: dict[int, Ended] = {}
 
     def describe(self) -> dict[str, Any]:
         """What does not change: name, method, unit, period, commands."""
@@ -44,6 +43,7 @@ class Session:
             self.host.off()
         about = value_of(WORDS[word], value, self.unit)
         with self._lock:
+            self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
             return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)
 
     def ending(self, command: int) -> Ended | None:

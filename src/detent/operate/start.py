@@ -85,10 +85,15 @@ def connect(file: Path | str) -> LiveAxis:
     Returns
     -------
     LiveAxis
-        Closing it leaves the axis as it is.
+        Closing it gives the command back, and stops what it had under way; the axis stays live.
     """
     path = Path(file)
-    return LiveAxis(Connection(path if path.suffix == ".sock" else channel_of(path)))
+    link = Connection(path if path.suffix == ".sock" else channel_of(path))
+    try:
+        return LiveAxis(link)
+    except DetentError:
+        link.close()
+        raise
 
 
 class Place:

@@ -181,6 +181,35 @@ def test_a_period_that_no_loop_has_is_refused(folder: Path, period: str) -> None
     assert (refused.returncode, refused.stdout) == (2, "")
 
 
+def test_what_nobody_waits_for_is_noted_all_the_same(folder: Path) -> None:
+    """The loop keeps the last 256 endings; a program that only asks lost those before."""
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        session: Any = axis.link
+        asked = []
+        for _ in range(600):
+            asked.append(session.ask("keep"))
+            session.host._run(1)
+        assert all(session.ending(command) for command in asked)
+        assert len(session.host.log.asked) == 600
+
+
+def test_the_seventeenth_client_is_told(folder: Path, running: Running) -> None:
+    file = folder / "slide.toml"
+    others = [detent.connect(file) for _ in range(16)]
+    with pytest.raises(AxisError, match="16 clients"):
+        detent.connect(file)
+    others[0].close()
+    while True:  # until the channel has noticed
+        try:
+            detent.connect(file).close()
+            break
+        except AxisError:
+            continue
+    for one in others[1:]:
+        one.close()
+    running.end()
+
+
 def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:
     with pytest.raises(AxisError, match="detent live"):
         detent.connect(folder / "nobody.toml")
