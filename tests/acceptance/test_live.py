@@ -1,7 +1,10 @@
 """Live specification, section 8. The first ones are about the cut: what a controller is, and that it is whole."""
 
+import json
 import math
 import mmap
+import os
+import random
 import subprocess
 import sys
 import threading
@@ -9,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from random import Random
 from typing import Any
@@ -17,19 +21,35 @@ import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests import live_course
 from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
+from tests.course_rig import excursions, follow, shortest_stop, turns
 from tests.difference import diff
+from tests.live_axes import PAGES, PLAIN, Head, Stepper, longest_stop, moves
 from tests.live_bench import MOVED, OPERATED, Bench
+from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
+from tests.places import ROOT
+from tests.unit.planning import test_course
 
 from detent.control import operation as ops
 from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
 from detent.control.guard import FOLLOWING, STUCK
+from detent.control.head_computer import IDLE
+from detent.control.operation import ABORTED, DONE, REFUSED
+from detent.control.step_rule import INFEASIBLE
 from detent.errors import LOOP_OVERRUN, DetentError
 from detent.kernel.loop import advance, replay
 from detent.kernel.registers import CONTROLLER, PLANT, Registers
 from detent.methods.cascade.system import Cascade, along
+from detent.methods.load import load_spec
+from detent.methods.print_head.controller import PERIOD_US
+from detent.methods.print_head.print_job import load_job
+from detent.methods.print_head.run import SimulatedPrinting, print_job
 from detent.methods.registry import METHODS
-from detent.operate.host import Ending, repeat
+from detent.methods.stepper_envelope.host import StageHost
+from detent.methods.stepper_envelope.stage_job import Change, StageMove
+from detent.operate.host import Ending, Host, repeat
+from detent.planning import course
 from detent.planning.course import advance as advance_course
 
 SAMPLES = 50
@@ -131,7 +151,6 @@ class Shuttle:
     def __init__(self, *, guarded: bool) -> None:
         from detent.methods.cascade.build import motion_limits
         from detent.methods.cascade.host import CascadeHost
-        from detent.methods.load import load_spec
         from detent.planning.profile import plan_move
 
         spec = load_spec(EXAMPLES / "cascade.toml", ())
@@ -928,3 +947,300 @@ def python_loop(periods: int, period: float) -> float:
             late += 1
             deadline = time.monotonic()
     return late / periods
+
+
+STOPS = 20_000
+
+
+SHARE = 0.9  # of the mutants, that the module's own tests must kill
+
+
+EVERY = 60  # mutants of which the ordinary tests take one
+
+
+@pytest.mark.parametrize("stops", [2000, pytest.param(STOPS, marks=pytest.mark.wide)])
+def test_14_a_stop_is_short_without_reversal_inside_the_limits_and_continuous(stops):
+    """The rig checks each sample: finite, |v|, |a|, |j| within their limits, no step of the command."""
+    rng, phases = random.Random(14), Counter[str]()
+    for _ in range(stops):
+        p, c = under_way(rng)
+        x, v, a = c.position, c.velocity, c.acceleration
+        most, jerk, level = p.acceleration, p.jerk, course.level_speed(p.jerk, v, a)
+        low, high = excursions(COMPILED, c)
+        course.come_to_rest(p, c)
+        assert c.end - x == pytest.approx(shortest_stop(v, a, most, jerk), rel=1e-9, abs=1e-12)
+        period = rng.uniform(0.05, 0.3) * (p.speed / most + most / jerk)
+        states = follow(COMPILED, p, c, min(period, 1.0))
+        assert all(p.lowest <= one[0] <= p.highest for one in states)
+        assert all(low - 1e-12 <= one[0] <= high + 1e-12 for one in states)
+        if v * level >= 0.0:
+            assert abs(c.position - x) <= bound(v, a, most, jerk, period) + 1e-12
+            assert turns(states) == 0
+        else:  # an acceleration against the speed, too large to be taken away before the speed is gone: one turn
+            ahead, back = (high - x, high - c.position) if v > 0.0 else (x - low, c.position - low)
+            assert ahead <= bound(v, 0.0, most, jerk, period) + 1e-12
+            assert back <= bound(level, 0.0, most, jerk, abs(a) / jerk) + 1e-12
+            assert turns(states) <= 1
+        phases["at rest" if v == a == 0.0 else "turning" if v * level < 0.0 else "speeding up" if v * a > 0.0 else
+               "slowing down" if v * a < 0.0 else "steady"] += 1  # fmt: skip
+    assert min(phases[name] for name in ("turning", "speeding up", "slowing down", "steady")) > stops / 50, phases
+
+
+def test_14_the_bound_of_the_specification_is_too_short_while_the_axis_speeds_up():
+    """v^2 / 2 a + v a / 2 j + v T, to the letter: no stop within the jerk can be that short. In exact fractions.
+
+    At v = 0.5 m/s and a = 5 m/s^2, with limits of 5 m/s^2 and 100 m/s^3: taking the acceleration away lasts 50 ms and
+    carries the axis 29.2 mm; then it goes at 0.625 m/s, and needs 54.7 mm more.
+    """
+    v, a, most, jerk, latency = Fraction(1, 2), Fraction(5), Fraction(5), Fraction(100), Fraction(1, 1000)
+    t = a / jerk
+    carried = v * t + a * t**2 / 2 - jerk * t**3 / 6
+    level = v + a**2 / (2 * jerk)
+    rest = level**2 / (2 * most) + level * most / (2 * jerk)
+    assert (carried, level, rest) == (Fraction(7, 240), Fraction(5, 8), Fraction(7, 128))
+    to_the_letter = v**2 / (2 * most) + v * most / (2 * jerk) + v * latency
+    assert float(carried + rest) == pytest.approx(0.0838542, rel=1e-6)
+    assert float(to_the_letter) == 0.038
+    # Not by the speed that counts alone, either; with the time that the acceleration takes, it is.
+    assert carried + rest > rest + level * latency
+    assert carried + rest <= rest + level * (latency + t)
+    assert shortest_stop(0.5, 5.0, 5.0, 100.0) == pytest.approx(float(carried + rest), rel=1e-15)
+
+
+def test_15_every_branch_is_taken_by_its_own_tests():
+    files = [str(path) for path in test_course.SOURCES]
+    done = subprocess.run(
+        [sys.executable, "-c", COVERED, *files],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    found = json.loads(done.stdout)["files"].values()
+    assert [(one["missing_lines"], one["missing_branches"]) for one in found] == [([], [])] * len(files)
+    assert sum(one["summary"]["num_branches"] for one in found) > 60
+
+
+def test_15_its_own_tests_kill_some_of_its_mutants():
+    hunt = hunted(EVERY)
+    assert hunt.count >= 10
+    assert len(hunt.alive) <= 0.3 * hunt.count, hunt.alive  # of so few, many may happen to change nothing
+
+
+@pytest.mark.wide
+def test_15_its_own_tests_kill_its_mutants(record_property):
+    hunt = hunted(1)
+    record_property("mutants", [hunt.count, *hunt.alive])
+    assert hunt.count > 500
+    assert len(hunt.alive) <= (1 - SHARE) * hunt.count, "\n".join(hunt.alive)
+
+
+def test_15_a_test_that_looks_at_nothing_kills_nothing(monkeypatch):
+    """The hunt itself can fail."""
+    monkeypatch.setattr(live_course, "own_tests", lambda: [lambda _: None])
+    hunt = hunted(4 * EVERY)
+    assert len(hunt.alive) > 0.5 * hunt.count
+
+
+STATES = 200  # random ones that an axis is stopped from
+
+
+@pytest.mark.compiled
+def test_25_an_end_position_moved_during_a_run_shortens_the_ramp():
+    """As specification stepper-envelope 3.6 and its tests 18 and 19; step by step as the simulation of that change."""
+    for new, stop in ((6000, 6000), (3300, 3300)):
+        axis = Stepper(*PLAIN)
+        move = axis.host.ask(ops.MOVE_TO, 0.04)
+        axis.until(3000)
+        at = int(axis.rule.position)
+        end = axis.host.ask(ops.UPPER, axis.table.position_of(new))
+        axis.host.run(1)
+        ending = axis.host.ending(move)
+        assert ending is not None
+        assert (ending.how, ending.by) == (ABORTED, end)
+        peak = 0
+        while axis.rule.position < new - 230 and not axis.answer.rests:
+            peak = max(peak, int(axis.rule.index))
+            axis.host.run(1)
+        assert new < 4000 or peak == 227  # at full speed up to the new ramp
+        axis.until_rest()
+        assert axis.rule.position == stop
+        simulated = StageHost(axis.spec)
+        change = Change(axis.table.position_of(at), axis.table.position_of(new))
+        task = StageMove(1, 0, targets={"group_a": 0.04}, change=change)
+        assert not simulated.run(task)[1]
+        motor = simulated.stage.motors["group_a"]
+        assert motor.controller.timer.pulses == axis.state.controller.timer.pulses == stop
+        assert axis.lost() == 0
+        simulated.stage.pass_time(0.2)
+        assert motor.r.plant.rotor.angle == axis.state.plant.rotor.angle
+        assert motor.r.plant.rotor.peak_lag == axis.state.plant.rotor.peak_lag
+
+
+@pytest.mark.compiled
+def test_25_an_end_nearer_than_the_motor_can_stop_is_overrun_without_a_lost_step():
+    axis = Stepper(*PLAIN)
+    axis.host.ask(ops.MOVE_TO, 0.04)
+    axis.until(3000)
+    at, k = int(axis.rule.position), int(axis.rule.index)
+    axis.host.ask(ops.UPPER, axis.table.position_of(3100))
+    places = axis.until_rest()
+    assert k == 227
+    assert axis.rule.position == at + k
+    assert places == sorted(places)
+    assert axis.host.axis.memory.overruns == 1
+    assert axis.lost() == 0
+    outward = axis.host.until_ended(axis.host.ask(ops.MOVE_BY, 0.001))
+    assert (outward.how, outward.why) == (REFUSED, ops.BEYOND)
+    assert axis.host.until_ended(axis.host.ask(ops.MOVE_TO, axis.table.position_of(3100))).how == DONE
+    assert axis.rule.position == 3100
+
+
+@pytest.mark.compiled
+def test_25_an_end_moved_outwards_lets_a_jog_rise_again():
+    axis = Stepper(*PLAIN)
+    axis.host.ask(ops.UPPER, axis.table.position_of(6000))
+    jog = axis.host.ask(ops.JOG, 0.02)
+    slowest = 0
+    for _ in range(4000):
+        axis.host.ask(ops.KEEP)
+        axis.host.run(1)
+        if axis.rule.position >= 5900 and not slowest:
+            slowest = int(axis.rule.index)
+            axis.host.ask(ops.UPPER, axis.table.position_of(8000))
+        if axis.rule.position >= 6050:
+            break
+    assert 0 < slowest < 120
+    assert axis.rule.index > slowest
+    for _ in range(700):
+        axis.host.ask(ops.KEEP)
+        axis.host.run(1)
+    assert axis.rule.position == 8000
+    assert axis.host.ending(jog) is None
+    axis.host.ask(ops.JOG, 0.0, id=jog)
+    assert axis.host.until_ended(jog).how == DONE
+    assert axis.lost() == 0
+
+
+@pytest.mark.compiled
+def test_14_a_stepper_stops_from_every_state_by_its_ramp():
+    axis, chance = Stepper(), random.Random(14)
+    host, seen = axis.host, set[int]()
+    todo = moves(chance, 0.0, 0.04, 0.02)
+    for _ in range(STATES):
+        for _ in range(chance.choice((1, 1, 2))):  # the second may find the first under way, and turn it round
+            kind, value, share = next(todo)
+            host.ask(kind, value, share)
+            host.run(chance.randrange(1, 150))
+        at, k, direction = int(axis.rule.position), int(axis.rule.index), int(axis.rule.direction)
+        seen.add(int(axis.rule.state))
+        host.stop()
+        places = axis.until_rest()
+        steps = [b - a for a, b in pairwise(places)]
+        assert all(one * direction >= 0 for one in steps)  # no reversal
+        assert abs(places[-1] - at) == max(k, 0)  # by its ramp: an index a step
+        assert 0 <= places[-1] <= 8000
+        assert host.board.operation.last_stop <= (k + 6) * axis.table.step  # seen from the look before
+    assert len(seen) >= 3
+    assert axis.rule.cause != INFEASIBLE
+    assert axis.lost() == 0
+
+
+@pytest.mark.compiled
+def test_28_a_session_with_moving_ends_repeats_itself():
+    """The tables are edited by the loop, and so they are part of what a log repeats."""
+    axis, chance = Stepper(), random.Random(28)
+    host, todo = axis.host, moves(chance, 0.0, 0.04, 0.02)
+    for _ in range(60):
+        kind, value, share = next(todo)
+        host.ask(kind, value, share)
+        host.run(chance.randrange(1, 200))
+        host.ask(chance.choice((ops.LOWER, ops.UPPER)), chance.uniform(0.0, 0.04))
+        host.run(chance.randrange(1, 100))
+        if chance.random() < 0.1:
+            host.stop()
+    axis.until_rest()
+    assert axis.host.axis.memory.overruns > 0
+    assert axis.lost() == 0
+    again = Host(METHODS["stepper_envelope"], axis.spec, motor="group_a", wall=False)
+    repeat(again, host.log, host.board.loop.periods)
+    state: Any = again.axis.state
+    assert bytes(state) == bytes(axis.state)
+    assert [bytes(one) for one in again.axis.feed] == [bytes(one) for one in host.axis.feed]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", PAGES)
+def test_23_the_print_head_prints_a_stream_live_as_a_run_does(name):
+    """In the loop the head begins its first line when the host is ready, a while after it has come to rest."""
+    if not PAGES[name].exists():
+        pytest.skip("the recorded workloads (../shared/data) are not here")
+    job, axis = load_job(PAGES[name]), Head(speed=10.0)
+    measured = axis.memory.answered_us
+    assert axis.host.until_ended(axis.host.work(job)).how == DONE
+    live = axis.printed()
+    fed = next(one.period for one in axis.host.log.asked if one.fields[1] == ops.FEED)
+    begun = math.floor((fed - 1) * axis.host.board.loop.ticks)  # the tick in which that period begins
+    waited = begun - (round(measured / PERIOD_US) + 1)
+
+    simulated = SimulatedPrinting(axis.spec, job, None, lambda _share, _text: None)
+    simulated.prepare()
+    simulated.machine.pass_ticks(waited)
+    simulated.print_all()
+    same = simulated.finish()
+    assert same.done
+    assert live.done
+    assert live.strikes == same.strikes
+    assert (live.errors_right == same.errors_right).all()
+    assert (live.errors_left == same.errors_left).all()
+    assert (live.worst_error, live.rms_error) == (same.worst_error, same.rms_error)
+    assert [one.speed_value for one in live.lines] == [one.speed_value for one in same.lines]
+
+    run = print_job(axis.spec, job)  # its first line begins at once, before the last current has died away
+    assert (live.characters, live.columns, live.missed) == (run.characters, run.columns, 0)
+    assert [one.direction for one in live.lines] == [one.direction for one in run.lines]
+    assert live.worst_error == pytest.approx(run.worst_error, abs=2e-6)
+    assert live.print_time == pytest.approx(run.print_time, rel=0.05)
+
+
+@pytest.mark.compiled
+def test_14_a_print_head_stops_from_every_state_as_short_as_its_speed():
+    axis, chance = Head(), random.Random(14)
+    host, seen, fastest = axis.host, set[int](), 0.0
+    todo = moves(chance, 0.0, 0.36, 1.0)
+    for _ in range(STATES):
+        for _ in range(chance.choice((1, 1, 2))):
+            kind, value, share = next(todo)
+            host.ask(kind, value, share)
+            host.run(chance.randrange(1, 150))
+        at, speed, heading = int(axis.head.emitter), axis.speed, math.copysign(1, axis.state.plant.train.velocity)
+        seen.add(int(axis.head.state))
+        fastest = max(fastest, speed)
+        host.stop()
+        places = axis.until_rest()
+        assert host.state == "operation enabled"
+        assert abs(places[-1] - at) <= longest_stop(speed)
+        assert all((b - a) * heading >= -1 for a, b in pairwise(places))  # a stop swings back by an emitter at most
+        assert 0 <= places[-1] <= axis.head.width
+        assert (axis.head.drive_cmd, axis.head.state) == (0, IDLE)
+    assert len(seen) >= 6
+    assert fastest > 39.0
+
+
+@pytest.mark.compiled
+def test_14_a_print_head_stops_while_it_looks_for_its_frames_and_measures_itself():
+    seen: set[int] = set()
+    for moment in (5, 60, 400, 2000, *range(3300, 7500, 73)):
+        axis = Head(enable=False)
+        axis.host.ask(ops.ENABLE)
+        axis.host.run(moment)
+        at, speed = int(axis.head.emitter), axis.speed
+        seen.add(int(axis.head.state))
+        assert axis.memory.measuring
+        axis.host.stop()
+        places = axis.until_rest()
+        assert abs(places[-1] - at) <= longest_stop(speed)
+        assert axis.memory.identified == 0
+    assert len(seen) >= 5
+    host = axis.host
+    assert host.until_ended(host.ask(ops.HOME)).how == DONE  # once more, and whole
+    assert axis.memory.identified == 1
+    assert host.until_ended(host.ask(ops.MOVE_TO, 0.1)).how == DONE

@@ -1,14 +1,19 @@
 """What the host makes of a job; what the loop does with it is among the acceptance tests."""
 
+from typing import Any
+
 import pytest
+from tests.acceptance.test_golden_bits import EXAMPLES
+from tests.live_axes import Head
 from tests.print_head_rig import make_spec
 
 from detent.control import operation as ops
 from detent.control.column_timer import COLUMNS
-from detent.control.operation import OperationParams
+from detent.control.operation import ABORTED, DONE, REFERENCED, OperationParams
 from detent.errors import AxisError
 from detent.methods.print_head.live import HEAD, PIECE, PIECES, HeadWork, live
-from detent.methods.print_head.print_job import parse_text
+from detent.methods.print_head.print_job import load_job, parse_text
+from detent.operate.host import repeat
 
 
 def operation(look, window, limits, *motions):
@@ -73,3 +78,85 @@ def test_without_frames_there_is_nothing_to_plan_in(axis):
     axis.state.controller.head.homed = 0
     with pytest.raises(AxisError, match="not calibrated"):
         HeadWork(make_spec(), axis, parse_text("detent"))
+
+
+@pytest.mark.compiled
+def test_a_print_head_is_switched_on_and_off():
+    axis = Head()
+    host = axis.host
+    assert host.until_ended(host.ask(ops.MOVE_BY, 0.0)).how == DONE  # a null move is done, too
+    place = axis.answer.position
+    host.ask(ops.MOVE_TO, 0.02)
+    host.run(120)
+    assert axis.speed > 20
+    host.off()
+    host.run(1)
+    assert (axis.head.drive_cmd, axis.state.lines.count, axis.state.lines.transition) == (0, 0, 0)
+    host.ask(ops.ENABLE)
+    host.ask(ops.CONFIRM)
+    home = host.ask(ops.MOVE_TO, place)
+    host.run(1)
+    assert axis.speed > 10  # it still rolls, counted on: what is asked waits for that
+    assert host.until_ended(home).how == DONE
+    assert axis.answer.position == pytest.approx(place, abs=1.1e-3)
+    assert host.board.operation.trust == REFERENCED
+
+
+@pytest.mark.compiled
+def test_a_print_head_without_power_stalls_and_is_reset():
+    axis = Head()
+    host = axis.host
+    params: Any = host.axis.params
+    move, params.plant.supply = host.ask(ops.MOVE_TO, 0.1), 0.0
+    ending = host.until_ended(move)
+    assert (ending.how, ending.why) == (ops.FAILED, 250)
+    host.run(2)
+    assert host.state == "fault"
+    assert "obstructed or stalled" in host.axis.fault()
+    params.plant.supply = 38.0
+    assert host.until_ended(host.ask(ops.RESET)).how == DONE
+    host.run(2)
+    assert host.state == "switch on disabled"
+    host.ask(ops.ENABLE)
+    host.ask(ops.CONFIRM)
+    axis.until_rest()
+    assert host.until_ended(host.ask(ops.MOVE_TO, 0.1)).how == DONE
+
+
+@pytest.mark.compiled
+def test_a_job_that_is_stopped_ends_there_and_another_one_prints_whole():
+    job, axis = load_job(EXAMPLES / "letter.txt"), Head()
+    first = axis.host.work(job)
+    while axis.memory.done < 2:
+        axis.host.run(1)
+    axis.host.stop()
+    assert axis.host.until_ended(first).how == ABORTED
+    axis.until_rest()
+    half = axis.printed()
+    assert len(half.lines) == 2
+    assert not half.done
+    assert axis.host.until_ended(axis.host.work(job)).how == DONE
+    page = axis.printed()
+    assert page.done
+    assert (page.missed, len(page.lines)) == (0, len(job.lines))
+    again = Head(enable=False)  # what came from outside makes the session, bit for bit
+    repeat(again.host, axis.host.log, axis.host.board.loop.periods)
+    assert bytes(again.state.controller) == bytes(axis.state.controller)
+
+
+@pytest.mark.compiled
+def test_a_job_waits_for_the_frames_and_for_the_first_motion_to_be_confirmed():
+    job, axis = load_job(EXAMPLES / "letter.txt"), Head(enable=False)
+    with pytest.raises(AxisError, match="not calibrated"):
+        axis.host.work(job)
+    axis.host.ask(ops.ENABLE)
+    axis.until_rest()
+    assert axis.host.until_ended(axis.host.work(job)).why == ops.NOT_CONFIRMED
+    axis.host.ask(ops.CONFIRM)
+    assert axis.host.until_ended(axis.host.ask(ops.FEED, 1)).why == ops.NO_JOB
+    assert axis.host.until_ended(axis.host.ask(ops.MOVE_TO, 0.1, 0.2)).how == DONE
+    assert axis.head.maximum < 60
+    assert axis.host.until_ended(axis.host.work(job)).how == DONE  # at the speed of the file, not of the last move
+    page = axis.printed()
+    assert page.done
+    assert max(page.speeds) > 60
