@@ -9,6 +9,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _leave)
+    # The matrices here are small: on a busy machine a second thread waits a hundred times longer than it works.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from detent import cli
     from detent.cli.terminal import heed_signals
 
