@@ -316,7 +316,7 @@ class Axis(OnScreen):
             Largest sensitivity peak max |1/(1 + L)| where a loop is cut, 1.2 to 2.5. It guarantees a gain margin of
             Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
         overshoot : float
-            Largest peak of the reference to the position without feed-forward, 1 to 2.
+            Largest peak of the reference to the position without feedforward, 1 to 2.
         goal : str
             "stiff": as much integral stiffness as the bounds allow; "quiet": as little noise as the stiffness of the
             file's gains takes. Default: the first that the method has.

@@ -31,26 +31,14 @@ LEVEL = NormalDist().inv_cdf(0.975)  # standard deviations from the middle to an
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What is not known of one key.
+    """What is not known of one key."""
 
-    Attributes
-    ----------
-    key : str
-        The key, dotted.
-    low, high : float
-        Ends of the interval, in the SI unit of the key; for a normal distribution those of 95 %.
-    normal, whole : bool
-        Whether the values are normally distributed; whether they are whole numbers.
-    unit : str
-        SI unit of the key.
-    """
-
-    key: str
-    low: float
+    key: str  # dotted
+    low: float  # and high: ends of the interval, in the SI unit of the key; of a normal distribution those of 95 %
     high: float
     normal: bool = False
-    whole: bool = False
-    unit: str = ""
+    whole: bool = False  # the values are whole numbers
+    unit: str = ""  # SI unit of the key
 
     @property
     def path(self) -> Path:

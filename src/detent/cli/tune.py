@@ -9,9 +9,10 @@ from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, app, option
 from detent.cli.terminal import print_json, print_table, progress_bar, say, split_names
 
 MS = "Largest sensitivity peak, 1.2 to 2.5; 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
-OVERSHOOT = "Largest peak of the reference to the position without feed-forward, at least 1."
+OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1."
 GOAL = "stiff: the most integral stiffness; quiet: the least noise at the stiffness of the file."
 HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
+REPORT = "Write the report, one self-contained HTML file."
 WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
 
 
@@ -25,6 +26,7 @@ def tune(
     hold: Annotated[list[str] | None, option("--hold", "KEY", HOLD)] = None,
     job: Job = None,
     write: Annotated[Path | None, option("--write", "FILE", WRITE)] = None,
+    report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
     *,
     force: Force = False,
     as_json: Json = False,
@@ -40,24 +42,30 @@ def tune(
     if write is not None:
         is_own = write.exists() and file.exists() and write.samefile(file)
         check_target(write, (".toml",), "an axis", force=force or is_own)
+    if report is not None:
+        check_target(report, (".html",), "a report", force=force)
     with progress_bar(quiet=as_json) as progress:
         found = axis.tune(
             ms=sensitivity, overshoot=overshoot, goal=goal, hold=split_names(hold), job=job, progress=progress
         )
-    written = found.save(write, force=force) if write is not None and found.values else None
+        written = [found.save(write, force=force)] if write is not None and found.values else []
+        if report is not None:
+            progress(0.97, "writing the report")
+            written.append(found.report(report, force=force))
     if as_json:
         changes = [one._asdict() for one in found.changes]
-        print_json(found.to_dict() | {"changes": changes, "files": [str(written)] if written else []})
+        print_json(found.to_dict() | {"changes": changes, "files": [str(path) for path in written]})
     else:
         say(found.sentence, "bold green" if found.done else "bold yellow")
         for one in found.refusals:
             say(f"  {one}", "yellow", wrong=True)
         print_table("", ("", "before", "after"), found.rows)
-        if written:
-            say(f"written: {written}")
-            for change in found.changes:
-                say(f"  {change}")
-        elif found.changes:
+        for path in written:
+            say(f"written: {path}")
+            if path == write:
+                for change in found.changes:
+                    say(f"  {change}")
+        if found.changes and write is None:
             say("--write FILE puts the new gains into an axis file")
     if not found.done:
         raise typer.Exit(NOT_DONE)

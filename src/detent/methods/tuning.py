@@ -10,18 +10,10 @@ DIGITS = 3  # of a gain that is chosen
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What the gains must keep.
+    """What the gains must keep."""
 
-    Attributes
-    ----------
-    sensitivity : float
-        Ms, largest magnitude of 1/(1 + L) where the loops are cut.
-    overshoot : float
-        Largest magnitude of the transmission from reference to position, without feed-forward.
-    """
-
-    sensitivity: float = 1.7
-    overshoot: float = 1.1
+    sensitivity: float = 1.7  # Ms, largest magnitude of 1/(1 + L) where the loops are cut
+    overshoot: float = 1.1  # largest magnitude of the reference to the position, without feedforward
 
 
 class Tuning(Protocol):

@@ -25,24 +25,12 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Guaranteed:
-    """Gains, and for what they hold.
+    """Gains, and for what they hold."""
 
-    Attributes
-    ----------
-    values : mapping of str to float
-        The gains by key; empty where none keeps the bounds.
-    binding : sequence of Variant
-        The plants that decided, the nominal one first.
-    worst : float
-        By how much the worst bound is exceeded over all plants that were looked at: 1 is at the bound.
-    fresh : int
-        How many plants that the choice had not seen were looked at.
-    """
-
-    values: Mapping[str, float]
-    binding: Sequence[Variant] = field(default_factory=list[Variant])
-    worst: float = 0.0
-    fresh: int = 0
+    values: Mapping[str, float]  # by key; empty where none keeps the bounds
+    binding: Sequence[Variant] = field(default_factory=list[Variant])  # plants that decided, the nominal one first
+    worst: float = 0.0  # by how much the worst bound is exceeded over all plants looked at: 1 is at the bound
+    fresh: int = 0  # how many of them the choice had not seen
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from detent.tune.plants import Plants
 from detent.units import format_quantity
 
 SAME = 1e-12  # of a gain, as a share
+TRADED = (1.3, 1.4, 1.5, 1.6, 1.7, 1.85, 2.0, 2.2)  # values of Ms of which a report tells what they would give
 RANKED = 2  # intervals of which is told what they would be worth
 
 
@@ -66,7 +67,7 @@ class Stand:
             yield f"gain margin at {cut}", f"{one.gain:.3g}" if math.isfinite(one.gain) else "any"
         if self.bandwidth is not None:
             yield "bandwidth, -3 dB", format_quantity(self.bandwidth, "Hz", 3)
-        yield from self.summary
+        yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -96,6 +97,64 @@ class Tuned(OnScreen):
     worth_text: str
     guaranteed: Guaranteed
     refusals: Sequence[Caution]
+    chooser: Chooser = field(compare=False)
+
+    @property
+    def typed(self) -> dict[str, float]:
+        """The gains, whole where the key is."""
+        return _typed(self.before.file.spec, self.values)
+
+    @property
+    def why(self) -> list[str]:
+        """What decided, in sentences."""
+        if not self.values:
+            return []
+        bounds = f"Ms up to {self.bounds.sensitivity:g} at every cut and an overshoot up to {self.bounds.overshoot:g}"
+        told = [f"The largest {self.worth_text} with {bounds}."]
+        if self.done and self.before.file.tolerance:
+            share = 100 * self.worth[2] / self.worth[1]
+            number = len(self.guaranteed.binding) - 1
+            told.append(
+                f"What [tolerance] leaves open costs {100 - share:.0f} % of it; {number} other "
+                f"plant{'s' if number != 1 else ''} decided, and {self.guaranteed.fresh} random ones kept the bounds."
+            )
+        return told
+
+    @cached_property
+    def trade(self) -> list[tuple[float, float]]:
+        """What other bounds on Ms would give on the nominal axis: Ms, and what is made large; 0 where there is none."""
+        found = list[tuple[float, float]]()
+        for level in TRADED:
+            tried = replace(self.chooser, bounds=Bounds(level, self.bounds.overshoot))
+            found.append((level, tried.worth(tried.nominal())))
+        return found
+
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the report, one self-contained HTML file.
+
+        Parameters
+        ----------
+        path : path
+            HTML file.
+        force : bool
+            Replace a file that detent did not write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        DetentError
+            The file cannot be written.
+        """
+        from detent.page.render import write_page
+        from detent.tune.page import tuned_page
+
+        target = check_target(path, (".html",), "a report", force=force)
+        write_page(target, tuned_page(self), force=force)
+        return target
 
     @property
     def done(self) -> bool:
@@ -183,7 +242,7 @@ class Tuned(OnScreen):
     def screen(self) -> Screen:
         """Gains and figures before and after, and why not."""
         title = "\n".join([self.sentence, self.before.file.file, *map(str, self.refusals)])
-        return Screen(title, [Block("", ("", "before", "after"), self.rows, 30)], ".save(FILE)")
+        return Screen(title, [Block("", ("", "before", "after"), self.rows, 30)], ".save(FILE)  .report(FILE)")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as ``--json`` prints it."""
@@ -236,8 +295,8 @@ def tune(  # noqa: PLR0913 - what may be asked
     before = Stand.of(file, job)
     progress(0.92, "trying the new gains")
     after = Stand.of(file.replaced(_typed(spec, values)), job) if values else None
-    shown = dict(values)
-    return Tuned(before, after, bounds, chooser.goal, shown, worth, tuning.worth_text, found, refusals)
+    chosen = dict(values)
+    return Tuned(before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, chooser)
 
 
 def _bounds(sensitivity: float, overshoot: float) -> Bounds:

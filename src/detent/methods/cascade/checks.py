@@ -20,7 +20,7 @@ MOST_COUNTS = 2**53  # counts of an encoder: beyond them a float no longer knows
 QUICK = 0.1  # bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit
 
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, math.radians(30)  # below them a loop rings
-LARGEST_PEAK = 1.3  # of the reference to the position, without feed-forward
+LARGEST_PEAK = 1.3  # of the reference to the position, without feedforward
 NEAR_RESONANCE = 0.5  # share of the anti-resonance above which a velocity loop on the motor leaves the load behind
 LARGEST_JUMP = 0.1  # share of the largest command by which one count may move the drive
 MOST_COMMAND = 0.95  # share of what the drive can do that a move at its limits may take
