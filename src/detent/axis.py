@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from detent.methods.linear import LinearModel
+    from detent.tune.tuned import Tuned
 
 KEPT_ROWS = 100_000  # rows in memory beside a trace file, 40 s at the usual rate: the report draws from these
 
@@ -296,6 +297,50 @@ class Axis(OnScreen):
         0.00025
         """
         return self.method.linear(self.spec)
+
+    def tune(  # noqa: PLR0913 - what may be asked
+        self,
+        *,
+        ms: float = 1.7,
+        overshoot: float = 1.1,
+        goal: str = "",
+        hold: Sequence[str] = (),
+        job: str | Path | Job | None = None,
+        progress: Progress | None = None,
+    ) -> "Tuned":
+        """Choose gains with margins, for all that ``[tolerance]`` allows, and try them on the simulation.
+
+        Parameters
+        ----------
+        ms : float
+            Largest sensitivity peak max |1/(1 + L)| where a loop is cut, 1.2 to 2.5. It guarantees a gain margin of
+            Ms/(Ms - 1) and a phase margin of 2 asin(1/(2 Ms)).
+        overshoot : float
+            Largest peak of the reference to the position without feedforward, 1 to 2.
+        goal : str
+            "stiff": as much integral stiffness as the bounds allow; "quiet": as little noise as the stiffness of the
+            file's gains takes. Default: the first that the method has.
+        hold : sequence of str
+            Keys that stay as they are.
+        job : path or job object, optional
+            What both sets of gains are tried with. Default: of an axis that makes moves, half of the travel and back.
+        progress : callable, optional
+            ``progress(share, text)``.
+
+        Returns
+        -------
+        Tuned
+            Also where no gains were found: see `Tuned.refusals`.
+
+        Raises
+        ------
+        DetentError
+            The method has no gains that a linear model chooses, or a parameter is out of its range.
+        """
+        from detent.tune.tuned import tune
+
+        tried = None if job is None else self._job(job)
+        return tune(self.file, sensitivity=ms, overshoot=overshoot, goal=goal, hold=hold, job=tried, progress=progress)
 
     def envelopes(self) -> Mapping[str, Any]:
         """Table of permissible frequencies, an `Envelope`, of each motor by name, between its extremes at power-on.

@@ -41,6 +41,7 @@ class Margins(NamedTuple):
     delay: float  # dead time that may be added until it no longer settles [s]; infinite where there is none
     sensitivity: float  # Ms, largest magnitude of 1/(1 + L)
     peak: float  # frequency of it [Hz]
+    least: float = 0.0  # largest factor below 1 of the gain at which L passes -1; 0 where there is none
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -105,6 +106,22 @@ class LinearSystem:
         return LinearSystem(a=a, b=b, c=c, d=d, dt=self.dt, name=f"{self.name}, closed")
 
     @property
+    def peak(self) -> tuple[float, float]:
+        """Largest magnitude, and its frequency [Hz]."""
+        return largest_level(lambda at: np.abs(self.response(at)), self.frequencies())
+
+    @property
+    def bandwidth(self) -> float:
+        """Frequency above which the magnitude stays below that at rest over sqrt(2) [Hz]; of T, of a closed loop."""
+        frequencies = self.frequencies()
+        limit = abs(self.response(frequencies[:1])[0]) / math.sqrt(2.0)
+        above = np.flatnonzero(np.abs(self.response(frequencies)) >= limit)
+        if above[-1] + 1 == len(frequencies):
+            return 0.5 / self.dt
+        low, high = frequencies[above[-1]], frequencies[above[-1] + 1]
+        return _crossing(self.response, lambda found: _level(found) - math.log(limit), float(low), float(high))
+
+    @property
     def spectral_radius(self) -> float:
         """Largest factor by which a mode changes from sample to sample: below 1 the system is stable."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a))))
@@ -164,14 +181,16 @@ def margins_of(respond: Respond, frequencies: Numbers, dt: float) -> Margins:
     turns = [k for k in _changes(loop.imag) if loop.real[k] < 0.0]
     real = [respond(np.array([_crossing(respond, np.imag, frequencies[k], frequencies[k + 1])]))[0].real for k in turns]
     real.append(loop[-1].real)
-    factors = [-1.0 / float(value) for value in real if -1.0 < value < 0.0]
+    factors = [-1.0 / float(value) for value in real if value < 0.0]
+    more, less = [one for one in factors if one > 1.0], [one for one in factors if one < 1.0]
     falling = [one for one, k in zip(crossings, places, strict=True) if gain[k] >= 0.0]
     phases = [math.remainder(float(np.angle(-respond(np.array([one]))[0])), math.tau) for one in crossings]
     late = [(phase % math.tau) / (math.tau * one) for phase, one in zip(phases, crossings, strict=True)]
-    level, peak = _peak(respond, frequencies, 1.0 / np.maximum(np.abs(1.0 + loop), 1e-300))
+    level, peak = largest_level(lambda at: _sensitivity(respond(at)), frequencies, _sensitivity(loop))
     crossover = falling[0] if falling else 0.0
     phase = min(phases, key=abs) if falling else math.pi
-    return Margins(crossover, phase, min(factors, default=math.inf), min(late, default=math.inf), level, peak)
+    gains = min(more, default=math.inf), max(less, default=0.0)
+    return Margins(crossover, phase, gains[0], min(late, default=math.inf), level, peak, gains[1])
 
 
 def _changes(values: Numbers) -> list[int]:
@@ -194,12 +213,22 @@ def _crossing(respond: Respond, part: Callable[[Phasors], Numbers], low: float, 
     return math.sqrt(low * high)
 
 
-def _peak(respond: Respond, frequencies: Numbers, levels: Numbers) -> tuple[float, float]:
-    """Largest sensitivity and its frequency [Hz]."""
+def largest_level(
+    level: Callable[[Numbers], Numbers], frequencies: Numbers, levels: Numbers | None = None
+) -> tuple[float, float]:
+    """Largest value of a positive function of frequency, looked for on a grid [Hz], and where it lies [Hz].
+
+    `levels` are its values on the grid, where they are known already.
+    """
+    levels = level(frequencies) if levels is None else levels
     for _ in range(ZOOMS):
         top = int(np.argmax(levels))
         low, high = float(frequencies[max(top - 1, 0)]), float(frequencies[min(top + 1, len(frequencies) - 1)])
         frequencies = np.geomspace(low, high, ZOOM, dtype=np.float64)
-        levels = 1.0 / np.maximum(np.abs(1.0 + respond(frequencies)), 1e-300)
+        levels = level(frequencies)
     top = int(np.argmax(levels))
     return float(levels[top]), float(frequencies[top])
+
+
+def _sensitivity(loop: Phasors) -> Numbers:
+    return 1.0 / np.maximum(np.abs(1.0 + loop), 1e-300)

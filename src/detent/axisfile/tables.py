@@ -1,12 +1,13 @@
 """Tables of the axis file that several control methods share, and what every specification has in common."""
 
 import math
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, cast
 
 from annotated_types import Ge, Le
 from pydantic import Field
 
-from detent.files.fields import Table, optional, required
+from detent.files.fields import Table, file_key, optional, required
 from detent.files.quantities import (
     Angle,
     BackEmfConstant,
@@ -53,12 +54,29 @@ class AxisSpec(Table, frozen=True):
         }
         return self.model_copy(update=made)
 
+    def varied(self, values: Mapping[str, float]) -> Self:
+        """A copy with other values of keys, dotted, in SI units; nothing is checked."""
+        made: Any = self
+        for key, value in values.items():
+            made = _put(made, key.split("."), value)
+        return made
+
     def filled(self, **tables: dict[str, object]) -> Self:
         """The same where a value is still to be made, as its `derived` text says: NaN, a number below 0, or no list."""
         return self.changed(**{
             name: {key: value for key, value in values.items() if _is_open(getattr(getattr(self, name), key))}
             for name, values in tables.items()
         })  # fmt: skip
+
+
+def _put(table: Any, path: list[str], value: float) -> Any:
+    """A copy of nested tables, those that the user names among them, with another value."""
+    first, *rest = path
+    if isinstance(table, dict):
+        held = cast("dict[str, Any]", table)
+        return held | {first: _put(held[first], rest, value) if rest else value}
+    name = next(name for name, field in type(table).model_fields.items() if file_key(name, field) == first)
+    return table.model_copy(update={name: _put(getattr(table, name), rest, value) if rest else value})
 
 
 def _is_open(value: float | list[Any]) -> bool:

@@ -17,7 +17,7 @@ from detent.files.text import lines_of
 from detent.units import format_quantity, in_unit_of
 
 DIGITS = 6  # of a value
-_NOTE = re.compile(r"(?:^#|;) identified(, .*? before)?: .*$")  # what an earlier time said of a value
+_NOTE = re.compile(r"(?:^#|;) (?:identified|tuned)(, .*? before)?: .*$")  # what an earlier time said of a value
 
 
 class NewValue(NamedTuple):
@@ -27,6 +27,7 @@ class NewValue(NamedTuple):
     value: float  # in `unit`; a pure number where that is empty
     unit: str  # SI unit
     note: str  # what is said of it in a comment
+    by: str = "identified"  # or "tuned": where it comes from
 
 
 class Change(NamedTuple):
@@ -118,25 +119,25 @@ def _put(document: Any, value: NewValue) -> tuple[Change, str]:
     item = item_of(change.after)
     if old is not None and not in_line:
         item.trivia.comment_ws = old.trivia.comment_ws or "  "
-        item.trivia.comment = _comment(old, change, value.note)
+        item.trivia.comment = _comment(old, change, value)
     table[path[-1]] = item
     return change, ""
 
 
-def _comment(old: Any, change: Change, note: str) -> str:
+def _comment(old: Any, change: Change, value: NewValue) -> str:
     """What stood behind a value, then what is said of the new one; not what was said of the old one."""
     noted = _NOTE.search(old.trivia.comment)
     kept = _NOTE.sub("", old.trivia.comment)
     was = f", {' '.join(str(old).split()) if isinstance(old, str) else change.before} before"
     if change.before == change.after:
         was = (noted and noted[1]) or ""
-    return f"{kept}{';' if kept else '#'} identified{was}: {note}"
+    return f"{kept}{';' if kept else '#'} {value.by}{was}: {value.note}"
 
 
 def _new(value: NewValue) -> tuple[Change, str]:
     """A value that a file does not have, and what stands behind its key."""
     written = _written(value, None)
-    return Change(value.key, "", written), f"{written}  # identified: {value.note}"
+    return Change(value.key, "", written), f"{written}  # {value.by}: {value.note}"
 
 
 def _written(value: NewValue, old: Any) -> str:

@@ -13,6 +13,8 @@ from pydantic import ValidationError
 
 from detent.axisfile.catalogue import Catalogue
 from detent.axisfile.tables import AxisSpec
+from detent.axisfile.tolerance import TABLE as TOLERANCE
+from detent.axisfile.tolerance import Tolerance, read_tolerances
 from detent.errors import FileProblem, InputError
 from detent.files.fields import (
     AnyName,
@@ -55,6 +57,7 @@ class AxisFile(OnScreen):
     source: Source
     overrides: tuple[str, ...] = ()
     changes: dict[str, Any] = field(default_factory=dict[str, Any])
+    tolerance: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])  # by key, what is not known of it
 
     def replaced(self, changes: Mapping[str, Any]) -> "AxisFile":
         """The same with other values, checked as a whole."""
@@ -102,12 +105,14 @@ def axis_of(source: Source, overrides: Sequence[str] = (), changes: dict[str, An
     layers = _Layers(tables, texts | written, named, problems=problems)
     reporter = Reporter(source.file, source.places, layers.overrides, model, named)
     _apply_catalogue(layers, reporter, method)
+    stated = layers.tables.pop(TOLERANCE, {})  # what the axis is does not depend on what is not known of it
     layers.problems += [reporter.wrong_name(path, field) for path, field in bad_names(model, layers.tables)]
     spec = _validated(layers, reporter, method, is_whole=source.is_whole)
     problems = [*source.problems, *layers.problems]
-    if problems:
-        raise InputError(problems)
-    return AxisFile(source.file, spec, *_origins(source, layers, spec), source, tuple(overrides), changes)
+    tolerance, wrong = read_tolerances(stated, spec, model, reporter) if not problems else ({}, [])
+    if problems or wrong:
+        raise InputError([*problems, *wrong])
+    return AxisFile(source.file, spec, *_origins(source, layers, spec), source, tuple(overrides), changes, tolerance)
 
 
 def _method_of(source: Source, overrides: Sequence[str], changes: dict[str, Any]) -> Method[Any]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from detent.kernel.registers import Registers
     from detent.methods.linear import LinearModel
     from detent.methods.position import PositionSensor
+    from detent.methods.tuning import Tuning
     from detent.page.frame import Comparison, Page
     from detent.record.capture import Clocking
     from detent.record.machine import AnyRecorder, Progress
@@ -190,6 +191,8 @@ class Method(Protocol[SpecT]):
     linear_loops: ClassVar[str] = ""
     """Place of its loops as linear systems, by where they are cut open: ``loops(spec)``; none where none is linear."""
     leaves_out: ClassVar[tuple[str, ...]] = ()  # what these do not know, in sentences
+    tunes: ClassVar[str] = ""
+    """Place of what chooses its gains: ``tuning(spec)`` gives a `tuning.Tuning`; none where it has no gains."""
     compares: ClassVar[tuple[str, ...]] = ()
     """Places of what holds it beside its alternatives: ``compare(spec, progress=)``."""
 
@@ -278,6 +281,10 @@ class Method(Protocol[SpecT]):
         """A short job for looking at signals."""
         ...
 
+    def trial_job(self, spec: SpecT) -> Any:
+        """The job that gains are tried with unless told otherwise."""
+        return self.sample_job(spec)
+
     def simulated(self, spec: SpecT) -> Simulated:
         """The axis as the simulation takes it."""
         return Simulated(
@@ -316,6 +323,15 @@ class Method(Protocol[SpecT]):
                 "look at its steps with run and compare"
             )
         return LinearModel(spec.axis.name, self.brought(self.linear_loops)(spec), self.leaves_out)
+
+    def tuning(self, spec: SpecT) -> "Tuning":
+        """What chooses its gains; refused where it has none."""
+        if not self.tunes:
+            raise DetentError(
+                f"{spec.axis.name}: got an axis of the method {self.name}, whose gains no linear model chooses; "
+                f"expected: a method with one; try: compare settings of this one with `detent run --set KEY=VALUE`"
+            )
+        return self.brought(self.tunes)(spec)
 
     def sensors(self, spec: SpecT) -> "Mapping[str, PositionSensor]":
         """What counts the position of each of its motors; of a single one by the name ""."""

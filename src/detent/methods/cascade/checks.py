@@ -20,7 +20,7 @@ MOST_COUNTS = 2**53  # counts of an encoder: beyond them a float no longer knows
 QUICK = 0.1  # bandwidth of a velocity loop that is proposed [rad] over its dead time: it keeps far from its limit
 
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, math.radians(30)  # below them a loop rings
-SLOWER = 2.0  # by how much the velocity loop should be faster than the position loop around it
+LARGEST_PEAK = 1.3  # of the reference to the position, without feedforward
 NEAR_RESONANCE = 0.5  # share of the anti-resonance above which a velocity loop on the motor leaves the load behind
 LARGEST_JUMP = 0.1  # share of the largest command by which one count may move the drive
 MOST_COMMAND = 0.95  # share of what the drive can do that a move at its limits may take
@@ -261,13 +261,15 @@ def _lowered(m: CascadeFigures, share: float) -> str:
 def _bandwidth(m: CascadeFigures) -> Iterator[Caution]:
     """Each loop keeps below what it acts on."""
     loop, method = m.loop, m.spec.method
-    inner, outer = loop.velocity_loop.crossover, loop.position_loop.crossover
+    inner = loop.velocity_loop.crossover
     near = NEAR_RESONANCE * m.anti_resonance
-    if 0 < inner < SLOWER * outer:
-        limit = f"up to half that of the velocity loop, {text(inner / SLOWER, 'Hz')}"
+    peak, at = loop.open_loop("position").closed().peak if inner > 0 and loop.spectral_radius < 1.0 else (0.0, 0.0)
+    if peak > LARGEST_PEAK:
+        limit = f"up to {LARGEST_PEAK:g} times the reference"
         consequence = "the velocity loop is too slow for it, and moves overshoot"
-        remedy = f"lower method.position_gain, {method.position_gain:.4g}, or raise method.velocity_gain"
-        yield Caution("bandwidth of the position loop", text(outer, "Hz"), limit, consequence, remedy)
+        remedy = f"lower method.position_gain, {method.position_gain:.4g}, or choose gains with `detent tune`"
+        value = f"{peak:.3g} times the reference at {text(at, 'Hz', 3)}"
+        yield Caution("peak of the position loop", value, limit, consequence, remedy)
     if inner > near > 0 and method.feedback.velocity == "motor":
         limit = f"up to half the anti-resonance, {text(near, 'Hz')}"
         consequence = "it holds the motor while the load oscillates on its coupling with hardly any damping"

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from detent.analysis.linear_system import LinearSystem, gain_limit, margins_of, usual_frequencies
+from detent.analysis.linear_system import LinearSystem, Margins, gain_limit, margins_of, usual_frequencies
 from detent.methods.cascade.schema import CascadeSpec
 from detent.plant.linear_two_mass import linear_plant
 
@@ -30,6 +30,7 @@ Numbers = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
 
 LARGEST_MARGIN = 1e3  # largest gain margin that is looked for
+WELL_APART = 1e8  # condition of the modes up to which responses are sums over them
 
 
 def machine_of(spec: CascadeSpec) -> Any:
@@ -73,10 +74,16 @@ class LinearLoop:
         self.velocity_share = smoothing(self.velocity_sensor.velocity_filter, self.period)
         self.derivative_share = smoothing(spec.method.derivative_filter, self.period)
         self.frequencies = usual_frequencies(self.period)  # of the open loops [Hz]
-        # Margins; a PID has no velocity loop, which then never crosses a gain of 1.
-        self.velocity_loop, self.position_loop = (
-            margins_of(lambda at, k=k: self._open_loops(at)[k], self.frequencies, self.period) for k in (0, 1)
-        )
+
+    @cached_property
+    def velocity_loop(self) -> Margins:
+        """Margins of the velocity loop; a PID has none, which then never crosses a gain of 1."""
+        return margins_of(lambda at: self._open_loops(at)[0], self.frequencies, self.period)
+
+    @cached_property
+    def position_loop(self) -> Margins:
+        """Margins of the position loop around it; of a PID, of its only loop."""
+        return margins_of(lambda at: self._open_loops(at)[1], self.frequencies, self.period)
 
     @cached_property
     def held(self) -> tuple[Numbers, Numbers]:
@@ -165,20 +172,40 @@ class LinearLoop:
 
     def _open_loops(self, frequencies: Numbers) -> tuple[Phasors, Phasors]:
         """Velocity loop, and position loop with that inside it closed; of a PID no velocity loop, and all of it."""
-        m, read, z = self.spec.method, self.velocity_sensor, np.exp(2j * np.pi * frequencies * self.period)
-        held, driven = self.held
-        size, span = len(driven), float(read.velocity_span)
-        through = z[:, None, None] * np.eye(size) - held
-        x = np.linalg.solve(through, np.broadcast_to(driven[:, None], (len(z), size, 1)).astype(np.complex128))[:, :, 0]
-        x = x * (self.gain * z ** -float(self.spec.drive.delay))[:, None]
-        position = x[:, self.position_place] * z ** -float(self.position_sensor.delay)
-        velocity = x[:, self.velocity_place] * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
-        velocity, summed = velocity * _filter(z, self.velocity_share), self.period * z / (z - 1.0)
+        m, (position, velocity, summed) = self.spec.method, self.paths(frequencies)
         if m.structure == "pid":
-            lead = m.derivative * _filter(z, self.derivative_share)
-            return np.zeros_like(z), (m.proportional + m.integral * summed) * position + lead * velocity
+            return np.zeros_like(position), (m.proportional + m.integral * summed) * position + m.derivative * velocity
         law = m.velocity_gain + m.velocity_integral * summed
         return law * velocity, m.position_gain * law * position / (1.0 + law * velocity)
+
+    def paths(self, frequencies: Numbers) -> tuple[Phasors, Phasors, Phasors]:
+        """What the gains stand between, at frequencies [Hz]: from a command to the position and to the velocity.
+
+        Both as they are read; the velocity of a PID behind its derivative's filter. Third, the sum of an integral.
+        """
+        read, z = self.velocity_sensor, np.exp(2j * np.pi * frequencies * self.period)
+        span, late = float(read.velocity_span), self.gain * z ** -float(self.spec.drive.delay)
+        position, velocity = self._driven(z)
+        position = late * position * z ** -float(self.position_sensor.delay)
+        velocity = late * velocity * z ** -float(read.delay) * (1 - z**-span) / (span * self.period)
+        velocity = velocity * _filter(z, self.velocity_share)
+        if self.spec.method.structure == "pid":
+            velocity = velocity * _filter(z, self.derivative_share)
+        return position, velocity, self.period * z / (z - 1.0)
+
+    def _driven(self, z: Phasors) -> tuple[Phasors, Phasors]:
+        """Both positions of the plant that are read, to what the amplifier puts out; by its modes where they differ."""
+        held, driven = self.held
+        places = [self.position_place, self.velocity_place]
+        modes, vectors = np.linalg.eig(held)
+        if np.linalg.cond(vectors) < WELL_APART:
+            shares = vectors[places] * np.linalg.solve(vectors, driven.astype(np.complex128))
+            found = (1.0 / (z[:, None] - modes)) @ shares.T
+        else:  # without drag the position sums up what is summed up already
+            through = z[:, None, None] * np.eye(len(driven)) - held
+            put_in = np.broadcast_to(driven[:, None], (len(z), len(driven), 1)).astype(np.complex128)
+            found = np.linalg.solve(through, put_in)[:, places, 0]
+        return found[:, 0], found[:, 1]
 
     def velocity_level(self, frequency: float) -> float:
         """Gain of the open velocity loop at a frequency [Hz] below half the sample rate."""

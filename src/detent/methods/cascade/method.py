@@ -8,7 +8,7 @@ from detent.axisfile.catalogue import DC_MOTORS
 from detent.axisfile.motion import rotary_model
 from detent.methods.cascade.schema import CascadeSpec
 from detent.methods.method import Method, Shown, Simulated
-from detent.methods.moves.job import MoveJob, one_move
+from detent.methods.moves.job import MoveJob, half_and_back, one_move
 
 if TYPE_CHECKING:
     from detent.page.frame import Page
@@ -38,6 +38,7 @@ class CascadeMethod(Method[CascadeSpec]):
     )  # fmt: skip
     takes, reads = "detent.methods.moves.job:MoveJob", "detent.methods.moves.job:load_moves"
     linear_loops = "loop:linear_loops"
+    tunes = "tuning:CascadeTuning"
     leaves_out = (
         "Neglected: saturation, quantization, Coulomb and Stribeck friction; both masses move, backlash is closed.",
     )
@@ -75,6 +76,10 @@ class CascadeMethod(Method[CascadeSpec]):
         """A short way to where there is more room."""
         way, middle = 0.02 * spec.limits.travel, spec.limits.lowest + 0.5 * spec.limits.travel
         return one_move("one move", way if spec.mechanics.start_position < middle else -way, 0.05)
+
+    def trial_job(self, spec: CascadeSpec) -> MoveJob:
+        """Half of the travel and back."""
+        return half_and_back(spec.limits.lowest, spec.highest, spec.mechanics.start_position)
 
     def verdict(self, axis: str, result: Any) -> str:
         """Whether every move was in position, or that the recording was replayed."""

@@ -39,6 +39,7 @@ class FilteredServoMethod(MoveMethod[FilteredServoSpec]):
     seed = "encoder.seed"
     signals, timing = SIGNALS, TIMING
     linear_loops = "derive:linear_loops"
+    tunes = "tuning:FilteredTuning"
     leaves_out = ("Neglected: saturation, quantization, friction that is not viscous.",)
     lives = "live:live"
     compares = ("comparison:compare_feedback",)

@@ -249,3 +249,10 @@ def _make_move(line: int, row: MoveRow) -> tuple[Move, int]:
 def one_move(name: str, by: float, dwell: float) -> MoveJob:
     """A job of one move by a way [m] or [rad] and a dwell [s], for looking at signals."""
     return MoveJob(name, "moves", (Move(number=1, row=0, by=by, dwell=dwell),))
+
+
+def half_and_back(lowest: float, highest: float, start: float) -> MoveJob:
+    """A job over half of the travel to where there is more room, and back, half a second at rest after each."""
+    way = 0.5 * (highest - lowest) * (1 if start - lowest < highest - start else -1)
+    moves = tuple(Move(number=k, row=0, by=by, dwell=0.5) for k, by in enumerate((way, -way), 1))
+    return MoveJob("half of the travel and back", "moves", moves)

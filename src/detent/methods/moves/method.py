@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 from detent.axisfile.tables import AxisSpec
 from detent.methods.method import Method, Shown
-from detent.methods.moves.job import MoveJob, one_move
+from detent.methods.moves.job import MoveJob, half_and_back, one_move
 
 if TYPE_CHECKING:
     from detent.methods.moves.page import MoveView
@@ -30,6 +30,11 @@ class MoveMethod(Method[SpecT], Protocol[SpecT]):
     def sample_job(self, spec: SpecT) -> MoveJob:
         """A hundredth of the travel, from where the axis stands."""
         return one_move("one short move", 0.01 * getattr(spec, "limits").travel, 0.05)  # noqa: B009
+
+    def trial_job(self, spec: SpecT) -> MoveJob:
+        """Half of the travel and back."""
+        whole: Any = spec
+        return half_and_back(0.0, whole.limits.travel, whole.mechanics.start_position)
 
     def run(
         self, spec: SpecT, job: MoveJob, recorder: "AnyRecorder | None" = None, progress: "Progress | None" = None

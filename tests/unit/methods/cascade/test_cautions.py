@@ -52,7 +52,7 @@ CASES = [
         "phase margin of the velocity loop",
     ),
     ("cascade", [*PID, "method.derivative=10 V*s/m"], "phase margin of the position loop"),
-    ("cascade", ["method.position_gain=200"], "bandwidth of the position loop"),
+    ("cascade", ["method.position_gain=400"], "peak of the position loop"),
     ("cascade", ["mechanics.coupling.stiffness=5 N/um"], "bandwidth of the velocity loop"),
     ("turntable", ["mechanics.coupling.backlash=0.1 deg"], "backlash in the position loop"),
     ("turntable", ["encoder.resolution=0.01 deg"], "command noise from velocity quantization"),

@@ -1,0 +1,71 @@
+"""`detent tune`: gains with margins."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from detent.cli.app import NOT_DONE, File, Force, Job, Json, Set, app, option
+from detent.cli.terminal import print_json, print_table, progress_bar, say, split_names
+
+MS = "Largest sensitivity peak, 1.2 to 2.5; 1.7 leaves a gain margin of 2.4 and 34 degrees of phase."
+OVERSHOOT = "Largest peak of the reference to the position without feedforward, at least 1."
+GOAL = "stiff: the most integral stiffness; quiet: the least noise at the stiffness of the file."
+HOLD = "Leave this key as it is, as in method.velocity_gain; repeat for more."
+REPORT = "Write the report, one self-contained HTML file."
+WRITE = "Write the axis file with the gains; its text otherwise stays. It may be the file itself."
+
+
+@app.command()
+def tune(
+    file: File,
+    overrides: Set = None,
+    sensitivity: Annotated[float, option("--ms", "NUMBER", MS)] = 1.7,
+    overshoot: Annotated[float, option("--overshoot", "NUMBER", OVERSHOOT)] = 1.1,
+    goal: Annotated[str, option("--for", "GOAL", GOAL)] = "",
+    hold: Annotated[list[str] | None, option("--hold", "KEY", HOLD)] = None,
+    job: Job = None,
+    write: Annotated[Path | None, option("--write", "FILE", WRITE)] = None,
+    report: Annotated[Path | None, option("--report", "FILE", REPORT)] = None,
+    *,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Choose gains with margins, for all that [tolerance] allows, and try them on the simulated axis.
+
+    Exit status: 0 chosen for all plants, 1 refused or chosen for the axis of the file only, 2 wrong input.
+    """
+    from detent.axis import load
+    from detent.files.text import check_target
+
+    axis = load(file, overrides or [])
+    if write is not None:
+        is_own = write.exists() and file.exists() and write.samefile(file)
+        check_target(write, (".toml",), "an axis", force=force or is_own)
+    if report is not None:
+        check_target(report, (".html",), "a report", force=force)
+    with progress_bar(quiet=as_json) as progress:
+        found = axis.tune(
+            ms=sensitivity, overshoot=overshoot, goal=goal, hold=split_names(hold), job=job, progress=progress
+        )
+        written = [found.save(write, force=force)] if write is not None and found.values else []
+        if report is not None:
+            progress(0.97, "writing the report")
+            written.append(found.report(report, force=force))
+    if as_json:
+        changes = [one._asdict() for one in found.changes]
+        print_json(found.to_dict() | {"changes": changes, "files": [str(path) for path in written]})
+    else:
+        say(found.sentence, "bold green" if found.done else "bold yellow")
+        for one in found.refusals:
+            say(f"  {one}", "yellow", wrong=True)
+        print_table("", ("", "before", "after"), found.rows)
+        for path in written:
+            say(f"written: {path}")
+            if path == write:
+                for change in found.changes:
+                    say(f"  {change}")
+        if found.changes and write is None:
+            say("--write FILE puts the new gains into an axis file")
+    if not found.done:
+        raise typer.Exit(NOT_DONE)

@@ -1,0 +1,356 @@
+"""`detent tune`: gains chosen on the linear model, tried on the simulation, and put into the axis file."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from detent.analysis.linear_system import Margins
+from detent.axisfile.tables import AxisSpec
+from detent.errors import DetentError
+from detent.files.fields import held_leaves, type_of, unit_of
+from detent.files.findings import Caution
+from detent.files.patch import Change, NewValue, patch
+from detent.files.problems import dotted, format_value
+from detent.files.screen import Block, OnScreen, Screen
+from detent.files.text import check_target, did_you_mean, write_text
+from detent.methods.check import check_spec
+from detent.methods.load import AxisFile
+from detent.methods.method import untold
+from detent.methods.registry import METHODS
+from detent.methods.tuning import Bounds
+from detent.tune.choice import FEWEST, Chooser, Guaranteed, Progress
+from detent.tune.plants import Plants
+from detent.units import format_quantity
+
+SAME = 1e-12  # of a gain, as a share
+TRADED = (1.3, 1.4, 1.5, 1.6, 1.7, 1.85, 2.0, 2.2)  # values of Ms of which a report tells what they would give
+RANKED = 2  # intervals of which is told what they would be worth
+
+
+@dataclass(frozen=True)
+class Stand:
+    """An axis with some gains: its margins by the cut, what it does with the job, and what `check` says."""
+
+    file: AxisFile
+    margins: Mapping[str, Margins]
+    settles: bool
+    bandwidth: float | None  # of the reference to the position [Hz]
+    result: Any
+    summary: Sequence[tuple[str, str]]
+    cautions: Sequence[Caution]
+
+    @classmethod
+    def of(cls, file: AxisFile, job: Any) -> "Stand":
+        """Try a job on an axis."""
+        spec = file.spec
+        method = METHODS[spec.axis.method]
+        model, result = method.linear(spec), method.run(spec, job)
+        outer = [cut for cut in model.loops if "position" in cut]
+        bandwidth = model[outer[0]].closed().bandwidth if outer and model.settles else None
+        summary = method.summary(spec, result)
+        return cls(file, model.margins, model.settles, bandwidth, result, summary, check_spec(file).warnings)
+
+    @property
+    def sensitivity(self) -> tuple[float, float]:
+        """Largest Ms of all cuts, and its frequency [Hz]."""
+        worst = max(self.margins.values(), key=lambda one: one.sensitivity)
+        return worst.sensitivity, worst.peak
+
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Figures to be laid beside those of other gains."""
+        for cut, one in self.margins.items():
+            yield f"Ms at {cut}", f"{one.sensitivity:.3g} at {format_quantity(one.peak, 'Hz', 3)}"
+            yield f"phase margin at {cut}", format_quantity(one.phase, "rad", 3)
+            yield f"gain margin at {cut}", f"{one.gain:.3g}" if math.isfinite(one.gain) else "any"
+        if self.bandwidth is not None:
+            yield "bandwidth, -3 dB", format_quantity(self.bandwidth, "Hz", 3)
+        yield from ((name, text.partition(", from ")[0]) for name, text in self.summary)
+
+
+@dataclass(frozen=True, repr=False)
+class Tuned(OnScreen):
+    """What `detent tune` has found.
+
+    Attributes
+    ----------
+    before, after : Stand
+        The axis with the gains of its file, and with those that were chosen; `after` is None where there are none.
+    values : mapping of str to float
+        The gains by key, in SI units; empty where there are none.
+    worth : tuple of float
+        What was made as large as the bounds allow: with the gains of the file, for the nominal axis alone, for all.
+    guaranteed : Guaranteed
+        For which plants the gains hold.
+    refusals : sequence of Caution
+        Why there are none, or why they hold for the nominal axis only.
+    """
+
+    before: Stand
+    after: Stand | None
+    bounds: Bounds
+    goal: str
+    values: Mapping[str, float]
+    worth: tuple[float, float, float]
+    worth_text: str
+    guaranteed: Guaranteed
+    refusals: Sequence[Caution]
+    chooser: Chooser = field(compare=False)
+
+    @property
+    def typed(self) -> dict[str, float]:
+        """The gains, whole where the key is."""
+        return _typed(self.before.file.spec, self.values)
+
+    @property
+    def why(self) -> list[str]:
+        """What decided, in sentences."""
+        if not self.values:
+            return []
+        bounds = f"Ms up to {self.bounds.sensitivity:g} at every cut and an overshoot up to {self.bounds.overshoot:g}"
+        told = [f"The largest {self.worth_text} with {bounds}."]
+        if self.done and self.before.file.tolerance:
+            share = 100 * self.worth[2] / self.worth[1]
+            number = len(self.guaranteed.binding) - 1
+            told.append(
+                f"What [tolerance] leaves open costs {100 - share:.0f} % of it; {number} other "
+                f"plant{'s' if number != 1 else ''} decided, and {self.guaranteed.fresh} random ones kept the bounds."
+            )
+        return told
+
+    @cached_property
+    def trade(self) -> list[tuple[float, float]]:
+        """What other bounds on Ms would give on the nominal axis: Ms, and what is made large; 0 where there is none."""
+        found = list[tuple[float, float]]()
+        for level in TRADED:
+            tried = replace(self.chooser, bounds=Bounds(level, self.bounds.overshoot))
+            found.append((level, tried.worth(tried.nominal())))
+        return found
+
+    def report(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the report, one self-contained HTML file.
+
+        Parameters
+        ----------
+        path : path
+            HTML file.
+        force : bool
+            Replace a file that detent did not write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        DetentError
+            The file cannot be written.
+        """
+        from detent.page.render import write_page
+        from detent.tune.page import tuned_page
+
+        target = check_target(path, (".html",), "a report", force=force)
+        write_page(target, tuned_page(self), force=force)
+        return target
+
+    @property
+    def done(self) -> bool:
+        """True where gains were chosen that hold for all plants."""
+        return not self.refusals
+
+    @property
+    def sentence(self) -> str:
+        """What came of it."""
+        file, bounds = self.before.file, self.bounds
+        name = file.spec.axis.name
+        if self.after is None:
+            return f"{name}: no gains keep Ms {bounds.sensitivity:g}."
+        level, peak = self.after.sensitivity
+        told = f"Ms {level:.3g} at {format_quantity(peak, 'Hz', 3)}"
+        if self.refusals:
+            return f"{name}: gains for the axis as its file states it only, {told}; not for all that it may be."
+        seen = f", guaranteed over [tolerance] ({len(file.tolerance)} keys)" if file.tolerance else ""
+        return f"{name}: gains chosen, {told}{seen}."
+
+    @cached_property
+    def changes(self) -> list[Change]:
+        """What becomes of the axis file."""
+        return self._patched()[1] if self.values else []
+
+    def _patched(self) -> tuple[str, list[Change]]:
+        file = self.before.file
+        if not file.source.content:
+            raise DetentError(
+                f"{file.file}: got an axis without a file; expected: one of a file; try: write it down first"
+            )
+        return patch(file.source.content.decode(), self._new_values(), file.file)
+
+    def _new_values(self) -> list[NewValue]:
+        units = {dotted(path): unit_of(field) for path, field, _ in held_leaves(self.before.file.spec)}
+        level, peak = (self.after or self.before).sensitivity
+        old, at = self.before.sensitivity
+        note = (
+            f"Ms {level:.3g} at {format_quantity(peak, 'Hz', 3)} ({old:.3g} at {format_quantity(at, 'Hz', 3)} before)"
+        )
+        if self.before.file.tolerance and self.done:
+            note += f", guaranteed {self.bounds.sensitivity:g} over [tolerance]"
+        return [NewValue(key, value, units[key], note, "tuned") for key, value in self.values.items()]
+
+    def save(self, path: str | Path, *, force: bool = False) -> Path:
+        """Write the axis file with the gains; all else of its text stays.
+
+        Parameters
+        ----------
+        path : path
+            TOML file; that of the axis itself, or a new one.
+        force : bool
+            Replace another file that detent did not write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        DetentError
+            There are no gains, or the file cannot be written.
+        """
+        if not self.values:
+            raise DetentError(
+                f"{self.before.file.file}: got no gains; expected: gains that keep the bounds; see why not"
+            )
+        own = Path(self.before.file.file)
+        is_own = own.exists() and Path(path).exists() and own.samefile(path)
+        target = check_target(path, (".toml",), "an axis", force=force or is_own)
+        return write_text(target, self._patched()[0], force=force or is_own)
+
+    @property
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Gains and figures before and after."""
+        before, after = dict(self.before.rows()), dict(self.after.rows()) if self.after else {}
+        fields = {dotted(path): (field, value) for path, field, value in held_leaves(self.before.file.spec)}
+        told = [
+            (key, format_value(*fields[key]), format_value(fields[key][0], value)) for key, value in self.values.items()
+        ]
+        told.append((self.worth_text, f"{self.worth[0]:.4g}", f"{self.worth[2] or self.worth[1]:.4g}"))
+        return told + [(name, text, after.get(name, "")) for name, text in before.items()]
+
+    def screen(self) -> Screen:
+        """Gains and figures before and after, and why not."""
+        title = "\n".join([self.sentence, self.before.file.file, *map(str, self.refusals)])
+        return Screen(title, [Block("", ("", "before", "after"), self.rows, 30)], ".save(FILE)  .report(FILE)")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as ``--json`` prints it."""
+
+        def stand(one: Stand | None) -> dict[str, Any] | None:
+            if one is None:
+                return None
+            margins = {cut: {k: v if math.isfinite(v) else None for k, v in m._asdict().items()}
+                       for cut, m in one.margins.items()}  # fmt: skip
+            return {
+                "margins": margins, "settles": one.settles, "bandwidth": one.bandwidth, "run": one.result.to_dict(),
+                "warnings": [str(caution) for caution in one.cautions],
+            }  # fmt: skip
+
+        nominal = self.worth
+        return {
+            "sentence": self.sentence, "goal": self.goal, "sensitivity": self.bounds.sensitivity,
+            "overshoot": self.bounds.overshoot, "values": dict(self.values),
+            "worth": {"before": nominal[0], "nominal": nominal[1], "guaranteed": nominal[2]},
+            "binding": [dict(one.values) for one in self.guaranteed.binding], "worst": self.guaranteed.worst,
+            "fresh": self.guaranteed.fresh, "refusals": [vars_of(one) for one in self.refusals],
+            "before": stand(self.before), "after": stand(self.after),
+        }  # fmt: skip
+
+
+def vars_of(caution: Caution) -> dict[str, str]:
+    """A refusal as plain data."""
+    return {name: getattr(caution, name) for name in ("name", "value", "limit", "consequence", "remedy")}
+
+
+def tune(  # noqa: PLR0913 - what may be asked
+    file: AxisFile, *, sensitivity: float = 1.7, overshoot: float = 1.1, goal: str = "", hold: Sequence[str] = (),
+    job: Any = None, progress: Progress | None = None,
+) -> Tuned:  # fmt: skip
+    """Choose the gains of an axis; parameters as of `Axis.tune`."""
+    progress = progress or untold
+    spec = file.spec
+    method = METHODS[spec.axis.method]
+    tuning, bounds = method.tuning(spec), _bounds(sensitivity, overshoot)
+    chooser = Chooser(
+        tuning, Plants(spec, file.tolerance), bounds, _goal(goal, tuning.goals), _held(hold, tuning), progress,
+    )  # fmt: skip
+    nominal = chooser.nominal()
+    found = chooser.guaranteed() if file.tolerance and nominal.values else nominal
+    worth = tuning.worth(tuning.stated), chooser.worth(nominal), chooser.worth(found)
+    refusals = list(_refusals(chooser, nominal, found))
+    values = (nominal if refusals else found).values
+    job = method.trial_job(spec) if job is None else job
+    progress(0.85, "trying the gains of the file")
+    before = Stand.of(file, job)
+    progress(0.92, "trying the new gains")
+    after = Stand.of(file.replaced(_typed(spec, values)), job) if values else None
+    chosen = dict(values)
+    return Tuned(before, after, bounds, chooser.goal, chosen, worth, tuning.worth_text, found, refusals, chooser)
+
+
+def _bounds(sensitivity: float, overshoot: float) -> Bounds:
+    for name, value, low, high in (("ms", sensitivity, 1.2, 2.5), ("overshoot", overshoot, 1.0, 2.0)):
+        if not low <= value <= high:
+            raise DetentError(f"{name}: got {value:g}; expected: a number from {low:g} to {high:g}; give one of these")
+    return Bounds(sensitivity, overshoot)
+
+
+def _goal(goal: str, goals: Sequence[str]) -> str:
+    if goal and goal not in goals:
+        known = " or ".join(goals)
+        raise DetentError(
+            f"goal: got {goal!r}; expected: {known}; try: {did_you_mean(goal, goals, 'choose one of these')}"
+        )
+    return goal or goals[0]
+
+
+def _held(hold: Sequence[str], tuning: Any) -> dict[str, float]:
+    """The keys that stay as they are, with their values."""
+    for key in hold:
+        if key not in tuning.keys:
+            remedy = did_you_mean(key, tuning.keys, "name keys that are chosen here")
+            raise DetentError(f"hold: got {key!r}; expected: {', '.join(tuning.keys)}; try: {remedy}")
+    return {key: tuning.stated[key] for key in hold}
+
+
+def _typed(spec: AxisSpec, values: Mapping[str, float]) -> dict[str, float]:
+    """Values of keys, whole where the key is."""
+    whole = {dotted(path) for path, field, _ in held_leaves(spec) if type_of(field) is int}
+    return {key: round(value) if key in whole else value for key, value in values.items()}
+
+
+def _refusals(chooser: Chooser, nominal: Guaranteed, found: Guaranteed) -> Iterator[Caution]:
+    """Why there are no gains, or none for all plants."""
+    limit = f"Ms up to {chooser.bounds.sensitivity:g}, overshoot up to {chooser.bounds.overshoot:g}"
+    if not nominal.values:
+        consequence = "no gains keep these bounds on the axis of the file"
+        yield Caution(
+            "gains", "none", limit, consequence, "shorten the dead time, stiffen the coupling, or allow a larger --ms"
+        )
+        return
+    share = chooser.worth(found) / chooser.worth(nominal)
+    if share >= FEWEST:
+        return
+    what = chooser.tuning.worth_text
+    ranking = [_worth_of(chooser, key, worth / chooser.worth(nominal)) for key, worth in chooser.regained()[:RANKED]]
+    yield Caution(
+        "plant", f"{what} for all plants {100 * share:.2g} % of the nominal one's", f"at least {100 * FEWEST:g} %",
+        "gains that hold for all that [tolerance] allows would be useless", "; ".join(ranking),
+    )  # fmt: skip
+
+
+def _worth_of(chooser: Chooser, key: str, share: float) -> str:
+    record = chooser.tuning.recordings.get(key.rpartition(".")[2], "")
+    told = f"know {key} better: a quarter of its interval gives {100 * share:.2g} %"
+    return f"{told}; record {record}" if record else told

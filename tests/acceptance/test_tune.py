@@ -1,0 +1,336 @@
+"""Tune specification, section 10: margins and gains. Its figures come from independent programs."""
+
+import json
+import math
+import random
+
+import numpy as np
+import pytest
+from tests.acceptance.test_golden_bits import EXAMPLES
+
+import detent
+from detent.analysis.sampled_loop import SampledLoop
+from detent.axis import Axis
+from detent.errors import InputError
+from detent.files.source import parse_source
+from detent.methods.cascade.loop import LinearLoop
+from detent.methods.cascade.tuning import CascadeTuning
+from detent.methods.filtered_servo.tuning import FilteredTuning
+from detent.methods.load import axis_of, load_spec
+from detent.methods.moves.job import one_move
+from detent.methods.rotary_table.loop import HeldLoop
+from detent.methods.tuning import Bounds
+from detent.tune.choice import Chooser
+from detent.tune.plants import Plants
+
+CASCADE = EXAMPLES / "cascade.toml"
+GAINS = ("method.position_gain", "method.velocity_gain", "method.velocity_integral")
+SET_OF_8 = """
+[tolerance]
+"mechanics.load_mass" = "10 %"
+"mechanics.motor_mass" = "2 %"
+"mechanics.coupling.stiffness" = "10 %"
+"mechanics.friction.negative.viscous" = "30 %"
+"drive.current_per_volt" = "5 %"
+"""
+
+
+def linear(*overrides: str):
+    return detent.load(CASCADE, overrides).linear()
+
+
+def near(value: float, share: float):
+    return pytest.approx(value, rel=share)
+
+
+# ---- margins
+
+
+def test_01_margins_of_the_example_at_its_three_cuts():
+    model = linear()
+    told = {
+        "command": (46.182, 36.136, 3.2163, 2.2209),
+        "velocity": (45.259, 37.75, None, 2.1486),
+        "position": (6.856, 86.75, None, 1.119),
+    }
+    for cut, (crossover, phase, gain, level) in told.items():
+        m = model.margins[cut]
+        assert m.crossover == near(crossover, 1e-3)
+        assert math.degrees(m.phase) == pytest.approx(phase, abs=0.05)
+        assert m.sensitivity == near(level, 2e-3)
+        assert gain is None or m.gain == near(gain, 1e-3)
+    assert model.margins["command"].least == near(0.0743, 1e-3)
+    assert model.margins["command"].peak == near(343.9, 1e-3)
+    assert model["position"].closed().bandwidth == near(7.380, 1e-3)
+    assert model["command"].closed().spectral_radius == pytest.approx(0.9918267, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "crossover", "phase", "gain", "level", "peak"),
+    [
+        (["method.velocity_gain=150 V*s/m"], 66.158, 22.137, 2.1744, 3.1816, 355.4),
+        (["drive.delay=2"], None, 6.248, 1.1577, 11.934, 333.6),
+        (["mechanics.load_mass=60 kg"], None, 30.756, 3.4197, 2.2810, 310.1),
+        (["method.feedback.position=load", "load_encoder.resolution=1 um"], None, 39.17, 3.4098, 2.0989, None),
+    ],
+)
+def test_02_margins_at_the_command_of_other_axes(overrides, crossover, phase, gain, level, peak):
+    m = linear(*overrides).margins["command"]
+    assert crossover is None or m.crossover == near(crossover, 1e-3)
+    assert math.degrees(m.phase) == pytest.approx(phase, abs=0.05)
+    assert m.gain == near(gain, 1e-3)
+    assert m.sensitivity == near(level, 1e-2 if level > 5 else 2e-3)
+    assert peak is None or m.peak == near(peak, 1e-3)
+
+
+def test_03_a_cascade_and_its_pid_have_the_same_loop_at_the_command():
+    plain = "encoder.velocity_filter=0 s"
+    pid = ["method.structure=pid", "method.proportional=9 kV/m", "method.integral=200 kV/(m*s)",
+           "method.derivative=100 V*s/m"]  # fmt: skip
+    both = [linear(plain), linear(plain, *pid)]
+    for model in both:
+        m = model.margins["command"]
+        assert math.degrees(m.phase) == pytest.approx(49.470, abs=0.05)
+        assert m.gain == near(4.5704, 1e-3)
+        assert m.sensitivity == near(1.6568, 2e-3)
+        assert m.peak == near(361.9, 1e-3)
+        assert model["command"].closed().spectral_radius == pytest.approx(0.9918013, abs=1e-6)
+    for one, other in zip(both[0].margins["command"], both[1].margins["command"], strict=True):
+        assert one == pytest.approx(other, rel=1e-9)
+
+
+def random_axis(chance: random.Random) -> tuple[str, ...]:
+    """A cascade axis that may be anything between slow and ringing."""
+    two = [f"mechanics.coupling.stiffness={10 ** chance.uniform(0.5, 2.5):.4g} N/um",
+           f"mechanics.coupling.damping={10 ** chance.uniform(2, 4):.4g} N*s/m"]  # fmt: skip
+    return (
+        *two, f"mechanics.load_mass={10 ** chance.uniform(0, 2):.4g} kg", f"drive.delay={chance.randrange(3)}",
+        f"mechanics.friction.negative.viscous={10 ** chance.uniform(0, 2.5):.4g} N*s/m",
+        f"method.position_gain={10 ** chance.uniform(0.5, 2):.4g}",
+        f"method.velocity_gain={10 ** chance.uniform(0.5, 2):.4g} V*s/m",
+        f"method.velocity_integral={10 ** chance.uniform(1, 4):.4g} V/m",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("axes", [25, pytest.param(500, marks=pytest.mark.wide)])
+def test_04_ms_guarantees_both_margins_and_the_gain_margin_is_the_limit(axes):
+    chance, settled = random.Random(4), 0
+    for _ in range(axes):
+        spec = load_spec(CASCADE, random_axis(chance))
+        system = LinearLoop(spec).open_loop("command")
+        m = system.margins()
+        if system.closed().spectral_radius >= 1.0:
+            continue
+        settled += 1
+        assert m.gain >= m.sensitivity / (m.sensitivity - 1) * (1 - 1e-3)
+        assert abs(m.phase) >= 2 * math.asin(1 / (2 * m.sensitivity)) - 1e-3
+        if math.isfinite(m.gain):
+            assert system.closed(m.gain).spectral_radius == pytest.approx(1.0, abs=1e-4)
+    assert settled > axes / 3
+
+
+def test_05_margins_of_the_rotary_table():
+    def loop(gain: float) -> HeldLoop:
+        return HeldLoop(gain=gain, share=0.95, time_constant=0.02, period=2e-3, delay=2e-4)
+
+    m = loop(30.0).open_loop().margins()
+    assert (m.crossover, math.degrees(m.phase)) == (near(4.0434, 2e-3), near(61.318, 2e-3))
+    assert m.sensitivity == near(1.3430, 2e-3)
+    assert loop(30.0).largest_gain(0.0) == near(890.70, 2e-3)
+    for gain, level in ((15.888, 1.2), (35.982, 1.4), (69.349, 1.7), (104.08, 2.0)):
+        assert loop(gain).open_loop().margins().sensitivity == near(level, 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("period", "scale", "coefficient", "damping", "margin"),
+    [(5e-3, 4, 0.25, 0.0921, 2.554), (5e-3, 4, 0.5, 0.2670, 3.430), (5e-3, 4, 0.75, 0.4912, 3.873),
+     (2e-3, 10, 0.5, 0.7544, 10.565), (1e-3, 20, 0.25, 0.7382, 20.98)],
+)  # fmt: skip
+def test_06_damping_and_margin_of_the_filtered_servo(period, scale, coefficient, damping, margin):
+    loop = SampledLoop(gain=4000, sample_period=period, scale=scale, coefficient=coefficient)
+    swings = [-pole.real / abs(pole) for pole in loop.poles() if abs(pole.imag) > 1e-9]
+    assert min(swings) == near(damping, 2e-3)
+    assert loop.stability_limit() / 4000 == near(margin, 2e-3)
+
+
+# ---- gains
+
+
+def chooser(text: str = "", sensitivity: float = 1.7, held: tuple[str, ...] = (), overrides: tuple[str, ...] = ()):
+    tables = CASCADE.read_text() + text
+    axis = axis_of_text(tables, overrides)
+    tuning = CascadeTuning(axis.spec)
+    return Chooser(
+        tuning, Plants(axis.spec, axis.file.tolerance), Bounds(sensitivity, 1.1),
+        held={key: tuning.stated[key] for key in held},
+    )  # fmt: skip
+
+
+def axis_of_text(text: str, overrides: tuple[str, ...] = ()):
+    return Axis(axis_of(parse_source("axis.toml", text), overrides))
+
+
+@pytest.mark.parametrize(("sensitivity", "best"), [(1.5, 2.162e5), (1.7, 5.224e5), (2.0, 1.196e6)])
+def test_07_the_gains_reach_the_optimum_and_keep_the_bounds(sensitivity, best):
+    one = chooser(sensitivity=sensitivity)
+    found = one.nominal()
+    assert 0.97 * best <= one.worth(found) <= 1.01 * best
+    assert one.worst([one.plants.nominal], found.values)[0] <= 1.002
+    axis = detent.load(CASCADE).replace(found.values)
+    margins = axis.linear().margins
+    assert max(margins["command"].sensitivity, margins["velocity"].sensitivity) <= 1.002 * sensitivity
+
+
+@pytest.mark.wide
+def test_08_gains_that_hold_for_all_that_tolerances_allow():
+    one = chooser(SET_OF_8)
+    nominal, found = one.nominal(), one.guaranteed()
+    assert one.worth(found) >= 2.83e5
+    keys = list(one.plants.tolerance)
+    seen = [*one.plants.random(3000, keys, 99), *one.plants.corners(keys)]  # the worst lie in corners
+
+    def worst(*values: float) -> float:
+        return 1.7 * max(one.worst(seen, dict(zip(GAINS, values, strict=True))))
+
+    assert worst(*found.values.values()) <= 1.709
+    assert worst(*nominal.values.values()) > 1.8
+    assert worst(95.4, 59.2, 5477) == near(1.861, 1e-2)
+    assert worst(74, 51.5, 4029) == near(1.690, 1e-2)
+    assert worst(40, 100, 5000) == near(2.518, 1e-2)
+    told = axis_of_text(CASCADE.read_text() + SET_OF_8).tune()
+    assert "guaranteed over [tolerance] (5 keys)" in told.sentence
+    assert told.values == found.values
+
+
+SINGLE = [
+    ("mechanics.coupling.stiffness", 10, 0.878), ("mechanics.coupling.stiffness", 30, 0.699),
+    ("mechanics.coupling.stiffness", 50, 0.576), ("mechanics.load_mass", 10, 0.868),
+    ("mechanics.load_mass", 20, 0.766), ("mechanics.load_mass", 30, 0.686), ("mechanics.load_mass", 50, 0.564),
+    ("drive.current_per_volt", 5, 0.837), ("drive.current_per_volt", 30, 0.324),
+    ("mechanics.friction.negative.viscous", 50, 0.974), ("mechanics.coupling.damping", 50, 0.298),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "percent", "share"), [one if k in (3, 7) else pytest.param(*one, marks=pytest.mark.wide)
+                                  for k, one in enumerate(SINGLE)],
+)  # fmt: skip
+def test_09_what_one_interval_costs(key, percent, share):
+    one = chooser(f'\n[tolerance]\n"{key}" = "{percent} %"\n')
+    nominal = one.worth(one.nominal())
+    narrow = one.worth(one.guaranteed(fresh=0)) / nominal
+    assert narrow >= 0.97 * share
+    wider = chooser(f'\n[tolerance]\n"{key}" = "{percent + 10} %"\n')
+    assert wider.worth(wider.guaranteed(fresh=0)) / nominal <= 1.01 * narrow
+
+
+@pytest.mark.wide
+def test_10_a_plant_that_is_not_known_well_enough_is_refused_with_what_helps():
+    keys = ("mechanics.coupling.stiffness", "mechanics.load_mass", "mechanics.coupling.damping")
+    table = "\n[tolerance]\n" + "".join(f'"{key}" = "50 %"\n' for key in keys)
+    told = axis_of_text(CASCADE.read_text() + table).tune()
+    assert not told.done
+    assert told.worth[2] / told.worth[1] == pytest.approx(0.059, abs=0.02)
+    remedy = told.refusals[0].remedy
+    assert 0 <= remedy.index("coupling.damping") < remedy.index("coupling.stiffness")
+    assert "through the resonance" in remedy
+    known = table.replace('coupling.damping" = "50', 'coupling.damping" = "10')
+    told = axis_of_text(CASCADE.read_text() + known).tune()
+    assert told.done
+    assert told.worth[2] / told.worth[1] >= 0.97 * 0.212
+
+
+def test_11_the_filtered_servo_takes_the_longest_period_that_is_damped():
+    spec = load_spec(EXAMPLES / "filtered_servo.toml")
+    tuning = FilteredTuning(spec)
+    for period, least, product in ((5e-3, 0.7582, 3.03), (2e-3, 0.3165, 3.16), (1e-3, 0.1614, 3.23)):
+        made = tuning.choose([spec], Bounds(), "quiet", {"method.sample_period": period})
+        assert made["method.coefficient"] == near(least, 1e-2)
+        assert made["method.coefficient"] * made["method.scale"] == near(product, 1e-2)
+    found = tuning.choose([spec], Bounds(), "quiet", {})
+    assert found["method.sample_period"] == 5e-3
+    assert found["method.coefficient"] == near(0.7582, 1e-2)
+
+
+def test_13_nothing_is_written_unasked_and_what_is_written_is_the_file_with_new_gains(tmp_path):
+    file = tmp_path / "slide.toml"
+    file.write_bytes(CASCADE.read_bytes())
+    axis = detent.load(file)
+    told = axis.tune()
+    assert file.read_bytes() == CASCADE.read_bytes()
+    written = told.save(tmp_path / "tuned.toml")
+    again = detent.load(written)
+    assert {str(one) for one in again.check().warnings} <= {str(one) for one in axis.check().warnings}
+    old, new = file.read_text().splitlines(), written.read_text().splitlines()
+    changed = [(one, other) for one, other in zip(old, new, strict=True) if one != other]
+    assert [other.split(" =")[0] for _, other in changed] == ["position_gain", "velocity_gain", "velocity_integral"]
+    for key, value in again.tune().values.items():
+        assert value == near(told.values[key], 5e-3)
+    told.save(file)  # its own file needs no force
+    (tmp_path / "other.toml").write_text("a = 1\n")
+    with pytest.raises(InputError, match="did not write"):
+        told.save(tmp_path / "other.toml")
+
+
+def test_14_the_same_file_gives_the_same_gains_and_a_key_may_be_held():
+    axis = detent.load(CASCADE)
+    one, other = axis.tune(), detent.load(CASCADE).tune()
+    assert json.dumps(one.to_dict()) == json.dumps(other.to_dict())
+    for key, overrides in (("method.velocity_gain", ["method.velocity_gain=50 V*s/m"]), ("method.position_gain", [])):
+        made = detent.load(CASCADE, overrides)
+        held = made.tune(hold=[key])
+        assert held.done
+        assert held.values[key] == CascadeTuning(made.spec).stated[key]
+        assert held.worth[1] <= one.worth[1] * 1.001
+
+
+def test_gains_that_are_quiet_reach_the_stiffness_of_the_file_with_less_noise():
+    axis = detent.load(CASCADE)
+    told = axis.tune(goal="quiet")
+    assert told.worth[1] >= told.worth[0] == 2e5
+    assert told.values["method.velocity_gain"] < 50.0
+    assert told.after is not None
+    assert told.after.sensitivity[0] <= 1.7 * 1.002
+
+
+def test_a_choice_does_not_depend_on_the_last_bits(monkeypatch):
+    """Another processor's linear algebra gives other last bits: the gains stay what they are."""
+    before = chooser().nominal().values
+    paths = LinearLoop.paths
+
+    def other(self, frequencies):
+        noise = np.random.default_rng(1).uniform(-1e-13, 1e-13, (3, len(frequencies)))
+        return tuple(one * (1 + shift) for one, shift in zip(paths(self, frequencies), noise, strict=True))
+
+    monkeypatch.setattr(LinearLoop, "paths", other)
+    assert chooser().nominal().values == before
+
+
+@pytest.mark.compiled
+def test_12_a_move_and_a_push_before_and_after():
+    """Time back within 5 um is seen by an encoder of 1 um: 131 ms here for the 139 ms of a program without counts."""
+    found = detent.load(CASCADE).tune().values
+    rows = [moved_and_pushed({}), moved_and_pushed(found)]
+    following, after_end, deflection, back = zip(*rows, strict=True)
+    assert (following[0], after_end[0]) == (pytest.approx(38.9e-6, abs=1e-6), pytest.approx(28e-6, abs=1e-6))
+    assert following[1] <= 21e-6
+    assert after_end[1] <= 10e-6
+    assert deflection[0] == pytest.approx(30.1e-6, abs=0.2e-6)
+    assert deflection[1] <= 33e-6
+    assert back[0] == near(0.139, 0.1)
+    assert back[1] <= 65e-3
+
+
+def moved_and_pushed(gains) -> tuple[float, float, float, float]:
+    """Peak error of a move of 250 mm, and behind it; of a push of 80 N the load's way, and the time back."""
+    axis = detent.load(CASCADE).replace(gains)
+    period, error = 0.25e-3, "controller.law.position_error"
+    moved = axis.run(one_move("250 mm", 0.25, 0.5), signals=[error, "controller.reference.velocity"]).trace
+    off = np.abs(np.array(moved[error]))
+    end = np.flatnonzero(np.array(moved["controller.reference.velocity"]))[-1]
+    pushed = axis.replace({"disturbance": {"push": {"force": 80.0, "at": 0.3, "duration": 0.5}}})
+    rest = pushed.run(one_move("nothing", 0.0, 1.0), signals=[error, "plant.machine.load.position"]).trace
+    first, last = round(0.3 / period), round(0.8 / period) - 10
+    way, error_then = (np.array(rest[name])[first - 2 : last] for name in ("plant.machine.load.position", error))
+    back = np.flatnonzero(np.abs(error_then) > 5e-6)[-1] * period
+    return off[:end].max(), off[end:].max(), np.abs(way - way[0]).max(), back

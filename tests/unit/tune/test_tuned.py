@@ -1,0 +1,104 @@
+"""`detent tune` as a command and in Python: what it says, writes and refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.acceptance.test_golden_bits import EXAMPLES
+from typer.testing import CliRunner
+
+import detent
+from detent.cli.app import app
+from detent.errors import DetentError
+
+CASCADE = EXAMPLES / "cascade.toml"
+TOLERANCE = '\n[tolerance]\n"mechanics.load_mass" = "10 %"\n'
+
+
+def run(*words: str):
+    return CliRunner().invoke(app, ["tune", *words])
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    made = tmp_path / "slide.toml"
+    made.write_text(CASCADE.read_text(encoding="utf-8") + TOLERANCE, encoding="utf-8")
+    return made
+
+
+@pytest.mark.compiled
+def test_the_command_writes_gains_and_report(file):
+    report, before = file.with_name("tuned.html"), file.read_text(encoding="utf-8")
+    done = run(str(file), "--write", str(file), "--report", str(report), "--json")
+    assert done.exit_code == 0
+    told = json.loads(done.stdout)
+    assert told["worth"]["before"] < told["worth"]["guaranteed"] < told["worth"]["nominal"]
+    assert [one["key"] for one in told["changes"]] == list(told["values"])
+    assert told["files"] == [str(file), str(report)]
+    assert told["worst"] <= 1.005
+    assert told["fresh"] == 2000
+    assert before != file.read_text(encoding="utf-8")
+    page = report.read_text(encoding="utf-8")
+    assert "guaranteed over [tolerance] (1 keys)" in page
+    for chart in ("sensitivity-command", "nyquist-velocity", "trade"):
+        assert f'"{chart}"' in page
+    again = json.loads(run(str(file), "--json").stdout)
+    assert again["values"] == told["values"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--ms", "3"], "1.2 to 2.5"),
+        (["--overshoot", "0.5"], "1 to 2"),
+        (["--for", "stif"], "stiff"),
+        (["--hold", "method.velocity_gian"], "method.velocity_gain"),
+    ],
+)
+def test_what_is_out_of_range_is_refused(words, told):
+    done = run(str(CASCADE), *words, "--json")
+    assert done.exit_code == 2
+    assert told in json.loads(done.stdout)["error"]
+
+
+@pytest.mark.parametrize("name", ["print_head", "phase_servo"])
+def test_a_method_without_linear_gains_says_so(name):
+    done = run(str(EXAMPLES / f"{name}.toml"), "--json")
+    assert done.exit_code == 2
+    assert "no linear model" in json.loads(done.stdout)["error"]
+
+
+def test_an_axis_that_nothing_makes_settle_is_refused():
+    """A dead time of 60 samples on a velocity loop that is held."""
+    told = detent.load(CASCADE, ["drive.delay=60"]).tune(hold=["method.velocity_gain"])
+    assert not told.done
+    assert told.values == {}
+    assert told.sentence == "cascade axis: no gains keep Ms 1.7."
+    assert "dead time" in told.refusals[0].remedy
+    assert "no gains keep" in repr(told)
+    with pytest.raises(DetentError, match="no gains"):
+        told.save("nothing.toml")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [("rotary_table", ["method.position_gain"]),
+     ("filtered_servo", ["method.sample_period", "method.scale", "method.coefficient"])],
+)  # fmt: skip
+def test_other_methods_are_tuned_and_tried(name, keys, tmp_path):
+    axis = detent.load(EXAMPLES / f"{name}.toml")
+    told = axis.tune()
+    assert told.done
+    assert list(told.values) == keys
+    assert told.after is not None
+    assert told.after.result.done
+    assert detent.load(told.save(tmp_path / "new.toml")).tune().values == told.values
+
+
+@pytest.mark.compiled
+def test_a_whole_number_stays_one():
+    axis = detent.load(EXAMPLES / "filtered_servo.toml", ["method.scale=8", "method.sample_period=2.5 ms"])
+    told = axis.tune()
+    assert told.typed["method.scale"] == 4
+    assert isinstance(told.typed["method.scale"], int)
