@@ -139,6 +139,7 @@ GUARD_TEXT: dict[int, str] = {
 
 
 LOOP_OVERRUN = 50  # fault of a live loop that cannot keep its time
+NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
 
 REFUSAL_TEXT: dict[int, str] = {
     31: "the target lies beyond a soft limit; name one between the limits",
@@ -148,6 +149,8 @@ REFUSAL_TEXT: dict[int, str] = {
     44: "a stop came after this was asked; look at the axis and ask again",
     50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
     "give it real-time priority, or a longer period",
+    55: "that the axis is going to move cannot be kept, so no new motion may begin, for after a power cut nobody would "
+    "know where it stands; give the store room on its disk, then enable again",
     52: "a value that is no number, infinite, or a share of the speed outside 0 to 1; correct it",
     101: "the axis is not enabled; enable it first",
     102: "the axis stands in a fault; read it, mend its cause, reset, then enable",

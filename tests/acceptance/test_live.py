@@ -2,6 +2,8 @@
 
 import math
 import mmap
+import shutil
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -10,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -21,6 +24,7 @@ from tests.acceptance.test_golden_bits import EXAMPLES, JOBS, Job
 from tests.difference import diff
 from tests.live_bench import MOVED, OPERATED, Bench
 
+import detent
 from detent.control import operation as ops
 from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
 from detent.control.guard import FOLLOWING, STUCK
@@ -928,3 +932,165 @@ def python_loop(periods: int, period: float) -> float:
             late += 1
             deadline = time.monotonic()
     return late / periods
+
+
+# ---- the store of a live axis
+
+
+def copied(folder: Path, name: str) -> Path:
+    """An axis file of one's own, beside which a store may lie."""
+    return Path(shutil.copy(EXAMPLES / f"{name}.toml", folder / "axis.toml"))
+
+
+def killed(axis: Any) -> None:
+    """What a kill leaves: nothing is stopped, nothing is parked, and the store is let go as it is."""
+    axis.link.host.keeper.close()
+
+
+def test_33_an_axis_is_found_where_it_was_parked(tmp_path):
+    file = copied(tmp_path, "rotary_table")
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "referenced"
+        axis.enable()
+        axis.go_to(3)
+        at = axis.position % (2 * math.pi)
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "restored"
+        assert axis.position == pytest.approx(at, abs=5e-5)
+        counters = axis.link.host.keeper.store.counters
+        assert (counters["starts"], counters["moves"]) == (2.0, 1.0)
+        assert 0.0 < counters["enabled"] < 60.0
+
+
+def test_33_what_was_killed_while_it_could_move_is_judged_by_its_sensor(tmp_path):
+    """The table has an absolute sensor; the slide counts from where it is switched on."""
+    for name, trust, why in (("rotary_table", "restored", "in motion"), ("filtered_servo", "unknown", "in motion")):
+        file = copied(tmp_path, name)
+        axis = detent.live(file, wall=False)
+        axis.enable()
+        killed(axis)
+        with detent.live(file, wall=False) as axis:
+            status = axis.status
+            assert status["trust"] == trust
+            assert why in status["store"]["position"]
+        (tmp_path / "axis.toml.state").unlink()
+
+
+def test_33_an_axis_that_was_off_and_still_is_parked_at_once(tmp_path):
+    axis = detent.live(copied(tmp_path, "filtered_servo"), wall=False)
+    host: Any = axis.link.host
+    store = host.keeper.store
+    assert store.saved.moving is False
+    axis.enable()
+    assert store.saved.moving is True
+    axis.disable()
+    host.run(90)  # not yet still for long enough
+    assert store.saved.moving is True
+    host.run(60)
+    assert (store.saved.moving, store.saved.trust) == (False, "referenced")
+    axis.enable()
+    axis.disable()
+    host.board.operation.trust = ops.NOT_KNOWN  # its controller has lost the count
+    host.run(150)
+    assert (store.saved.moving, store.saved.trust) == (False, "unknown")
+    killed(axis)
+
+
+def test_33_without_a_store_nothing_is_written(tmp_path):
+    file = copied(tmp_path, "filtered_servo")
+    for _ in range(2):
+        with detent.live(file, wall=False, store=None) as axis:
+            assert (axis.status["trust"], axis.status["store"]) == ("referenced", None)
+    with detent.live(detent.example("filtered_servo.toml"), wall=False) as axis:
+        assert axis.status["store"] is None
+    assert [one.name for one in tmp_path.iterdir()] == ["axis.toml"]
+    with detent.live(file, wall=False, store=tmp_path / "elsewhere.state"):
+        pass
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["axis.toml", "elsewhere.state"]
+
+
+@pytest.mark.parametrize(
+    ("edit", "name"),
+    [("limits.travel=0.4 m", "travel"), ("mechanics.travel_per_revolution=4 mm", "scale"),
+     ("encoder.cycles_per_revolution=240", "scale")],
+)  # fmt: skip
+def test_35_a_live_axis_keeps_the_store_of_another_file_aside(tmp_path, edit, name):
+    file = copied(tmp_path, "filtered_servo")
+    with detent.live(file, wall=False):
+        pass
+    with detent.live(file, [edit], wall=False) as axis:
+        status = axis.status
+        assert status["trust"] == "unknown"
+        assert f"{name}:" in status["store"]["aside"]
+        assert "in the axis file" in status["store"]["aside"]
+        assert (
+            ("the position is not known: it creeps, and goes to no position", status["find"])
+        ) in axis.why_not_moving
+    assert len(list(tmp_path.glob("*.aside-*"))) == 1
+
+
+def test_36_a_live_axis_that_was_moved_while_off_is_not_restored(tmp_path):
+    file = copied(tmp_path, "rotary_table")
+    with detent.live(file, wall=False):
+        pass
+    with detent.live(file, ["mechanics.start_angle=17 deg"], wall=False) as axis:
+        status = axis.status
+        assert status["trust"] == "unknown"
+        assert "7 deg from where it was left" in status["store"]["position"]
+        axis.enable()
+        with pytest.raises(detent.DetentError, match="35"):
+            axis.go_to(3)
+        axis.disable()
+        axis.do("trust", 1)  # a person confirms what the sensor shows
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "restored"
+        assert math.degrees(axis.position) == pytest.approx(17.0, abs=0.01)
+
+
+class FailingDisk(sqlite3.Connection):
+    """A disk that is full as long as it is told to be."""
+
+    full = False
+
+    def execute(self, sql, *arguments):
+        if FailingDisk.full and sql.startswith("BEGIN"):
+            error = sqlite3.OperationalError("database or disk is full")
+            error.sqlite_errorcode = sqlite3.SQLITE_FULL
+            raise error
+        return super().execute(sql, *arguments)
+
+
+def test_f55_no_motion_begins_that_could_not_be_marked(tmp_path):
+    from detent.operate.session import Session
+    from detent.operate.store import Store
+
+    spec = Bench("filtered_servo").spec
+    made = METHODS["filtered_servo"].sensors(spec)[""]
+    store = Store(tmp_path / "axis.state", made, connect=lambda path: sqlite3.connect(
+        path, timeout=0.0, isolation_level=None, check_same_thread=False, factory=FailingDisk))  # fmt: skip
+    bench = Bench("filtered_servo", store=store)
+    bench.host.run_until_ready()
+    session = Session(bench.host, {})
+    assert session.wait(session.ask("enable")).how == "done"
+    FailingDisk.full = True
+    try:
+        assert session.wait(session.ask("move_by", 0.01)).how == "done"  # what may move already goes on
+        assert session.wait(session.ask("disable")).how == "done"
+        bench.pass_time(0.3)
+        assert "full" in session.status()["store"]["trouble"]  # where it stands could not be kept
+        assert session.wait(session.ask("enable")).how == "done"  # and the mark of the last motion stands
+        session.wait(session.ask("disable"))
+        FailingDisk.full = False
+        bench.pass_time(0.3)
+        assert session.status()["store"]["trouble"] == ""
+        FailingDisk.full = True
+        taken = bench.operation.taken
+        refused = session.wait(session.ask("enable"))
+        assert (refused.how, refused.code) == ("refused", 55)
+        assert "axis.state" in refused.reason
+        assert "full" in refused.reason
+        assert (bench.operation.taken, bench.host.state) == (taken, "switch on disabled")
+    finally:
+        FailingDisk.full = False
+    assert session.wait(session.ask("enable")).how == "done"
+    bench.host.close()

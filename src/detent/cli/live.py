@@ -13,11 +13,14 @@ import typer
 from detent.cli.app import NOT_DONE, Json, Set, app, option
 from detent.cli.terminal import print_json, tell
 from detent.errors import DetentError
+from detent.units import format_quantity
 
 File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=False)]
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 FOR = "End after so many seconds by itself."
+STORE = "Where to keep what survives; by default beside the axis file."
+NO_STORE = "Keep nothing: a simulated axis then begins where its file puts it."
 WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
 
 
@@ -29,16 +32,18 @@ def live(
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
+    store: Annotated[Path | None, option("--store", "PATH", STORE)] = None,
     *,
+    no_store: Annotated[bool, option("--no-store", "", NO_STORE)] = False,
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
-    from detent.operate.start import Place, make_host
+    from detent.operate.start import Place, beside, make_host
 
-    place = Place(file)
-    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
+    place, where = Place(file), None if no_store else store or beside(file)
+    host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where)
     missing, left = host.start(), threading.Event()
     session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
     channel = place.serve(session)
@@ -49,7 +54,9 @@ def live(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
     started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
-    started |= {"state": host.state, "period": session.describe()["period"]}
+    status = session.status()
+    started |= {"state": host.state, "period": session.describe()["period"], "store": status["store"]}
+    started |= {key: status[key] for key in ("position", "trust", "find")} | {"unit": session.unit}
     if as_json:
         print(json.dumps(started), flush=True)
     else:
@@ -67,6 +74,8 @@ def live(
     else:
         tell(f"At rest at {status['position']:.6g} {axis.unit}, torque off; {status['loop']['periods']} periods, "
              f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
+        if status["store"]:
+            tell(f"Where it stands is kept in {status['store']['path']}")
     if died:
         raise typer.Exit(NOT_DONE)
 
@@ -89,8 +98,22 @@ def _tell_start(file: Path, started: dict[str, Any]) -> None:
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")
+    _tell_store(name, started)
     tell("Ctrl-C stops the axis, then ends.")
     sys.stdout.flush()
+
+
+def _tell_store(file: str, started: dict[str, Any]) -> None:
+    """What is kept, and where the axis stands."""
+    store, place = started["store"], format_quantity(started["position"], started["unit"], 6)
+    if store is None:
+        tell(f"Nothing is kept: the simulated axis begins where its file puts it, {place} ({started['trust']}).")
+        return
+    tell(f"Store: {store['path']}; {store['position']}")
+    if store["aside"]:
+        tell(store["aside"])
+    if started["trust"] == "unknown":
+        tell(f"The position is not known; find it with: detent connect {file} {started['find']}")
 
 
 @app.command()

@@ -18,7 +18,7 @@ from typing import Any, cast
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.session import Session
-from detent.operate.words import Ended
+from detent.operate.words import DURABLE, Ended
 
 LONGEST = 1 << 16  # bytes of a message
 MOST_CLIENTS = 16
@@ -94,7 +94,10 @@ class Channel:
         telling = asyncio.ensure_future(self._tell_endings(open_, writer))
         with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
             while line := await reader.readline():
-                answer = self._answer(line, number, open_)
+                if waits_for_disk(line):  # the stop of another client does not
+                    answer = await asyncio.to_thread(self._answer, line, number, open_)
+                else:
+                    answer = self._answer(line, number, open_)
                 if not _send(writer, answer):
                     break
         telling.cancel()
@@ -140,6 +143,11 @@ class Channel:
                     open_.discard(command)
                     _send(writer, {"ended": ended.to_dict()})
             await asyncio.sleep(LOOK)
+
+
+def waits_for_disk(line: bytes) -> bool:
+    """Whether a message may ask for something that is durable before it is done."""
+    return any(f'"{word}"'.encode() in line for word in DURABLE)
 
 
 def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> bool:

@@ -2,10 +2,11 @@
 
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from detent.control import operation as ops
-from detent.errors import DetentError
+from detent.errors import NO_MARK, DetentError
 from detent.operate.host import Host
 from detent.operate.words import WORDS, Ended, ended, status_of, value_of
 
@@ -31,7 +32,13 @@ class Session:
 
     def status(self) -> dict[str, Any]:
         """The axis now."""
-        return status_of(self.host, self.host.axis.fault())
+        keeper = self.host.keeper
+        kept = {"store": keeper.told() if keeper else None, "find": self.find_position()}
+        return status_of(self.host, self.host.axis.fault()) | kept
+
+    def find_position(self) -> str:
+        """The command that makes a position known: to home, or of an axis that cannot a person's word for it."""
+        return "home" if self.host.axis.live.operation.takes >> ops.HOME & 1 else f"trust {ops.REFERENCED}"
 
     def ask(self, word: str, value: object = None, speed: float = 1.0, *, client: int = 1, **more: int) -> int:
         """Ask for something; gives the id under which it will end. A `DetentError` where it makes no sense."""
@@ -44,7 +51,7 @@ class Session:
         about = value_of(WORDS[word], value, self.unit)
         with self._lock:
             self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
-            return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)
+        return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)  # may wait for the disk
 
     def ending(self, command: int) -> Ended | None:
         """How a command has ended; None while it has not."""
@@ -53,7 +60,9 @@ class Session:
         if found is None:
             return None
         fault = self.host.axis.fault() if found.how == ops.FAILED else ""
-        return ended(found.id, found.how, found.why, found.by, fault)
+        told = ended(found.id, found.how, found.why, found.by, fault)
+        trouble = self.host.keeper.trouble if self.host.keeper and found.why == NO_MARK else ""
+        return replace(told, reason=f"{told.reason} ({trouble})") if trouble else told
 
     def wait(self, command: int, timeout: float | None = None) -> Ended:
         """Wait until a command has ended; a `TimeoutError` where it has not in time [s]."""

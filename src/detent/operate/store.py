@@ -118,7 +118,7 @@ class Store:
         self._standing = replace(standing, trust=Trust.RESTORED, counts=standing.shown)
         return self._standing
 
-    def refer(self, counts: int, by: str, reading: int | None = None) -> Judgement:
+    def refer(self, counts: int, by: str, reading: int | None = None, why: Why = Why.REFERRED) -> Judgement:
         """A reference was found at a position; an absolute sensor gave this reading there."""
         last = self.reference
         at, number = self._now(), last.number + 1 if last else 1
@@ -129,7 +129,7 @@ class Store:
             change.put(Reference(number, by, counts, "" if reading is None else str(reading), at))
             # A mark of motion stays, and says from now on that the position was known.
             self._put_motion(change, motion.phase if motion else "parked", counts, Trust.REFERENCED)
-        self._standing = Judgement(Trust.REFERENCED, Why.REFERRED, counts)
+        self._standing = Judgement(Trust.REFERENCED, why, counts)
         return self._standing
 
     def distrust(self) -> Judgement:
