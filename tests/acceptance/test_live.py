@@ -1094,3 +1094,98 @@ def test_f55_no_motion_begins_that_could_not_be_marked(tmp_path):
         FailingDisk.full = False
     assert session.wait(session.ask("enable")).how == "done"
     bench.host.close()
+
+
+# ---- positions
+
+
+def test_46_positions_are_taught_gone_to_edited_undone_and_exported(tmp_path):
+    with detent.live(copied(tmp_path, "filtered_servo"), wall=False) as axis:
+        assert axis.positions == []
+        axis.teach(3)
+        axis.enable()
+        axis.confirm()
+        axis.move_to("40 mm")
+        axis.teach("load")
+        axis.go_to(3)
+        assert axis.position == pytest.approx(0.02, abs=2.1e-5)
+        axis.go_to("load")
+        assert axis.position == pytest.approx(0.04, abs=2.1e-5)
+        third, load = axis.positions
+        assert (third["number"], third["name"], third["counts"]) == (3, "3", 4000)
+        assert (load["number"], load["name"]) == (None, "load")
+        assert load["used"] >= load["taught"]
+        axis.do("edit", ["load", "0.2 in"])
+        assert axis.positions[1]["position"] == pytest.approx(0.00508)
+        axis.go_to("load")
+        assert axis.position == pytest.approx(0.00508, abs=2.1e-5)
+        axis.do("undo")
+        assert axis.positions[1]["counts"] == load["counts"]
+        axis.do("redo")
+        assert axis.positions[1]["position"] == pytest.approx(0.00508)
+        axis.do("rename", ["load", "unload"])
+        axis.do("export", str(tmp_path / "places.csv"))
+        axis.do("forget", "unload")
+        axis.do("forget", "3")
+        assert axis.positions == []
+        axis.do("import", str(tmp_path / "places.csv"))
+        assert [row["name"] for row in axis.positions] == ["3", "unload"]
+    assert "0.00508" in (tmp_path / "places.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "told"),
+    [("go_to", "nowhere", "unknown position"), ("teach", "", "such as"), ("teach", None, "such as"),
+     ("edit", ["3", "5 V"], "such as"), ("edit", "3", "such as"), ("edit", ["3", "9 m"], "within the travel"),
+     ("edit", ["3", None], "such as"), ("rename", ["3", "load"], "a new one"), ("forget", "x", "unknown position"),
+     ("import", "no.csv", "no.csv"), ("export", "places.txt", "places.txt"), ("teach", "a\nb", "characters")],
+)  # fmt: skip
+def test_46_what_no_position_can_be_is_told_and_changes_nothing(tmp_path, word, value, told):
+    with detent.live(copied(tmp_path, "filtered_servo"), wall=False) as axis:
+        axis.teach("3")
+        axis.teach("load")
+        before = axis.positions
+        with pytest.raises(detent.DetentError, match=told):
+            axis.do(word, value)
+        assert axis.positions == before
+
+
+def test_46_what_cannot_be_taught_now_is_refused(tmp_path):
+    file = copied(tmp_path, "filtered_servo")
+    with detent.live(file, wall=False) as axis:
+        axis.enable()
+        moves = axis.move_by("10 mm", wait=False)
+        axis.link.host.run(100)
+        with pytest.raises(detent.DetentError, match="111"):
+            axis.teach("3")
+        with pytest.raises(detent.DetentError, match="112"):
+            axis.do("undo")
+        session: Any = axis.link
+        assert session.wait(session.ask("forget", "3", client=7)).code == ops.SECOND
+        moves.wait()
+        axis.disable()
+        axis.do("trust", 0)
+    with detent.live(file, wall=False, store=None) as axis, pytest.raises(detent.DetentError, match="keeps nothing"):
+        axis.teach("3")
+    with detent.live(file, wall=False) as axis:
+        with pytest.raises(detent.DetentError, match="35"):
+            axis.teach("3")
+        axis.do("trust", 2)
+        axis.teach("3")
+
+
+def test_46_a_table_goes_to_its_own_numbers_and_to_those_that_were_taught(tmp_path):
+    with detent.live(copied(tmp_path, "rotary_table"), wall=False) as axis:
+        axis.teach("3")  # the table has a 3 of its own, which stays what it is
+        axis.teach("77")
+        axis.do("edit", ["camera", "200 deg"])
+        axis.enable()
+        axis.confirm()
+        axis.go_to(3)
+        assert math.degrees(axis.position) % 360 == pytest.approx(350.0, abs=0.01)
+        axis.go_to("camera")
+        assert math.degrees(axis.position) % 360 == pytest.approx(200.0, abs=0.01)
+        axis.go_to(77)
+        assert math.degrees(axis.position) % 360 == pytest.approx(10.0, abs=0.01)
+        with pytest.raises(detent.DetentError, match="202"):
+            axis.go_to(55)

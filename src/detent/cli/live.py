@@ -21,7 +21,10 @@ PERIOD = "Time between two periods of the loop; a machine without real-time prio
 FOR = "End after so many seconds by itself."
 STORE = "Where to keep what survives; by default beside the axis file."
 NO_STORE = "Keep nothing: a simulated axis then begins where its file puts it."
-WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
+WORD = (
+    "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
+    "table: positions, teach, edit, rename, forget, undo, redo, export, import."
+)
 
 
 @app.command()
@@ -121,6 +124,7 @@ def connect(
     file: Annotated[Path, typer.Argument(help="Axis file that runs live, or its socket.", show_default=False)],
     word: Annotated[str, typer.Argument(help=WORD)] = "status",
     value: Annotated[str | None, typer.Argument(help='Where to, how far, how fast: "120 mm", 3, "20 mm/s".')] = None,
+    second: Annotated[str | None, typer.Argument(help='Of edit the place, "5 mm"; of rename the new name.')] = None,
     speed: Annotated[float, option("--speed", "", "Share of the largest speed, above 0 to 1.")] = 1.0,
     seconds: Annotated[float, option("--for", "SECONDS", "How long a jog lasts.", min=0.0)] = 1.0,
     *,
@@ -128,7 +132,7 @@ def connect(
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
     from detent.operate.start import connect as connect_to
-    from detent.operate.words import describe_status
+    from detent.operate.words import PLACES, describe_status
 
     axis = connect_to(file)
     ended: dict[str, Any] = {}
@@ -137,8 +141,11 @@ def connect(
             raise DetentError('connect: a jog needs a velocity such as "20 mm/s"')
         with axis.jog(value):
             threading.Event().wait(seconds)
-    elif word != "status":
-        ended = axis.do(word, value, speed, wait=False).wait().to_dict()
+    elif word not in ("status", "positions"):
+        ended = axis.do(word, _about(word, value, second), speed, wait=False).wait().to_dict()
+    if word in ("positions", *PLACES):
+        _show_positions(axis.positions, axis.unit, as_json=as_json)
+        return
     status = axis.status
     if as_json:
         print_json({"status": status, "ended": ended, "why_not_moving": axis.why_not_moving})
@@ -146,3 +153,23 @@ def connect(
     tell(describe_status(status, axis.unit))
     for what, remedy in axis.why_not_moving:
         tell(f"  not moving: {what}; {remedy}")
+
+
+def _about(word: str, value: str | None, second: str | None) -> object:
+    """What a word is about: a value, two of them, or a file, whose place does not depend on who opens it."""
+    if word in ("export", "import") and value is not None:
+        return str(Path(value).absolute())
+    return value if second is None else [value, second]
+
+
+def _show_positions(table: list[dict[str, Any]], unit: str, *, as_json: bool) -> None:
+    """The position table."""
+    if as_json:
+        print_json({"positions": table})
+        return
+    for row in table:
+        used = f", last used {row['used']}" if row["used"] else ""
+        tell(f"{row['name']}: {format_quantity(row['position'], unit, 6)}, {row['counts']} counts, "
+             f"taught {row['taught']}{used}")  # fmt: skip
+    if not table:
+        tell("No positions yet; teach the first one with: detent connect FILE teach 1")

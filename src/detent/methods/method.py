@@ -115,6 +115,7 @@ class Live:
     fault: Callable[[], str] = str  # the fault of its guard in a sentence, empty where there is none
     tray: "NDArray[np.uint8] | None" = None
     """Places for pieces of a job in what the loop shares, a row each; None where it does no jobs."""
+    numbers: frozenset[int] | None = None  # of positions that the method itself knows; None where it knows none
     work: "Callable[[Any], Work] | None" = None  # a job as pieces for the tray
 
 

@@ -125,6 +125,8 @@ class Channel:
             return {"status": self.session.status()}
         if do == "describe":
             return {"describe": self.session.describe()}
+        if do == "positions":
+            return {"positions": self.session.positions()}
         speed = asked.get("speed", 1.0)
         if not isinstance(do, str) or isinstance(speed, bool) or not isinstance(speed, int | float):
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
@@ -205,6 +207,10 @@ class Connection:
     def status(self) -> dict[str, Any]:
         """The axis now."""
         return self._request({"do": "status"})["status"]
+
+    def positions(self) -> list[dict[str, Any]]:
+        """The position table."""
+        return self._request({"do": "positions"})["positions"]
 
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""

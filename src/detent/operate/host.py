@@ -206,6 +206,13 @@ class Host:
                 self._ended[command] = Ending(command, ops.REFUSED, NO_MARK, 0)
         return command
 
+    def settle(self, why: int) -> int:
+        """An ending of what no loop needs to do: refused for a reason, or with 0 done; gives its id."""
+        with self._asking:
+            command = self._next_id()
+        self._ended[command] = Ending(command, ops.REFUSED if why else ops.DONE, why, 0)
+        return command
+
     def work(self, job: Any, client: int = 1) -> int:
         """Begin a job; gives the id under which it will end. Its pieces are laid ready whenever the host takes note."""
         if self.axis.work is None:

@@ -51,7 +51,7 @@ class Keeper:
         """
         store, counts = self.store, self._counts()
         judged = store.restore(self._reading(counts))
-        with self._kept():
+        with self.kept():
             if stated and judged.why is Why.NEW and store.aside is None:
                 store.refer(counts, BY_FILE, self._reading(counts), Why.STATED)
             store.count(starts=1)
@@ -95,7 +95,7 @@ class Keeper:
             yield True
             return
         with self.lock:
-            with self._kept():
+            with self.kept():
                 self.trouble = ""
                 self.store.moving()
                 self._marked = True
@@ -104,7 +104,7 @@ class Keeper:
 
     def look(self) -> bool:
         """Keep what has changed; gives whether the axis is parked."""
-        with self.lock, self._kept():
+        with self.lock, self.kept():
             o, loop, counts = self._board.operation, self._board.loop, self._counts()
             now, trust = int(loop.periods), int(o.trust)
             self._note(o, counts, (now - self._looked) * loop.period * 1e-9)
@@ -123,6 +123,11 @@ class Keeper:
                 self._marked = True
             self._looked = now
         return not self._marked
+
+    @property
+    def place(self) -> int:
+        """Where the axis is [count]."""
+        return self._place(self._counts())
 
     def told(self) -> dict[str, Any]:
         """The store, for people; waits for no disk."""
@@ -163,7 +168,7 @@ class Keeper:
         return counts % sensor.band if sensor.band else counts
 
     @contextmanager
-    def _kept(self) -> Generator[None]:
+    def kept(self) -> Generator[None]:
         """A disk that takes nothing is trouble, which is told; a motion that runs goes on."""
         try:
             yield

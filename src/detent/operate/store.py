@@ -215,6 +215,14 @@ class Store:
         made = {entry[0]: self._entry(*entry) for entry in entries}
         self._change_table(made.values())
 
+    def rename(self, name: str, to: str) -> Position:
+        """Give an entry another name, which none has; all else of it stays."""
+        made = replace(self._entry(to, self.position(name).counts, 0), **{**asdict(self.position(name)), "name": to})
+        if to in self.positions:
+            raise DetentError(f'{self.path}: got the name "{short(to)}", which there is; expected: a new one; give one')
+        self._change_table([made], [name])
+        return made
+
     def delete(self, name: str) -> None:
         """Take an entry out."""
         self.position(name)

@@ -38,7 +38,16 @@ WORDS = {
     "order": Word(ops.ORDER, "number", "an order of the control word of CiA 402, 0 shutdown to 6 fault reset"),
 }
 
-DURABLE = "enable", "order"  # that may have to wait until something is on a disk
+PLACES = {
+    "teach": "where the axis rests becomes a position of the table, under a name or a number",
+    "edit": "a position of the table is typed in: its name and where it is",
+    "rename": "a position gets another name", "forget": "a position leaves the table",
+    "undo": "the last change of the table is taken back", "redo": "it is made again",
+    "export": "the table is written to a file", "import": "the positions of a file are taken into it",
+}  # fmt: skip
+"""What is done with the position table: nothing of it moves the axis."""
+
+DURABLE = "enable", "order", "go_to", "positions", *PLACES  # that may have to wait until something is on a disk
 
 
 class CommandError(AxisError):

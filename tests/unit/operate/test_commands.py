@@ -240,3 +240,19 @@ def test_33_a_killed_process_leaves_a_position_that_is_not_known(folder: Path) -
     assert told.returncode == 0
     assert str(file) + ".state" in told.stdout
     assert f"detent connect {file}" in told.stdout.splitlines()[-4]
+
+
+def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
+    file = folder / "places.toml"
+    shutil.copy(folder / "slide.toml", file)
+    live = Running(file, "--period", "10 ms")
+    assert "No positions yet" in run("connect", str(file), "positions").stdout
+    assert run("connect", str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
+    assert run("connect", str(file), "edit", "load", "0.2 in").returncode == 0
+    table = json.loads(run("connect", str(file), "positions", "--json").stdout)["positions"]
+    assert [(row["name"], row["number"], row["counts"]) for row in table] == [("3", 3, 4000), ("load", None, 1016)]
+    assert run("connect", str(file), "export", str(folder / "places.csv")).returncode == 0
+    missing = run("connect", str(file), "go_to", "lode")
+    assert (missing.returncode, missing.stdout) == (2, "")
+    assert "load" in missing.stderr
+    live.end()
