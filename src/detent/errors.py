@@ -139,6 +139,8 @@ GUARD_TEXT: dict[int, str] = {
 
 
 LOOP_OVERRUN = 50  # fault of a live loop that cannot keep its time
+NO_MARK = 55  # refusal of a motion that a power cut would make a riddle of
+NOT_AT_REST, NOTHING_TO_UNDO = 111, 112  # refusals of what is asked of a position table
 
 REFUSAL_TEXT: dict[int, str] = {
     31: "the target lies beyond a soft limit; name one between the limits",
@@ -148,6 +150,8 @@ REFUSAL_TEXT: dict[int, str] = {
     44: "a stop came after this was asked; look at the axis and ask again",
     50: "the loop came too late, for more than 5 periods or more than 3 times in a second, and the axis was stopped; "
     "give it real-time priority, or a longer period",
+    55: "that the axis is going to move cannot be kept, so no new motion may begin, for after a power cut nobody would "
+    "know where it stands; give the store room on its disk, then enable again",
     52: "a value that is no number, infinite, or a share of the speed outside 0 to 1; correct it",
     101: "the axis is not enabled; enable it first",
     102: "the axis stands in a fault; read it, mend its cause, reset, then enable",
@@ -159,6 +163,8 @@ REFUSAL_TEXT: dict[int, str] = {
     108: "the axis is not ready: it has not yet taken its first position; wait a moment",
     109: "no job is under way that this could be a piece of; begin the job first",
     110: "the first motion since enabling has not been confirmed, and a job goes at speeds of its own; confirm first",
+    111: "the axis moves, and where it is cannot be taught; wait until it rests, or stop it",
+    112: "there is no change of the position table left to take back, or to make again; look at the table",
     201: "the table was still moving; wait until it stands, or stop it",
     202: "the position table has no such number; name one that it has, or add it to the axis file",
     203: "the way is longer than the remaining angle can count; name a nearer position",

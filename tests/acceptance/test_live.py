@@ -5,6 +5,8 @@ import math
 import mmap
 import os
 import random
+import shutil
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -14,6 +16,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -31,6 +34,7 @@ from tests.live_course import COMPILED, COVERED, bound, hunted, under_way
 from tests.places import ROOT
 from tests.unit.planning import test_course
 
+import detent
 from detent.control import operation as ops
 from detent.control.axis_states import ORDER_NAMES, STATE_NAMES, ordered
 from detent.control.guard import FOLLOWING, STUCK
@@ -1244,3 +1248,258 @@ def test_14_a_print_head_stops_while_it_looks_for_its_frames_and_measures_itself
     assert host.until_ended(host.ask(ops.HOME)).how == DONE  # once more, and whole
     assert axis.memory.identified == 1
     assert host.until_ended(host.ask(ops.MOVE_TO, 0.1)).how == DONE
+# ---- the store of a live axis
+
+
+def copied(folder: Path, name: str) -> Path:
+    """An axis file of one's own, beside which a store may lie."""
+    return Path(shutil.copy(EXAMPLES / f"{name}.toml", folder / "axis.toml"))
+
+
+def killed(axis: Any) -> None:
+    """What a kill leaves: nothing is stopped, nothing is parked, and the store is let go as it is."""
+    axis.link.host.keeper.close()
+
+
+def test_33_an_axis_is_found_where_it_was_parked(tmp_path):
+    file = copied(tmp_path, "rotary_table")
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "referenced"
+        axis.enable()
+        axis.go_to(3)
+        at = axis.position % (2 * math.pi)
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "restored"
+        assert axis.position == pytest.approx(at, abs=5e-5)
+        counters = axis.link.host.keeper.store.counters
+        assert (counters["starts"], counters["moves"]) == (2.0, 1.0)
+        assert 0.0 < counters["enabled"] < 60.0
+
+
+def test_33_what_was_killed_while_it_could_move_is_judged_by_its_sensor(tmp_path):
+    """The table has an absolute sensor; the slide counts from where it is switched on."""
+    for name, trust, why in (("rotary_table", "restored", "in motion"), ("filtered_servo", "unknown", "in motion")):
+        file = copied(tmp_path, name)
+        axis = detent.live(file, wall=False)
+        axis.enable()
+        killed(axis)
+        with detent.live(file, wall=False) as axis:
+            status = axis.status
+            assert status["trust"] == trust
+            assert why in status["store"]["position"]
+        (tmp_path / "axis.toml.state").unlink()
+
+
+def test_33_an_axis_that_was_off_and_still_is_parked_at_once(tmp_path):
+    axis = detent.live(copied(tmp_path, "filtered_servo"), wall=False)
+    host: Any = axis.link.host
+    store = host.keeper.store
+    assert store.saved.moving is False
+    axis.enable()
+    assert store.saved.moving is True
+    axis.disable()
+    host.run(90)  # not yet still for long enough
+    assert store.saved.moving is True
+    host.run(60)
+    assert (store.saved.moving, store.saved.trust) == (False, "referenced")
+    axis.enable()
+    axis.disable()
+    host.board.operation.trust = ops.NOT_KNOWN  # its controller has lost the count
+    host.run(150)
+    assert (store.saved.moving, store.saved.trust) == (False, "unknown")
+    killed(axis)
+
+
+def test_33_without_a_store_nothing_is_written(tmp_path):
+    file = copied(tmp_path, "filtered_servo")
+    for _ in range(2):
+        with detent.live(file, wall=False, store=None) as axis:
+            assert (axis.status["trust"], axis.status["store"]) == ("referenced", None)
+    with detent.live(detent.example("filtered_servo.toml"), wall=False) as axis:
+        assert axis.status["store"] is None
+    assert [one.name for one in tmp_path.iterdir()] == ["axis.toml"]
+    with detent.live(file, wall=False, store=tmp_path / "elsewhere.state"):
+        pass
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["axis.toml", "elsewhere.state"]
+
+
+@pytest.mark.parametrize(
+    ("edit", "name"),
+    [("limits.travel=0.4 m", "travel"), ("mechanics.travel_per_revolution=4 mm", "scale"),
+     ("encoder.cycles_per_revolution=240", "scale")],
+)  # fmt: skip
+def test_35_a_live_axis_keeps_the_store_of_another_file_aside(tmp_path, edit, name):
+    file = copied(tmp_path, "filtered_servo")
+    with detent.live(file, wall=False):
+        pass
+    with detent.live(file, [edit], wall=False) as axis:
+        status = axis.status
+        assert status["trust"] == "unknown"
+        assert f"{name}:" in status["store"]["aside"]
+        assert "in the axis file" in status["store"]["aside"]
+        assert (
+            ("the position is not known: it creeps, and goes to no position", status["find"])
+        ) in axis.why_not_moving
+    assert len(list(tmp_path.glob("*.aside-*"))) == 1
+
+
+def test_36_a_live_axis_that_was_moved_while_off_is_not_restored(tmp_path):
+    file = copied(tmp_path, "rotary_table")
+    with detent.live(file, wall=False):
+        pass
+    with detent.live(file, ["mechanics.start_angle=17 deg"], wall=False) as axis:
+        status = axis.status
+        assert status["trust"] == "unknown"
+        assert "7 deg from where it was left" in status["store"]["position"]
+        axis.enable()
+        with pytest.raises(detent.DetentError, match="35"):
+            axis.go_to(3)
+        axis.disable()
+        axis.do("trust", 1)  # a person confirms what the sensor shows
+    with detent.live(file, wall=False) as axis:
+        assert axis.status["trust"] == "restored"
+        assert math.degrees(axis.position) == pytest.approx(17.0, abs=0.01)
+
+
+class FailingDisk(sqlite3.Connection):
+    """A disk that is full as long as it is told to be."""
+
+    full = False
+
+    def execute(self, sql, *arguments):
+        if FailingDisk.full and sql.startswith("BEGIN"):
+            error = sqlite3.OperationalError("database or disk is full")
+            error.sqlite_errorcode = sqlite3.SQLITE_FULL
+            raise error
+        return super().execute(sql, *arguments)
+
+
+def test_f55_no_motion_begins_that_could_not_be_marked(tmp_path):
+    from detent.operate.session import Session
+    from detent.operate.store import Store
+
+    spec = Bench("filtered_servo").spec
+    made = METHODS["filtered_servo"].sensors(spec)[""]
+    store = Store(tmp_path / "axis.state", made, connect=lambda path: sqlite3.connect(
+        path, timeout=0.0, isolation_level=None, check_same_thread=False, factory=FailingDisk))  # fmt: skip
+    bench = Bench("filtered_servo", store=store)
+    bench.host.run_until_ready()
+    session = Session(bench.host, {})
+    assert session.wait(session.ask("enable")).how == "done"
+    FailingDisk.full = True
+    try:
+        assert session.wait(session.ask("move_by", 0.01)).how == "done"  # what may move already goes on
+        assert session.wait(session.ask("disable")).how == "done"
+        bench.pass_time(0.3)
+        assert "full" in session.status()["store"]["trouble"]  # where it stands could not be kept
+        assert session.wait(session.ask("enable")).how == "done"  # and the mark of the last motion stands
+        session.wait(session.ask("disable"))
+        FailingDisk.full = False
+        bench.pass_time(0.3)
+        assert session.status()["store"]["trouble"] == ""
+        FailingDisk.full = True
+        taken = bench.operation.taken
+        refused = session.wait(session.ask("enable"))
+        assert (refused.how, refused.code) == ("refused", 55)
+        assert "axis.state" in refused.reason
+        assert "full" in refused.reason
+        assert (bench.operation.taken, bench.host.state) == (taken, "switch on disabled")
+    finally:
+        FailingDisk.full = False
+    assert session.wait(session.ask("enable")).how == "done"
+    bench.host.close()
+
+
+# ---- positions
+
+
+def test_46_positions_are_taught_gone_to_edited_undone_and_exported(tmp_path):
+    with detent.live(copied(tmp_path, "filtered_servo"), wall=False) as axis:
+        assert axis.positions == []
+        axis.teach(3)
+        axis.enable()
+        axis.confirm()
+        axis.move_to("40 mm")
+        axis.teach("load")
+        axis.go_to(3)
+        assert axis.position == pytest.approx(0.02, abs=2.1e-5)
+        axis.go_to("load")
+        assert axis.position == pytest.approx(0.04, abs=2.1e-5)
+        third, load = axis.positions
+        assert (third["number"], third["name"], third["counts"]) == (3, "3", 4000)
+        assert (load["number"], load["name"]) == (None, "load")
+        assert load["used"] >= load["taught"]
+        axis.do("edit", ["load", "0.2 in"])
+        assert axis.positions[1]["position"] == pytest.approx(0.00508)
+        axis.go_to("load")
+        assert axis.position == pytest.approx(0.00508, abs=2.1e-5)
+        axis.do("undo")
+        assert axis.positions[1]["counts"] == load["counts"]
+        axis.do("redo")
+        assert axis.positions[1]["position"] == pytest.approx(0.00508)
+        axis.do("rename", ["load", "unload"])
+        axis.do("export", str(tmp_path / "places.csv"))
+        axis.do("forget", "unload")
+        axis.do("forget", "3")
+        assert axis.positions == []
+        axis.do("import", str(tmp_path / "places.csv"))
+        assert [row["name"] for row in axis.positions] == ["3", "unload"]
+    assert "0.00508" in (tmp_path / "places.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "told"),
+    [("go_to", "nowhere", "unknown position"), ("teach", "", "such as"), ("teach", None, "such as"),
+     ("edit", ["3", "5 V"], "such as"), ("edit", "3", "such as"), ("edit", ["3", "9 m"], "within the travel"),
+     ("edit", ["3", None], "such as"), ("rename", ["3", "load"], "a new one"), ("forget", "x", "unknown position"),
+     ("import", "no.csv", "no.csv"), ("export", "places.txt", "places.txt"), ("teach", "a\nb", "characters")],
+)  # fmt: skip
+def test_46_what_no_position_can_be_is_told_and_changes_nothing(tmp_path, word, value, told):
+    with detent.live(copied(tmp_path, "filtered_servo"), wall=False) as axis:
+        axis.teach("3")
+        axis.teach("load")
+        before = axis.positions
+        with pytest.raises(detent.DetentError, match=told):
+            axis.do(word, value)
+        assert axis.positions == before
+
+
+def test_46_what_cannot_be_taught_now_is_refused(tmp_path):
+    file = copied(tmp_path, "filtered_servo")
+    with detent.live(file, wall=False) as axis:
+        axis.enable()
+        moves = axis.move_by("10 mm", wait=False)
+        axis.link.host.run(100)
+        with pytest.raises(detent.DetentError, match="111"):
+            axis.teach("3")
+        with pytest.raises(detent.DetentError, match="112"):
+            axis.do("undo")
+        session: Any = axis.link
+        assert session.wait(session.ask("forget", "3", client=7)).code == ops.SECOND
+        moves.wait()
+        axis.disable()
+        axis.do("trust", 0)
+    with detent.live(file, wall=False, store=None) as axis, pytest.raises(detent.DetentError, match="keeps nothing"):
+        axis.teach("3")
+    with detent.live(file, wall=False) as axis:
+        with pytest.raises(detent.DetentError, match="35"):
+            axis.teach("3")
+        axis.do("trust", 2)
+        axis.teach("3")
+
+
+def test_46_a_table_goes_to_its_own_numbers_and_to_those_that_were_taught(tmp_path):
+    with detent.live(copied(tmp_path, "rotary_table"), wall=False) as axis:
+        axis.teach("3")  # the table has a 3 of its own, which stays what it is
+        axis.teach("77")
+        axis.do("edit", ["camera", "200 deg"])
+        axis.enable()
+        axis.confirm()
+        axis.go_to(3)
+        assert math.degrees(axis.position) % 360 == pytest.approx(350.0, abs=0.01)
+        axis.go_to("camera")
+        assert math.degrees(axis.position) % 360 == pytest.approx(200.0, abs=0.01)
+        axis.go_to(77)
+        assert math.degrees(axis.position) % 360 == pytest.approx(10.0, abs=0.01)
+        with pytest.raises(detent.DetentError, match="202"):
+            axis.go_to(55)

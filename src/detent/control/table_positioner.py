@@ -370,10 +370,16 @@ def take_position(p: PositionerParams, r: Positioner) -> None:
     if r.number >= p.pdt.entries or p.pdt.speed[r.number] <= 0:
         refuse(r, NO_SUCH_POSITION)
         return
+    set_out(p, r, p.pdt.angle[r.number], p.pdt.policy[r.number], p.pdt.speed[r.number])
+
+
+@step
+def set_out(p: PositionerParams, r: Positioner, angle: int, policy: int, speed: int) -> None:
+    """Begin a positioning to an angle [count] at a speed [count/2^f per interrupt]."""
     if p.angle.form != TURN_COUNTER:
         start_raw(r.angle)
-    policy = p.pdt.policy[r.number] if p.angle.form == TURN_COUNTER else AS_COMMANDED
-    way = way_to(p.angle.period, p.pdt.tolerance, policy, p.pdt.angle[r.number], r.angle.aar)
+    policy = policy if p.angle.form == TURN_COUNTER else AS_COMMANDED
+    way = way_to(p.angle.period, p.pdt.tolerance, policy, angle, r.angle.aar)
     if abs(way) >= LONGEST_WAY:
         refuse(r, TOO_FAR)
         return
@@ -381,7 +387,7 @@ def take_position(p: PositionerParams, r: Positioner) -> None:
     r.oar = r.angle.aar + way
     r.interpolator.irr = abs(way) << p.interpolator.fraction
     r.interpolator.speed = 0
-    r.limit = p.pdt.speed[r.number]
+    r.limit = speed
     r.inside = 0
     r.state = MOVE
 

@@ -116,6 +116,7 @@ class Live:
     fault: Callable[[], str] = str  # the fault of its guard in a sentence, empty where there is none
     tray: "NDArray[np.uint8] | None" = None
     """Places for pieces of a job in what the loop shares, a row each; None where it does no jobs."""
+    numbers: frozenset[int] | None = None  # of positions that the method itself knows; None where it knows none
     work: "Callable[[Any], Work] | None" = None  # a job as pieces for the tray
 
 
@@ -185,6 +186,8 @@ class Method(Protocol[SpecT]):
     runs: ClassVar[str]  # place of what makes a job: ``run(spec, job, recorder=, progress=)``
     senses: ClassVar[str] = ""
     """Place of what counts its position: ``senses(spec)``, by the name of the motor; of a single one by ""."""
+    begins: ClassVar[str] = "mechanics.start_position"
+    """Key of the place where a simulated axis stands at power-on; of a motor by its name in the place of a ``*``."""
     lives: ClassVar[str] = ""
     """Place of what makes it live: ``live(spec, operation)`` gives a `Live` by the name of each motor, by "" where
     there is one only; none where it has no operator."""

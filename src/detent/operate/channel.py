@@ -18,7 +18,7 @@ from typing import Any, cast
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
 from detent.operate.session import Session
-from detent.operate.words import Ended
+from detent.operate.words import DURABLE, Ended
 
 LONGEST = 1 << 16  # bytes of a message
 MOST_CLIENTS = 16
@@ -94,7 +94,10 @@ class Channel:
         telling = asyncio.ensure_future(self._tell_endings(open_, writer))
         with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
             while line := await reader.readline():
-                answer = self._answer(line, number, open_)
+                if waits_for_disk(line):  # the stop of another client does not
+                    answer = await asyncio.to_thread(self._answer, line, number, open_)
+                else:
+                    answer = self._answer(line, number, open_)
                 if not _send(writer, answer):
                     break
         telling.cancel()
@@ -122,6 +125,8 @@ class Channel:
             return {"status": self.session.status()}
         if do == "describe":
             return {"describe": self.session.describe()}
+        if do == "positions":
+            return {"positions": self.session.positions()}
         speed = asked.get("speed", 1.0)
         if not isinstance(do, str) or isinstance(speed, bool) or not isinstance(speed, int | float):
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
@@ -140,6 +145,11 @@ class Channel:
                     open_.discard(command)
                     _send(writer, {"ended": ended.to_dict()})
             await asyncio.sleep(LOOK)
+
+
+def waits_for_disk(line: bytes) -> bool:
+    """Whether a message may ask for something that is durable before it is done."""
+    return any(f'"{word}"'.encode() in line for word in DURABLE)
 
 
 def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> bool:
@@ -197,6 +207,10 @@ class Connection:
     def status(self) -> dict[str, Any]:
         """The axis now."""
         return self._request({"do": "status"})["status"]
+
+    def positions(self) -> list[dict[str, Any]]:
+        """The position table."""
+        return self._request({"do": "positions"})["positions"]
 
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""

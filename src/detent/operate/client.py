@@ -30,6 +30,10 @@ class Link(Protocol):
         """The axis now."""
         ...
 
+    def positions(self) -> list[dict[str, Any]]:
+        """The position table."""
+        ...
+
     def ask(self, word: str, value: object = None, speed: float = 1.0) -> int:
         """Ask for something; gives an id."""
         ...
@@ -178,9 +182,18 @@ class LiveAxis:
         """Go by a way from the commanded point."""
         return self.do("move_by", way, speed, wait=wait)
 
-    def go_to(self, number: int, *, speed: float = 1.0, wait: bool = True) -> Command:
-        """Go to a numbered position."""
-        return self.do("go_to", number, speed, wait=wait)
+    @property
+    def positions(self) -> list[dict[str, Any]]:
+        """The position table: number, name, position, counts, tolerance, taught and used of each; SI units."""
+        return self.link.positions()
+
+    def go_to(self, name: int | str, *, speed: float = 1.0, wait: bool = True) -> Command:
+        """Go to a position of the table, by its name or number."""
+        return self.do("go_to", name, speed, wait=wait)
+
+    def teach(self, name: int | str) -> Command:
+        """Make where the axis rests a position of the table."""
+        return self.do("teach", name)
 
     def home(self, *, wait: bool = True) -> Command:
         """Find the reference."""

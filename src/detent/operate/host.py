@@ -4,6 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,11 +14,13 @@ from detent.axisfile.tables import AxisSpec
 from detent.control import operation as ops
 from detent.control.axis_states import STATE_NAMES
 from detent.control.operation import ENDS, OperationParams
-from detent.errors import DetentError
+from detent.errors import NO_MARK, DetentError
 from detent.methods.method import Live, Method, Work
+from detent.operate.keeper import Keeper
 from detent.operate.loop import INBOX, PULLS, Board, run_loop
 from detent.operate.realtime import ask_for_time, give_back
 from detent.operate.scope import Scope
+from detent.operate.store import Store
 
 PERIOD = 1e-3  # of the loop [s]
 LEASE = 0.2  # time that a jog lives without being kept [s]
@@ -71,11 +74,15 @@ def operation_params(**more: Any) -> Any:
 
 
 class Host:
-    """An axis that runs in its loop; `wall` False lets it run as fast as it can, when `run` is called."""
+    """An axis that runs in its loop; `wall` False lets it run as fast as it can, when `run` is called.
+
+    `store` keeps what survives; `stated`: the axis stands where its file says, which a store that is new takes.
+    """
 
     def __init__(  # noqa: PLR0913 - an axis and its clock
         self, method: Method[Any], spec: AxisSpec, *, motor: str = "", period: float = PERIOD, speed: float = 1.0,
-        wall: bool = True, careful: bool = True, channels: Sequence[str] = (),
+        wall: bool = True, careful: bool = True, channels: Sequence[str] = (), store: Store | None = None,
+        stated: bool = True,
     ) -> None:  # fmt: skip
         make = operation_params(careful=int(careful))
         self.axis: Live = method.live(spec, make, motor)
@@ -87,6 +94,8 @@ class Host:
         self.log = Log()
         self._ids = self._read = self._noted = self._pulls = 0
         self._thread: threading.Thread | None = None
+        self.keeper: Keeper | None = None
+        self._store, self._stated, self._asking = store, stated, threading.Lock()
         self._ended: dict[int, Ending] = {}
         self.job: Work | None = None  # the last one begun
         self._of_job: dict[str, int] = {}
@@ -98,6 +107,8 @@ class Host:
         """Run periods in this thread."""
         done = self._run(periods)
         self.note()
+        if self.keeper is not None:
+            self.keeper.look()
         return done
 
     def _run(self, periods: int) -> int:
@@ -137,14 +148,28 @@ class Host:
     def run_until_ready(self) -> None:
         """Let time pass until the axis could be enabled."""
         self._until(lambda: bool(self.board.operation.answer.ready))
+        if self._store is not None and self.keeper is None:
+            self._keep(self._store)
+
+    def _keep(self, store: Store) -> None:
+        """Keep what survives, now that the axis could be enabled."""
+        keeper = Keeper(store, self.board)
+        trusted = self.ask(ops.TRUST, keeper.begin(stated=self._stated))
+        self._until(lambda: self.ending(trusted) is not None)
+        self.keeper = keeper
+        if self._thread is not None:
+            keeper.start()
 
     def close(self) -> None:
-        """Stop, wait for rest, take the torque away, and end the loop."""
+        """Stop, wait for rest, take the torque away, park, and end the loop."""
         self.stop()
         self._until(lambda: bool(self.board.operation.answer.rests))
         self.off()
         pulls = self.board.loop.offs
         self._until(lambda: self.board.operation.offs == pulls)
+        if self.keeper is not None:
+            self._until(self.keeper.look)
+            self.keeper.close()
         self.board.loop.leave = 1
         if self._thread is not None:
             self._thread.join()
@@ -166,12 +191,26 @@ class Host:
 
     def ask(self, kind: int, value: float = 0.0, speed: float = 1.0, **more: int) -> int:
         """Write a request; gives the id under which it will end. `more`: id, epoch, client."""
-        box, number = self.board.inbox, self.board.inbox.written + 1
-        if not self._has_room():
-            raise BlockingIOError("the mailbox is full")
-        command = more.get("id") or self._next_id()
-        epoch, client = more.get("epoch", int(self.board.operation.epoch)), more.get("client", 1)
-        write_request(box, number, kind, command, epoch, client, value, speed)
+        box = self.board.inbox
+        with (
+            self.keeper.marked(kind, value) if self.keeper else nullcontext(enter_result=True) as durable,
+            self._asking,
+        ):
+            if not self._has_room():
+                raise BlockingIOError("the mailbox is full")
+            command = more.get("id") or self._next_id()
+            epoch, client = more.get("epoch", int(self.board.operation.epoch)), more.get("client", 1)
+            if durable:
+                write_request(box, box.written + 1, kind, command, epoch, client, value, speed)
+            else:
+                self._ended[command] = Ending(command, ops.REFUSED, NO_MARK, 0)
+        return command
+
+    def settle(self, why: int) -> int:
+        """An ending of what no loop needs to do: refused for a reason, or with 0 done; gives its id."""
+        with self._asking:
+            command = self._next_id()
+        self._ended[command] = Ending(command, ops.REFUSED if why else ops.DONE, why, 0)
         return command
 
     def work(self, job: Any, client: int = 1) -> int:

@@ -62,8 +62,8 @@ class ForeignError(DamagedError):
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Open a file of SQLite's, which waits for nobody."""
-    return sqlite3.connect(path, timeout=0.0, isolation_level=None)
+    """Open a file of SQLite's, which waits for nobody; threads that use it take turns (`keeper.Keeper`)."""
+    return sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
 
 
 class SealedFile:

@@ -4,15 +4,17 @@ import fcntl
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from detent.errors import AxisError, DetentError
-from detent.methods.load import read_axis
+from detent.methods.load import AxisFile, read_axis
 from detent.methods.registry import METHODS
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
-from detent.operate.host import PERIOD, Host
+from detent.operate.host import PERIOD, Host, operation_params
+from detent.operate.opening import store_path
 from detent.operate.session import Session
+from detent.operate.store import Store
 
 SPEEDS = 0.1, 10.0
 PERIODS = 1e-4, 0.1  # of the loop [s]
@@ -26,8 +28,9 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
     speed: float = 1.0,
     wall: bool = True,
     period: float = PERIOD,
+    store: Path | str | None = None,
 ) -> tuple[Host, str]:
-    """Host of the simulated axis of a file, and its name."""
+    """Host of the simulated axis of a file, and its name; `store` is where it keeps what survives, None nowhere."""
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise DetentError(
             f"speed {speed:g}: time may pass {SPEEDS[0]:g} to {SPEEDS[1]:g} times as fast; choose between"
@@ -36,15 +39,49 @@ def make_host(  # noqa: PLR0913 - a file, and what is chosen of it
         raise DetentError(
             f"period {period:g} s: it must be from {PERIODS[0]:g} s to {PERIODS[1]:g} s; choose one between"
         )
-    spec = read_axis(file, overrides).spec
-    method = METHODS[spec.axis.method]
+    read = read_axis(file, overrides)
+    method = METHODS[read.spec.axis.method]
     if not method.lives:
-        raise DetentError(f"{file}: the method {spec.axis.method} has no operator yet; simulate it with: detent run")
-    return Host(method, spec, motor=motor, period=period, speed=speed, wall=wall), spec.axis.name
+        raise DetentError(f"{file}: the method {method.name} has no operator yet; simulate it with: detent run")
+    chosen: dict[str, Any] = {"motor": motor, "period": period, "speed": speed, "wall": wall}
+    if store is None:
+        return Host(method, read.spec, **chosen), read.spec.axis.name
+    motors = method.sensors(read.spec)
+    one = next(iter(motors)) if not motor and len(motors) == 1 else motor
+    if one not in motors:
+        method.live(read.spec, operation_params(), motor)  # says what there is
+    opened = Store(Path(store) if store else store_path(file, one), motors[one])
+    try:
+        return Host(method, stand(read, one, opened).spec, store=opened, **chosen), read.spec.axis.name
+    except BaseException:
+        opened.close()
+        raise
 
 
-def live(
-    file: Path | str, overrides: Sequence[str] = (), *, motor: str = "", speed: float = 1.0, wall: bool = True
+def stand(read: AxisFile, motor: str, store: Store) -> AxisFile:
+    """The simulated axis where its store saw it last; where ``--set`` says another place, it was pushed there."""
+    key = METHODS[read.spec.axis.method].begins.replace("*", motor)
+    saved, sensor = store.saved, store.sensor
+    if saved is None or saved.elsewhere or key in {one.partition("=")[0].strip() for one in read.overrides}:
+        return read
+    place = sensor.position(saved.counts)
+    return read.replaced({key: min(max(place, sensor.ends[0]), sensor.ends[1]) if sensor.ends else place})
+
+
+def beside(file: Path | str) -> str | None:
+    """Where a store lies unless told otherwise: "" beside the axis file; None, nowhere, of a packaged example."""
+    examples = Path(__file__).resolve().parents[1] / "examples"
+    return None if Path(file).resolve().parent == examples else ""
+
+
+def live(  # noqa: PLR0913 - as `make_host`
+    file: Path | str,
+    overrides: Sequence[str] = (),
+    *,
+    motor: str = "",
+    speed: float = 1.0,
+    wall: bool = True,
+    store: Path | str | None = "",
 ) -> LiveAxis:
     """Run the axis of a file live, in this process.
 
@@ -60,13 +97,17 @@ def live(
         How fast time passes on the simulated axis, 0.1 to 10.
     wall : bool, optional
         False: time passes only while a command is waited for, as fast as it can.
+    store : path, optional
+        Where it keeps what survives; by default beside the axis file, of a packaged example nowhere. None: nothing is
+        kept, and the axis begins where its file puts it.
 
     Returns
     -------
     LiveAxis
         To be used in a ``with`` block, behind which the axis is at rest and without torque.
     """
-    host, name = make_host(file, overrides, motor=motor, speed=speed, wall=wall)
+    where = beside(file) if store == "" else store
+    host, name = make_host(file, overrides, motor=motor, speed=speed, wall=wall, store=where)
     if wall:
         host.start()
     else:

@@ -118,7 +118,7 @@ class Store:
         self._standing = replace(standing, trust=Trust.RESTORED, counts=standing.shown)
         return self._standing
 
-    def refer(self, counts: int, by: str, reading: int | None = None) -> Judgement:
+    def refer(self, counts: int, by: str, reading: int | None = None, why: Why = Why.REFERRED) -> Judgement:
         """A reference was found at a position; an absolute sensor gave this reading there."""
         last = self.reference
         at, number = self._now(), last.number + 1 if last else 1
@@ -129,7 +129,7 @@ class Store:
             change.put(Reference(number, by, counts, "" if reading is None else str(reading), at))
             # A mark of motion stays, and says from now on that the position was known.
             self._put_motion(change, motion.phase if motion else "parked", counts, Trust.REFERENCED)
-        self._standing = Judgement(Trust.REFERENCED, Why.REFERRED, counts)
+        self._standing = Judgement(Trust.REFERENCED, why, counts)
         return self._standing
 
     def distrust(self) -> Judgement:
@@ -214,6 +214,14 @@ class Store:
         """Make many places entries in one step: name, counts, tolerance of each."""
         made = {entry[0]: self._entry(*entry) for entry in entries}
         self._change_table(made.values())
+
+    def rename(self, name: str, to: str) -> Position:
+        """Give an entry another name, which none has; all else of it stays."""
+        made = replace(self._entry(to, self.position(name).counts, 0), **{**asdict(self.position(name)), "name": to})
+        if to in self.positions:
+            raise DetentError(f'{self.path}: got the name "{short(to)}", which there is; expected: a new one; give one')
+        self._change_table([made], [name])
+        return made
 
     def delete(self, name: str) -> None:
         """Take an entry out."""

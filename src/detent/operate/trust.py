@@ -23,6 +23,7 @@ class Why(StrEnum):
     """Why a position is trusted as far as it is: what is known, and what to do where it does not suffice."""
 
     REFERRED = "a reference was found"
+    STATED = "its axis file says where it stands"
     PARKED = "it was at rest and held while the power was off"
     READ = "the absolute sensor shows one place only, and the axis stands where it was left"
     UNIQUE = "it was in motion when it was last seen, and the absolute sensor shows one place only"

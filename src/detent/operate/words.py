@@ -38,6 +38,17 @@ WORDS = {
     "order": Word(ops.ORDER, "number", "an order of the control word of CiA 402, 0 shutdown to 6 fault reset"),
 }
 
+PLACES = {
+    "teach": "where the axis rests becomes a position of the table, under a name or a number",
+    "edit": "a position of the table is typed in: its name and where it is",
+    "rename": "a position gets another name", "forget": "a position leaves the table",
+    "undo": "the last change of the table is taken back", "redo": "it is made again",
+    "export": "the table is written to a file", "import": "the positions of a file are taken into it",
+}  # fmt: skip
+"""What is done with the position table: nothing of it moves the axis."""
+
+DURABLE = "enable", "order", "go_to", "positions", *PLACES  # that may have to wait until something is on a disk
+
 
 class CommandError(AxisError):
     """A live command that was not done: `reason` says why, `remedy` what to do, `code` is the number of both."""
@@ -150,7 +161,9 @@ def why_not_moving(status: dict[str, Any]) -> list[tuple[str, str]]:
     elif state != "operation enabled" and not fault:
         found.append((f"no torque: {state}", "enable"))
     if status["trust"] == "unknown":
-        found.append(("the position is not known: it creeps, and goes to no position", "home"))
+        found.append(("the position is not known: it creeps, and goes to no position", status["find"]))
+    if status["store"] and status["store"]["trouble"]:
+        found.append((f"what survives cannot be kept: {status['store']['trouble']}", "give its disk room, then enable"))
     if state == "operation enabled" and not status["confirmed"]:
         found.append(("the first motion is held to a tenth of the speed", "look at it, then confirm"))
     if status["limited"]:

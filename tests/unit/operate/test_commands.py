@@ -56,7 +56,7 @@ class Running:
 @pytest.fixture
 def running(folder: Path) -> Iterator[Running]:
     """The axis live."""
-    one = Running(folder / "slide.toml", "--period", "10 ms")  # other tests want the processors, too
+    one = Running(folder / "slide.toml", "--no-store", "--period", "10 ms")  # other tests want the processors, too
     yield one
     if one.process.poll() is None:
         one.process.kill()
@@ -136,7 +136,7 @@ def test_18_a_jog_of_a_killed_program_stops_within_its_lease(folder: Path, runni
 
 
 def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
-    with detent.live(folder / "slide.toml", wall=False) as axis:
+    with detent.live(folder / "slide.toml", wall=False, store=None) as axis:
         assert [what for what, _ in axis.why_not_moving] == [
             "no torque: switch on disabled",
         ]
@@ -171,7 +171,10 @@ def test_the_words_of_the_api_block_and_can_be_awaited(folder: Path) -> None:
 
 @pytest.mark.parametrize("value", [None, True, "5", "5 V", "x", [1], {}, "nan mm"])
 def test_a_value_that_makes_no_sense_is_told(folder: Path, value: Any) -> None:
-    with detent.live(folder / "slide.toml", wall=False) as axis, pytest.raises(DetentError, match="such as"):
+    with (
+        detent.live(folder / "slide.toml", wall=False, store=None) as axis,
+        pytest.raises(DetentError, match="such as"),
+    ):
         axis.move_to(value)
 
 
@@ -183,7 +186,7 @@ def test_a_period_that_no_loop_has_is_refused(folder: Path, period: str) -> None
 
 def test_what_nobody_waits_for_is_noted_all_the_same(folder: Path) -> None:
     """The loop keeps the last 256 endings; a program that only asks lost those before."""
-    with detent.live(folder / "slide.toml", wall=False) as axis:
+    with detent.live(folder / "slide.toml", wall=False, store=None) as axis:
         session: Any = axis.link
         asked = []
         for _ in range(600):
@@ -213,3 +216,43 @@ def test_the_seventeenth_client_is_told(folder: Path, running: Running) -> None:
 def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:
     with pytest.raises(AxisError, match="detent live"):
         detent.connect(folder / "nobody.toml")
+
+
+def test_33_a_killed_process_leaves_a_position_that_is_not_known(folder: Path) -> None:
+    file = folder / "kept.toml"
+    shutil.copy(folder / "slide.toml", file)
+    first = Running(file, "--period", "10 ms")
+    assert first.started["trust"] == "referenced"
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.do("jog", "10 mm/s", wait=False)
+    first.process.kill()
+    first.process.communicate()
+    second = Running(file, "--period", "10 ms")
+    assert second.started["trust"] == "unknown"
+    assert "in motion when it was last seen" in second.started["store"]["position"]
+    with detent.connect(file) as axis:
+        axis.do("trust", 2)
+    ended = second.end()
+    assert ended["trust"] == "referenced"
+    assert ended["store"]["trouble"] == ""
+    told = run("live", str(file), "--for", "0")
+    assert told.returncode == 0
+    assert str(file) + ".state" in told.stdout
+    assert f"detent connect {file}" in told.stdout.splitlines()[-4]
+
+
+def test_46_the_position_table_from_a_second_terminal(folder: Path) -> None:
+    file = folder / "places.toml"
+    shutil.copy(folder / "slide.toml", file)
+    live = Running(file, "--period", "10 ms")
+    assert "No positions yet" in run("connect", str(file), "positions").stdout
+    assert run("connect", str(file), "teach", "3").stdout.startswith("3: 20 mm, 4000 counts")
+    assert run("connect", str(file), "edit", "load", "0.2 in").returncode == 0
+    table = json.loads(run("connect", str(file), "positions", "--json").stdout)["positions"]
+    assert [(row["name"], row["number"], row["counts"]) for row in table] == [("3", 3, 4000), ("load", None, 1016)]
+    assert run("connect", str(file), "export", str(folder / "places.csv")).returncode == 0
+    missing = run("connect", str(file), "go_to", "lode")
+    assert (missing.returncode, missing.stdout) == (2, "")
+    assert "load" in missing.stderr
+    live.end()

@@ -4,9 +4,21 @@ from collections.abc import Callable
 from typing import Any
 
 from detent.control.guard import NO_ARRIVAL, enable_guard
-from detent.control.operation import GO, HALT, HOLD, JOG, NUMBERED, REST_OFF, RUN, Operation, OperationParams
+from detent.control.operation import (
+    GO,
+    HALT,
+    HOLD,
+    JOG,
+    MOVE_TO,
+    NUMBERED,
+    REST_OFF,
+    RUN,
+    TRAVEL,
+    Operation,
+    OperationParams,
+)  # fmt: skip
 from detent.control.table_positioner import HOLD as STANDS
-from detent.control.table_positioner import MOVE, STOPPING, braking_path
+from detent.control.table_positioner import MOVE, SHORTEST, STOPPING, braking_path, set_out
 from detent.kernel.loop import serves
 from detent.kernel.registers import Registers, block, f8, i8, register
 from detent.kernel.step import step
@@ -14,6 +26,8 @@ from detent.methods.method import Live
 from detent.methods.rotary_table.controller import TableController, TableControllerParams, TableLines
 from detent.methods.rotary_table.host import TableHost
 from detent.methods.rotary_table.schema import RotaryTableSpec
+
+BUSY = 201  # reason to refuse, `errors.REFUSAL_TEXT`
 
 
 class TableLiveParams(Registers):
@@ -73,6 +87,10 @@ def serve(  # noqa: PLR0913 - as all of its kind
             r.plus, r.minus = (1, 0) if d.velocity > 0.0 else (0, 1)
         elif d.do == NUMBERED:
             r.number, r.start = d.number, 1
+        elif d.do == TRAVEL and r.state != STANDS:
+            a.refused = BUSY
+        elif d.do == TRAVEL:
+            set_out(p.positioner, r, round(d.target / q.count), SHORTEST, round(q.speed * d.share * q.dial))
         elif d.do in (RUN, HALT):
             halt(p, c)
     place = r.angle.position
@@ -97,7 +115,11 @@ def live(spec: RotaryTableSpec, operation: Callable[..., OperationParams]) -> di
     strobe = spec.method.strobe_period
     q = TableLiveParams(count=spec.count, dial=spec.per_interrupt(1.0), speed=spec.limits.speed, seconds=strobe)
     q.look_ticks = round(strobe / host.machine.tick)
-    q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO)
+    q.operation = operation(strobe, spec.method.in_position_time, (0.0, 0.0), JOG, GO, MOVE_TO)
     q.operation.endless = 1
     machine: Any = host.machine
-    return {"": Live(machine.params, machine.state, q, TableLive(), machine.tick, "rad", fault=lambda: host.failure)}
+    made = Live(
+        machine.params, machine.state, q, TableLive(), machine.tick, "rad", fault=lambda: host.failure,
+        numbers=frozenset(map(int, spec.position)),
+    )  # fmt: skip
+    return {"": made}

@@ -18,7 +18,7 @@ class RotaryTableMethod(Method[RotaryTableSpec]):
     pace = "100 us, every 20th"
     spec = RotaryTableSpec
     fills, derives = "schema:fill_derived", "derive:derive"
-    senses = "derive:position_sensors"
+    senses, begins = "derive:position_sensors", "mechanics.start_angle"
     refuses, warns = "checks:RULES", "checks:find_cautions"
     state, params = "system:RotaryTable", "system:RotaryTableParams"
     every = 20

@@ -34,7 +34,7 @@ class StepperEnvelopeMethod(Method[StepperEnvelopeSpec]):
     rotary: type[StepperEnvelopeSpec] | None = rotary_model(StepperEnvelopeSpec)
     catalogue = STEPPER_MOTORS
     fills, derives = "schema:fill_derived", "derive:derive"
-    senses = "derive:position_sensors"
+    senses, begins = "derive:position_sensors", "stepper.*.mechanics.start_position"
     refuses, warns = "rules:RULES", "checks:find_cautions"
     state, params = "system:Stepper", "system:StepperParams"
     every = 100
