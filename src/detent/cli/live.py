@@ -5,6 +5,7 @@ import shlex
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +19,12 @@ File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=Fal
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 FOR = "End after so many seconds by itself."
-WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home."
+BIND = "Address at which the panel is reached from other machines; else only this one reaches it."
+PORT = "Port of the panel; else any that is free."
+NAME = "Name by which the panel is called, beside its address; repeat for more."
+PLAIN = "Serve the panel without TLS on a network; whoever is on it can then read and change what is sent."
+VIEWER = "Print a second link, for somebody who only looks, and may stop."
+WORD = "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; link: to the panel."
 
 
 @app.command()
@@ -29,6 +35,16 @@ def live(
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
+    headless: Annotated[bool, option("--headless", "", "Without the panel in the browser.")] = False,
+    bind: Annotated[str, option("--bind", "ADDRESS", BIND)] = "",
+    port: Annotated[int, option("--port", "", PORT, min=0, max=65535)] = 0,
+    names: Annotated[list[str] | None, option("--name", "HOST", NAME)] = None,
+    certificate: Annotated[str, option("--tls-certificate", "PEM", "Certificate of the panel.")] = "",
+    key_file: Annotated[str, option("--tls-key", "PEM", "Its private key.")] = "",
+    plain: Annotated[bool, option("--i-accept-plain-http", "", PLAIN)] = False,
+    viewer_link: Annotated[
+        bool, option("--viewer-link", "", "Print a second link, for somebody who only looks.")
+    ] = False,
     *,
     as_json: Json = False,
 ) -> None:
@@ -36,7 +52,10 @@ def live(
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
     from detent.operate.start import Place, make_host
+    from detent.panel.child import Child, PanelPlace
 
+    at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
+    at.check()
     place = Place(file)
     host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
     missing, left = host.start(), threading.Event()
@@ -48,18 +67,23 @@ def live(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
+    panel = None if headless else Child(channel.path, at)
+    links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
     started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
-    started |= {"state": host.state, "period": session.describe()["period"]}
+    started |= {"state": host.state, "period": session.describe()["period"], "panel": links}
     if as_json:
         print(json.dumps(started), flush=True)
     else:
         _tell_start(file, started)
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        pass
+        if panel and panel.mend() and not as_json:
+            tell(f"The panel had ended, and runs again: {panel.link('engineer')}")
     died = not host.is_alive
-    channel.close()
     axis = LiveAxis(session)
     axis.close()
+    if panel:
+        panel.close()
+    channel.close()
     place.leave()
     status = session.status()
     if as_json:
@@ -86,6 +110,8 @@ def _tell_start(file: Path, started: dict[str, Any]) -> None:
     name = shlex.quote(str(file))
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
     tell(f"{started['name']}: live, SIMULATION{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    for link, role in zip(started["panel"], ("", ", to look only"), strict=False):
+        tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name} link)")
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")
@@ -104,9 +130,14 @@ def connect(
     as_json: Json = False,
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
+    from detent.operate.channel import channel_of
     from detent.operate.start import connect as connect_to
     from detent.operate.words import describe_status
+    from detent.panel.keys import keys_of, link_of
 
+    if word == "link":
+        tell(link_of(keys_of(channel_of(file)), value or "engineer", time.time()))
+        return
     axis = connect_to(file)
     ended: dict[str, Any] = {}
     if word == "jog":

@@ -214,6 +214,12 @@ class Host:
         """Pull the line that takes the torque away."""
         self.board.loop.offs += 1
 
+    def pulled(self) -> int:
+        """Id of a stop or off that its line has done, where the mailbox took no request for it."""
+        command = self._next_id()
+        self._ended[command] = Ending(command, ops.DONE, 0, 0)
+        return command
+
     # ---- hearing
 
     def note(self) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 import detent
 from detent.errors import AxisError, DetentError
+from detent.operate.channel import MOST_CLIENTS
 from detent.operate.words import CommandError, CommandRefusedError
 
 pytestmark = [
@@ -56,7 +57,7 @@ class Running:
 @pytest.fixture
 def running(folder: Path) -> Iterator[Running]:
     """The axis live."""
-    one = Running(folder / "slide.toml", "--period", "10 ms")  # other tests want the processors, too
+    one = Running(folder / "slide.toml", "--headless", "--period", "10 ms")  # other tests want the processors, too
     yield one
     if one.process.poll() is None:
         one.process.kill()
@@ -98,7 +99,7 @@ def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(folder: P
 
 
 def test_55_a_second_one_on_the_same_axis_is_refused(folder: Path, running: Running) -> None:
-    second = run("live", str(folder / "slide.toml"), "--for", "0")
+    second = run("live", str(folder / "slide.toml"), "--headless", "--for", "0")
     assert (second.returncode, second.stdout) == (1, "")
     assert str(running.process.pid) in second.stderr
     running.end(signal.SIGTERM)
@@ -193,10 +194,10 @@ def test_what_nobody_waits_for_is_noted_all_the_same(folder: Path) -> None:
         assert len(session.host.log.asked) == 600
 
 
-def test_the_seventeenth_client_is_told(folder: Path, running: Running) -> None:
+def test_a_client_too_many_is_told(folder: Path, running: Running) -> None:
     file = folder / "slide.toml"
-    others = [detent.connect(file) for _ in range(16)]
-    with pytest.raises(AxisError, match="16 clients"):
+    others = [detent.connect(file) for _ in range(MOST_CLIENTS)]
+    with pytest.raises(AxisError, match=f"{MOST_CLIENTS} clients"):
         detent.connect(file)
     others[0].close()
     while True:  # until the channel has noticed
