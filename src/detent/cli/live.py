@@ -49,7 +49,10 @@ def live(
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
+    from detent.methods.load import read_axis
+    from detent.operate.audit import Audit
     from detent.operate.client import LiveAxis
+    from detent.operate.opening import store_path
     from detent.operate.session import Session
     from detent.operate.start import Place, make_host
     from detent.panel.child import Child, PanelPlace
@@ -57,10 +60,13 @@ def live(
     at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
     at.check()
     place = Place(file)
+    read = read_axis(file, overrides or [])
     host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
     missing, left = host.start(), threading.Event()
-    session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
-    channel = place.serve(session)
+    about = {"name": name, "file": str(file), "simulated": True, "speed": speed}
+    session = Session(host, about, _axis_file(read))
+    audit = Audit(store_path(file, motor).with_suffix(".audit"))
+    channel = place.serve(session, audit)
 
     def leave(_number: int, _frame: object) -> None:
         left.set()
@@ -84,6 +90,7 @@ def live(
     if panel:
         panel.close()
     channel.close()
+    audit.close()
     place.leave()
     status = session.status()
     if as_json:
@@ -93,6 +100,14 @@ def live(
              f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
     if died:
         raise typer.Exit(NOT_DONE)
+
+
+def _axis_file(read: Any) -> dict[str, Any]:
+    """Text of an axis file, and every effective value with its origin."""
+    from detent.methods.check import check_spec
+
+    rows = [[row.key, row.value, row.origin, row.doc] for row in check_spec(read).rows]
+    return {"file": read.file, "text": read.source.content.decode(errors="replace"), "effective": rows}
 
 
 def _seconds(period: str) -> float:

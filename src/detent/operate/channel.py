@@ -23,6 +23,7 @@ from typing import Any, cast
 
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
+from detent.operate.audit import Audit
 from detent.operate.session import Session, packed
 from detent.operate.words import Ended, why_not_moving
 
@@ -31,11 +32,13 @@ MOST_CLIENTS = 32
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
 SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
 LOOK = 2e-3  # how often endings are looked for [s]
+UNTOLD = {"keep"}  # twenty a second: of the jog that they keep there is a record
 RATES = 1.0, 50.0  # of a watch [Hz]
 QUESTIONS: dict[str, Callable[..., Any]] = {
     "status": Session.status,
     "describe": Session.describe,
     "scope": Session.scope,
+    "axis": Session.axis,
 }
 """What only reads: the method of `Session` that answers; what else stands in the message are its arguments."""
 
@@ -68,14 +71,15 @@ class Client:
     writer: asyncio.StreamWriter
     who: str
     open: set[int] = field(default_factory=set[int])  # commands that have not ended
+    told: set[int] = field(default_factory=set[int])  # those of them that stand in the log
     watch: asyncio.Future[None] | None = None
 
 
 class Channel:
     """The server's side, in a thread of its own."""
 
-    def __init__(self, session: Session, path: Path) -> None:
-        self.session, self.path = session, path
+    def __init__(self, session: Session, path: Path, audit: Audit | None = None) -> None:
+        self.session, self.path, self.audit = session, path, audit or Audit()
         self._clients: dict[int, Client] = {}
         self._come = 0  # clients that have ever come
         self._loop = asyncio.new_event_loop()
@@ -148,20 +152,38 @@ class Channel:
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
         if do in QUESTIONS:
             told = _told(QUESTIONS[do], self.session, asked)
-            return {do: told | {"questions": [*QUESTIONS]} if do == "describe" else told}
-        if do == "watch":
-            return {do: _told(self._watch, client, asked)}
-        if do == "name":
-            return {do: _told(self._name, client, asked)}
-        speed = asked.get("speed", 1.0)
+            return {do: told | {"questions": [*QUESTIONS, "log"]} if do == "describe" else told}
+        if do in (own := {"watch": self._watch, "name": self._name, "log": self._log, "note": self._note}):
+            return {do: _told(own[do], client, asked)}
+        who = str(asked.pop("who", client.who))
+        try:
+            return {"id": self._command(do, asked, client, who)}
+        except DetentError as error:
+            self.audit.note(who, client=client.number, do=do[:40], error=str(error)[:200])
+            raise
+
+    def _command(self, do: str, asked: dict[str, Any], client: Client, who: str) -> int:
+        value, speed = asked.get("value"), asked.get("speed", 1.0)
         if isinstance(speed, bool) or not isinstance(speed, int | float):
             raise DetentError(f"speed {speed!r:.60}: expected a number above 0 to 1, a share of the largest speed")
         try:
-            command = self.session.ask(do, asked.get("value"), float(speed), client=client.number)
+            command = self.session.ask(do, value, float(speed), client=client.number)
         except BlockingIOError as error:
             raise DetentError("too many commands at once") from error
         client.open.add(command)
-        return {"id": command}
+        if do not in UNTOLD:
+            client.told.add(command)
+            more = {} if value is None else {"value": value}
+            self.audit.note(who, client=client.number, do=do, id=command, **more)
+        return command
+
+    def _log(self, _client: Client) -> dict[str, Any]:
+        """Who asked for what, and how that ended."""
+        return self.audit.recent()
+
+    def _note(self, client: Client, who: object = "", what: object = "") -> None:
+        """Something that happened at the client's, for the log."""
+        self.audit.note(str(who)[:80] or client.who, client=client.number, note=str(what)[:200])
 
     def _name(self, client: Client, who: object = "") -> str:
         """A client says on whose behalf it asks."""
@@ -212,6 +234,9 @@ class Channel:
                 ended = self.session.ending(command)
                 if ended is not None:
                     client.open.discard(command)
+                    if command in client.told:
+                        client.told.discard(command)
+                        self.audit.note(client.who, client=client.number, ended=command, how=ended.how, code=ended.code)
                     _send(client.writer, {"ended": ended.to_dict()})
             await asyncio.sleep(LOOK)
 

@@ -21,8 +21,8 @@ LARGEST = 1 << 62  # number of a row
 class Session:
     """Takes commands in words and tells how they end; every method may be called from any thread."""
 
-    def __init__(self, host: Host, about: Mapping[str, Any]) -> None:
-        self.host, self.about = host, dict(about)
+    def __init__(self, host: Host, about: Mapping[str, Any], file: Mapping[str, Any] | None = None) -> None:
+        self.host, self.about, self._file = host, dict(about), dict(file or {})
         self.unit = host.axis.unit
         self._lock = threading.Lock()
         self._signals = self._name_signals()
@@ -86,6 +86,10 @@ class Session:
     def close(self) -> None:
         """Come to rest, take the torque away, end the loop."""
         self.host.close()
+
+    def axis(self) -> dict[str, Any]:
+        """The axis file as it was read, and what it comes to."""
+        return self._file
 
     # ---- the scope
 

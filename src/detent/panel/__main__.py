@@ -33,20 +33,26 @@ def listen(addresses: Sequence[str], port: int) -> list[socket.socket]:
     return found
 
 
-async def serve(told: dict[str, Any]) -> None:
-    """Serve until told to end."""
+def make_server(told: dict[str, Any]) -> tuple[uvicorn.Server, list[socket.socket], Panel]:
+    """A server, what it listens on, and what it serves."""
     tls = {"ssl_certfile": told["certificate"], "ssl_keyfile": told["key_file"]} if told["certificate"] else {}
     sockets = listen(told["addresses"], told["port"])
     port = sockets[0].getsockname()[1]
     here = Here("https" if tls else "http", local_names([s.getsockname()[0] for s in sockets], port, told["names"]))
     panel = Panel(Path(told["channel"]), Keys(told["keys"]), here, plain=told["plain"])
-    server = uvicorn.Server(uvicorn.Config(
+    config = uvicorn.Config(
         panel.app(), log_level="warning", access_log=False, proxy_headers=False, server_header=False, lifespan="on",
         ws="websockets-sansio", http="h11", ws_max_size=LONGEST_FRAME, ws_per_message_deflate=False,
         ws_ping_interval=5.0, ws_ping_timeout=5.0, timeout_graceful_shutdown=1, **tls,
-    ))  # fmt: skip
+    )  # fmt: skip
+    return uvicorn.Server(config), sockets, panel
+
+
+async def serve(told: dict[str, Any]) -> None:
+    """Serve until told to end."""
+    server, sockets, panel = make_server(told)
     ending = asyncio.ensure_future(_until_told(server, panel))
-    sys.stdout.write(json.dumps({"port": port}) + "\n")
+    sys.stdout.write(json.dumps({"port": sockets[0].getsockname()[1]}) + "\n")
     sys.stdout.flush()
     await server.serve(sockets=sockets)
     ending.cancel()

@@ -3,7 +3,7 @@
 import csv
 import io
 from base64 import b64decode
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Iterable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, select_autoescape
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
@@ -20,9 +21,9 @@ from starlette.websockets import WebSocket
 
 from detent.errors import DetentError
 from detent.panel.gate import Gate, Here, Rule
-from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys
+from detent.panel.keys import COOKIE, LIFETIMES, LINK, TICKET, Keys, Pass
 from detent.panel.line import Line
-from detent.panel.sockets import Sockets
+from detent.panel.sockets import Budget, Sockets
 
 HERE = Path(__file__).parent
 
@@ -34,6 +35,10 @@ RULES = {
     "/ws": Rule("viewer"),
     "/api/ticket": Rule("viewer", changes=True),
     "/api/describe": Rule("viewer"),
+    "/api/axis": Rule("viewer"),
+    "/api/faults": Rule("viewer"),
+    "/api/log": Rule("operator"),
+    "/api/positions.csv": Rule("viewer"),
     "/api/scope.csv": Rule("viewer"),
 }
 """What each route asks of whoever calls it; a route without a rule lets nobody in."""
@@ -46,6 +51,7 @@ class Panel:
         self.channel, self.keys, self.here, self.plain = channel, keys, here, plain
         self.sockets = Sockets(channel, keys)
         self.line: Line | None = None
+        self._wrong_links = Budget(10, 60.0)  # that the log tells
         self.about: dict[str, Any] = {}
         loader = PackageLoader("detent.panel", "template")
         self._pages = Environment(loader=loader, autoescape=select_autoescape(default=True))
@@ -59,7 +65,8 @@ class Panel:
             Mount("/static", StaticFiles(directory=HERE / "static", packages=[("detent.page", "vendor")])),
             WebSocketRoute("/ws", self.attend),
             Route("/api/ticket", self.ticket, methods=["POST"]),
-            Route("/api/describe", self.describe),
+            *(Route(f"/api/{name}", self.answer) for name in ("describe", "axis", "faults", "log")),
+            Route("/api/positions.csv", self.positions),
             Route("/api/scope.csv", self.scope),
         ]
         gate = Middleware(Gate, routes=routes, rules=RULES, keys=self.keys, here=self.here)
@@ -76,8 +83,13 @@ class Panel:
         self.line.close()
 
     async def _ask(self, **message: Any) -> Any:
-        assert self.line is not None  # noqa: S101 - the server starts no request before
-        return (await self.line.ask(message))[message["do"]]
+        if self.about and message["do"] not in self.about["questions"]:
+            raise HTTPException(404, f"this axis tells nothing of {message['do']}")
+        return (await self._tell(**message))[message["do"]]
+
+    async def _tell(self, **message: Any) -> dict[str, Any]:
+        assert self.line is not None  # noqa: S101 - the server takes no request before
+        return await self.line.ask(message)
 
     # ---- routes
 
@@ -94,9 +106,12 @@ class Panel:
         """A one-time link becomes a cookie."""
         who = self.keys.read(request.query_params.get("ticket", ""), LINK)
         if who is None:
+            if self._wrong_links.take():
+                await self._tell(do="note", who=_place(request), what="shows a link that was used or has run out")
             return PlainTextResponse(
                 "This link was used or has run out.\nGet one with: detent connect FILE link\n", 401
             )
+        await self._tell(do="note", who=f"{who.role} {_place(request)}", what="enters")
         answer = RedirectResponse("/", 303)
         answer.set_cookie(
             self.here.cookie, self.keys.sign(who.role, COOKIE), max_age=int(LIFETIMES[COOKIE]), httponly=True,
@@ -106,8 +121,7 @@ class Panel:
 
     async def stop(self, request: Request) -> Response:
         """Stop; a page without scripts comes back to itself."""
-        assert self.line is not None  # noqa: S101 - the server starts no request before
-        told = await self.line.ask({"do": "stop"})
+        told = await self._tell(do="stop", who=person(request))
         if "text/html" in request.headers.get("accept", ""):
             return RedirectResponse("/", 303)
         return JSONResponse({"id": told["id"]})
@@ -120,9 +134,15 @@ class Panel:
         """A ticket for one socket, within ten seconds."""
         return JSONResponse({"ticket": self.keys.sign(request.scope["pass"].role, TICKET)})
 
-    async def describe(self, _request: Request) -> Response:
-        """What does not change."""
-        return JSONResponse(self.about)
+    async def answer(self, request: Request) -> Response:
+        """What the axis answers to a question."""
+        return JSONResponse(await self._ask(do=request.url.path.rpartition("/")[2]))
+
+    async def positions(self, _request: Request) -> Response:
+        """The position table."""
+        found: list[dict[str, Any]] = await self._ask(do="positions")
+        names = list(dict.fromkeys(name for row in found for name in row))
+        return _table(names, ([row.get(name, "") for name in names] for row in found))
 
     async def scope(self, request: Request) -> Response:
         """Rows of the ring as a table: ?channels=position,velocity&first=0."""
@@ -132,11 +152,26 @@ class Panel:
             raise DetentError(f"first={first:.40}: expected the number of a row")
         found = await self._ask(do="scope", channels=names, first=int(first))
         table = np.frombuffer(b64decode(found["data"]), "<f8").reshape(len(names), -1).T
-        text = io.StringIO()
-        writer = csv.writer(text)
-        writer.writerow(["row", *names])
-        writer.writerows([found["first"] + k, *row] for k, row in enumerate(table.tolist()))
-        return Response(text.getvalue(), media_type="text/csv")
+        return _table(["row", *names], ([found["first"] + k, *row] for k, row in enumerate(table.tolist())))
+
+
+def _table(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> Response:
+    """A table as a file; a cell that a spreadsheet would take for a formula gets a quotation mark."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(names)
+    writer.writerows([f"'{c}" if isinstance(c, str) and c[:1] in "=+-@\t" else c for c in row] for row in rows)
+    return Response(text.getvalue(), media_type="text/csv")
+
+
+def person(request: Request) -> str:
+    """Who asks, for the log: role, the beginning of its random name, and from where."""
+    who: Pass = request.scope["pass"]
+    return f"{who.role} {who.name[:6]} {_place(request)}"
+
+
+def _place(request: Request) -> str:
+    return f"from {request.client.host if request.client else '?'}"
 
 
 async def _told(_request: Request, error: Exception) -> Response:

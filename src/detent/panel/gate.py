@@ -6,7 +6,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, NamedTuple
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse
+from starlette.responses import HTMLResponse, PlainTextResponse
 from starlette.routing import BaseRoute, Match
 
 from detent.panel.keys import COOKIE, Keys, Pass
@@ -100,8 +100,7 @@ class Gate:
         headers = Headers(scope=scope)
         try:
             scope["pass"] = self._judge(scope, headers)
-            bounded = _bounded(receive) if scope["type"] == "http" else receive
-            await self.app(scope, bounded, _with_headers(send))
+            await self.app(scope, receive, _with_headers(send))
         except Refusal as refused:
             await _refuse(scope, refused)(scope, receive, _with_headers(send))
 
@@ -114,10 +113,10 @@ class Gate:
         asks_more = scope["type"] == "websocket" or rule.changes
         if not self.here.is_origin(origin) and not (hidden if rule.stops else origin == "" and not asks_more):
             raise Refusal(403, "another page asks; use the panel's own")
-        if (
-            headers.get("content-length", "0").strip("0123456789")
-            or int(headers.get("content-length", "0")) > MOST_BODY
-        ):
+        length = headers.get("content-length", "0")
+        if "transfer-encoding" in headers or not (length.isascii() and length.isdigit()):
+            raise Refusal(411, "a request says how long it is")
+        if int(length[:12]) > MOST_BODY:
             raise Refusal(413, f"a request has {MOST_BODY} bytes at most")
         who = self._who(headers)
         if rule.role and who is None:
@@ -147,21 +146,6 @@ class Gate:
         return self.keys.read(cookies[self.here.cookie].value, COOKIE) if self.here.cookie in cookies else None
 
 
-def _bounded(receive: Receive) -> Receive:
-    """Read a body of any kind as far as it may go."""
-    read = 0
-
-    async def bounded() -> dict[str, Any]:
-        nonlocal read
-        message = await receive()
-        read += len(message.get("body", b""))
-        if read > MOST_BODY:
-            raise Refusal(413, f"a request has {MOST_BODY} bytes at most")
-        return message
-
-    return bounded
-
-
 def _with_headers(send: Send) -> Send:
     async def with_headers(message: dict[str, Any]) -> None:
         if message["type"] == "http.response.start":
@@ -177,8 +161,10 @@ def _with_headers(send: Send) -> Send:
 def _refuse(scope: Scope, refused: Refusal) -> Any:
     if scope["type"] == "websocket":
         return _close
-    text = f"{refused.told}\n"
-    return PlainTextResponse(text, refused.status)
+    if refused.status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
+        # A page of another site led here: the cookie comes with the next click only.
+        return HTMLResponse(f'<p>{refused.told}</p><p><a href="/">Try again</a></p>', 401)
+    return PlainTextResponse(f"{refused.told}\n", refused.status)
 
 
 async def _close(_scope: Scope, receive: Receive, send: Send) -> None:

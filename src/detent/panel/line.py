@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from detent.errors import AxisError, DetentError
 
-LONGEST = 1 << 20  # bytes of an answer
+LONGEST = 4 << 20  # bytes of an answer: the axis file may have one million
 PATIENCE = 5.0  # how long an answer is waited for [s]
 
 

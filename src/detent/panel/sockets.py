@@ -23,8 +23,8 @@ from detent.panel.line import LONGEST
 MOST_SOCKETS = 16
 LONGEST_FRAME = 1 << 16  # bytes, as in the channel
 FIRST_WORD = 2.0  # until the ticket must be there [s]
-A_SECOND = 50  # commands of a client
-FLOOD = 1000  # refused ones in a second, until it is put out
+A_SECOND = 50.0  # messages of a client
+FLOOD = 500.0  # refused ones in a second, until it is put out
 RATE = 25  # of status [Hz]
 
 FREE = {"stop", "disable"}  # from everybody, and never counted
@@ -33,20 +33,17 @@ TAKEN = ("do", "value", "speed", "as")  # of a command
 
 
 class Budget:
-    """Commands that a client may send; they come back with time."""
+    """So many in a time, and no more; they come back as it passes."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock, self._at, self._left = clock, clock(), float(A_SECOND)
-        self.refused = 0.0
+    def __init__(self, most: float, seconds: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._at, self._most, self._rate, self._left = clock, clock(), most, most / seconds, most
 
     def take(self) -> bool:
         """Spend one, if there is one."""
         now = self._clock()
-        passed, self._at = now - self._at, now
-        self._left = min(A_SECOND, self._left + A_SECOND * passed)
-        self.refused = max(0.0, self.refused - FLOOD * passed)
+        self._left = min(self._most, self._left + self._rate * (now - self._at))
+        self._at = now
         if self._left < 1.0:
-            self.refused += 1
             return False
         self._left -= 1.0
         return True
@@ -78,11 +75,10 @@ class Sockets:
 
     async def _first_word(self, socket: WebSocket) -> Pass | None:
         """The ticket, which belongs to the same pass as the cookie."""
-        with suppress(TimeoutError, WebSocketDisconnect, ValueError, KeyError, TypeError, AttributeError):
-            first = json.loads(await asyncio.wait_for(socket.receive_text(), FIRST_WORD))
-            who = self._keys.read(str(first["ticket"]), TICKET)
-            held: Pass = socket.scope["pass"]
-            return who and who._replace(name=held.name) if who and who.role == held.role else None
+        with suppress(TimeoutError):
+            first = _read(await asyncio.wait_for(socket.receive(), FIRST_WORD))
+            who, held = self._keys.read(str(first.get("ticket")), TICKET), cast("Pass", socket.scope["pass"])
+            return held if who and who.role == held.role else None
         return None
 
     async def _relay(self, socket: WebSocket, who: Pass) -> None:
@@ -109,40 +105,36 @@ class Sockets:
                 await socket.close()
 
     async def _to_axis(self, socket: WebSocket, writer: asyncio.StreamWriter, who: Pass) -> None:
-        budget = Budget()
+        commands, refusals = Budget(A_SECOND), Budget(FLOOD)
         while True:
             told = await socket.receive()
             if told["type"] == "websocket.disconnect":
                 return
-            message, wrong = self._message(told.get("text"))
+            message, wrong = self._message(told)
             word = message.get("do", "")
-            if not wrong and word not in FREE and not budget.take():
-                wrong = f"more than {A_SECOND} commands a second; send fewer (a stop is always taken)"
             if not wrong and not who.may(needed := self.role_for(word)):
                 wrong = f"a {who.role} may not {word}; it needs {needed}"
+            if word not in FREE and not commands.take():
+                wrong = f"more than {A_SECOND:g} messages a second; send fewer (a stop is always taken)"
+            if wrong and not refusals.take():
+                await socket.close(1008, "too many messages")
+                return
             if wrong:
-                if budget.refused > FLOOD:
-                    await socket.close(1008, "too many commands")
-                    return
                 mark = {"as": message["as"]} if "as" in message else {}
                 await socket.send_text(json.dumps(mark | {"error": wrong}))
                 continue
             writer.write(json.dumps(message).encode() + b"\n")
             await writer.drain()
 
-    def _message(self, text: str | None) -> tuple[dict[str, Any], str]:
+    def _message(self, told: Any) -> tuple[dict[str, Any], str]:
         """What a page says, as far as it is passed on; and what is wrong with it."""
-        try:
-            read: Any = json.loads(text or "")
-        except (ValueError, RecursionError):
-            return {}, "that is no JSON"
-        said = cast("dict[str, Any]", read) if isinstance(read, dict) else {}
-        mark = said.get("as", 0)
+        said = _read(told)
+        mark, word = said.get("as", 0), said.get("do")
         if isinstance(mark, bool) or not isinstance(mark, int | str) or len(str(mark)) > 40:
             return {}, '"as" is a number or a short text'
-        word = said.get("do")
         if not isinstance(word, str) or len(word) > 40:
-            return {name: said[name] for name in ("as",) if name in said}, 'a message is an object with "do", a command'
+            passed = {"as": mark} if "as" in said else {}
+            return passed, 'a message is JSON, an object with "do", a command'
         return (said if word in self.looks else {name: said[name] for name in TAKEN if name in said}), ""
 
     def role_for(self, word: str) -> str:
@@ -150,6 +142,15 @@ class Sockets:
         if word in FREE or word in self.looks:
             return "viewer"
         return "engineer" if word in ENGINEERS else "operator"
+
+
+def _read(told: Any) -> dict[str, Any]:
+    """An object that came as text; an empty one where something else did."""
+    try:
+        read: Any = json.loads(told.get("text") or "")
+    except (ValueError, RecursionError):
+        return {}
+    return cast("dict[str, Any]", read) if isinstance(read, dict) else {}
 
 
 async def _to_page(socket: WebSocket, reader: asyncio.StreamReader) -> None:
