@@ -47,7 +47,7 @@ class Browser:
         """A socket, without a first word."""
         cookie = "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
         more = {"origin": self.base, "additional_headers": {"Cookie": cookie} if cookie else {}} | more
-        return connect(self.base.replace("http", "ws", 1) + "/ws", max_size=None, **more)
+        return connect(self.base.replace("http", "ws", 1) + "/ws", max_size=None, max_queue=None, **more)
 
     @contextmanager
     def socket(self) -> Iterator["Socket"]:

@@ -285,12 +285,12 @@ def test_50_51_who_did_what_is_appended(rig: PanelRig) -> None:
     assert mine["who"].startswith("operator ")
     assert mine["who"].endswith("from 127.0.0.1")
     assert any(one.get("do") == "move_to" and "error" in one for one in records)
-    assert rig.audit.path is not None
-    rig.audit._waiting.join()
-    assert [json.loads(line) for line in rig.audit.path.read_text(encoding="utf-8").splitlines()][
+    assert rig.audit.file is not None
+    rig.audit.file.flush()
+    assert [json.loads(line) for line in rig.audit.file.path.read_text(encoding="utf-8").splitlines()][
         -len(records) :
     ] == records
-    assert stat.S_IMODE(rig.audit.path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(rig.audit.file.path.stat().st_mode) == 0o600
 
 
 @pytest.mark.parametrize("bind", ["192.168.1.20", "10.0.0.1", "2001:db8::1", "fe80::1"])

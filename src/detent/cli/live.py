@@ -19,6 +19,7 @@ File = Annotated[Path, typer.Argument(help="Axis file (TOML).", show_default=Fal
 SPEED = "How fast time passes on the simulated axis, 0.1 to 10: for practice."
 PERIOD = "Time between two periods of the loop; a machine without real-time priority may need a longer one."
 FOR = "End after so many seconds by itself."
+RECORD = "Write down, line by line, all that is asked: whoever repeats it, repeats the session bit for bit."
 BIND = "Address at which the panel is reached from other machines; else only this one reaches it."
 PORT = "Port of the panel; else any that is free."
 NAME = "Name by which the panel is called, beside its address; repeat for more."
@@ -35,6 +36,7 @@ def live(
     speed: Annotated[float, option("--speed", "", SPEED)] = 1.0,
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
+    record: Annotated[Path | None, option("--record", "FILE", RECORD)] = None,
     headless: Annotated[bool, option("--headless", "", "Without the panel in the browser.")] = False,
     bind: Annotated[str, option("--bind", "ADDRESS", BIND)] = "",
     port: Annotated[int, option("--port", "", PORT, min=0, max=65535)] = 0,
@@ -62,6 +64,7 @@ def live(
     place = Place(file)
     read = read_axis(file, overrides or [])
     host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period))
+    recorder = _record(host, record) if record else None
     missing, left = host.start(), threading.Event()
     about = {"name": name, "file": str(file), "simulated": True, "speed": speed}
     session = Session(host, about, _axis_file(read))
@@ -75,8 +78,10 @@ def live(
         signal.signal(number, leave)
     panel = None if headless else Child(channel.path, at)
     links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
-    started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
-    started |= {"state": host.state, "period": session.describe()["period"], "panel": links}
+    started = {
+        "name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing,
+        "state": host.state, "period": session.describe()["period"], "panel": links,
+    }  # fmt: skip
     if as_json:
         print(json.dumps(started), flush=True)
     else:
@@ -87,10 +92,13 @@ def live(
     died = not host.is_alive
     axis = LiveAxis(session)
     axis.close()
+    host.note()  # the pulls of its end belong to the log
     if panel:
         panel.close()
     channel.close()
     audit.close()
+    if recorder:
+        recorder.close()
     place.leave()
     status = session.status()
     if as_json:
@@ -100,6 +108,16 @@ def live(
              f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
     if died:
         raise typer.Exit(NOT_DONE)
+
+
+def _record(host: Any, path: Path) -> Any:
+    """Let a new file take the log of a host."""
+    from detent.operate.audit import Appender
+
+    path.open("x", encoding="utf-8").close()
+    recorder = Appender(path)
+    host.log.sink = recorder.add
+    return recorder
 
 
 def _axis_file(read: Any) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 KEPT = 1000  # records in memory
-WAITING = 10_000  # that the disk has not taken; more are lost, and counted
+WAITING = 10_000  # lines that the disk has not taken; more are lost, and counted
 
 
 def now() -> datetime:
@@ -20,52 +20,66 @@ def now() -> datetime:
     return datetime.now(UTC)
 
 
+class Appender:
+    """Lines for a file that only this user reads; where they cannot be written it says how many, but delays nobody."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.lost, self.trouble = path, 0, ""
+        self._waiting: queue.Queue[str | None] = queue.Queue(WAITING)
+        self._thread = threading.Thread(target=self._write, name=path.name, daemon=True)
+        self._thread.start()
+
+    def add(self, line: str) -> None:
+        """Add a line."""
+        try:
+            self._waiting.put_nowait(line)
+        except queue.Full:
+            self.lost += 1
+
+    def flush(self) -> None:
+        """Wait until the disk has taken what waits."""
+        self._waiting.join()
+
+    def close(self) -> None:
+        """Let the disk take what waits, but not for ever."""
+        with suppress(queue.Full):
+            self._waiting.put(None, timeout=1.0)
+        self._thread.join(2.0)
+
+    def _write(self) -> None:
+        while (line := self._waiting.get()) is not None:
+            try:
+                descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+                with os.fdopen(descriptor, "a", encoding="utf-8") as file:
+                    file.write(line)
+            except OSError as error:
+                self.lost += 1
+                self.trouble = f"{self.path}: {error.strerror}"
+            self._waiting.task_done()
+
+
 class Audit:
-    """Records of a session; a file that cannot be written loses them, and says how many, but delays nobody."""
+    """Records of a session: the last ones in memory, all in a file where there is one."""
 
     def __init__(self, path: Path | None = None, clock: Callable[[], datetime] = now) -> None:
-        self.path, self._clock = path, clock
+        self._clock = clock
         self._kept: deque[dict[str, Any]] = deque(maxlen=KEPT)
-        self._waiting: queue.Queue[str | None] = queue.Queue(WAITING)
-        self.lost, self.trouble = 0, ""
-        self._thread: threading.Thread | None = None
-        if path is not None:
-            self._thread = threading.Thread(target=self._write, args=(path,), name="audit", daemon=True)
-            self._thread.start()
+        self.file = Appender(path) if path else None
 
     def note(self, who: str, **what: Any) -> None:
         """Add a record."""
         record = {"at": self._clock().isoformat(timespec="milliseconds"), "who": who} | what
         self._kept.append(record)
-        if self._thread is not None:
-            try:
-                self._waiting.put_nowait(json.dumps(record) + "\n")
-            except queue.Full:
-                self.lost += 1
+        if self.file is not None:
+            self.file.add(json.dumps(record) + "\n")
 
     def recent(self) -> dict[str, Any]:
         """The last records, where all are, and what is not there."""
-        where = str(self.path) if self.path else ""
-        return {"records": list(self._kept), "file": where, "lost": self.lost, "trouble": self.trouble}
+        file = self.file
+        where = {"file": str(file.path), "lost": file.lost, "trouble": file.trouble} if file else {"file": ""}
+        return {"records": list(self._kept)} | where
 
     def close(self) -> None:
-        """Let the disk take what waits, but not for ever."""
-        if self._thread is not None:
-            with suppress(queue.Full):
-                self._waiting.put(None, timeout=1.0)
-            self._thread.join(2.0)
-
-    def _write(self, path: Path) -> None:
-        while (line := self._waiting.get()) is not None:
-            try:
-                _append(path, line)
-            except OSError as error:
-                self.lost += 1
-                self.trouble = f"{path}: {error.strerror}"
-            self._waiting.task_done()
-
-
-def _append(path: Path, line: str) -> None:
-    """Add to a file that only this user reads."""
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), "a", encoding="utf-8") as file:
-        file.write(line)
+        """End its file."""
+        if self.file is not None:
+            self.file.close()

@@ -9,6 +9,7 @@ told how many. One that does not read what it is sent is dropped; one that is go
 
 import asyncio
 import json
+import math
 import os
 import socket
 import struct
@@ -122,16 +123,17 @@ class Channel:
         client = Client(self._come + 1, writer, _process_of(writer))  # the process itself is client 1
         self._clients[client.number] = client
         telling = asyncio.ensure_future(self._tell_endings(client))
-        with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
-            while line := await reader.readline():
-                if not _send(writer, self._answer(line, client)):
-                    break
-        telling.cancel()
-        self._watch_no_more(client)
-        del self._clients[client.number]
-        with suppress(BlockingIOError):  # the lease of a jog runs out by itself
-            self.session.ask("leave", client=client.number)
-        writer.close()
+        try:
+            with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
+                while (line := await reader.readline()) and _send(writer, self._answer(line, client)):
+                    pass
+        finally:
+            telling.cancel()
+            self._watch_no_more(client)
+            del self._clients[client.number]
+            with suppress(BlockingIOError):  # the lease of a jog runs out by itself
+                self.session.ask("leave", client=client.number)
+            writer.close()
 
     def _answer(self, line: bytes, client: Client) -> dict[str, Any]:
         """What a message is answered."""
@@ -164,7 +166,7 @@ class Channel:
 
     def _command(self, do: str, asked: dict[str, Any], client: Client, who: str) -> int:
         value, speed = asked.get("value"), asked.get("speed", 1.0)
-        if isinstance(speed, bool) or not isinstance(speed, int | float):
+        if isinstance(speed, bool) or not isinstance(speed, int | float) or abs(speed) > 1e300:
             raise DetentError(f"speed {speed!r:.60}: expected a number above 0 to 1, a share of the largest speed")
         try:
             command = self.session.ask(do, value, float(speed), client=client.number)
@@ -263,8 +265,21 @@ def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> bool:
     if writer.is_closing() or writer.transport.get_write_buffer_size() > MOST_WAITING:
         writer.transport.abort()
         return False
-    writer.write(json.dumps(message).encode() + b"\n")
+    try:
+        text = json.dumps(message, allow_nan=False)
+    except ValueError:  # what a fault has left; a browser reads no NaN
+        text = json.dumps(_finite(message))
+    writer.write(text.encode() + b"\n")
     return True
+
+
+def _finite(value: Any) -> Any:
+    """Data in which null stands for what is no number."""
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in cast("list[Any]", value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class Connection:

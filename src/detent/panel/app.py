@@ -151,7 +151,7 @@ class Panel:
         if not (first.isascii() and first.isdigit() and len(first) < 19):
             raise DetentError(f"first={first:.40}: expected the number of a row")
         found = await self._ask(do="scope", channels=names, first=int(first))
-        table = np.frombuffer(b64decode(found["data"]), "<f8").reshape(len(names), -1).T
+        table = np.frombuffer(b64decode(found["data"]), "<f8").reshape(len(names), found["rows"]).T
         return _table(["row", *names], ([found["first"] + k, *row] for k, row in enumerate(table.tolist())))
 
 
