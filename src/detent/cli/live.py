@@ -5,6 +5,7 @@ import shlex
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,9 +22,15 @@ PERIOD = "Time between two periods of the loop; a machine without real-time prio
 FOR = "End after so many seconds by itself."
 STORE = "Where to keep what survives; by default beside the axis file."
 NO_STORE = "Keep nothing: a simulated axis then begins where its file puts it."
+RECORD = "Write down, line by line, all that is asked: whoever repeats it, repeats the session bit for bit."
+BIND = "Address at which the panel is reached from other machines; else only this one reaches it."
+PORT = "Port of the panel; else any that is free."
+NAME = "Name by which the panel is called, beside its address; repeat for more."
+PLAIN = "Serve the panel without TLS on a network; whoever is on it can then read and change what is sent."
+VIEWER = "Print a second link, for somebody who only looks, and may stop."
 WORD = (
     "Command: status, stop, enable, confirm, move_to, move_by, go_to, jog, disable, reset, home; of the position "
-    "table: positions, teach, edit, rename, forget, undo, redo, export, import."
+    "table: positions, teach, edit, rename, forget, undo, redo, export, import; link: to the panel."
 )
 
 
@@ -36,51 +43,99 @@ def live(
     period: Annotated[str, option("--period", "", PERIOD)] = "1 ms",
     seconds: Annotated[float | None, option("--for", "SECONDS", FOR, min=0.0)] = None,
     store: Annotated[Path | None, option("--store", "PATH", STORE)] = None,
+    record: Annotated[Path | None, option("--record", "FILE", RECORD)] = None,
+    headless: Annotated[bool, option("--headless", "", "Without the panel in the browser.")] = False,
+    bind: Annotated[str, option("--bind", "ADDRESS", BIND)] = "",
+    port: Annotated[int, option("--port", "", PORT, min=0, max=65535)] = 0,
+    names: Annotated[list[str] | None, option("--name", "HOST", NAME)] = None,
+    certificate: Annotated[str, option("--tls-certificate", "PEM", "Certificate of the panel.")] = "",
+    key_file: Annotated[str, option("--tls-key", "PEM", "Its private key.")] = "",
+    plain: Annotated[bool, option("--i-accept-plain-http", "", PLAIN)] = False,
+    viewer_link: Annotated[bool, option("--viewer-link", "", VIEWER)] = False,
     *,
     no_store: Annotated[bool, option("--no-store", "", NO_STORE)] = False,
     as_json: Json = False,
 ) -> None:
     """Run an axis live, in wall time, until Ctrl-C: it then comes to rest in a ramp and lets go."""
+    from detent.methods.load import read_axis
+    from detent.operate.audit import Audit
+    from detent.operate.channel import channel_of
     from detent.operate.client import LiveAxis
     from detent.operate.session import Session
     from detent.operate.start import Place, beside, make_host
+    from detent.panel.child import Child, PanelPlace
 
+    at = PanelPlace(bind, port, certificate, key_file, plain, names or ())
+    at.check()
     place, where = Place(file), None if no_store else store or beside(file)
+    read = read_axis(file, overrides or [])
     host, name = make_host(file, overrides or [], motor=motor, speed=speed, period=_seconds(period), store=where)
+    recorder = _record(host, record) if record else None
     missing, left = host.start(), threading.Event()
-    session = Session(host, {"name": name, "file": str(file), "simulated": True, "speed": speed})
-    channel = place.serve(session)
+    about = {"name": name, "file": str(file), "simulated": True, "speed": speed}
+    session = Session(host, about, _axis_file(read))
+    audit = Audit(Path(where or channel_of(file)).with_suffix(".audit"))
+    channel = place.serve(session, audit)
 
     def leave(_number: int, _frame: object) -> None:
         left.set()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
-    started = {"name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing}
+    panel = None if headless else Child(channel.path, at)
+    links = [panel.link(role) for role in ("engineer", "viewer")[: 1 + viewer_link]] if panel else []
     status = session.status()
-    started |= {"state": host.state, "period": session.describe()["period"], "store": status["store"]}
-    started |= {key: status[key] for key in ("position", "trust", "find")} | {"unit": session.unit}
+    started = {
+        "name": name, "simulated": True, "speed": speed, "channel": str(channel.path), "not_permitted": missing,
+        "state": host.state, "period": session.describe()["period"], "panel": links, "store": status["store"],
+        "unit": session.unit,
+    } | {key: status[key] for key in ("position", "trust", "find")}  # fmt: skip
     if as_json:
         print(json.dumps(started), flush=True)
     else:
         _tell_start(file, started)
     while not left.wait(seconds if seconds is not None else 0.2) and seconds is None and host.is_alive:
-        pass
+        if panel and panel.mend() and not as_json:
+            tell(f"The panel had ended, and runs again: {panel.link('engineer')}")
     died = not host.is_alive
-    channel.close()
-    axis = LiveAxis(session)
-    axis.close()
+    LiveAxis(session).close()
+    host.note()  # the pulls of its end belong to the log
+    for one in filter(None, (panel, channel, audit, recorder)):
+        one.close()
     place.leave()
+    _tell_end(session, as_json=as_json)
+    if died:
+        raise typer.Exit(NOT_DONE)
+
+
+def _tell_end(session: Any, *, as_json: bool) -> None:
+    """Where it stands, and how the loop did."""
     status = session.status()
     if as_json:
         print_json({"ended": status})
-    else:
-        tell(f"At rest at {status['position']:.6g} {axis.unit}, torque off; {status['loop']['periods']} periods, "
-             f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
-        if status["store"]:
-            tell(f"Where it stands is kept in {status['store']['path']}")
-    if died:
-        raise typer.Exit(NOT_DONE)
+        return
+    tell(f"At rest at {status['position']:.6g} {session.unit}, torque off; {status['loop']['periods']} periods, "
+         f"{status['loop']['skipped']} skipped, latest {status['loop']['worst'] * 1e6:.0f} us.")  # fmt: skip
+    if status["store"]:
+        tell(f"Where it stands is kept in {status['store']['path']}")
+
+
+def _record(host: Any, path: Path) -> Any:
+    """Let a new file take the log of a host."""
+    from detent.operate.audit import Appender
+
+    path.open("x", encoding="utf-8").close()
+    recorder = Appender(path)
+    host.log.sink = recorder.add
+    return recorder
+
+
+def _axis_file(read: Any) -> dict[str, Any]:
+    """Text of an axis file, and every effective value with its origin."""
+    from detent.methods.check import check_spec
+
+    rows = [[row.key, row.value, row.origin, row.doc] for row in check_spec(read).rows]
+    return {"file": read.file, "text": read.source.content.decode(errors="replace"), "effective": rows}
 
 
 def _seconds(period: str) -> float:
@@ -98,6 +153,8 @@ def _tell_start(file: Path, started: dict[str, Any]) -> None:
     name = shlex.quote(str(file))
     speed = "" if started["speed"] == 1.0 else f", time {started['speed']:g} times as fast"
     tell(f"{started['name']}: live, SIMULATION{speed}; every {started['period'] * 1e3:g} ms; {started['state']}.")
+    for link, role in zip(started["panel"], ("", ", to look only"), strict=False):
+        tell(f"Panel{role}: {link} (works once, within ten minutes; another: detent connect {name} link)")
     tell(f'From a second terminal: detent connect {name} enable, then detent connect {name} move_by "5 mm"')
     for one in started["not_permitted"]:
         tell(f"Not permitted: {one}")
@@ -131,9 +188,14 @@ def connect(
     as_json: Json = False,
 ) -> None:
     """Ask an axis that runs live for something, and wait until that has ended."""
+    from detent.operate.channel import channel_of
     from detent.operate.start import connect as connect_to
     from detent.operate.words import PLACES, describe_status
+    from detent.panel.keys import keys_of, link_of
 
+    if word == "link":
+        tell(link_of(keys_of(channel_of(file)), value or "engineer", time.time()))
+        return
     axis = connect_to(file)
     ended: dict[str, Any] = {}
     if word == "jog":

@@ -1,29 +1,48 @@
 """The local channel to a live axis: a socket of the system, so that other processes may ask, watch, and be killed.
 
 A message is a line of JSON, 64 kB at most. A client asks ``{"do": "move_to", "value": "120 mm", "as": 7}`` and hears
-``{"as": 7, "id": 31}``, later ``{"ended": {...}}``; ``{"do": "status"}`` and ``{"do": "describe"}`` are answered at
-once. A client that does not read what it is sent is dropped; one that is gone leaves its jog to the lease.
+``{"as": 7, "id": 31}``, later ``{"ended": {...}}``. The questions of `QUESTIONS` are answered at once: ``{"do":
+"status"}`` with ``{"status": {...}}``. After ``{"do": "watch", "rate": 25, "channels": ["position"]}`` the status comes
+by itself, and with it the rows of the ring that were written meanwhile; a client that reads slowly loses rows and is
+told how many. One that does not read what it is sent is dropped; one that is gone leaves its jog to the lease.
 """
 
 import asyncio
 import json
+import math
 import os
 import socket
+import struct
 import threading
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, field
 from hashlib import sha256
+from inspect import signature
 from pathlib import Path
 from typing import Any, cast
 
 from detent.errors import AxisError, DetentError
 from detent.files.text import shown
-from detent.operate.session import Session
-from detent.operate.words import DURABLE, Ended
+from detent.operate.audit import Audit
+from detent.operate.session import Session, packed
+from detent.operate.words import DURABLE, Ended, why_not_moving
 
 LONGEST = 1 << 16  # bytes of a message
-MOST_CLIENTS = 16
+MOST_CLIENTS = 32
 MOST_WAITING = 1 << 20  # bytes that a client has not read until it is dropped
+SLOW = 1 << 16  # bytes that it has not read until it is sent no rows
 LOOK = 2e-3  # how often endings are looked for [s]
+UNTOLD = {"keep"}  # twenty a second: of the jog that they keep there is a record
+RATES = 1.0, 50.0  # of a watch [Hz]
+QUESTIONS: dict[str, Callable[..., Any]] = {
+    "status": Session.status,
+    "describe": Session.describe,
+    "scope": Session.scope,
+    "axis": Session.axis,
+    "positions": Session.positions,
+}
+"""What only reads: the method of `Session` that answers; what else stands in the message are its arguments."""
 
 
 def runtime_folder() -> Path:
@@ -46,12 +65,25 @@ def channel_of(file: Path) -> Path:
     return runtime_folder() / f"{stem}-{sha256(str(path).encode()).hexdigest()[:10]}.sock"
 
 
+@dataclass
+class Client:
+    """Somebody at the other end."""
+
+    number: int
+    writer: asyncio.StreamWriter
+    who: str
+    open: set[int] = field(default_factory=set[int])  # commands that have not ended
+    told: set[int] = field(default_factory=set[int])  # those of them that stand in the log
+    watch: asyncio.Future[None] | None = None
+
+
 class Channel:
     """The server's side, in a thread of its own."""
 
-    def __init__(self, session: Session, path: Path) -> None:
-        self.session, self.path = session, path
-        self._clients = self._open = 0  # that have ever come, and that are there
+    def __init__(self, session: Session, path: Path, audit: Audit | None = None) -> None:
+        self.session, self.path, self.audit = session, path, audit or Audit()
+        self._clients: dict[int, Client] = {}
+        self._come = 0  # clients that have ever come
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._serve, name="channel", daemon=True)
         self._ready, self._left = threading.Event(), asyncio.Event()
@@ -84,66 +116,136 @@ class Channel:
 
     async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One client, until it leaves."""
-        if self._open >= MOST_CLIENTS:
+        if len(self._clients) >= MOST_CLIENTS:
             _send(writer, {"error": f"{MOST_CLIENTS} clients are there already; close one of them"})
             writer.close()
             return
-        self._open += 1
-        self._clients += 1
-        number, open_ = self._clients + 1, set[int]()  # the process itself is client 1
-        telling = asyncio.ensure_future(self._tell_endings(open_, writer))
-        with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
-            while line := await reader.readline():
-                if waits_for_disk(line):  # the stop of another client does not
-                    answer = await asyncio.to_thread(self._answer, line, number, open_)
-                else:
-                    answer = self._answer(line, number, open_)
-                if not _send(writer, answer):
-                    break
-        telling.cancel()
-        self._open -= 1
-        with suppress(BlockingIOError):  # the lease of a jog runs out by itself
-            self.session.ask("leave", client=number)
-        writer.close()
+        self._come += 1
+        client = Client(self._come + 1, writer, _process_of(writer))  # the process itself is client 1
+        self._clients[client.number] = client
+        telling = asyncio.ensure_future(self._tell_endings(client))
+        try:
+            with suppress(ConnectionError, asyncio.CancelledError, ValueError, asyncio.LimitOverrunError):
+                while line := await reader.readline():
+                    if waits_for_disk(line):  # the stop of another client does not
+                        answer = await asyncio.to_thread(self._answer, line, client)
+                    else:
+                        answer = self._answer(line, client)
+                    if not _send(writer, answer):
+                        break
+        finally:
+            telling.cancel()
+            self._watch_no_more(client)
+            del self._clients[client.number]
+            with suppress(BlockingIOError):  # the lease of a jog runs out by itself
+                self.session.ask("leave", client=client.number)
+            writer.close()
 
-    def _answer(self, line: bytes, client: int, open_: set[int]) -> dict[str, Any]:
+    def _answer(self, line: bytes, client: Client) -> dict[str, Any]:
         """What a message is answered."""
         try:
             read: Any = json.loads(line)
         except (ValueError, RecursionError):
             return {"error": "that is no JSON"}
         asked = cast("dict[str, Any]", read if isinstance(read, dict) else {})
-        mark = {"as": asked["as"]} if "as" in asked else {}
+        mark = {"as": asked.pop("as")} if "as" in asked else {}
         try:
-            return mark | self._done(asked, client, open_)
+            return mark | self._done(asked, client)
         except DetentError as error:
             return mark | {"error": str(error)}
 
-    def _done(self, asked: dict[str, Any], client: int, open_: set[int]) -> dict[str, Any]:
-        do = asked.get("do")
-        if do == "status":
-            return {"status": self.session.status()}
-        if do == "describe":
-            return {"describe": self.session.describe()}
-        if do == "positions":
-            return {"positions": self.session.positions()}
-        speed = asked.get("speed", 1.0)
-        if not isinstance(do, str) or isinstance(speed, bool) or not isinstance(speed, int | float):
+    def _done(self, asked: dict[str, Any], client: Client) -> dict[str, Any]:
+        do = asked.pop("do", None)
+        if not isinstance(do, str):
             raise DetentError('a message is an object with "do", a command, and perhaps "value" and "speed", a number')
+        if do in QUESTIONS:
+            told = _told(QUESTIONS[do], self.session, asked)
+            return {do: told | {"questions": [*QUESTIONS, "log"]} if do == "describe" else told}
+        if do in (own := {"watch": self._watch, "name": self._name, "log": self._log, "note": self._note}):
+            return {do: _told(own[do], client, asked)}
+        who = str(asked.pop("who", client.who))
         try:
-            command = self.session.ask(do, asked.get("value"), float(speed), client=client)
+            return {"id": self._command(do, asked, client, who)}
+        except DetentError as error:
+            self.audit.note(who, client=client.number, do=do[:40], error=str(error)[:200])
+            raise
+
+    def _command(self, do: str, asked: dict[str, Any], client: Client, who: str) -> int:
+        value, speed = asked.get("value"), asked.get("speed", 1.0)
+        if isinstance(speed, bool) or not isinstance(speed, int | float) or abs(speed) > 1e300:
+            raise DetentError(f"speed {speed!r:.60}: expected a number above 0 to 1, a share of the largest speed")
+        try:
+            command = self.session.ask(do, value, float(speed), client=client.number)
         except BlockingIOError as error:
             raise DetentError("too many commands at once") from error
-        open_.add(command)
-        return {"id": command}
+        client.open.add(command)
+        if do not in UNTOLD:
+            client.told.add(command)
+            more = {} if value is None else {"value": value}
+            self.audit.note(who, client=client.number, do=do, id=command, **more)
+        return command
 
-    async def _tell_endings(self, open_: set[int], writer: asyncio.StreamWriter) -> None:
+    def _log(self, _client: Client) -> dict[str, Any]:
+        """Who asked for what, and how that ended."""
+        return self.audit.recent()
+
+    def _note(self, client: Client, who: object = "", what: object = "") -> None:
+        """Something that happened at the client's, for the log."""
+        self.audit.note(str(who)[:80] or client.who, client=client.number, note=str(what)[:200])
+
+    def _name(self, client: Client, who: object = "") -> str:
+        """A client says on whose behalf it asks."""
+        client.who = shown(str(who))[:80]
+        return client.who
+
+    def _watch(self, client: Client, rate: object = 25.0, channels: object = ()) -> dict[str, Any]:
+        """Send status and rows from now on."""
+        lowest, highest = RATES
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not lowest <= rate <= highest:
+            raise DetentError(f"rate {rate!r:.60}: expected {lowest:g} to {highest:g} times a second")
+        paths = self.session.paths(channels)
+        first = self.session.show(paths, client.number)
+        if client.watch is not None:
+            client.watch.cancel()
+        client.watch = asyncio.ensure_future(self._stream(client, 1.0 / rate, paths, first))
+        return {"first": first, "channels": channels}
+
+    def _watch_no_more(self, client: Client) -> None:
+        if client.watch is not None:
+            client.watch.cancel()
+            self.session.forget(client.number)
+
+    async def _stream(self, client: Client, pause: float, paths: list[str], after: int) -> None:
+        """Status and rows, again and again; who reads slowly misses some."""
+        missed = 0
         while True:
-            for command in sorted(open_):
+            if client.writer.transport.get_write_buffer_size() <= SLOW:
+                if paths:
+                    rows = self.session.rows(after, paths)
+                    after, missed = rows.first + len(rows.columns[0]), missed + rows.missed
+                    told = {"first": rows.first, "n": len(rows.columns[0]), "data": packed(rows.columns, "<f4")}
+                    _send(client.writer, {"rows": told})
+                _send(client.writer, self._status_for(client) | {"missed": missed})
+            await asyncio.sleep(pause)
+
+    def _status_for(self, client: Client) -> dict[str, Any]:
+        status = self.session.status()
+        holder = self._clients.get(status["client"])
+        return {
+            "status": status, "why": why_not_moving(status), "clients": len(self._clients), "you": client.number,
+            "holder": status["client"], "holder_name": holder.who if holder else "",
+        }  # fmt: skip
+
+    async def _tell_endings(self, client: Client) -> None:
+        while True:
+            for command in sorted(client.open):
                 ended = self.session.ending(command)
                 if ended is not None:
-                    open_.discard(command)
-                    _send(writer, {"ended": ended.to_dict()})
+                    client.open.discard(command)
+                    if command in client.told:
+                        client.told.discard(command)
+                        self.audit.note(client.who, client=client.number, ended=command, how=ended.how, code=ended.code)
+                    _send(client.writer, {"ended": ended.to_dict()})
             await asyncio.sleep(LOOK)
 
 
@@ -152,13 +254,43 @@ def waits_for_disk(line: bytes) -> bool:
     return any(f'"{word}"'.encode() in line for word in DURABLE)
 
 
+def _told(answer: Callable[..., Any], about: object, asked: dict[str, Any]) -> Any:
+    """Answer a question; what it does not take is an error that says so."""
+    names = [*signature(answer).parameters][1:]
+    unknown = [name for name in asked if name not in names]
+    if unknown:
+        raise DetentError(f"no {unknown[0]!r:.60} in a message of that kind; it takes {', '.join(names) or 'nothing'}")
+    return answer(about, **asked)
+
+
+def _process_of(writer: asyncio.StreamWriter) -> str:
+    """Whose process it is, where the system tells."""
+    if not hasattr(socket, "SO_PEERCRED"):
+        return "a process"
+    held = writer.get_extra_info("socket").getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    return f"process {struct.unpack('3i', held)[0]}"
+
+
 def _send(writer: asyncio.StreamWriter, message: dict[str, Any]) -> bool:
     """Send, unless the client has left or does not read."""
     if writer.is_closing() or writer.transport.get_write_buffer_size() > MOST_WAITING:
         writer.transport.abort()
         return False
-    writer.write(json.dumps(message).encode() + b"\n")
+    try:
+        text = json.dumps(message, allow_nan=False)
+    except ValueError:  # what a fault has left; a browser reads no NaN
+        text = json.dumps(_finite(message))
+    writer.write(text.encode() + b"\n")
     return True
+
+
+def _finite(value: Any) -> Any:
+    """Data in which null stands for what is no number."""
+    if isinstance(value, dict):
+        return {name: _finite(one) for name, one in cast("dict[str, Any]", value).items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in cast("list[Any]", value)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class Connection:

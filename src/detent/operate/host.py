@@ -1,11 +1,13 @@
 """The host of a live axis: it makes the board, runs the loop in a thread, asks, and hears how that has ended."""
 
+import json
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,7 @@ from detent.operate.store import Store
 PERIOD = 1e-3  # of the loop [s]
 LEASE = 0.2  # time that a jog lives without being kept [s]
 LEAST_WINDOW = 0.02  # shortest time in the window until a command is done [s]
+KEPT = 2048  # endings, and in wall time requests, that memory holds
 REST = 10.0  # time that an axis is given to come to rest before its loop ends [s]
 
 
@@ -46,13 +49,52 @@ class Asked:
     fields: tuple[int, int, int, int, int, float, float]
 
 
-@dataclass
 class Log:
     """All that came from outside: who repeats it, repeats the session."""
 
-    asked: list[Asked] = field(default_factory=list[Asked])
-    pulled: list[int] = field(default_factory=list[int])  # periods of the stop line; negative of the off line
-    pieces: list[bytes] = field(default_factory=list[bytes])  # of jobs, in the order in which requests laid them ready
+    def __init__(self, most: int | None = None) -> None:
+        self.asked: deque[Asked] = deque(maxlen=most)
+        self.pulled: deque[int] = deque(maxlen=most)  # periods of the stop line; negative of the off line
+        self.pieces: deque[bytes] = deque(maxlen=most)  # of jobs, in the order in which requests laid them ready
+        self.dropped = 0  # entries that memory holds no longer
+        self.sink: Callable[[str], object] | None = None  # takes every entry as a line of JSON
+
+    def bound(self, most: int) -> None:
+        """Hold the last entries only."""
+        self.asked, self.pulled = deque(self.asked, most), deque(self.pulled, most)
+        self.pieces = deque(self.pieces, most)
+
+    def add_request(self, one: Asked) -> None:
+        """Note a request that was taken."""
+        self._add(self.asked, one, "asked", [one.period, *one.fields])
+
+    def add_pull(self, period: int) -> None:
+        """Note a pull of a line."""
+        self._add(self.pulled, period, "pulled", period)
+
+    def add_piece(self, piece: bytes) -> None:
+        """Note a piece of a job."""
+        self._add(self.pieces, piece, "piece", piece.hex())
+
+    def _add(self, held: deque[Any], one: object, kind: str, told: object) -> None:
+        self.dropped += len(held) == held.maxlen
+        held.append(one)
+        if self.sink is not None:
+            self.sink(json.dumps({kind: told}) + "\n")
+
+    @classmethod
+    def read(cls, lines: Iterable[str]) -> "Log":
+        """Read what a sink has taken."""
+        log = cls()
+        for line in lines:
+            ((kind, told),) = json.loads(line).items()
+            if kind == "asked":
+                log.add_request(Asked(told[0], (*told[1:6], *map(float, told[6:]))))  # pyright: ignore[reportArgumentType]
+            elif kind == "pulled":
+                log.add_pull(told)
+            else:
+                log.add_piece(bytes.fromhex(told))
+        return log
 
 
 def operation_params(**more: Any) -> Any:
@@ -97,6 +139,7 @@ class Host:
         self.keeper: Keeper | None = None
         self._store, self._stated, self._asking = store, stated, threading.Lock()
         self._ended: dict[int, Ending] = {}
+        self._forgotten = 0  # id of the last one that is not among them any more
         self.job: Work | None = None  # the last one begun
         self._of_job: dict[str, int] = {}
         self._job_id = self._laid = 0
@@ -125,6 +168,7 @@ class Host:
 
     def start(self) -> list[str]:
         """Run the loop in a thread of its own; gives what the system did not permit."""
+        self.log.bound(KEPT)
         self.run(0)  # compiles
         self.board.loop.deadline = 0
         ready, missing = threading.Event(), list[str]()
@@ -236,7 +280,7 @@ class Host:
         """Put a piece of a job, the first has number 1, in its place; nobody looks there before a request says so."""
         tray: Any = self.axis.tray
         tray[(number - 1) % len(tray)] = np.frombuffer(piece, np.uint8)
-        self.log.pieces.append(piece)
+        self.log.add_piece(piece)
 
     def _has_room(self) -> bool:
         return self.board.inbox.written - self.board.operation.taken < INBOX
@@ -261,13 +305,15 @@ class Host:
         while self._noted < self.board.operation.taken:
             k = self._noted % INBOX
             taken = (box.number[k], box.kind[k], box.id[k], box.epoch[k], box.client[k], box.value[k], box.speed[k])
-            self.log.asked.append(Asked(int(box.period[k]), taken))
+            self.log.add_request(Asked(int(box.period[k]), taken))
             self._noted += 1
         while self._pulls < loop.pulls:
-            self.log.pulled.append(int(loop.pulled[self._pulls % PULLS]))
+            self.log.add_pull(int(loop.pulled[self._pulls % PULLS]))
             self._pulls += 1
         for ending in self._new_endings():
             self._ended[ending.id] = ending
+        while len(self._ended) > KEPT:
+            self._forgotten = self._ended.pop(next(iter(self._ended))).id
         self._feed()
 
     def _new_endings(self) -> Iterator[Ending]:
@@ -280,6 +326,8 @@ class Host:
     def ending(self, command: int) -> Ending | None:
         """How a command has ended; None while it has not."""
         self.note()
+        if command not in self._ended and 0 < command <= self._forgotten:
+            raise DetentError(f"command {command}: it ended long ago; of the last {KEPT} it is known how")
         return self._ended.get(command)
 
     def until_ended(self, command: int, periods: int = 100_000) -> Ending:
@@ -310,6 +358,8 @@ def write_request(  # noqa: PLR0913 - a record
 
 def repeat(host: Host, log: Log, periods: int) -> None:
     """Do a session again: each request and each pull in the period in which it was taken."""
+    if log.dropped:
+        raise DetentError(f"{log.dropped} requests of the session are no longer there; record it with --record")
     asked, pulled, pieces = iter(log.asked), iter(log.pulled), iter(log.pieces)
     request, pull = next(asked, None), next(pulled, None)
     loop = host.board.loop

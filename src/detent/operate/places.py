@@ -6,7 +6,7 @@ who commands the axis changes it, others read it.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from detent.control import operation as ops
 from detent.errors import NOT_AT_REST, NOTHING_TO_UNDO, DetentError
@@ -124,7 +124,7 @@ def _name(value: object) -> str:
 
 def _pair(value: object, what: str, example: str) -> tuple[str, Any]:
     """What a word with two values is about."""
-    if not isinstance(value, list | tuple) or len(value) != 2:  # pyright: ignore[reportUnknownArgumentType]
+    both: list[Any] = list(cast("Any", value)) if isinstance(value, list | tuple) else []
+    if len(both) != 2:
         raise DetentError(f'got {value!r}; expected: {what}, such as ["3", {example.rpartition(" ")[2]}]; give both')
-    first, second = value  # pyright: ignore[reportUnknownVariableType]
-    return _name(first), second
+    return _name(both[0]), both[1]

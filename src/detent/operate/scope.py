@@ -4,12 +4,13 @@ The loop writes a row and then counts it; it never waits for a reader. A reader 
 again: what the loop may have overwritten meanwhile is dropped, and how much was missed is said.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from detent.errors import DetentError
 from detent.kernel.registers import Leaf, Registers
 from detent.operate.loop import Board
 from detent.record.recorder import byte_places, choose_leaves
@@ -24,6 +25,14 @@ SHOWN = (
 _FIXED: list[Leaf] = choose_leaves(Board, SHOWN)
 
 
+class Rows(NamedTuple):
+    """Columns of the ring, from row `first` on; `missed` rows before it are gone."""
+
+    first: int
+    missed: int
+    columns: tuple[NDArray[Any], ...]
+
+
 class Scope:
     """Columns of a ring, and what is read of it."""
 
@@ -32,35 +41,79 @@ class Scope:
         self.of_board = byte_places(_FIXED)
         self.of_axis = np.zeros(8 * CHANNELS, np.int64)
         self.ring = np.zeros((ROWS, len(self.of_board) + len(self.of_axis)), np.uint8)
-        self.channels: list[Leaf] = []
+        self._places: list[Leaf | None] = [None] * CHANNELS
+        self._since = [0] * CHANNELS  # first row that holds what stands in a place
+        self._wanted: dict[int, list[Leaf]] = {}  # registers of the axis, by who watches them
         self.show(channels)
 
-    def show(self, channels: Sequence[str]) -> None:
-        """Choose up to eight channels, registers by their paths; the rows from now on hold them."""
-        if len(channels) > CHANNELS:
-            raise ValueError(f"{len(channels)} channels, must be {CHANNELS} or fewer")
-        leaves = [choose_leaves(self._registers, (path,))[0] for path in channels]
-        for k, leaf in enumerate(leaves):
-            places = leaf.offset + np.arange(8)
-            self.of_axis[8 * k : 8 * k + 8] = np.where(np.arange(8) < leaf.width.size, places, leaf.offset)
-        self.channels, self.since = leaves, int(self._board.loop.rows)
+    def show(self, channels: Iterable[str], who: int = 0) -> None:
+        """Choose what somebody watches: fixed columns, and registers of the axis by their paths, eight among all."""
+        asked = dict.fromkeys(path for path in channels if path not in SHOWN)
+        leaves = [choose_leaves(self._registers, (path,))[0] for path in asked]
+        others = {leaf.path for w, held in self._wanted.items() if w != who for leaf in held}
+        wanted = others | {leaf.path for leaf in leaves}
+        if len(wanted) > CHANNELS:
+            taken = f", of which others watch {', '.join(sorted(others))}" if others else ""
+            raise DetentError(
+                f"{len(wanted)} registers of the axis, must be {CHANNELS} or fewer{taken}; leave some out"
+            )
+        self._wanted[who] = leaves
+        held = {leaf.path for leaf in self._places if leaf is not None}
+        for k, leaf in enumerate(self._places):
+            if leaf is not None and leaf.path not in wanted:
+                self._places[k] = None
+        for leaf in leaves:
+            if leaf.path not in held:
+                self._put(self._places.index(None), leaf)
+
+    def leave(self, who: int) -> None:
+        """Watch no longer."""
+        self.show((), who)
+        self._wanted.pop(who, None)
+
+    def _put(self, k: int, leaf: Leaf) -> None:
+        places = leaf.offset + np.arange(8)
+        self.of_axis[8 * k : 8 * k + 8] = np.where(np.arange(8) < leaf.width.size, places, leaf.offset)
+        self._places[k], self._since[k] = leaf, self._written + 1  # the row that is being written may be torn
+
+    @property
+    def _written(self) -> int:
+        return int(self._board.loop.rows)
 
     @property
     def row(self) -> Any:
         """Layout of a row."""
-        leaves = [*_FIXED, *self.channels]
-        offsets = np.cumsum([0, *(leaf.width.size for leaf in _FIXED)]).tolist()  # the last one is the first channel's
-        offsets += [offsets[-1] + 8 * k for k in range(1, len(self.channels))]
-        return np.dtype({
-            "names": [leaf.path for leaf in leaves], "formats": ["<" + leaf.width.code for leaf in leaves],
-            "offsets": offsets[: len(leaves)], "itemsize": self.ring.shape[1],
-        })  # fmt: skip
+        leaves, offset, held = [*_FIXED], 0, list[tuple[str, str, int]]()
+        for leaf in leaves:
+            held.append((leaf.path, "<" + leaf.width.code, offset))
+            offset += leaf.width.size
+        for k, leaf in enumerate(self._places):
+            if leaf is not None:
+                held.append((leaf.path, "<" + leaf.width.code, offset + 8 * k))
+        names, formats, offsets = zip(*held, strict=True)
+        return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": self.ring.shape[1]})
 
-    def rows(self, after: int) -> tuple[NDArray[Any], int, int]:
-        """Rows from number `after` on: these, the number of the next one, and how many were missed."""
-        written = int(self._board.loop.rows)
-        first = max(after, written - ROWS + SPARE, self.since)
+    def begin(self, channels: Iterable[str]) -> int:
+        """First row that holds all of these."""
+        paths = set(channels)
+        places = zip(self._places, self._since, strict=True)
+        return max((since for leaf, since in places if leaf is not None and leaf.path in paths), default=0)
+
+    def rows(self, after: int, channels: Iterable[str] | None = None) -> tuple[NDArray[Any], int, int]:
+        """Rows from number `after` on: these, the number of the next one, and how many were missed.
+
+        They begin where the ring holds the channels asked for, or all that are watched.
+        """
+        row, written = self.row, self._written
+        first = min(
+            max(after, written - ROWS + SPARE, self.begin(row.names if channels is None else channels)), written
+        )
         copied = self.ring[np.arange(first, written) % ROWS]
-        lowest = int(self._board.loop.rows) - ROWS + 1  # the loop may be writing this one by now
+        lowest = self._written - ROWS + 1  # the loop may be writing this one by now
         kept = copied[max(0, lowest - first) :]
-        return kept.view(self.row)[:, 0], written, max(first, lowest) - after
+        return kept.view(row)[:, 0], written, max(first, lowest) - after
+
+    def columns(self, after: int, channels: Sequence[str], most: int) -> Rows:
+        """The oldest `most` rows from number `after` on, of some columns."""
+        rows, following, missed = self.rows(after, channels)
+        return Rows(following - len(rows), missed, tuple(rows[name][:most] for name in channels))

@@ -1,36 +1,46 @@
 """A live axis in this process: its host, asked in words by several clients."""
 
+import base64
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 from detent.control import operation as ops
 from detent.errors import NO_MARK, DetentError
 from detent.operate.host import Host
+from detent.operate.loop import Board
 from detent.operate.places import Places
+from detent.operate.scope import CHANNELS, SHOWN, Rows
 from detent.operate.words import PLACES, WORDS, Ended, ended, status_of, value_of
 
 STEP = 2e-3  # how often an ending is looked for [s]
+LINES = ("stop", "disable")  # never refused
+MOST_ROWS = 2048  # of the ring, in one answer
+LARGEST = 1 << 62  # number of a row
 
 
 class Session:
     """Takes commands in words and tells how they end; every method may be called from any thread."""
 
-    def __init__(self, host: Host, about: Mapping[str, Any]) -> None:
-        self.host, self.about = host, dict(about)
+    def __init__(self, host: Host, about: Mapping[str, Any], file: Mapping[str, Any] | None = None) -> None:
+        self.host, self.about, self._file = host, dict(about), dict(file or {})
         self.unit = host.axis.unit
         self._lock, self._places = threading.Lock(), Places(host)
+        self._signals = self._name_signals()
 
     def describe(self) -> dict[str, Any]:
-        """What does not change: name, method, unit, period, commands."""
+        """What does not change: name, method, unit, period, commands, what the scope can show."""
         words = [word for word, (kind, *_) in WORDS.items() if self._takes(kind)]
         if self.host.keeper is not None:
             words += [word for word in ("go_to", *PLACES) if word not in words]
         q = self.host.axis.live.operation
         limits = None if q.endless else [q.lowest, q.highest]
         period = self.host.board.loop.period * 1e-9
-        return self.about | {"unit": self.unit, "period": period, "commands": words, "limits": limits}
+        channels = [{"name": name, "unit": unit, "help": help_} for name, (_, unit, help_) in self._signals.items()]
+        return self.about | {
+            "unit": self.unit, "period": period, "commands": words, "limits": limits, "channels": channels,
+        }  # fmt: skip
 
     def status(self) -> dict[str, Any]:
         """The axis now."""
@@ -57,7 +67,12 @@ class Session:
         about = value_of(WORDS[word], value, self.unit)
         with self._lock:
             self.host.note()  # of what nobody waits for, too: the loop keeps the last endings only
-        return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)  # may wait for the disk
+        try:
+            return self.host.ask(WORDS[word].kind, about, speed, client=client, **more)  # may wait for the disk
+        except BlockingIOError:
+            if word not in LINES:
+                raise
+            return self.host.settle(0)  # its line has done it
 
     def positions(self) -> list[dict[str, Any]]:
         """The position table: number, name, position, counts, tolerance, taught and used of each; SI units."""
@@ -111,3 +126,68 @@ class Session:
     def close(self) -> None:
         """Come to rest, take the torque away, end the loop."""
         self.host.close()
+
+    def axis(self) -> dict[str, Any]:
+        """The axis file as it was read, and what it comes to."""
+        return self._file
+
+    # ---- the scope
+
+    def _name_signals(self) -> dict[str, tuple[str, str, str]]:
+        """All that the scope can show: by its name the register, its unit and its meaning."""
+        units = {"m": self.unit, "m/s": f"{self.unit}/s"}
+        board = {leaf.path: leaf for leaf in Board.leaves()}
+        fixed = {path.rpartition(".")[2]: board[path] for path in SHOWN}
+        axis = {leaf.path: leaf for leaf in type(self.host.axis.state).leaves() if not leaf.length}
+        found = {name: (leaf.path, units.get(leaf.unit, leaf.unit), leaf.doc) for name, leaf in fixed.items()}
+        return found | {path: (path, leaf.unit, leaf.doc) for path, leaf in axis.items()}
+
+    def paths(self, channels: object) -> list[str]:
+        """Registers of channels, by their names; a `DetentError` where that is no list of at most eight of them."""
+        names = cast("list[object]", channels) if isinstance(channels, list | tuple) else [channels]
+        wrong = [name for name in names if not isinstance(name, str) or name not in self._signals]
+        if wrong or len(names) > CHANNELS:
+            got = f"{wrong[0]!r:.60}" if wrong else f"{len(names)} of them"
+            raise DetentError(f"channels: got {got}; expected a list of at most {CHANNELS} names, which describe lists")
+        return [self._signals[str(name)][0] for name in names]
+
+    def show(self, channels: Sequence[str], client: int) -> int:
+        """Let the ring hold what a client watches, by paths; gives the first row that does."""
+        with self._lock:
+            self.host.scope.show(channels, client)
+            return max(self.host.scope.begin(channels), int(self.host.board.loop.rows))
+
+    def forget(self, client: int) -> None:
+        """A client watches no longer."""
+        with self._lock:
+            self.host.scope.leave(client)
+
+    def rows(self, after: int, channels: Sequence[str]) -> Rows:
+        """The newest rows of the ring from a number on, by paths."""
+        rows, following, missed = self.host.scope.rows(after, channels)
+        rows = rows[-MOST_ROWS:]
+        first = following - len(rows)
+        return Rows(first, max(missed, first - after), tuple(rows[name] for name in channels))
+
+    def scope(self, channels: object = (), first: object = 0, rows: object = MOST_ROWS) -> dict[str, Any]:
+        """Rows of the ring as they are, the oldest ones from `first` on: doubles, column by column, in base64."""
+        paths = self.paths(channels)
+        after, most = (whole_number(name, n) for name, n in (("first", first), ("rows", rows)))
+        dark = [path for path in paths if path not in self.host.scope.row.names]
+        if dark:
+            raise DetentError(f"scope: nobody watches {', '.join(dark)}, so the ring does not hold it; watch it first")
+        at, missed, columns = self.host.scope.columns(after, paths, min(most, MOST_ROWS))
+        data = packed(columns, "<f8")
+        return {"first": at, "rows": len(columns[0]) if columns else 0, "missed": missed, "data": data}
+
+
+def whole_number(name: str, value: object) -> int:
+    """Read a number of rows."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < LARGEST:
+        raise DetentError(f"{name}: got {value!r:.60}; expected a whole number, 0 or more")
+    return value
+
+
+def packed(columns: Sequence[Any], width: str) -> str:
+    """Columns, one after the other, as little-endian floats in base64."""
+    return base64.b64encode(b"".join(column.astype(width).tobytes() for column in columns)).decode()

@@ -9,6 +9,7 @@ from typing import IO, Any
 from detent.errors import AxisError, DetentError
 from detent.methods.load import AxisFile, read_axis
 from detent.methods.registry import METHODS
+from detent.operate.audit import Audit
 from detent.operate.channel import Channel, Connection, channel_of
 from detent.operate.client import LiveAxis
 from detent.operate.host import PERIOD, Host, operation_params
@@ -155,9 +156,9 @@ class Place:
         self._lock.write(str(os.getpid()))
         self._lock.flush()
 
-    def serve(self, session: Session) -> Channel:
+    def serve(self, session: Session, audit: Audit | None = None) -> Channel:
         """Open its channel."""
-        channel = Channel(session, self.channel)
+        channel = Channel(session, self.channel, audit)
         channel.start()
         return channel
 

@@ -115,7 +115,7 @@ def value_of(word: Word, value: object, unit: str) -> float:
             return parse_quantity(value, wanted) if wanted else float(value)
         except (DetentError, ValueError) as error:
             raise DetentError(f"{value!r} is not {example_of(wanted)}") from error
-    return float(value)
+    return float(value) if abs(value) < 1e300 else math.copysign(math.inf, value)
 
 
 def example_of(unit: str) -> str:

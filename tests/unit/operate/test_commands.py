@@ -16,6 +16,10 @@ import pytest
 
 import detent
 from detent.errors import AxisError, DetentError
+from detent.operate.channel import MOST_CLIENTS
+from detent.operate.host import Log, repeat
+from detent.operate.session import Session
+from detent.operate.start import make_host
 from detent.operate.words import CommandError, CommandRefusedError
 
 pytestmark = [
@@ -56,7 +60,8 @@ class Running:
 @pytest.fixture
 def running(folder: Path) -> Iterator[Running]:
     """The axis live."""
-    one = Running(folder / "slide.toml", "--no-store", "--period", "10 ms")  # other tests want the processors, too
+    # Other tests want the processors, too.
+    one = Running(folder / "slide.toml", "--headless", "--no-store", "--period", "10 ms")
     yield one
     if one.process.poll() is None:
         one.process.kill()
@@ -98,7 +103,7 @@ def test_54_56_an_axis_runs_until_it_is_interrupted_and_others_move_it(folder: P
 
 
 def test_55_a_second_one_on_the_same_axis_is_refused(folder: Path, running: Running) -> None:
-    second = run("live", str(folder / "slide.toml"), "--for", "0")
+    second = run("live", str(folder / "slide.toml"), "--headless", "--for", "0")
     assert (second.returncode, second.stdout) == (1, "")
     assert str(running.process.pid) in second.stderr
     running.end(signal.SIGTERM)
@@ -196,10 +201,10 @@ def test_what_nobody_waits_for_is_noted_all_the_same(folder: Path) -> None:
         assert len(session.host.log.asked) == 600
 
 
-def test_the_seventeenth_client_is_told(folder: Path, running: Running) -> None:
+def test_a_client_too_many_is_told(folder: Path, running: Running) -> None:
     file = folder / "slide.toml"
-    others = [detent.connect(file) for _ in range(16)]
-    with pytest.raises(AxisError, match="16 clients"):
+    others = [detent.connect(file) for _ in range(MOST_CLIENTS)]
+    with pytest.raises(AxisError, match=f"{MOST_CLIENTS} clients"):
         detent.connect(file)
     others[0].close()
     while True:  # until the channel has noticed
@@ -211,6 +216,62 @@ def test_the_seventeenth_client_is_told(folder: Path, running: Running) -> None:
     for one in others[1:]:
         one.close()
     running.end()
+
+
+def test_28_a_recorded_session_is_done_again_at_a_desk(folder: Path) -> None:
+    file, log = folder / "slide.toml", folder / "session.jsonl"
+    one = Running(file, "--headless", "--no-store", "--period", "10 ms", "--record", str(log))
+    with detent.connect(file) as axis:
+        axis.enable()
+        axis.confirm()
+        axis.move_by("5 mm")
+        with axis.jog("-30 mm/s"):
+            while axis.status["rests"]:
+                pass
+    ended = one.end()
+    again, _ = make_host(file, wall=False, period=1e-2)
+    repeat(again, Log.read(log.read_text(encoding="ascii").splitlines()), ended["loop"]["periods"])
+    status = Session(again, {}).status()
+    assert {k: v for k, v in status.items() if k != "loop"} == {k: v for k, v in ended.items() if k != "loop"}
+    assert len(again.log.pulled) == 3  # the jog's, and two at the end
+    assert run("live", str(file), "--headless", "--for", "0", "--record", str(log)).returncode == 1
+
+
+def test_a_log_in_wall_time_holds_the_last_requests(folder: Path) -> None:
+    log = Log()
+    log.bound(3)
+    for k in range(5):
+        log.add_pull(k)
+    assert (list(log.pulled), log.dropped) == ([2, 3, 4], 2)
+    host, _ = make_host(folder / "slide.toml", wall=False)
+    with pytest.raises(DetentError, match="--record"):
+        repeat(host, log, 10)
+
+
+def test_how_a_command_of_long_ago_ended_is_not_known(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("detent.operate.host.KEPT", 20)
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        session: Any = axis.link
+        asked = [session.ask("stop") for _ in range(50)]
+        session.host.run(10)
+        assert session.ending(asked[-1]).how == "done"
+        assert len(session.host._ended) == 20
+        with pytest.raises(DetentError, match="long ago"):
+            session.ending(asked[0])
+
+
+def test_a_stop_for_which_the_mailbox_has_no_room_is_done(folder: Path) -> None:
+    with detent.live(folder / "slide.toml", wall=False) as axis:
+        session: Any = axis.link
+        for _ in range(1024):
+            session.ask("keep")
+        with pytest.raises(BlockingIOError):
+            session.ask("keep")
+        stops, offs = session.host.board.loop.stops, session.host.board.loop.offs
+        asked = [session.ask("stop"), session.ask("disable")]
+        assert (session.host.board.loop.stops, session.host.board.loop.offs) == (stops + 1, offs + 1)
+        assert [session.ending(command).how for command in asked] == ["done", "done"]
+        session.host.run(100)
 
 
 def test_an_axis_that_nobody_runs_is_told(folder: Path) -> None:

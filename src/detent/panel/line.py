@@ -1,0 +1,61 @@
+"""The panel's side of the channel to a live axis, for a program of many tasks."""
+
+import asyncio
+import json
+from itertools import count
+from pathlib import Path
+from typing import Any, cast
+
+from detent.errors import AxisError, DetentError
+
+LONGEST = 4 << 20  # bytes of an answer: the axis file may have one million
+PATIENCE = 5.0  # how long an answer is waited for [s]
+
+
+class Line:
+    """Asks and hears; what was not asked for goes to whoever reads `heard`."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader, self._writer, self._marks = reader, writer, count()
+        self._asked: dict[str, asyncio.Future[dict[str, Any]]] = {}
+        self.gone = asyncio.Event()
+        self._hearing = asyncio.ensure_future(self._hear())
+
+    @classmethod
+    async def open(cls, path: Path, who: str) -> "Line":
+        """Attach to an axis."""
+        reader, writer = await asyncio.open_unix_connection(path, limit=LONGEST)
+        line = cls(reader, writer)
+        await line.ask({"do": "name", "who": who})
+        return line
+
+    async def ask(self, message: dict[str, Any]) -> dict[str, Any]:
+        """Ask, and wait for the answer."""
+        mark = f"line {next(self._marks)}"
+        self._asked[mark] = answer = asyncio.get_running_loop().create_future()
+        try:
+            self._writer.write(json.dumps(message | {"as": mark}).encode() + b"\n")
+            told = await asyncio.wait_for(answer, PATIENCE)
+        except (OSError, TimeoutError) as error:
+            raise AxisError("the live axis does not answer; look at the process that runs it") from error
+        finally:
+            del self._asked[mark]
+        if "error" in told:
+            raise DetentError(told["error"])
+        return told
+
+    async def _hear(self) -> None:
+        try:
+            while text := await self._reader.readline():
+                message = cast("dict[str, Any]", json.loads(text))
+                waiting = self._asked.get(message.get("as", ""))
+                if waiting is not None and not waiting.done():
+                    waiting.set_result(message)
+        except (OSError, ValueError):
+            pass
+        self.gone.set()
+
+    def close(self) -> None:
+        """Leave."""
+        self._hearing.cancel()
+        self._writer.close()

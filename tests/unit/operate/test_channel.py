@@ -1,0 +1,123 @@
+"""The channel's side of a message: whatever comes, an answer goes."""
+
+import json
+import math
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numba
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.live_bench import Bench
+
+from detent.errors import DetentError
+from detent.operate import channel as module
+from detent.operate.audit import Audit
+from detent.operate.channel import QUESTIONS, Channel, Client
+from detent.operate.session import Session
+from detent.operate.words import WORDS
+
+pytestmark = [pytest.mark.compiled, pytest.mark.skipif(numba.config.DISABLE_JIT, reason="a loop that is compiled")]
+
+
+@pytest.fixture(scope="module")
+def channel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Channel]:
+    """A channel that does not listen."""
+    bench = Bench("cascade")
+    bench.pass_time(0.7)
+    made = Channel(Session(bench.host, {"name": "axis"}), tmp_path_factory.mktemp("channel") / "axis.sock")
+    yield made
+    made._loop.close()
+
+
+@pytest.fixture(scope="module")
+def client() -> Client:
+    """Somebody."""
+    return Client(7, SimpleNamespace(), "somebody")  # type: ignore[arg-type]
+
+
+NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([10**400, -(10**400), 1e308, math.nan]))
+VALUES = st.recursive(
+    st.one_of(st.none(), st.booleans(), NUMBERS, st.text(max_size=20), st.sampled_from(["5 mm", "-1e400 mm"])),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=5), inner, max_size=3)),
+    max_leaves=5,
+)  # fmt: skip
+SAID = st.sampled_from([*WORDS, *QUESTIONS, "log", "note", "name", "dance"])
+KEYS = st.sampled_from(["value", "speed", "as", "channels", "first", "rows", "who", "what", "client", "self"])
+
+
+@settings(max_examples=300, deadline=None)
+@given(do=st.one_of(SAID, VALUES), more=st.dictionaries(KEYS, VALUES, max_size=4))
+def test_whatever_is_said_is_answered(channel: Channel, client: Client, do: Any, more: dict[str, Any]) -> None:
+    answer = channel._answer(json.dumps({"do": do} | more).encode(), client)
+    assert answer.keys() - {"as"} <= {"id", "error", *QUESTIONS, "log", "note", "name"}
+    assert len(answer.keys() - {"as"}) == 1
+    channel.session.host.run(1)
+
+
+@pytest.mark.parametrize("line", [b"", b"{", b"\xff\xfe", b"[" * 9000, b"[]", b'"stop"', b"7"])
+def test_what_is_no_message_is_an_error(channel: Channel, client: Client, line: bytes) -> None:
+    assert list(channel._answer(line, client)) == ["error"]
+
+
+def test_what_is_no_number_is_told_as_null() -> None:
+    sent: list[bytes] = []
+    transport = SimpleNamespace(get_write_buffer_size=lambda: 0)
+    writer: Any = SimpleNamespace(is_closing=lambda: False, transport=transport, write=sent.append)
+    assert module._send(writer, {"status": {"position": math.nan, "late": [1.0, math.inf], "state": "fault"}})
+    assert json.loads(sent[0]) == {"status": {"position": None, "late": [1.0, None], "state": "fault"}}
+
+
+def test_a_client_that_does_not_read_is_dropped() -> None:
+    dropped: list[bool] = []
+    transport = SimpleNamespace(get_write_buffer_size=lambda: (1 << 20) + 1, abort=lambda: dropped.append(True))
+    writer: Any = SimpleNamespace(is_closing=lambda: False, transport=transport)
+    assert not module._send(writer, {"status": {}})
+    assert dropped == [True]
+
+
+def test_channels_of_several_clients_share_eight_places(channel: Channel) -> None:
+    session, scope = channel.session, channel.session.host.scope
+    names = [one["name"] for one in session.describe()["channels"] if "." in one["name"]]
+    session.show(session.paths(names[:5]), 2)
+    session.show(session.paths([*names[3:8], "position"]), 3)
+    assert set(scope.row.names) >= set(names[:8])
+    with pytest.raises(DetentError, match="others watch"):
+        session.show(session.paths([names[8]]), 4)
+    session.host.run(5)
+    begun = scope.begin(names[:5])
+    session.forget(3)
+    session.show(session.paths([names[8]]), 4)
+    assert scope.begin(names[:5]) == begun  # whose places have stayed
+    assert set(names[5:8]).isdisjoint(scope.row.names)
+    with pytest.raises(DetentError, match="nobody watches"):
+        session.scope([names[6]])
+    for who in (2, 4):
+        session.forget(who)
+    assert len(scope.row.names) == 8
+
+
+def test_rows_that_a_slow_reader_missed_are_counted(channel: Channel) -> None:
+    session = channel.session
+    path = session.paths(["periods"])
+    first = int(session.host.board.loop.rows)
+    session.host.run(5000)
+    rows = session.rows(first, path)
+    assert (len(rows.columns[0]), rows.missed) == (2048, 5000 - 2048)
+    assert rows.columns[0][-1] == session.host.board.loop.periods
+    assert rows.columns[0][0] == rows.first + 1
+
+
+def test_a_log_that_cannot_be_written_delays_nobody(tmp_path: Any) -> None:
+    audit = Audit(tmp_path / "no folder" / "axis.audit")
+    for k in range(3):
+        audit.note("somebody", do="stop", id=k)
+    assert audit.file is not None
+    audit.file.flush()
+    told = audit.recent()
+    assert [one["id"] for one in told["records"]] == [0, 1, 2]
+    assert told["lost"] == 3
+    assert "No such file" in told["trouble"]
+    audit.close()
